@@ -1,0 +1,58 @@
+"""What goes wrong, in words: every error of the package, and the nearest valid name."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class FastSlowError(Exception):
+    """Base class of every error raised by this package."""
+
+
+class ModelError(FastSlowError, ValueError):
+    """The model as written cannot be read: a symbol, a value or a region is wrong."""
+
+
+class UnknownNameError(FastSlowError, KeyError):
+    """A name that is not one of the valid ones."""
+
+    def __str__(self) -> str:
+        return str(self.args[0]) if self.args else ""
+
+
+class ArgumentError(FastSlowError, ValueError):
+    """An argument has the wrong value, shape or range."""
+
+
+class FileFormatError(FastSlowError, OSError):
+    """A stored file is foreign, damaged, or from another version."""
+
+
+def unknown_name(kind: str, name: object, valid: Iterable[object]) -> UnknownNameError:
+    """Build the error for a name that is not valid, with the nearest valid one.
+
+    Parameters
+    ----------
+    kind : str
+        What the name was taken for, for instance ``"parameter"``.
+    name : object
+        The name received (a symbol counts by what it prints).
+    valid : iterable of object
+        The names that would have been accepted.
+
+    Returns
+    -------
+    UnknownNameError
+        To be raised by the caller.
+
+    Examples
+    --------
+    >>> print(unknown_name("parameter", "omga", ["A", "omega"]))
+    unknown parameter 'omga'; did you mean 'omega'? (known: A, omega)
+    """
+    names = [str(v) for v in valid]
+    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    hint = f"; did you mean '{near[0]}'?" if near else ";"
+    known = ", ".join(names) if names else "none"
+    return UnknownNameError(f"unknown {kind} '{name}'{hint} (known: {known})")

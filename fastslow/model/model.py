@@ -1,0 +1,261 @@
+"""The model: what the user writes, read once and never changed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import sympy as sp
+
+from fastslow.errors import ModelError, unknown_name
+from fastslow.model.interfaces import Interface, Region, vanishes_on
+from fastslow.model.periods import common_period
+from fastslow.model.structure import TIME, Structure, read_structure, real
+from fastslow.results.named import Named
+
+Written = Mapping[Any, Any]
+
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Model:
+    """A piecewise-smooth ODE with slow quantities, written in SymPy.
+
+    Symbols are matched by name and are real inside, so ``Symbol("x")`` and
+    ``Symbol("x", real=True)`` are the same state. Time is the symbol named t.
+
+    Parameters
+    ----------
+    rates : mapping
+        State to its rate. The order is the order of the state vector.
+    forcing : mapping, optional
+        Slow quantity to its law in time.
+    parameters : mapping, optional
+        Parameter to its value.
+    slow : mapping, optional
+        Slow state to its rate.
+    interfaces : mapping, optional
+        Name to switching function h. Interfaces that the equations show
+        (Piecewise, Abs, Max, Min, sign, Heaviside) are added when not named here.
+    regions : mapping, optional
+        Name to a condition; other regions are named S1, S2, … in lexicographic
+        order of their sign patterns, + before −.
+
+    Attributes
+    ----------
+    states, slow_states : tuple of str
+    rates, forcing : Named of sympy.Expr
+    parameters : Named of float
+    free : tuple of str
+        Parameters without a value: the slow quantities of a frozen model.
+    interfaces : Named of Interface
+    regions : Named of Region
+
+    Raises
+    ------
+    ModelError
+        For an unknown symbol, a missing or non-finite value, or regions that contradict.
+
+    Examples
+    --------
+    >>> x, D = sp.symbols("x D")
+    >>> gap = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
+    >>> model = Model({x: -gap}, parameters={D: 0.5})
+    >>> list(model.interfaces), list(model.regions)
+    (['x - D', 'x + D'], ['S1', 'S2', 'S3'])
+    >>> print(model.regions["S2"].rates["x"])
+    0
+    """
+
+    states: tuple[str, ...]
+    slow_states: tuple[str, ...]
+    rates: Named[sp.Expr]
+    forcing: Named[sp.Expr]
+    parameters: Named[float]
+    free: tuple[str, ...]
+    interfaces: Named[Interface]
+    regions: Named[Region]
+    structure: Structure = field(repr=False)
+
+    def __init__(
+        self,
+        rates: Written,
+        *,
+        forcing: Written | None = None,
+        parameters: Written | None = None,
+        slow: Written | None = None,
+        interfaces: Written | None = None,
+        regions: Written | None = None,
+    ) -> None:
+        values = {str(k): number(f"parameter {k}", v) for k, v in (parameters or {}).items()}
+        structure = read_structure(
+            rates, forcing or {}, slow or {}, tuple(values), interfaces or {}, (), regions or {}
+        )
+        self._fill(structure, values)
+
+    def _fill(self, structure: Structure, values: Mapping[str, float]) -> None:
+        numbers = {real(name): value for name, value in values.items()}
+        interfaces, regions, structure = structure.regions_at(numbers)
+        fields = {
+            "states": structure.states,
+            "slow_states": structure.slow_states,
+            "rates": Named("state", structure.rates),
+            "forcing": Named("slow quantity", structure.forcing),
+            "parameters": Named("parameter", values),
+            "free": structure.free,
+            "interfaces": Named("interface", {i.name: i for i in interfaces}),
+            "regions": Named("region", {r.name: r for r in regions}),
+            "structure": structure,
+        }
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def _from(cls, structure: Structure, values: Mapping[str, float]) -> Model:
+        model = cls.__new__(cls)
+        model._fill(structure, values)
+        return model
+
+    def with_parameters(self, changes: Written | None = None, /, **named: float) -> Model:
+        """The same model at other parameter values; region names are kept.
+
+        Parameters
+        ----------
+        changes : mapping, optional
+            Parameter (symbol or name) to value.
+        **named : float
+            The same by name. A slow quantity of a frozen model may be given a value.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no parameter of the model.
+        ModelError
+            For a value that is not a finite number.
+
+        Examples
+        --------
+        >>> x, k = sp.symbols("x k")
+        >>> Model({x: -k * x}, parameters={k: 1}).with_parameters(k=2).parameters["k"]
+        2.0
+        """
+        values = dict(self.parameters)
+        valid = [*self.parameters, *(n for n in self.free if n not in values)]
+        for key, value in {**(changes or {}), **named}.items():
+            if str(key) not in valid:
+                raise unknown_name("parameter", key, valid)
+            values[str(key)] = number(f"parameter {key}", value)
+        return self._from(self.structure, values)
+
+    def frozen(self, slow: Written | None = None) -> Model:
+        """The fast subsystem: every slow quantity becomes a parameter without a value.
+
+        Parameters that only the laws of the slow quantities used leave the model.
+
+        Parameters
+        ----------
+        slow : mapping, optional
+            Slow quantities as functions of fewer new ones, to freeze along a
+            path: ``frozen(slow={w1: 2*g**2 - 1, w2: g})``.
+
+        Raises
+        ------
+        ModelError
+            If time stands in a rate itself, outside the slow quantities.
+
+        Examples
+        --------
+        >>> x, w, t = sp.symbols("x w t")
+        >>> fast = Model({x: w - x}, forcing={w: sp.sin(t)}).frozen()
+        >>> fast.free, list(fast.forcing)
+        (('w',), [])
+        """
+        timed = [n for n in self.states if TIME in self.structure.rates[n].free_symbols]
+        if timed:
+            raise ModelError(
+                f"the rate of {timed[0]} contains time itself ({self.rates[timed[0]]}); only slow "
+                "quantities can be frozen: give the time-dependent part a name in forcing="
+            )
+        quantities = (*self.forcing, *self.slow_states)
+        path: dict[str, sp.Expr] = {}
+        for key, law in (slow or {}).items():
+            if str(key) not in quantities:
+                raise unknown_name("slow quantity", key, quantities)
+            law = sp.sympify(law)
+            path[str(key)] = law.xreplace({s: real(s.name) for s in law.free_symbols})
+        return self._from(*self.structure.frozen(path, self.parameters))
+
+    def period(self) -> float | None:
+        """Smallest common period of everything that depends on time, None if there is none.
+
+        Examples
+        --------
+        >>> x, w, t = sp.symbols("x w t")
+        >>> Model({x: w - x}, forcing={w: sp.sin(4 * t)}).period() / sp.pi.evalf(15)
+        0.500000000000000
+        """
+        laws = [*self.forcing.values(), *self.rates.values()]
+        return common_period(laws, TIME, self.values)
+
+    @property
+    def values(self) -> dict[sp.Symbol, float]:
+        """Parameter values by (real) symbol, for substitution."""
+        return {real(name): value for name, value in self.parameters.items()}
+
+    @cached_property
+    def continuous(self) -> Named[bool]:
+        """Whether the rates are continuous across each interface, decided symbolically.
+
+        Examples
+        --------
+        >>> x = sp.Symbol("x")
+        >>> Model({x: -sp.Abs(x)}).continuous, Model({x: -sp.sign(x)}).continuous
+        ({x: True}, {x: False})
+        """
+        return Named("interface", {name: self._continuous(name) for name in self.interfaces})
+
+    def _continuous(self, name: str) -> bool:
+        function = self.interfaces[name].function
+        for one in self.regions.values():
+            for other in self.regions.values():
+                differ = [i for i in self.interfaces if one.signs[i] != other.signs[i]]
+                if differ != [name] or one.signs[name] < 0:
+                    continue
+                for state in one.rates:
+                    if not vanishes_on(one.rates[state] - other.rates[state], function):
+                        return False
+        return True
+
+    def __repr__(self) -> str:
+        lines = [
+            f"Model of {', '.join((*self.states, *self.slow_states))}"
+            + (f" with {', '.join(self.free)} frozen" if self.free else "")
+        ]
+        for region in self.regions.values():
+            rates = ", ".join(f"{state}' = {rate}" for state, rate in region.rates.items())
+            lines.append(f"  {region}:  {rates}" if len(self.regions) > 1 else f"  {rates}")
+        lines += [f"  {name} = {law}" for name, law in self.forcing.items()]
+        if self.parameters:
+            lines.append("  " + ", ".join(f"{k} = {v:g}" for k, v in self.parameters.items()))
+        return "\n".join(lines)
+
+
+def number(what: str, value: object) -> float:
+    """A finite float, or an error that shows what was received.
+
+    Examples
+    --------
+    >>> number("parameter A", "1/0")
+    Traceback (most recent call last):
+    ...
+    fastslow.errors.ModelError: parameter A: expected a finite number, received '1/0'
+    """
+    try:
+        result = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        result = math.nan
+    if not math.isfinite(result):
+        raise ModelError(f"{what}: expected a finite number, received {value!r}")
+    return result

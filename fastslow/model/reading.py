@@ -1,0 +1,238 @@
+"""Reading interfaces off the equations, and the smooth rates off a sign pattern."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+from sympy.core.relational import Relational
+from sympy.logic.boolalg import And, BooleanFunction, Not, Or
+
+from fastslow.errors import ModelError
+
+SWITCHING = (sp.Abs, sp.Max, sp.Min, sp.sign, sp.Heaviside)
+
+
+def with_piecewise(expression: sp.Expr) -> sp.Expr:
+    """Rewrite Abs, Max, Min, sign and Heaviside as Piecewise, inside out.
+
+    On an interface itself, sign and Heaviside have values of their own; a
+    region is open, so those single points are left out.
+
+    Examples
+    --------
+    >>> x = sp.Symbol("x", real=True)
+    >>> with_piecewise(sp.sign(x))
+    Piecewise((1, x > 0), (-1, True))
+    """
+    if not expression.has(*SWITCHING):
+        return expression
+    arguments = [with_piecewise(a) if isinstance(a, sp.Basic) else a for a in expression.args]
+    if isinstance(expression, sp.Abs):
+        (u,) = arguments
+        return sp.Piecewise((u, u > 0), (-u, True))
+    if isinstance(expression, sp.sign):
+        return sp.Piecewise((sp.Integer(1), arguments[0] > 0), (sp.Integer(-1), True))
+    if isinstance(expression, sp.Heaviside):
+        return sp.Piecewise((sp.Integer(1), arguments[0] > 0), (sp.Integer(0), True))
+    if isinstance(expression, (sp.Max, sp.Min)):
+        best = arguments[0]
+        for other in arguments[1:]:
+            gap = other - best if isinstance(expression, sp.Max) else best - other
+            best = sp.Piecewise((other, gap > 0), (best, True))
+        return best
+    return expression.func(*arguments)
+
+
+@dataclass(frozen=True)
+class Factorised:
+    """A switching expression as sign × product of interface functions and parameter factors."""
+
+    sign: int
+    factors: tuple[tuple[sp.Expr, int], ...]
+    scales: tuple[tuple[sp.Expr, int], ...]
+
+
+def factorise(expression: sp.Expr, moving: Sequence[sp.Symbol]) -> Factorised:
+    """Split a smooth switching expression into irreducible interface functions.
+
+    Factors without zeros are dropped by their sign, parameter-only factors
+    are kept apart as scales, and each remaining factor is oriented so that
+    the first moving symbol in it grows with it.
+
+    Parameters
+    ----------
+    expression : sympy.Expr
+        Without Piecewise.
+    moving : sequence of Symbol
+        States, slow quantities and time, in order.
+    """
+    numerator, denominator = sp.together(sp.nsimplify(expression, rational=True)).as_numer_denom()
+    sign, factors, scales = 1, [], []
+    for part in (numerator, denominator):
+        constant, pieces = sp.factor_list(part)
+        sign *= -1 if constant.is_negative else 1
+        for factor, power in pieces:
+            if factor.is_positive:
+                continue
+            if factor.is_negative:
+                sign *= (-1) ** power
+                continue
+            if not factor.free_symbols & set(moving):
+                scales.append((factor, power))
+                continue
+            flip = -1 if _decreases(factor, moving) else 1
+            factors.append((sp.expand(flip * factor), power))
+            sign *= flip**power
+    if not factors and len(scales) == 1:
+        (factor, power), scales = scales[0], []
+        first = sorted(factor.free_symbols, key=lambda s: s.name)
+        flip = -1 if _decreases(factor, first) else 1
+        factors, sign = [(sp.expand(flip * factor), power)], sign * flip**power
+    return Factorised(sign, tuple(factors), tuple(scales))
+
+
+def _decreases(factor: sp.Expr, order: Sequence[sp.Symbol]) -> bool:
+    """Whether the first of the symbols in a factor lowers it (by its leading coefficient)."""
+    for symbol in order:
+        if symbol not in factor.free_symbols:
+            continue
+        if factor.is_polynomial(symbol):
+            leading = sp.LC(factor, symbol)
+            if leading.is_number:
+                return bool(leading < 0)
+            return bool(leading.could_extract_minus_sign())
+        return bool(factor.could_extract_minus_sign())
+    return False
+
+
+def switching_expressions(expression: sp.Expr) -> Iterable[sp.Expr]:
+    """Every smooth expression whose sign decides a branch, in order of appearance."""
+    for piecewise in _piecewise_in_order(expression):
+        for _, condition in piecewise.args:
+            for relation in _relations(condition):
+                difference = relation.lhs - relation.rhs
+                if difference.has(sp.Piecewise):
+                    yield from switching_expressions(difference)
+                    for value, _ in _folded(difference):
+                        yield value
+                else:
+                    yield difference
+
+
+def _folded(expression: sp.Expr) -> list[tuple[sp.Expr, sp.Basic]]:
+    """All smooth values an expression with Piecewise can take (conditions unpruned)."""
+    inner = next((p for p in _piecewise_in_order(expression) if not _nested(p)), None)
+    if inner is None:
+        return [(expression, sp.true)]
+    values = []
+    for branch, condition in inner.args:
+        for value, _ in _folded(expression.xreplace({inner: branch})):
+            values.append((value, condition))
+    return values
+
+
+def _nested(piecewise: sp.Piecewise) -> bool:
+    return any(isinstance(a, sp.Basic) and a.has(sp.Piecewise) for a in piecewise.args)
+
+
+def _piecewise_in_order(expression: sp.Basic) -> list[sp.Piecewise]:
+    return [node for node in sp.preorder_traversal(expression) if isinstance(node, sp.Piecewise)]
+
+
+def _relations(condition: sp.Basic) -> Iterable[Relational]:
+    if isinstance(condition, Relational):
+        yield condition
+    elif isinstance(condition, BooleanFunction):
+        for argument in condition.args:
+            yield from _relations(argument)
+
+
+def smooth(
+    expression: sp.Expr,
+    signs: Mapping[sp.Expr, int],
+    moving: Sequence[sp.Symbol],
+    values: Mapping[sp.Symbol, float],
+) -> sp.Expr:
+    """The smooth expression that holds where the interface functions have given signs.
+
+    Parameters
+    ----------
+    expression : sympy.Expr
+        May hold nested Piecewise.
+    signs : mapping
+        Interface function to +1 or −1.
+    moving : sequence of Symbol
+        As for `factorise`.
+    values : mapping
+        Parameter values, used for the sign of parameter-only factors alone.
+
+    Raises
+    ------
+    ModelError
+        If a Piecewise has no branch for the pattern.
+    """
+    if not expression.has(sp.Piecewise):
+        return expression
+    if isinstance(expression, sp.Piecewise):
+        for value, condition in expression.args:
+            if _holds(condition, signs, moving, values):
+                return smooth(value, signs, moving, values)
+        pattern = ", ".join(f"{h} {'>' if s > 0 else '<'} 0" for h, s in signs.items())
+        raise ModelError(
+            f"{expression} has no branch where {pattern}; end it with (value, True)"
+        )
+    return expression.func(*[smooth(a, signs, moving, values) for a in expression.args])
+
+
+def _holds(
+    condition: sp.Basic,
+    signs: Mapping[sp.Expr, int],
+    moving: Sequence[sp.Symbol],
+    values: Mapping[sp.Symbol, float],
+) -> bool:
+    if condition in (True, sp.true):
+        return True
+    if condition in (False, sp.false):
+        return False
+    if isinstance(condition, And):
+        return all(_holds(a, signs, moving, values) for a in condition.args)
+    if isinstance(condition, Or):
+        return any(_holds(a, signs, moving, values) for a in condition.args)
+    if isinstance(condition, Not):
+        return not _holds(condition.args[0], signs, moving, values)
+    if isinstance(condition, BooleanFunction):
+        return _holds(condition.to_nnf(simplify=False), signs, moving, values)
+    if not isinstance(condition, Relational):
+        raise ModelError(f"cannot read the condition {condition}; expected inequalities")
+    if isinstance(condition, sp.Eq):
+        return False
+    if isinstance(condition, sp.Ne):
+        return True
+    difference = smooth(condition.lhs - condition.rhs, signs, moving, values)
+    side = sign_of(difference, signs, moving, values)
+    return side > 0 if isinstance(condition, (sp.Gt, sp.Ge)) else side < 0
+
+
+def sign_of(
+    expression: sp.Expr,
+    signs: Mapping[sp.Expr, int],
+    moving: Sequence[sp.Symbol],
+    values: Mapping[sp.Symbol, float],
+) -> int:
+    """Sign of a smooth switching expression where the interface functions have given signs."""
+    parts = factorise(expression, moving)
+    side = parts.sign
+    for factor, power in parts.factors:
+        if factor not in signs:
+            raise ModelError(f"{factor} = 0 decides a branch but is not one of the interfaces")
+        side *= signs[factor] ** power
+    for scale, power in parts.scales:
+        value = float(scale.subs(values))
+        if value == 0:
+            raise ModelError(
+                f"{expression} decides a branch, but {scale} is zero at these parameter values"
+            )
+        side *= (1 if value > 0 else -1) ** power
+    return side

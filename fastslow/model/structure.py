@@ -1,0 +1,334 @@
+"""What is symbolic in a model, shared by all its parameter values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import sympy as sp
+from sympy.logic.boolalg import Boolean
+
+from fastslow.errors import ModelError, unknown_name
+from fastslow.model.geometry import Pattern, affine_rows, possible_patterns
+from fastslow.model.interfaces import Interface, Region
+from fastslow.model.reading import factorise, smooth, switching_expressions, with_piecewise
+from fastslow.results.named import Named
+
+TIME = sp.Symbol("t", real=True)
+
+Cell = frozenset[tuple[sp.Expr, int]]
+Values = Mapping[sp.Symbol, float]
+
+
+def real(name: str) -> sp.Symbol:
+    """The real symbol of a name: the one that every expression inside uses."""
+    return sp.Symbol(name, real=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """The equations with their interfaces, and the names given to regions so far."""
+
+    states: tuple[str, ...]
+    slow_states: tuple[str, ...]
+    rates: dict[str, sp.Expr]
+    forcing: dict[str, sp.Expr]
+    free: tuple[str, ...]
+    interfaces: tuple[Interface, ...]
+    given: frozenset[str]
+    conditions: dict[str, Boolean]
+    names: dict[Cell, str] = field(default_factory=dict)
+
+    @property
+    def moving(self) -> tuple[sp.Symbol, ...]:
+        """Symbols that change along a solution or that have no value: what interfaces depend on."""
+        names = (*self.states, *self.slow_states, *self.forcing, *self.free)
+        return (*(real(n) for n in names), TIME)
+
+    def regions_at(
+        self, values: Values
+    ) -> tuple[tuple[Interface, ...], tuple[Region, ...], Structure]:
+        """Interfaces and regions at parameter values, and the structure with their names."""
+        functions = [i.function for i in self.interfaces]
+        numbers = [f.subs(values) for f in functions]
+        patterns = possible_patterns(affine_rows(numbers, self.moving))
+        contents = {p: self._contents(functions, p, values) for p in patterns}
+        keep = [
+            j
+            for j, interface in enumerate(self.interfaces)
+            if interface.name in self.given or not _idle(j, contents)
+        ]
+        interfaces = tuple(self.interfaces[j] for j in keep)
+        cells: dict[Pattern, dict[str, sp.Expr]] = {}
+        whole: dict[Pattern, list[Cell]] = {}
+        for pattern in patterns:
+            kept = tuple(pattern[j] for j in keep)
+            cells[kept] = contents[pattern]
+            whole.setdefault(kept, []).append(_cell(self.interfaces, pattern))
+        named = self._named(interfaces, whole, values)
+        regions = tuple(
+            Region(
+                name,
+                Named("interface", zip((i.name for i in interfaces), pattern, strict=True)),
+                tuple(_inequality(i, s) for i, s in zip(interfaces, pattern, strict=True)),
+                Named("state", {n: cells[pattern][n] for n in self.rates}),
+                Named("slow quantity", {n: cells[pattern][n] for n in self.forcing}),
+            )
+            for pattern, name in named.items()
+        )
+        names = {
+            **self.names,
+            **{_cell(interfaces, pattern): name for pattern, name in named.items()},
+        }
+        return interfaces, regions, replace(self, names=names)
+
+    def _contents(
+        self, functions: Sequence[sp.Expr], pattern: Pattern, values: Values
+    ) -> dict[str, sp.Expr]:
+        signs = _both_ways(zip(functions, pattern, strict=True))
+        written = {**self.rates, **self.forcing}
+        return {n: smooth(e, signs, self.moving, values) for n, e in written.items()}
+
+    def _named(
+        self, interfaces: Sequence[Interface], patterns: Mapping[Pattern, list[Cell]], values: Values
+    ) -> dict[Pattern, str]:
+        """A name for each pattern: asked for, kept from before, or the next free number."""
+        named: dict[Pattern, str] = {}
+        for pattern, whole in patterns.items():
+            signs = _both_ways(_cell(interfaces, pattern))
+            asked = [
+                name
+                for name, condition in self.conditions.items()
+                if smooth(_indicator(condition), signs, self.moving, values) == 1
+            ]
+            if len(asked) > 1:
+                raise ModelError(
+                    f"regions {asked[0]!r} and {asked[1]!r} overlap; expected one condition "
+                    "for each region"
+                )
+            kept = next((n for c, n in self.names.items() if any(c <= w for w in whole)), None)
+            name = asked[0] if asked else kept
+            if name is not None and name not in named.values():
+                named[pattern] = name
+            elif asked:
+                raise ModelError(
+                    f"region {name!r} ({self.conditions[asked[0]]}) holds more than one sign "
+                    "pattern of the interfaces; expected one condition for each region"
+                )
+        unused = set(self.conditions) - set(named.values()) - set(self.names.values())
+        if unused:
+            name = min(unused)
+            raise ModelError(f"region {name!r} ({self.conditions[name]}) is empty or unknown")
+        taken = {*named.values(), *self.names.values()}
+        number = 0
+        for pattern in patterns:
+            if pattern not in named:
+                number += 1
+                while f"S{number}" in taken:
+                    number += 1
+                named[pattern] = f"S{number}"
+        return {pattern: named[pattern] for pattern in patterns}
+
+    def frozen(
+        self, path: Mapping[str, sp.Expr], values: Mapping[str, float]
+    ) -> tuple[Structure, dict[str, float]]:
+        """The fast structure with slow quantities free, and the values that it still uses."""
+        along = {real(name): law for name, law in path.items()}
+        rates = {n: self.rates[n].xreplace(along) for n in self.states}
+        known = {*map(real, values), *map(real, self.states)}
+        left = [n for n in (*self.forcing, *self.slow_states, *self.free) if n not in path]
+        fresh: list[str] = []
+        for law in path.values():
+            for symbol in sorted(law.free_symbols - known, key=lambda s: s.name):
+                if symbol.name not in (*fresh, *left):
+                    fresh.append(symbol.name)
+        free = (*fresh, *left)
+        interfaces = tuple(
+            replace(i, function=i.function.xreplace(along))
+            for i in self.interfaces
+            if TIME not in i.function.free_symbols
+        )
+        used = set().union(*(e.free_symbols for e in rates.values()))
+        used |= set().union(set(), *(i.function.free_symbols for i in interfaces))
+        used |= set().union(set(), *(c.free_symbols for c in self.conditions.values()))
+        moving = (*map(real, (*self.states, *free)),)
+        structure = replace(
+            self,
+            slow_states=(),
+            rates=rates,
+            forcing={},
+            free=free,
+            interfaces=tuple(i for i in interfaces if i.function.free_symbols & set(moving))
+            if path
+            else interfaces,
+            names={
+                frozenset((h.xreplace(along), s) for h, s in cell if TIME not in h.free_symbols): n
+                for cell, n in reversed(self.names.items())
+            },
+        )
+        return structure, {n: v for n, v in values.items() if real(n) in used}
+
+
+def read_structure(
+    rates: Mapping[Any, Any],
+    forcing: Mapping[Any, Any],
+    slow: Mapping[Any, Any],
+    parameters: tuple[str, ...],
+    interfaces: Mapping[Any, Any],
+    free: tuple[str, ...],
+    regions: Mapping[Any, Any],
+) -> Structure:
+    """Check what the user wrote and find the interfaces in it.
+
+    Raises
+    ------
+    ModelError
+        If a symbol is unknown, a name is used twice, or an expression is not finite and real.
+    """
+    groups = {
+        "state": [str(n) for n in rates],
+        "slow state": [str(n) for n in slow],
+        "slow quantity": [str(n) for n in forcing],
+        "parameter": [*parameters, *free],
+    }
+    seen: dict[str, str] = {}
+    for kind, names in groups.items():
+        for name in names:
+            if name == TIME.name:
+                raise ModelError(f"'t' is time; it cannot be a {kind}")
+            if name in seen:
+                raise ModelError(f"'{name}' is both a {seen[name]} and a {kind}")
+            seen[name] = kind
+    if not rates:
+        raise ModelError("a model needs at least one state with its rate")
+    laws = {str(n): _checked(f"law of {n}", e, {*parameters, "t"}) for n, e in forcing.items()}
+    known = {*seen, "t"}
+    equations = {
+        str(n): _checked(f"rate of {n}", e, known) for n, e in {**rates, **slow}.items()
+    }
+    moving = (*(real(n) for kind, names in groups.items() if kind != "parameter" for n in names),)
+    moving = (*moving, TIME)
+    listed = {
+        str(n): _checked(f"interface {n}", h, known) for n, h in interfaces.items()
+    }
+    found = [Interface(n, _irreducible(n, h, moving)) for n, h in listed.items()]
+    shapes = {_shape(i.function, moving) for i in found}
+    for expression in (*equations.values(), *laws.values()):
+        for switching in switching_expressions(expression):
+            for function, _ in factorise(switching, moving).factors:
+                if _shape(function, moving) not in shapes:
+                    shapes.add(_shape(function, moving))
+                    found.append(Interface(_written(function, moving), function))
+    conditions = {
+        str(n): _checked_condition(f"region {n}", c, known) for n, c in regions.items()
+    }
+    return Structure(
+        tuple(groups["state"]),
+        tuple(groups["slow state"]),
+        equations,
+        laws,
+        free,
+        tuple(found),
+        frozenset(listed),
+        conditions,
+    )
+
+
+def _checked(what: str, expression: Any, known: set[str]) -> sp.Expr:
+    written = sp.sympify(expression)
+    if not isinstance(written, sp.Expr):
+        raise ModelError(f"{what}: expected an expression, received {expression!r}")
+    written = written.xreplace({s: real(s.name) for s in written.free_symbols})
+    if written.has(sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I):
+        raise ModelError(f"{what}: expected a finite real expression, received {written}")
+    for symbol in sorted(written.free_symbols, key=lambda s: s.name):
+        if symbol.name not in known:
+            reason = unknown_name("symbol", symbol.name, sorted(known))
+            raise ModelError(
+                f"{what}: {reason}; every symbol is a state, a slow quantity, "
+                "a parameter with a value, or t"
+            )
+    return with_piecewise(written)
+
+
+def _irreducible(name: str, function: sp.Expr, moving: Sequence[sp.Symbol]) -> sp.Expr:
+    """A given interface function as its one factor with zeros, oriented as given."""
+    parts = factorise(function, moving)
+    if len(parts.factors) != 1:
+        names = ", ".join(str(factor) for factor, _ in parts.factors) or "nothing that moves"
+        raise ModelError(
+            f"interface {name}: expected one irreducible switching function, received "
+            f"{function}, which vanishes where one of these does: {names}"
+        )
+    return sp.expand(parts.sign * parts.factors[0][0])
+
+
+def _checked_condition(what: str, condition: Any, known: set[str]) -> Boolean:
+    written = sp.sympify(condition)
+    if not isinstance(written, Boolean):
+        raise ModelError(f"{what}: expected a condition such as x > D, received {condition!r}")
+    for symbol in sorted(written.free_symbols, key=lambda s: s.name):
+        if symbol.name not in known:
+            raise ModelError(f"{what}: {unknown_name('symbol', symbol.name, sorted(known))}")
+    return written.xreplace({s: real(s.name) for s in written.free_symbols})
+
+
+def _shape(function: sp.Expr, moving: Sequence[sp.Symbol]) -> sp.Expr:
+    """One expression for all functions with the same zero set up to sign and factor."""
+    factors = factorise(function, moving).factors
+    return sp.Mul(*(factor for factor, _ in factors)) if factors else function
+
+
+def _written(function: sp.Expr, moving: Sequence[sp.Symbol]) -> str:
+    """A function as it prints, moving symbols first."""
+    if not isinstance(function, sp.Add):
+        return str(function)
+    rank = {s: k for k, s in enumerate(moving)}
+    terms = sorted(
+        function.args,
+        key=lambda a: (min((rank[s] for s in a.free_symbols if s in rank), default=99), str(a)),
+    )
+    text = str(terms[0])
+    for term in terms[1:]:
+        minus = term.could_extract_minus_sign()
+        text += f" - {-term}" if minus else f" + {term}"
+    return text
+
+
+def _cell(interfaces: Sequence[Interface], pattern: Pattern) -> Cell:
+    return frozenset((i.function, s) for i, s in zip(interfaces, pattern, strict=True))
+
+
+def _idle(j: int, contents: Mapping[Pattern, dict[str, sp.Expr]]) -> bool:
+    """Whether crossing interface j never changes anything."""
+    pairs = 0
+    for pattern, content in contents.items():
+        across = (*pattern[:j], -pattern[j], *pattern[j + 1 :])
+        if across in contents:
+            pairs += 1
+            if contents[across] != content:
+                return False
+    return pairs > 0
+
+
+def _inequality(interface: Interface, sign: int) -> sp.Rel:
+    h = interface.function
+    for symbol in sorted(h.free_symbols, key=lambda s: s.name):
+        if h.diff(symbol) == 1 and interface.name.startswith(symbol.name):
+            level = sp.expand(symbol - h)
+            return sp.Gt(symbol, level) if sign > 0 else sp.Lt(symbol, level)
+    return sp.Gt(h, 0) if sign > 0 else sp.Lt(h, 0)
+
+
+def _both_ways(signs: Iterable[tuple[sp.Expr, int]]) -> dict[sp.Expr, int]:
+    """Signs of the functions and of their negatives, whichever way a factor is oriented."""
+    known: dict[sp.Expr, int] = {}
+    for function, sign in signs:
+        known[function] = sign
+        known[sp.expand(-function)] = -sign
+    return known
+
+
+def _indicator(condition: Boolean) -> sp.Expr:
+    return sp.Piecewise((sp.Integer(1), condition), (sp.Integer(0), True))

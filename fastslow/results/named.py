@@ -1,0 +1,78 @@
+"""A small immutable mapping whose keys are names, and symbols by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Generic, TypeVar
+
+from fastslow.errors import unknown_name
+
+V = TypeVar("V")
+
+
+class Named(Mapping[str, V], Generic[V]):
+    """An ordered, immutable mapping from names to values.
+
+    A key may be a name or anything that prints as one (a SymPy symbol). An
+    unknown key raises an error that suggests the nearest name.
+
+    Parameters
+    ----------
+    kind : str
+        What the entries are, used in error messages.
+    items : mapping or iterable of (name, value)
+        The entries.
+
+    Examples
+    --------
+    >>> values = Named("parameter", {"A": 1.0, "omega": 0.1})
+    >>> values["A"]
+    1.0
+    >>> values["omga"]
+    Traceback (most recent call last):
+    ...
+    fastslow.errors.UnknownNameError: unknown parameter 'omga'; did you mean 'omega'? (known: A, omega)
+    """
+
+    __slots__ = ("_items", "kind")
+
+    def __init__(
+        self, kind: str, items: Mapping[str, V] | Iterable[tuple[str, V]] = ()
+    ) -> None:
+        self.kind = kind
+        pairs = items.items() if isinstance(items, Mapping) else items
+        self._items: dict[str, V] = {str(key): value for key, value in pairs}
+
+    def __getitem__(self, key: object) -> V:
+        try:
+            return self._items[str(key)]
+        except KeyError:
+            raise unknown_name(self.kind, key, self._items) from None
+
+    def get(self, key: object, default: V | None = None) -> V | None:  # type: ignore[override]
+        return self._items.get(str(key), default)
+
+    def __contains__(self, key: object) -> bool:
+        return str(key) in self._items
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __repr__(self) -> str:
+        return "{" + ", ".join(f"{k}: {v}" for k, v in self._items.items()) + "}"
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, Mapping):
+            return dict(self._items) == {str(k): v for k, v in other.items()}
+        return NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(tuple(self._items.items()))
+
+    def index(self, key: object) -> int:
+        """Position of a name among the keys."""
+        self[key]
+        return list(self._items).index(str(key))

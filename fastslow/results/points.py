@@ -1,0 +1,274 @@
+"""Single points: an equilibrium, and a located special point of a branch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastslow.errors import unknown_name
+
+#: An eigenvalue counts as zero when its real part is below this times the largest modulus.
+NEUTRAL = 1e-10
+
+CODE_NAMES = {
+    "EP": "end point",
+    "UZ": "user value",
+    "LP": "fold",
+    "HB": "Hopf",
+    "BP": "branch point",
+    "NSD": "neutral saddle",
+    "BE": "boundary equilibrium",
+}
+
+
+def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
+    """Stable, unstable or neutral, for eigenvalues of shape (..., n).
+
+    Neutral means that no real part is positive and at least one vanishes to
+    rounding: linear theory does not decide.
+
+    Examples
+    --------
+    >>> stability_of(np.array([[-1.0, -2.0], [0.0, -1.0], [1.0, -1.0]])).tolist()
+    ['stable', 'neutral', 'unstable']
+    """
+    values = np.asarray(eigenvalues)
+    scale = np.maximum(1.0, np.abs(values).max(axis=-1))
+    largest = values.real.max(axis=-1)
+    small = NEUTRAL * scale
+    return np.where(
+        largest < -small, "stable", np.where(largest > small, "unstable", "neutral")
+    )
+
+
+def type_of(eigenvalues: ArrayLike) -> str:
+    """Node, focus, saddle, saddle-focus, or non-hyperbolic, of one equilibrium.
+
+    For n > 2 the name node or focus follows the leading eigenvalue, the one
+    nearest the imaginary axis.
+
+    Examples
+    --------
+    >>> type_of([-1, -2]), type_of([-1 + 2j, -1 - 2j]), type_of([1, -1])
+    ('node', 'focus', 'saddle')
+    """
+    values = np.asarray(eigenvalues, dtype=complex)
+    scale = max(1.0, float(np.abs(values).max()))
+    if np.any(np.abs(values.real) <= NEUTRAL * scale):
+        return "non-hyperbolic"
+    turning = np.abs(values.imag) > 1e-8 * scale
+    if np.any(values.real > 0) and np.any(values.real < 0):
+        return "saddle-focus" if turning.any() else "saddle"
+    leading = int(np.argmin(np.abs(values.real)))
+    return "focus" if turning[leading] else "node"
+
+
+class _Point:
+    """What every point has: names for its numbers."""
+
+    states: tuple[str, ...]
+    state: NDArray[np.float64]
+    parameters: Mapping[str, float]
+
+    def __getitem__(self, name: object) -> float:
+        key = str(name)
+        if key in self.states:
+            return float(self.state[self.states.index(key)])
+        if key in self.parameters:
+            return self.parameters[key]
+        raise unknown_name("state or parameter", key, [*self.states, *self.parameters])
+
+    def _values(self) -> str:
+        return ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.states, self.state, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium(_Point):
+    """An equilibrium of a frozen model in one region.
+
+    Parameters
+    ----------
+    states : tuple of str
+        State names.
+    state : ndarray, shape (n,)
+        The equilibrium.
+    parameters : mapping
+        Every parameter value at which it was found.
+    region : str
+        The region whose rates vanish here.
+    admissible : bool
+        Whether the point lies in the closure of that region; otherwise it is virtual.
+    eigenvalues : ndarray of complex, shape (n,)
+        Of the region's Jacobian.
+    residual : float
+        Largest rate left over at the point.
+    continuum : bool
+        Whether it is one of a continuum (its equilibrium is not isolated).
+    interpolated : bool
+        Whether it was read between stored points instead of solved for.
+    """
+
+    states: tuple[str, ...]
+    state: NDArray[np.float64]
+    parameters: Mapping[str, float]
+    region: str
+    admissible: bool
+    eigenvalues: NDArray[np.complex128]
+    residual: float = 0.0
+    continuum: bool = False
+    interpolated: bool = False
+
+    @property
+    def stability(self) -> str:
+        """``"stable"``, ``"unstable"`` or ``"neutral"``."""
+        return str(stability_of(self.eigenvalues))
+
+    @property
+    def stable(self) -> bool:
+        return self.stability == "stable"
+
+    @property
+    def type(self) -> str:
+        """Node, focus, saddle, saddle-focus or non-hyperbolic."""
+        return type_of(self.eigenvalues)
+
+    def __repr__(self) -> str:
+        kind = f"{self.stability} {self.type}" if self.type != "non-hyperbolic" else "non-hyperbolic"
+        seat = "in" if self.admissible else "virtual, of"
+        more = ", one of a continuum" if self.continuum else ""
+        return f"Equilibrium({self._values()}; {seat} {self.region}; {kind}{more})"
+
+
+class Equilibria(list[Equilibrium]):
+    """The equilibria at one value, as a list that says how sure it is.
+
+    Attributes
+    ----------
+    coverage : str
+        ``"complete"`` when the list is proved to hold all of them, else ``"found"``.
+    """
+
+    def __init__(self, items: list[Equilibrium] | None = None, coverage: str = "found") -> None:
+        super().__init__(items or [])
+        self.coverage = coverage
+
+
+@dataclass(frozen=True, eq=False)
+class ClarkePath:
+    """The convex path q J₁ + (1 − q) J₂ between the Jacobians at a boundary equilibrium.
+
+    Leine and Nijmeijer (2004): the eigenvalues of this path say what a
+    continuous piecewise-smooth system does at the interface.
+
+    Parameters
+    ----------
+    regions : tuple of str
+        ``q = 1`` is ``regions[0]``.
+    jacobians : ndarray, shape (2, n, n)
+        J₁ and J₂.
+
+    Examples
+    --------
+    >>> path = ClarkePath(("S1", "S2"), np.array([[[1.0]], [[-3.0]]]))
+    >>> round(path.q_zero, 12)
+    0.75
+    """
+
+    regions: tuple[str, str]
+    jacobians: NDArray[np.float64]
+
+    @property
+    def determinants(self) -> tuple[float, float]:
+        first, second = np.linalg.det(self.jacobians)
+        return float(first), float(second)
+
+    @property
+    def q_zero(self) -> float | None:
+        """Where the determinant of the path crosses zero inside (0, 1), if it does."""
+        first, second = self.determinants
+        if first * second >= 0:
+            return None
+        return second / (second - first)
+
+    @property
+    def q_hopf(self) -> float | None:
+        """Planar systems: where the trace vanishes in (0, 1) with positive determinant."""
+        if self.jacobians.shape[-1] != 2:
+            return None
+        first, second = np.trace(self.jacobians, axis1=1, axis2=2)
+        if first * second >= 0:
+            return None
+        q = float(second / (second - first))
+        return q if float(np.linalg.det(self._matrix(q))) > 0 else None
+
+    def _matrix(self, q: ArrayLike) -> NDArray[np.float64]:
+        weight = np.asarray(q, dtype=float)[..., None, None]
+        return weight * self.jacobians[0] + (1.0 - weight) * self.jacobians[1]
+
+    def path(self, q: ArrayLike) -> NDArray[np.complex128]:
+        """Eigenvalues along the path, shape (..., n) for q of shape (...)."""
+        return np.linalg.eigvals(self._matrix(q)).astype(complex)
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialPoint(_Point):
+    """A located point of a branch: what it is and how well it is known.
+
+    Parameters
+    ----------
+    code : str
+        LP, HB, BP, NSD, BE, UZ or EP.
+    label : str
+        The code with its number along the diagram, such as ``"BE2"``.
+    states, state, parameters
+        As for an equilibrium.
+    regions : tuple of str
+        The region it lies in; for a boundary equilibrium the two it joins.
+    eigenvalues : ndarray of complex, shape (n,)
+        Of the Jacobian in ``regions[0]``.
+    tangent : ndarray, shape (n + 1,)
+        Unit tangent of the branch, (states, parameter), in the direction of tracing.
+    residual : float
+        Largest component of the defining equations that is left.
+    converged : bool
+        Whether the defining equations were solved to rounding.
+    interface : str, optional
+        The interface a boundary equilibrium lies on.
+    subtype : str, optional
+        ``"persistence"``, ``"non-smooth fold"`` or ``"degenerate"``.
+    clarke : ClarkePath, optional
+        For boundary equilibria of a continuous field.
+    coefficient : float, optional
+        Quadratic normal-form coefficient of a fold, a in y' = β + a y².
+    frequency : float, optional
+        Angular frequency at a Hopf point.
+    note : str
+        What else a reader should know, e.g. why an end point is one.
+    """
+
+    code: str
+    label: str
+    states: tuple[str, ...]
+    state: NDArray[np.float64]
+    parameters: Mapping[str, float]
+    regions: tuple[str, ...]
+    eigenvalues: NDArray[np.complex128]
+    tangent: NDArray[np.float64]
+    residual: float
+    converged: bool
+    interface: str | None = None
+    subtype: str | None = None
+    clarke: ClarkePath | None = field(default=None, repr=False)
+    coefficient: float | None = None
+    frequency: float | None = None
+    note: str = ""
+
+    def __repr__(self) -> str:
+        kind = CODE_NAMES.get(self.code, self.code)
+        if self.subtype:
+            kind += f", {self.subtype}"
+        on = f" on {self.interface}" if self.interface else ""
+        return f"SpecialPoint({self.label}: {kind}{on}; {self._values()})"
