@@ -1,0 +1,100 @@
+"""Bifurcation and fast-slow analysis of piecewise-smooth ODEs, written once in SymPy.
+
+Names are imported when first used, so that ``import fastslow`` is as quick as
+``import numpy``.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fastslow import plot, systems
+    from fastslow.continuation.settings import Continuation
+    from fastslow.diagrams.solving import equilibria
+    from fastslow.diagrams.tracing import continue_equilibria
+    from fastslow.errors import (
+        ArgumentError,
+        FastSlowError,
+        FileFormatError,
+        ModelError,
+        UnknownNameError,
+    )
+    from fastslow.model.model import Model
+    from fastslow.passage.overlays import overlay
+    from fastslow.results.branches import Branch
+    from fastslow.results.diagrams import Diagram
+    from fastslow.results.overlays import Overlay
+    from fastslow.results.points import Equilibrium, SpecialPoint
+    from fastslow.results.trajectories import Trajectory
+    from fastslow.simulation.trajectories import simulate
+    from fastslow.symbolic.derivation import derive
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "ArgumentError": "errors",
+    "Branch": "results.branches",
+    "Continuation": "continuation.settings",
+    "Diagram": "results.diagrams",
+    "Equilibrium": "results.points",
+    "FastSlowError": "errors",
+    "FileFormatError": "errors",
+    "Model": "model.model",
+    "ModelError": "errors",
+    "Overlay": "results.overlays",
+    "SpecialPoint": "results.points",
+    "Trajectory": "results.trajectories",
+    "UnknownNameError": "errors",
+    "continue_equilibria": "diagrams.tracing",
+    "derive": "symbolic.derivation",
+    "equilibria": "diagrams.solving",
+    "overlay": "passage.overlays",
+    "plot": "",
+    "simulate": "simulation.trajectories",
+    "systems": "",
+}
+
+__all__ = [
+    "ArgumentError",
+    "Branch",
+    "Continuation",
+    "Diagram",
+    "Equilibrium",
+    "FastSlowError",
+    "FileFormatError",
+    "Model",
+    "ModelError",
+    "Overlay",
+    "SpecialPoint",
+    "Trajectory",
+    "UnknownNameError",
+    "__version__",
+    "continue_equilibria",
+    "derive",
+    "equilibria",
+    "overlay",
+    "plot",
+    "simulate",
+    "systems",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        from fastslow.errors import unknown_name
+
+        # the machinery of import and copying probes for names such as __path__
+        if name.startswith("__"):
+            raise AttributeError(f"module 'fastslow' has no attribute '{name}'")
+        raise AttributeError(f"module 'fastslow': {unknown_name('name', name, __all__)}")
+    home = _HOME[name]
+    module = import_module(f"fastslow.{home or name}")
+    value = getattr(module, name) if home else module
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

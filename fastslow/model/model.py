@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -148,6 +148,27 @@ class Model:
                 raise unknown_name("parameter", key, valid)
             values[str(key)] = number(f"parameter {key}", value)
         return self._from(self.structure, values)
+
+    def freed(self, name: str) -> Model:
+        """The model with one parameter's value taken away, to vary it.
+
+        Regions that are empty at the old value but not at every value are among
+        its regions; names are kept.
+
+        Examples
+        --------
+        >>> x, D = sp.symbols("x D")
+        >>> model = Model({x: -sp.Max(x - D, -x - D, 0)}, parameters={D: 1})
+        >>> len(model.regions), len(model.freed("D").regions)
+        (3, 6)
+        """
+        if name in self.free and name not in self.parameters:
+            return self
+        if name not in self.parameters:
+            raise unknown_name("parameter", name, [*self.parameters, *self.free])
+        free = self.free if name in self.free else (*self.free, name)
+        values = {n: v for n, v in self.parameters.items() if n != name}
+        return self._from(replace(self.structure, free=free), values)
 
     def frozen(self, slow: Written | None = None) -> Model:
         """The fast subsystem: every slow quantity becomes a parameter without a value.

@@ -229,10 +229,12 @@ def sign_of(
             raise ModelError(f"{factor} = 0 decides a branch but is not one of the interfaces")
         side *= signs[factor] ** power
     for scale, power in parts.scales:
-        value = float(scale.subs(values))
-        if value == 0:
+        number = scale.subs(values)
+        if not number.is_number or number == 0:
             raise ModelError(
-                f"{expression} decides a branch, but {scale} is zero at these parameter values"
+                f"{expression} decides a branch, but the sign of {scale} is not known; "
+                "expected parameter values at which it is not zero"
             )
+        value = float(number)
         side *= (1 if value > 0 else -1) ** power
     return side

@@ -1,0 +1,131 @@
+"""A frozen model's rates, Jacobian and interface functions as compiled code."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+from sympy.printing.pycode import PythonCodePrinter
+
+from fastslow.compiled.store import load_generated
+from fastslow.errors import ModelError
+from fastslow.model.model import Model
+from fastslow.model.structure import real
+
+
+@dataclass(frozen=True)
+class CompiledField:
+    """Address of a generated function and how its arrays are laid out.
+
+    The function fills, for u = (states, parameter) of length n + 1: F (n), the
+    Jacobian (n, n + 1) row by row, h (m) and the gradients of h (m, n + 1).
+
+    Parameters
+    ----------
+    address : int
+        Of ``void(int64 region, double* u, double* parameters, double* out)``.
+    parameters : tuple of str
+        Order of the parameter array.
+    n, m : int
+        Numbers of states and interfaces.
+    """
+
+    address: int
+    parameters: tuple[str, ...]
+    n: int
+    m: int
+
+    @property
+    def size(self) -> int:
+        """Length of the output array."""
+        return (self.n + self.m) * (self.n + 2)
+
+
+def compile_field(model: Model, parameter: str) -> CompiledField:
+    """Compile the frozen rates of every region, with derivatives by the states and a parameter.
+
+    Parameters
+    ----------
+    model : Model
+        Without forcing: a frozen model.
+    parameter : str
+        The continuation parameter.
+
+    Raises
+    ------
+    ModelError
+        If the rates depend on time.
+    """
+    names = (*model.states, parameter)
+    others = tuple(n for n in (*model.parameters, *model.free) if n != parameter)
+    rename = {real(n): sp.Symbol(f"u{k}") for k, n in enumerate(names)}
+    rename |= {real(n): sp.Symbol(f"p{k}") for k, n in enumerate(others)}
+    bodies = []
+    for region in model.regions.values():
+        rows = [region.rates[n] for n in model.states]
+        rows += [i.function for i in model.interfaces.values()]
+        unknown = set().union(*(r.free_symbols for r in rows)) - set(rename)
+        if unknown:
+            name = min(s.name for s in unknown)
+            raise ModelError(
+                f"the rates depend on '{name}', which has no frozen value; "
+                "call frozen() on the model first"
+            )
+        bodies.append(_body(rows, len(model.states), rename))
+    module = load_generated(_source(bodies, len(names), len(others)), "field")
+    return CompiledField(
+        module.field.address, others, len(model.states), len(model.interfaces)
+    )
+
+
+def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -> list[str]:
+    """Assignments that fill the output array for one region."""
+    unknowns = list(rename)[: n + 1]
+    values = [r.xreplace(rename) for r in rows]
+    slopes = [[r.diff(u).xreplace(rename) for u in unknowns] for r in rows]
+    ordered = [*values[:n], *sum(slopes[:n], []), *values[n:], *sum(slopes[n:], [])]
+    shared, results = sp.cse(ordered, symbols=sp.numbered_symbols("s"))
+    printer = PythonCodePrinter({"fully_qualified_modules": True})
+    lines = [f"{symbol} = {printer.doprint(value)}" for symbol, value in shared]
+    lines += [f"out[{k}] = {_float(printer.doprint(v))}" for k, v in enumerate(results)]
+    return lines
+
+
+def _float(code: str) -> str:
+    return f"{code}.0" if code.lstrip("-").isdigit() else code
+
+
+def _source(bodies: Sequence[list[str]], unknowns: int, parameters: int) -> str:
+    lines = [
+        "import math",
+        "from numba import cfunc",
+        "from fastslow.compiled.pointers import SIGNATURE",
+        "",
+        "@cfunc(SIGNATURE, cache=True, error_model='numpy')",
+        "def field(region, u, p, out):",
+        *(f"    u{k} = u[{k}]" for k in range(unknowns)),
+        *(f"    p{k} = p[{k}]" for k in range(parameters)),
+    ]
+    for number, body in enumerate(bodies):
+        lines.append(f"    {'if' if number == 0 else 'elif'} region == {number}:")
+        lines += [f"        {line}" for line in body]
+    return "\n".join(lines) + "\n"
+
+
+def parameter_array(model: Model, compiled: CompiledField) -> np.ndarray:
+    """Parameter values in the order of the compiled function.
+
+    Raises
+    ------
+    ModelError
+        If a slow quantity has been given no value.
+    """
+    for name in compiled.parameters:
+        if name not in model.parameters:
+            raise ModelError(
+                f"the frozen slow quantity '{name}' has no value; "
+                f"give one with with_parameters({name}=…)"
+            )
+    return np.array([model.parameters[n] for n in compiled.parameters], dtype=float)

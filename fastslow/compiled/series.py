@@ -1,0 +1,295 @@
+"""A model's Taylor series as one compiled function.
+
+The function has a mode for every region, for every sliding motion between two
+regions, and for the gradient of every interface. Its source depends on the
+equations alone: parameter values arrive as an array.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.compiled.recurrences import Recurrences, scalar_code
+from fastslow.compiled.store import load_generated
+from fastslow.model.model import Model
+from fastslow.model.structure import TIME, real
+
+_HEADER = '''"""Taylor coefficients of order {order} for {modes} modes of {states} states."""
+import math
+
+from numba import cfunc
+
+from fastslow.compiled.pointers import SIGNATURE
+
+
+@cfunc(SIGNATURE, cache=True, error_model="numpy")
+def series(mode, inputs, parameters, W):
+'''
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledSeries:
+    """The compiled series of a model and how its arrays are laid out.
+
+    Called with a mode, ``inputs = (t, states, slow states)`` and the parameter
+    array, the function fills rows of ``order + 1`` coefficients: states and
+    slow states, slow quantities, interface functions, the two drifts that
+    decide where sliding ends, then work space. In a gradient mode ``inputs``
+    goes on with the slow quantities, and the output is h, the sum of the
+    moduli of its terms, and its gradient by states and slow states.
+
+    Parameters
+    ----------
+    address : int
+        Of the compiled function.
+    order : int
+        Highest Taylor coefficient.
+    parameters : tuple of str
+        Order of the parameter array.
+    n_states, n_forcing, n_interfaces, n_rows : int
+        Numbers of rows: states with slow states, slow quantities, interfaces, and all.
+    signs : ndarray of int64, shape (n_modes, n_interfaces)
+        Side of each interface in every mode, 0 on the interface that is slid along.
+    modes : tuple of str
+        Region names; sliding between A and B is named ``"A|B"``.
+    """
+
+    address: int
+    order: int
+    parameters: tuple[str, ...]
+    n_states: int
+    n_forcing: int
+    n_interfaces: int
+    n_rows: int
+    signs: NDArray[np.int64]
+    modes: tuple[str, ...]
+
+    def parameter_array(self, model: Model) -> NDArray[np.float64]:
+        """Parameter values in the order that the compiled function expects, never empty."""
+        return np.array([model.parameters[name] for name in self.parameters] or [0.0])
+
+
+@dataclass(frozen=True)
+class _Mode:
+    """One smooth motion: where it holds, its rates, its slow quantities and sliding drifts."""
+
+    name: str
+    signs: tuple[int, ...]
+    rates: tuple[sp.Expr, ...]
+    laws: tuple[sp.Expr, ...]
+    drifts: tuple[sp.Expr, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Equations:
+    """Everything that the generated source depends on."""
+
+    states: tuple[sp.Symbol, ...]
+    quantities: tuple[sp.Symbol, ...]
+    interfaces: tuple[sp.Expr, ...]
+    modes: tuple[_Mode, ...]
+    order: int
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of all parameters in use, sorted."""
+        used = set().union(*(h.free_symbols for h in self.interfaces))
+        for mode in self.modes:
+            used |= set().union(*(e.free_symbols for e in (*mode.rates, *mode.laws)))
+        return tuple(sorted(s.name for s in used - {*self.states, *self.quantities, TIME}))
+
+    def renamed(self) -> _Equations:
+        """The same with symbols that are valid in any source: y0, w0, p0, …"""
+        groups = {"y": self.states, "w": self.quantities, "p": map(real, self.parameters)}
+        new = {s: real(f"{g}{i}") for g, symbols in groups.items() for i, s in enumerate(symbols)}
+
+        def rename(expressions: tuple[sp.Expr, ...]) -> tuple[sp.Expr, ...]:
+            return tuple(e.xreplace(new) for e in expressions)
+
+        modes = tuple(
+            replace(
+                mode, rates=rename(mode.rates), laws=rename(mode.laws), drifts=rename(mode.drifts)
+            )
+            for mode in self.modes
+        )
+        return _Equations(
+            tuple(new[s] for s in self.states),
+            tuple(new[s] for s in self.quantities),
+            rename(self.interfaces),
+            modes,
+            self.order,
+        )
+
+
+_compiled: dict[_Equations, CompiledSeries] = {}
+
+
+def compile_series(model: Model, order: int) -> CompiledSeries:
+    """Compile the Taylor series of a model, or find it compiled already.
+
+    Parameters
+    ----------
+    model : Model
+    order : int
+        Highest coefficient.
+
+    Raises
+    ------
+    ModelError
+        If a function in the equations has no recurrence.
+    """
+    equations = _equations(model, order)
+    if equations not in _compiled:
+        sliding = tuple(_sliding_modes(equations, model))
+        _compiled[equations] = _compile(replace(equations, modes=equations.modes + sliding))
+    return _compiled[equations]
+
+
+def _equations(model: Model, order: int) -> _Equations:
+    names = (*model.states, *model.slow_states)
+    modes = tuple(
+        _Mode(
+            region.name,
+            tuple(region.signs.values()),
+            tuple(region.rates[n] for n in names),
+            tuple(region.forcing.values()),
+        )
+        for region in model.regions.values()
+    )
+    return _Equations(
+        tuple(map(real, names)),
+        tuple(map(real, model.forcing)),
+        tuple(i.function for i in model.interfaces.values()),
+        modes,
+        order,
+    )
+
+
+def _sliding_modes(equations: _Equations, model: Model) -> Iterator[_Mode]:
+    """Filippov's sliding motion along each discontinuity, for each pair of regions at it.
+
+    With the drifts a, b of h in the regions h > 0 and h < 0 the motion is
+    (1 - alpha) f_above + alpha f_below, alpha = a / (a - b) (Filippov 1988).
+    """
+    by_signs = {mode.signs: mode for mode in equations.modes}
+    for j, name in enumerate(model.interfaces):
+        pairs = []
+        for signs, above in by_signs.items():
+            below = by_signs.get((*signs[:j], -signs[j], *signs[j + 1 :]))
+            if signs[j] > 0 and below is not None:
+                pairs.append((above, below))
+        if not pairs or model.continuous[name]:
+            continue
+        for above, below in pairs:
+            a = _drift(equations, equations.interfaces[j], above)
+            b = _drift(equations, equations.interfaces[j], below)
+            share = _short(a / (a - b))
+            rates = tuple(
+                f if f == g else _short(f + share * (g - f))
+                for f, g in zip(above.rates, below.rates, strict=True)
+            )
+            signs = (*above.signs[:j], 0, *above.signs[j + 1 :])
+            yield _Mode(f"{above.name}|{below.name}", signs, rates, above.laws, (a, b))
+
+
+def _drift(equations: _Equations, function: sp.Expr, mode: _Mode) -> sp.Expr:
+    """Rate of change of an interface function along a mode."""
+    rates = dict(zip(equations.states, mode.rates, strict=True))
+    rates.update(
+        (w, law.diff(TIME)) for w, law in zip(equations.quantities, mode.laws, strict=True)
+    )
+    drift = function.diff(TIME) + sum(function.diff(s) * rate for s, rate in rates.items())
+    return sp.expand(drift)
+
+
+def _short(expression: sp.Expr) -> sp.Expr:
+    """Cancel common terms of a small expression, so that exact zeros stay exact."""
+    return sp.cancel(expression) if sp.count_ops(expression) <= 150 else expression
+
+
+def _compile(equations: _Equations) -> CompiledSeries:
+    parameters = equations.parameters
+    source, n_rows = _source(equations.renamed(), len(parameters))
+    module = load_generated(source, "series")
+    m, q, p = (len(g) for g in (equations.states, equations.quantities, equations.interfaces))
+    signs = np.array([mode.signs for mode in equations.modes], dtype=np.int64)
+    return CompiledSeries(
+        module.series.address,
+        equations.order,
+        parameters,
+        m,
+        q,
+        p,
+        n_rows,
+        signs.reshape(len(equations.modes), p),
+        tuple(mode.name for mode in equations.modes),
+    )
+
+
+def _source(equations: _Equations, n_parameters: int) -> tuple[str, int]:
+    """Source of the generated module, and the number of rows it fills."""
+    lines = [f"    p{i} = parameters[{i}]" for i in range(n_parameters)]
+    n_rows = 0
+    bodies: list[list[str]] = []
+    for mode in equations.modes:
+        body, rows = _mode_source(equations, mode)
+        bodies.append(body)
+        n_rows = max(n_rows, rows)
+    bodies += [_gradient_source(equations, h) for h in equations.interfaces]
+    for number, body in enumerate(bodies):
+        lines.append(f"    {'if' if number == 0 else 'elif'} mode == {number}:")
+        lines += [f"        {line}" for line in body]
+    header = _HEADER.format(
+        order=equations.order, modes=len(equations.modes), states=len(equations.states)
+    )
+    return header + "\n".join(lines) + "\n", n_rows
+
+
+def _mode_source(equations: _Equations, mode: _Mode) -> tuple[list[str], int]:
+    m, q, p = (len(g) for g in (equations.states, equations.quantities, equations.interfaces))
+    targets = [*mode.laws, *equations.interfaces, *mode.drifts]
+    symbols = {s: i for i, s in enumerate(equations.states)}
+    outputs = dict(enumerate(targets, start=m))
+    reserved: dict[sp.Expr, int] = {}
+    for row, expression in outputs.items():
+        if expression not in symbols:
+            reserved.setdefault(expression, row)
+    work = Recurrences(equations.order, symbols, TIME, reserved, m + q + p + 2)
+    for symbol, law in zip(equations.quantities, mode.laws, strict=True):
+        work.name(symbol, work.row(law))
+    rates = [work.row(rate) for rate in mode.rates]
+    held = {row: work.row(expression) for row, expression in outputs.items()}
+    copies = {row: source for row, source in held.items() if row != source}
+    n = equations.order
+    body = ["t = inputs[0]"]
+    body += [f"{work.at(i, '0')} = inputs[{i + 1}]" for i in range(m)]
+    body += [f"{name} = {code}" for code, name in work.scalars.items()]
+    body += work.values()
+    body += [f"{work.at(i, '1')} = {work.at(r, '0')}" for i, r in enumerate(rates)]
+    body += [f"for k in range(1, {n}):", *("    " + line for line in work.general())]
+    body += ["    r = 1.0 / (k + 1)"]
+    body += [f"    {work.at(i, 'k + 1')} = {work.at(r)} * r" for i, r in enumerate(rates)]
+    last = work.general(tuple(held.values()))
+    body += [f"k = {n}", *last] if last else []
+    if copies:
+        body += [f"for k in range({n + 1}):"]
+        body += [f"    {work.at(row)} = {work.at(source)}" for row, source in copies.items()]
+    return body, work.next
+
+
+def _gradient_source(equations: _Equations, function: sp.Expr) -> list[str]:
+    m = len(equations.states)
+    symbols = (TIME, *equations.states, *equations.quantities)
+    body = [
+        f"{s.name} = inputs[{i}]" for i, s in enumerate(symbols) if s in function.free_symbols
+    ]
+    terms = [scalar_code(term) for term in sp.Add.make_args(function)]
+    body.append("W[0] = " + " + ".join(f"({term})" for term in terms))
+    body.append("W[1] = " + " + ".join(f"abs({term})" for term in terms))
+    slopes = [scalar_code(function.diff(s)) for s in equations.states]
+    return body + [f"W[{2 + i}] = {slopes[i]}" for i in range(m)]

@@ -1,0 +1,245 @@
+"""The compiled loop: pseudo-arclength along a curve F(u) = 0 inside one region.
+
+Keller (1977). The loop knows a curve only by the address of a function that
+fills F, its Jacobian, and switching functions h with their gradients.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from fastslow.compiled.pointers import call_address
+
+FULL = 0
+RANGE = 1
+INTERFACE = 2
+SMALL_STEP = 3
+WINDOW = 4
+CLOSED = 5
+
+
+@njit(cache=True, error_model="numpy")
+def solve(matrix, right):  # type: ignore[no-untyped-def]
+    """Solve a small dense system in place by elimination with row pivoting.
+
+    Returns False, with the arrays spoiled, when a pivot is zero or not finite.
+    """
+    size = right.shape[0]
+    for k in range(size):
+        best = k
+        for i in range(k + 1, size):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        pivot = matrix[best, k]
+        if pivot == 0.0 or not math.isfinite(pivot):
+            return False
+        if best != k:
+            for j in range(k, size):
+                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+            right[k], right[best] = right[best], right[k]
+        for i in range(k + 1, size):
+            factor = matrix[i, k] / pivot
+            if factor != 0.0:
+                for j in range(k + 1, size):
+                    matrix[i, j] -= factor * matrix[k, j]
+                right[i] -= factor * right[k]
+    for k in range(size - 1, -1, -1):
+        total = right[k]
+        for j in range(k + 1, size):
+            total -= matrix[k, j] * right[j]
+        right[k] = total / matrix[k, k]
+        if not math.isfinite(right[k]):
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _bordered(out, n, border, weight, matrix):  # type: ignore[no-untyped-def]
+    for i in range(n):
+        for j in range(n + 1):
+            matrix[i, j] = out[n + i * (n + 1) + j]
+    for j in range(n + 1):
+        matrix[n, j] = border[j] * weight[j]
+
+
+@njit(cache=True, error_model="numpy")
+def _norm(vector, weight):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for j in range(vector.shape[0]):
+        total += vector[j] * vector[j] * weight[j]
+    return math.sqrt(total)
+
+
+@njit(cache=True, error_model="numpy")
+def _dips(h0, s0, h1, s1):  # type: ignore[no-untyped-def]
+    """Whether the cubic through two positive values with given slopes is negative between."""
+    if not (s0 < 0.0 < s1):
+        return False
+    a = 2.0 * (h0 - h1) + s0 + s1
+    b = 3.0 * (h1 - h0) - 2.0 * s0 - s1
+    inside = b * b - 3.0 * a * s0
+    if inside < 0.0:
+        return False
+    q = b + math.copysign(math.sqrt(inside), b)
+    for root in (-q / (3.0 * a) if a != 0.0 else -1.0, -s0 / q if q != 0.0 else -1.0):
+        if 0.0 < root < 1.0 and ((a * root + b) * root + s0) * root + h0 < 0.0:
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def trace(  # type: ignore[no-untyped-def]
+    address, mode, parameters, start, tangent, signs, weight, lower, upper, window,
+    step, smallest, largest, turn, tolerance, iterations, points, closing,
+):
+    """Follow one curve inside one region until something ends it.
+
+    Parameters
+    ----------
+    address, mode, parameters
+        The generated function, the region's number and the parameter array.
+    start, tangent : ndarray, shape (n + 1,)
+        A point of the curve and the unit tangent (in the weighted norm) to follow.
+    signs : ndarray, shape (m,)
+        Sign of each h in the region; 0 leaves an interface out.
+    weight : ndarray, shape (n + 1,)
+        Inverse squares of the scales.
+    lower, upper : float
+        Range of the last component.
+    window : ndarray, shape (n,)
+        Bounds on the moduli of the others.
+    closing : bool
+        Whether a return to the start ends the curve.
+
+    Returns
+    -------
+    u, tangents : ndarray, shape (N, n + 1)
+    status : int
+        With RANGE, INTERFACE and WINDOW the last row lies beyond the end.
+    step : float
+        The step in use at the end.
+    """
+    size = start.shape[0]
+    n = size - 1
+    m = signs.shape[0]
+    width = n * (n + 2) + m * (n + 2)
+    rows = np.empty((points, size))
+    tangents = np.empty((points, size))
+    out = np.empty(width)
+    matrix = np.empty((size, size))
+    right = np.empty(size)
+    guess = np.empty(size)
+    turned = np.empty(size)
+    h = np.empty(m)
+    slope = np.empty(m)
+    new_h = np.empty(m)
+    new_slope = np.empty(m)
+    heights = n * (n + 2)
+
+    rows[0] = start
+    tangents[0] = tangent
+    call_address(address, mode, rows[0], parameters, out)
+    for k in range(m):
+        h[k] = signs[k] * out[heights + k]
+        slope[k] = 0.0
+        for j in range(size):
+            slope[k] += signs[k] * out[heights + m + k * size + j] * tangent[j]
+    count = 1
+    while count < points:
+        last = rows[count - 1]
+        direction = tangents[count - 1]
+        accepted = False
+        used = 0
+        cosine = 1.0
+        if step < smallest:
+            return rows[:count], tangents[:count], SMALL_STEP, step
+        for j in range(size):
+            guess[j] = last[j] + step * direction[j]
+        for used in range(1, iterations + 1):
+            call_address(address, mode, guess, parameters, out)
+            along = 0.0
+            for j in range(size):
+                along += direction[j] * weight[j] * (guess[j] - last[j])
+            for i in range(n):
+                right[i] = -out[i]
+            right[n] = step - along
+            _bordered(out, n, direction, weight, matrix)
+            if not solve(matrix, right):
+                break
+            for j in range(size):
+                guess[j] += right[j]
+            if _norm(right, weight) <= tolerance:
+                accepted = True
+                break
+        if accepted:
+            call_address(address, mode, guess, parameters, out)
+            for i in range(n):
+                turned[i] = 0.0
+                accepted = accepted and math.isfinite(out[i])
+            turned[n] = 1.0
+            _bordered(out, n, direction, weight, matrix)
+            accepted = accepted and solve(matrix, turned)
+        if accepted:
+            length = _norm(turned, weight)
+            cosine = 0.0
+            for j in range(size):
+                turned[j] /= length
+                cosine += turned[j] * weight[j] * direction[j]
+            accepted = cosine > math.cos(turn)
+        if accepted:
+            for k in range(m):
+                new_h[k] = signs[k] * out[heights + k]
+                new_slope[k] = 0.0
+                for j in range(size):
+                    new_slope[k] += signs[k] * out[heights + m + k * size + j] * turned[j]
+                if (
+                    new_h[k] > 0.0
+                    and step > 4.0 * smallest
+                    and _dips(max(h[k], 0.0), slope[k] * step, new_h[k], new_slope[k] * step)
+                ):
+                    accepted = False
+        if not accepted:
+            step *= 0.5
+            continue
+        rows[count] = guess
+        tangents[count] = turned
+        count += 1
+        for k in range(m):
+            if signs[k] != 0.0 and new_h[k] < 0.0:
+                return rows[:count], tangents[:count], INTERFACE, step
+            h[k] = new_h[k]
+            slope[k] = new_slope[k]
+        if guess[n] < lower or guess[n] > upper:
+            return rows[:count], tangents[:count], RANGE, step
+        for i in range(n):
+            if abs(guess[i]) > window[i]:
+                return rows[:count], tangents[:count], WINDOW, step
+        if closing and count > 4:
+            ahead = 0.0
+            apart = 0.0
+            same = 0.0
+            for j in range(size):
+                ahead += (start[j] - last[j]) * weight[j] * direction[j]
+                same += tangent[j] * weight[j] * turned[j]
+            for j in range(size):
+                off = start[j] - last[j] - ahead * direction[j]
+                apart += off * off * weight[j]
+            if 0.0 < ahead <= step and math.sqrt(apart) < 0.2 * step and same > 0.9:
+                return rows[:count], tangents[:count], CLOSED, step
+        if used <= 3 and cosine > math.cos(0.5 * turn):
+            step = min(1.5 * step, largest)
+        elif used >= 6:
+            step *= 0.7
+    return rows[:count], tangents[:count], FULL, step
+
+
+@njit(cache=True, error_model="numpy")
+def evaluate(address, modes, points, parameters, width):  # type: ignore[no-untyped-def]
+    """Output of the generated function at every row of points, shape (N, width)."""
+    result = np.empty((points.shape[0], width))
+    for k in range(points.shape[0]):
+        call_address(address, modes[k], points[k], parameters, result[k])
+    return result

@@ -1,0 +1,211 @@
+"""Special points of a curve F(u) = 0, u = (states, parameter), solved as extended systems.
+
+Each is a regular square system at a generic point (Kuznetsov 2004, chapter 10).
+The Jacobian of F is analytic; the derivative of the extended equations that
+needs second derivatives is differenced, which costs Newton its last bit of
+speed but nothing of the solution's accuracy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: F and its Jacobian, shapes (n,) and (n, n + 1), at u.
+Curve = Callable[[Array], tuple[Array, Array]]
+
+
+@dataclass(frozen=True)
+class Located:
+    """A solved extended system.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n + 1,)
+    residual : float
+        Largest component of the extended equations that is left.
+    converged : bool
+    extra : ndarray
+        The remaining unknowns (null vectors and the like).
+    correction : float
+        Size of Newton's last correction, in units of the scale.
+    """
+
+    u: Array
+    residual: float
+    converged: bool
+    extra: Array
+    correction: float = 0.0
+
+
+@np.errstate(all="ignore")
+def newton(
+    equations: Callable[[Array], Array],
+    start: Array,
+    scale: Array,
+    *,
+    iterations: int = 30,
+) -> tuple[Array, float, bool]:
+    """Newton's method with a differenced Jacobian until the correction is at rounding.
+
+    Returns
+    -------
+    solution, residual, converged
+    """
+    z = start.copy()
+    value = equations(z)
+    size, least = np.inf, np.inf
+    for _ in range(iterations):
+        if not np.all(np.isfinite(value)):
+            return z, float("inf"), False
+        slopes = _differenced(equations, z, scale)
+        if not np.all(np.isfinite(slopes)):
+            return z, float("inf"), False
+        correction = np.linalg.lstsq(slopes * scale, -value, rcond=1e-14)[0]
+        z = z + correction * scale
+        value = equations(z)
+        size = float(np.abs(correction).max())
+        if size < 1e-15 or (size < 1e-9 and size >= 0.5 * least):
+            break
+        least = size
+    residual = float(np.abs(value).max()) if np.all(np.isfinite(value)) else float("inf")
+    return z, residual, bool(size < 1e-8 and np.isfinite(residual))
+
+
+def _differenced(equations: Callable[[Array], Array], z: Array, scale: Array) -> Array:
+    columns = []
+    for k in range(len(z)):
+        step = np.zeros_like(z)
+        step[k] = 6e-6 * max(abs(z[k]), scale[k])
+        columns.append((equations(z + step) - equations(z - step)) / (2.0 * step[k]))
+    return np.array(columns).T
+
+
+@np.errstate(all="ignore")
+def with_condition(
+    curve: Curve,
+    condition: Callable[[Array], tuple[float, Array]],
+    start: Array,
+    scale: Array,
+    iterations: int = 40,
+) -> Located:
+    """The point of the curve where a function with a known gradient vanishes.
+
+    Parameters
+    ----------
+    condition : callable
+        u to its value and gradient, shape (n + 1,).
+    """
+    u = start.copy()
+    size, least = np.inf, np.inf
+    for _ in range(iterations):
+        value, slopes = curve(u)
+        extra, gradient = condition(u)
+        right = np.append(value, extra)
+        matrix = np.vstack([slopes, gradient]) * scale
+        if not (np.all(np.isfinite(right)) and np.all(np.isfinite(matrix))):
+            return Located(u, float("inf"), False, np.empty(0), float("inf"))
+        correction = np.linalg.lstsq(matrix, -right, rcond=1e-14)[0]
+        u = u + correction * scale
+        size = float(np.abs(correction).max())
+        if size < 1e-16 or (size < 1e-10 and size >= 0.5 * least):
+            break
+        least = size
+    residual = float(np.abs(np.append(curve(u)[0], condition(u)[0])).max())
+    converged = bool(size < 1e-8 and np.isfinite(residual))
+    return Located(u, residual, converged, np.empty(0), size)
+
+
+def fold(curve: Curve, start: Array, scale: Array) -> Located:
+    """F = 0, F_x q = 0, |q| = 1; ``extra`` is the null vector q."""
+    n = len(start) - 1
+    _, _, right = np.linalg.svd(curve(start)[1][:, :n] * scale[:n])
+    guide = right[-1]
+
+    def equations(z: Array) -> Array:
+        value, slopes = curve(z[: n + 1])
+        q = z[n + 1 :]
+        return np.concatenate([value, slopes[:, :n] @ (scale[:n] * q), [guide @ q - 1.0]])
+
+    z, residual, converged = newton(
+        equations, np.append(start, guide), np.append(scale, np.ones(n))
+    )
+    return Located(z[: n + 1], residual, converged, scale[:n] * z[n + 1 :])
+
+
+def turning_pair(curve: Curve, start: Array, scale: Array, squared: float) -> Located:
+    """Two eigenvalues of opposite sign: F = 0, (J² + κ) q = 0, |q| = 1, ⟨l, q⟩ = 0.
+
+    κ = ω² > 0 is a Hopf point, κ < 0 a neutral saddle; ``extra`` is (κ,).
+    """
+    n = len(start) - 1
+
+    def jacobian(u: Array) -> tuple[Array, Array]:
+        value, slopes = curve(u)
+        return value, slopes[:, :n] * scale[:n] / scale[:n, None]
+
+    _, matrix = jacobian(start)
+    _, _, right = np.linalg.svd(matrix @ matrix + squared * np.eye(n))
+    guide, across = right[-1], right[-2]
+
+    def equations(z: Array) -> Array:
+        value, matrix = jacobian(z[: n + 1])
+        q, kappa = z[n + 1 : 2 * n + 1], z[-1]
+        double = matrix @ (matrix @ q) + kappa * q
+        return np.concatenate([value, double, [guide @ q - 1.0, across @ q]])
+
+    z, residual, converged = newton(
+        equations,
+        np.concatenate([start, guide, [squared]]),
+        np.concatenate([scale, np.ones(n), [max(1.0, abs(squared))]]),
+    )
+    return Located(z[: n + 1], residual, converged, z[-1:])
+
+
+def branch_point(curve: Curve, start: Array, scale: Array) -> Located:
+    """F + βψ = 0, [F_x F_p]ᵀψ = 0, |ψ| = 1; β = 0 at a true branch point (``extra`` is (β,))."""
+    n = len(start) - 1
+    left, _, _ = np.linalg.svd(curve(start)[1] * scale)
+    guide = left[:, -1]
+
+    def equations(z: Array) -> Array:
+        value, slopes = curve(z[: n + 1])
+        psi, beta = z[n + 1 : 2 * n + 1], z[-1]
+        return np.concatenate(
+            [value + beta * psi, scale * (slopes.T @ psi), [guide @ psi - 1.0]]
+        )
+
+    z, residual, converged = newton(
+        equations,
+        np.concatenate([start, guide, [0.0]]),
+        np.concatenate([scale, np.ones(n), [1.0]]),
+    )
+    converged = converged and abs(z[-1]) < 1e-9
+    return Located(z[: n + 1], residual, converged, z[-1:])
+
+
+def fold_coefficient(curve: Curve, u: Array, null: Array) -> float:
+    """Quadratic coefficient a = ½⟨p, B(q, q)⟩, with |q| = 1 and ⟨p, q⟩ = 1.
+
+    Kuznetsov (2004), equation 5.26. Its sign depends on the direction of q,
+    which is taken with its largest component positive. The second derivative
+    along q is differenced from the analytic Jacobian, to about 11 digits.
+    """
+    n = len(u) - 1
+    q = null / np.linalg.norm(null)
+    q = q if q[np.argmax(np.abs(q))] > 0 else -q
+    left, _, _ = np.linalg.svd(curve(u)[1][:, :n])
+    p = left[:, -1]
+    step = np.append(q, 0.0) * 1e-3 * max(1.0, float(np.abs(u[:n]).max()))
+    length = np.linalg.norm(step)
+
+    def slope(k: float) -> Array:
+        return np.asarray(curve(u + k * step)[1][:, :n] @ q)
+
+    second = (8.0 * (slope(1) - slope(-1)) - (slope(2) - slope(-2))) / (12.0 * length)
+    return float(0.5 * (p @ second) / (p @ q))

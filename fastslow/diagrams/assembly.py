@@ -1,0 +1,243 @@
+"""From the pieces of a walk to a Branch with its special points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.diagrams.detection import Detected, special_points
+from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.walking import Piece, Walk, Window
+from fastslow.results.branches import Branch
+from fastslow.results.outcome import Outcome
+from fastslow.results.points import ClarkePath, SpecialPoint
+
+Array = NDArray[np.float64]
+
+#: A determinant below this times the product of its row norms counts as zero.
+SINGULAR = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Both directions of a branch joined: pieces, the interfaces between, and both ends."""
+
+    pieces: tuple[Piece, ...]
+    joins: tuple[int, ...]
+    outcomes: tuple[Outcome, Outcome]
+    ends: tuple[int | None, int | None]
+    closed: bool
+
+
+def joined(backward: Walk | None, forward: Walk) -> Curve:
+    """One curve from the walks in both directions from a start."""
+    if backward is None:
+        return Curve(
+            forward.pieces, forward.joins, (forward.outcome, forward.outcome), (None, None), True
+        )
+    left = [p.reversed() for p in reversed(backward.pieces)]
+    first, second = left[-1], forward.pieces[0]
+    middle = Piece(
+        second.region,
+        np.concatenate([first.u, second.u[1:]]),
+        np.concatenate([first.tangents[:-1], second.tangents]),
+    )
+    return Curve(
+        (*left[:-1], middle, *forward.pieces[1:]),
+        (*reversed(backward.joins), *forward.joins),
+        (backward.outcome, forward.outcome),
+        (backward.last, forward.last),
+        False,
+    )
+
+
+def rising(curve: Curve) -> Curve:
+    """The curve in the direction in which the parameter at its ends does not fall."""
+    if curve.closed or curve.pieces[0].u[0, -1] <= curve.pieces[-1].u[-1, -1]:
+        return curve
+    return Curve(
+        tuple(p.reversed() for p in reversed(curve.pieces)),
+        tuple(reversed(curve.joins)),
+        (curve.outcomes[1], curve.outcomes[0]),
+        (curve.ends[1], curve.ends[0]),
+        False,
+    )
+
+
+def branch_of(
+    field: FrozenField, curve: Curve, window: Window, marks: Sequence[float], admissible: bool
+) -> Branch:
+    """The table of a curve, with its special points solved for and put among its rows."""
+    special: list[SpecialPoint] = []
+    at_row: list[int] = []
+    tables: list[tuple[Array, Array, int]] = []
+    rows = 0
+    for number, piece in enumerate(curve.pieces):
+        u, tangents = [], []
+        found = special_points(field, piece, window, marks)
+        for row in range(len(piece.u)):
+            u.append(piece.u[row])
+            tangents.append(piece.tangents[row])
+            for detected in (d for d in found if d.row == row):
+                point = _point(field, piece, detected, window)
+                special.append(point)
+                at_row.append(rows + len(u))
+                u.append(detected.located.u)
+                tangents.append(point.tangent)
+        tables.append((np.array(u), np.array(tangents), piece.region))
+        rows += len(u)
+        if number < len(curve.joins):
+            special.append(_corner(field, curve, number))
+            at_row.append(rows - 1)
+    u = np.concatenate([t[0] for t in tables])
+    tangents = np.concatenate([t[1] for t in tables])
+    eigenvalues = np.concatenate([field.eigenvalues(t[2], t[0]) for t in tables])
+    region = np.concatenate([np.full(len(t[0]), field.regions[t[2]]) for t in tables])
+    if not curve.closed:
+        special, at_row = _with_ends(field, curve, special, at_row, rows)
+    return Branch(
+        field.model.states,
+        field.parameter,
+        u[:, :-1],
+        u[:, -1],
+        tangents,
+        eigenvalues,
+        region,
+        tuple(special),
+        tuple(at_row),
+        curve.outcomes,
+        curve.closed,
+        admissible,
+    )
+
+
+def _special(
+    field: FrozenField, code: str, region: int, u: Array, tangent: Array, **more: object
+) -> SpecialPoint:
+    rates, _ = field.curve(region, u)
+    entries: dict[str, object] = {
+        "label": code,
+        "regions": (field.regions[region],),
+        "residual": float(np.abs(rates).max()),
+        "converged": True,
+        **more,
+    }
+    return SpecialPoint(
+        code=code,
+        states=field.model.states,
+        state=u[:-1].copy(),
+        parameters={**field.model.parameters, field.parameter: float(u[-1])},
+        eigenvalues=field.eigenvalues(region, u),
+        tangent=tangent.copy(),
+        **entries,  # type: ignore[arg-type]
+    )
+
+
+def _point(field: FrozenField, piece: Piece, detected: Detected, window: Window) -> SpecialPoint:
+    located = detected.located
+    tangent, single = field.tangent(piece.region, located.u, window.weight)
+    before = piece.tangents[detected.row]
+    if not single:
+        tangent = before
+    elif (tangent * window.weight) @ before < 0:
+        tangent = -tangent
+    return _special(
+        field,
+        detected.code,
+        piece.region,
+        located.u,
+        tangent,
+        residual=located.residual,
+        converged=located.converged,
+        coefficient=detected.coefficient,
+        frequency=detected.frequency,
+    )
+
+
+def _corner(field: FrozenField, curve: Curve, number: int) -> SpecialPoint:
+    """The boundary equilibrium between two pieces of a continuous field."""
+    before, after = curve.pieces[number], curve.pieces[number + 1]
+    u = before.u[-1]
+    jacobians = np.array([field.curve(p.region, u)[1][:, : field.n] for p in (before, after)])
+    first, second = (_determinant_sign(j) for j in jacobians)
+    kinds = {1: "persistence", 0: "degenerate", -1: "non-smooth fold"}
+    names = (field.regions[before.region], field.regions[after.region])
+    _, _, h, _ = field.at(before.region, u)
+    rates, _ = field.curve(before.region, u)
+    interface = curve.joins[number]
+    return _special(
+        field,
+        "BE",
+        before.region,
+        u,
+        before.tangents[-1],
+        regions=names,
+        residual=float(max(np.abs(rates).max(), abs(h[interface]))),
+        interface=field.interfaces[interface],
+        subtype=kinds[first * second],
+        clarke=ClarkePath(names, jacobians),
+    )
+
+
+def _determinant_sign(matrix: Array) -> int:
+    """Sign of a determinant, 0 where it vanishes to rounding."""
+    size = float(np.prod(np.maximum(np.linalg.norm(matrix, axis=1), 1e-300)))
+    value = float(np.linalg.det(matrix))
+    return 0 if abs(value) <= SINGULAR * size else int(np.sign(value))
+
+
+def _filippov(field: FrozenField, region: int, interface: int, u: Array) -> str:
+    """Persistence or non-smooth fold of a boundary equilibrium where the rates jump.
+
+    With N the Jacobian of the region whose equilibrium it is, E the jump of
+    the rates and C the gradient of h towards that region: C·N⁻¹E < 0 is
+    persistence, > 0 a non-smooth fold (di Bernardo et al. 2008, chapter 5).
+    """
+    beyond = field.neighbour(region, interface)
+    if beyond is None:
+        return "degenerate"
+    active, slopes, _, gradients = field.at(region, u)
+    other, _ = field.curve(beyond, u)
+    matrix = slopes[:, : field.n]
+    if _determinant_sign(matrix) == 0:
+        return "degenerate"
+    toward = field.signs[region, interface] * gradients[interface, : field.n]
+    value = float(toward @ np.linalg.solve(matrix, other - active))
+    return "persistence" if value < 0 else "non-smooth fold" if value > 0 else "degenerate"
+
+
+def _with_ends(
+    field: FrozenField, curve: Curve, special: list[SpecialPoint], at_row: list[int], rows: int
+) -> tuple[list[SpecialPoint], list[int]]:
+    """End points first and last, a boundary equilibrium where an interface was the end."""
+    ends = []
+    for side, piece in ((0, curve.pieces[0]), (-1, curve.pieces[-1])):
+        u, tangent, interface = piece.u[side], piece.tangents[side], curve.ends[side]
+        note = curve.outcomes[side].message
+        if interface is None:
+            ends.append([_special(field, "EP", piece.region, u, tangent, note=note)])
+            continue
+        beyond = field.neighbour(piece.region, interface)
+        names = (field.regions[piece.region],)
+        if beyond is not None:
+            names = (*names, field.regions[beyond])
+        point = _special(
+            field,
+            "BE",
+            piece.region,
+            u,
+            tangent,
+            regions=names,
+            interface=field.interfaces[interface],
+            subtype=_filippov(field, piece.region, interface, u),
+            note=note,
+        )
+        ends.append([point, _special(field, "EP", piece.region, u, tangent, note=note)])
+    first, last = ends[0][::-1], ends[1]
+    return (
+        [*first, *special, *last],
+        [*([0] * len(first)), *at_row, *([rows - 1] * len(last))],
+    )

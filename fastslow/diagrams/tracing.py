@@ -1,0 +1,291 @@
+"""All branches of equilibria of a frozen model over one parameter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.continuation.location import with_condition
+from fastslow.continuation.settings import Continuation
+from fastslow.diagrams.assembly import Curve, branch_of, joined, rising
+from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.solving import point_at, region_equations, solve_at
+from fastslow.diagrams.walking import Piece, Walk, Window, walk
+from fastslow.errors import ArgumentError, ModelError
+from fastslow.model.model import Model
+from fastslow.model.structure import real
+from fastslow.results.branches import Branch
+from fastslow.results.diagrams import Corrector, Diagram
+from fastslow.results.points import Equilibrium
+
+Array = NDArray[np.float64]
+
+
+def continue_equilibria(
+    model: Model,
+    parameter: Any,
+    over: tuple[float, float],
+    *,
+    settings: Continuation | None = None,
+    marks: Sequence[float] = (),
+    virtual: bool = False,
+) -> Diagram:
+    """Trace every branch of equilibria of a frozen model over a parameter range.
+
+    Pseudo-arclength continuation (Keller 1977) inside each region; at an
+    interface the boundary equilibrium is solved for exactly and the branch
+    goes on in the region beyond, turning back in the parameter where it must.
+
+    Parameters
+    ----------
+    model : Model
+        A frozen model; every parameter but ``parameter`` has a value.
+    parameter : str or Symbol
+        What varies.
+    over : (float, float)
+        Its range, in its own units.
+    settings : Continuation, optional
+    marks : sequence of float
+        Parameter values at which a point UZ is wanted exactly.
+    virtual : bool
+        Whether to trace the virtual branches too.
+
+    Returns
+    -------
+    Diagram
+
+    Raises
+    ------
+    UnknownNameError
+        If the parameter is not one of the model's.
+    ModelError
+        If the model is not frozen, or a slow quantity has no value.
+    ArgumentError
+        If the range is empty, reversed or not finite, or a mark lies outside.
+
+    Examples
+    --------
+    >>> x, w, t = sp.symbols("x w t")
+    >>> model = Model({x: w + x - x**3}, forcing={w: sp.sin(t)}).frozen()
+    >>> diagram = continue_equilibria(model, "w", (-1, 1))
+    >>> [round(p["w"], 12) for p in diagram.folds]
+    [0.3849001794598, -0.3849001794598]
+    """
+    name = str(parameter)
+    lower, upper = _range(name, over)
+    for mark in marks:
+        if not lower <= mark <= upper:
+            raise ArgumentError(
+                f"mark {name} = {mark:g} is outside the range [{lower:g}, {upper:g}]"
+            )
+    if model.forcing or model.slow_states:
+        quantity = next(iter((*model.forcing, *model.slow_states)))
+        raise ModelError(
+            f"'{quantity}' still varies in time; trace the branches of model.frozen() instead"
+        )
+    field = FrozenField(model.freed(name), name)
+    settings = settings or Continuation()
+    starts = _Starts(field, lower, upper, settings.starts)
+    window = Window(lower, upper, starts.scale())
+    branches: list[Branch] = []
+    for admissible in (True, False) if virtual else (True,):
+        for value in starts.values(branches):
+            for start in starts.at(value, admissible):
+                if not any(_passes(field, b, start, value, window) for b in branches):
+                    curve = _traced(field, start, value, window, settings, admissible)
+                    branches += _branches(field, curve, window, marks, admissible)
+    return Diagram(
+        model.states,
+        name,
+        (lower, upper),
+        dict(field.model.parameters),
+        _labelled(branches),
+        "found",
+        field.interfaces,
+        field.regions,
+        _interface_values(field.model),
+        repr(model),
+        _corrector(field),
+    )
+
+
+def _range(name: str, over: Any) -> tuple[float, float]:
+    try:
+        lower, upper = (float(v) for v in over)
+    except (TypeError, ValueError):
+        raise ArgumentError(
+            f"over={over!r}: expected two numbers, the range of {name}"
+        ) from None
+    if not (math.isfinite(lower) and math.isfinite(upper)):
+        raise ArgumentError(f"over=({lower:g}, {upper:g}): expected finite ends of the range")
+    if lower >= upper:
+        hint = f"; did you mean ({upper:g}, {lower:g})?" if lower > upper else ""
+        raise ArgumentError(
+            f"over=({lower:g}, {upper:g}): expected an increasing range of {name}{hint}"
+        )
+    return lower, upper
+
+
+class _Starts:
+    """Equilibria from which branches are traced, solved for once at each value."""
+
+    def __init__(self, field: FrozenField, lower: float, upper: float, inside: int) -> None:
+        self._field = field
+        self._over = (lower, upper)
+        # the golden ratio keeps the values clear of each other and of round numbers
+        parts = [(0.5 + k * 0.6180339887498949) % 1.0 for k in range(inside)]
+        self._first = [lower, upper, *(lower + p * (upper - lower) for p in parts)]
+        self._found: dict[float, list[Equilibrium]] = {}
+
+    def at(self, value: float, admissible: bool) -> list[Equilibrium]:
+        if value not in self._found:
+            self._found[value] = solve_at(self._field, value, virtual=True)
+        return [
+            e for e in self._found[value] if e.admissible == admissible and not e.continuum
+        ]
+
+    def values(self, branches: list[Branch]) -> Iterable[float]:
+        """The first values, then one between each two special points found so far."""
+        yield from self._first
+        done: set[float] = set()
+        while True:
+            special = {p[b.parameter_name] for b in branches for p in b.special}
+            levels = sorted({*self._over, *special})
+            gap = 1e-6 * (self._over[1] - self._over[0])
+            middles = {
+                0.5 * (a + b) for a, b in zip(levels[:-1], levels[1:], strict=True) if b - a > gap
+            }
+            fresh = sorted(middles - done)
+            if not fresh or len(done) > 200:
+                return
+            done |= set(fresh)
+            yield from fresh
+
+    def scale(self) -> Array:
+        """Unit of each state, the size of its equilibria, and the length of the range."""
+        states = [e.state for v in self._first for e in (*self.at(v, True), *self.at(v, False))]
+        n = self._field.n
+        size = np.abs(states).max(axis=0) if states else np.zeros(n)
+        size = np.where(size > 1e-14 * max(size.max(initial=0.0), 1e-300), size, 1.0)
+        return np.append(size, self._over[1] - self._over[0])
+
+
+def _traced(
+    field: FrozenField,
+    start: Equilibrium,
+    value: float,
+    window: Window,
+    settings: Continuation,
+    bounded: bool,
+) -> Curve:
+    """The whole branch through a start."""
+    region = field.regions.index(start.region)
+    u = np.append(start.state, value)
+    tangent, _ = field.tangent(region, u, window.weight)
+    forward = _walk(field, region, u, tangent, window, settings, bounded)
+    if forward.closed:
+        return joined(None, forward)
+    return rising(joined(_walk(field, region, u, -tangent, window, settings, bounded), forward))
+
+
+def _walk(
+    field: FrozenField,
+    region: int,
+    u: Array,
+    tangent: Array,
+    window: Window,
+    settings: Continuation,
+    bounded: bool,
+) -> Walk:
+    return walk(field, region, u, tangent, window, settings, bounded=bounded)
+
+
+def _branches(
+    field: FrozenField, curve: Curve, window: Window, marks: Sequence[float], admissible: bool
+) -> list[Branch]:
+    """The branch of a curve; of a virtual one, its parts outside the region."""
+    if admissible:
+        return [branch_of(field, curve, window, marks, True)]
+    found = []
+    (piece,) = curve.pieces
+    inside = np.array([field.admissible(piece.region, u) for u in piece.u])
+    edges = np.flatnonzero(np.diff(inside)) + 1
+    for rows in np.split(np.arange(len(inside)), edges):
+        if inside[rows[0]] or len(rows) < 2:
+            continue
+        part = Piece(piece.region, piece.u[rows], piece.tangents[rows])
+        cut = Curve((part,), (), curve.outcomes, (None, None), curve.closed and len(edges) == 0)
+        found.append(branch_of(field, cut, window, marks, False))
+    return found
+
+
+def _passes(
+    field: FrozenField, branch: Branch, start: Equilibrium, value: float, window: Window
+) -> bool:
+    """Whether a branch goes through an equilibrium."""
+    if branch.admissible != start.admissible:
+        return False
+    u = np.append(start.state, value) / window.scale
+    rows = np.column_stack([branch.state, branch.parameter]) / window.scale
+    if len(rows) < 2:
+        return bool(np.abs(rows[0] - u).max() < 1e-6)
+    chords = np.diff(rows, axis=0)
+    length = np.maximum((chords**2).sum(axis=1), 1e-300)
+    part = np.clip(((u - rows[:-1]) * chords).sum(axis=1) / length, 0.0, 1.0)
+    near = rows[:-1] + part[:, None] * chords
+    apart = np.linalg.norm(near - u, axis=1)
+    for k in np.flatnonzero(apart < 1e-2):
+        region = field.regions.index(str(branch.region[k]))
+        normal = chords[k] / np.sqrt(length[k]) / window.scale
+        found = with_condition(
+            lambda z, region=region: field.curve(region, z),
+            lambda z, normal=normal: (float((z - u * window.scale) @ normal), normal),
+            near[k] * window.scale,
+            window.scale,
+        )
+        if found.converged and np.abs(found.u / window.scale - u).max() < 1e-6:
+            return True
+    return False
+
+
+def _labelled(branches: list[Branch]) -> tuple[Branch, ...]:
+    """Labels LP1, LP2, … in order along the branches of a diagram."""
+    counts: dict[str, int] = {}
+    done = []
+    for branch in branches:
+        points = []
+        for point in branch.special:
+            counts[point.code] = counts.get(point.code, 0) + 1
+            points.append(replace(point, label=f"{point.code}{counts[point.code]}"))
+        done.append(replace(branch, special=tuple(points)))
+    return tuple(done)
+
+
+def _interface_values(model: Model) -> dict[str, tuple[str, float]]:
+    """Interfaces that are a constant value of one state, for drawing them as lines."""
+    values = {}
+    for name, interface in model.interfaces.items():
+        h = sp.sympify(interface.function).subs(model.values)
+        for state in model.states:
+            symbol = real(state)
+            if h.free_symbols == {symbol} and h.diff(symbol).is_number:
+                values[name] = (state, float(-h.subs(symbol, 0) / h.diff(symbol)))
+    return values
+
+
+def _corrector(field: FrozenField) -> Corrector:
+    def correct(region: str, state: Array, value: float) -> Equilibrium | None:
+        number = field.regions.index(region)
+        solved = region_equations(field)[number].corrected(state, value)
+        if solved is None:
+            return None
+        u = np.append(solved, value)
+        return point_at(field, number, u, field.admissible(number, u))
+
+    return correct

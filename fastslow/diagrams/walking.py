@@ -1,0 +1,283 @@
+"""One curve of equilibria followed from region to region."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation import engine
+from fastslow.continuation.location import Located, with_condition
+from fastslow.continuation.settings import Continuation
+from fastslow.diagrams.fields import FrozenField
+from fastslow.results.outcome import Outcome
+
+Array = NDArray[np.float64]
+
+#: Pieces (regions in order) that one branch may have.
+PIECES = 1000
+
+
+@dataclass(frozen=True)
+class Window:
+    """Where branches are traced, and in which units.
+
+    Parameters
+    ----------
+    lower, upper : float
+        Range of the parameter.
+    scale : ndarray, shape (n + 1,)
+        Unit of each state and of the parameter.
+    """
+
+    lower: float
+    upper: float
+    scale: Array
+
+    @property
+    def weight(self) -> Array:
+        return self.scale**-2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A part of a branch in one region: points u and unit tangents, shape (N, n + 1)."""
+
+    region: int
+    u: Array
+    tangents: Array
+
+    def reversed(self) -> Piece:
+        return Piece(self.region, self.u[::-1].copy(), -self.tangents[::-1])
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """Pieces in order, the interface between each two, and why the walk ended.
+
+    ``last`` is the interface on which the walk stopped for good, if it did.
+    """
+
+    pieces: tuple[Piece, ...]
+    joins: tuple[int, ...]
+    outcome: Outcome
+    last: int | None = None
+    closed: bool = False
+
+
+def walk(
+    field: FrozenField,
+    region: int,
+    start: Array,
+    tangent: Array,
+    window: Window,
+    settings: Continuation,
+    *,
+    bounded: bool = True,
+) -> Walk:
+    """Follow a curve of equilibria in one direction, through every interface on its way.
+
+    Parameters
+    ----------
+    region : int
+        Region whose rates vanish at the start.
+    start, tangent : ndarray, shape (n + 1,)
+        A point of the branch and the direction to go.
+    bounded : bool
+        Whether interfaces bound the regions; False follows virtual equilibria.
+    """
+    pieces: list[Piece] = []
+    joins: list[int] = []
+    first = (start, tangent, region)
+    step = settings.step
+    while len(pieces) < PIECES:
+        signs = field.signs[region] if bounded else np.zeros(len(field.interfaces))
+        u, tangents, status, step = engine.trace(
+            field.compiled.address, region, field.values, start, tangent, signs,
+            window.weight, window.lower, window.upper, settings.reach * window.scale[:-1],
+            max(step, 10 * settings.smallest_step), settings.smallest_step,
+            settings.largest_step, settings.largest_turn, settings.tolerance,
+            settings.iterations, settings.points, not joins,
+        )  # fmt: skip
+        met = None
+        if status == engine.INTERFACE:
+            met = _first_interface(field, region, u, tangents, window)
+            if met is None:
+                status = engine.SMALL_STEP
+                u, tangents = u[:-1], tangents[:-1]
+            elif not window.lower <= met[1][-1] <= window.upper:
+                status = engine.RANGE
+        if status == engine.RANGE:
+            u, tangents = _cut_at_range(field, region, u, tangents, window)
+        if status != engine.INTERFACE or met is None:
+            if status == engine.WINDOW:
+                u, tangents = u[:-1], tangents[:-1]
+            pieces.append(Piece(region, u, tangents))
+            closed = status == engine.CLOSED
+            if closed:
+                u[-1], tangents[-1] = first[0], first[1]
+            outcome = _outcome(status, field, u[-1], tangents[-1], window, settings)
+            return Walk(tuple(pieces), tuple(joins), outcome, closed=closed)
+        interface, corner = met
+        end = _oriented(field.tangent(region, corner, window.weight)[0], tangents[-1], window)
+        u[-1], tangents[-1] = corner, end
+        pieces.append(Piece(region, u, tangents))
+        beyond, outcome = _enter(field, region, interface, corner, window)
+        if beyond is None:
+            return Walk(tuple(pieces), tuple(joins), outcome, last=interface)
+        joins.append(interface)
+        region, tangent = beyond
+        start = corner
+        home = region == first[2] and np.abs((start - first[0]) / window.scale).max() < 1e-9
+        if home:
+            return Walk(tuple(pieces), tuple(joins), _closed(), closed=True)
+    return Walk(tuple(pieces), tuple(joins), _full(field, start, settings))
+
+
+def _first_interface(
+    field: FrozenField, region: int, u: Array, tangents: Array, window: Window
+) -> tuple[int, Array] | None:
+    """The interface met first on the last step, with the boundary equilibrium on it."""
+    before, after = u[-2], u[-1]
+    signs = field.signs[region]
+    _, _, h0, _ = field.at(region, before)
+    _, _, h1, _ = field.at(region, after)
+    length = float(np.linalg.norm((after - before) / window.scale))
+    best: tuple[float, int, Array] | None = None
+    for k in np.flatnonzero(signs * h1 < 0):
+        part = float(np.clip(h0[k] / (h0[k] - h1[k]), 0.0, 1.0)) if h0[k] != h1[k] else 0.5
+        found = on_interface(field, region, int(k), before + part * (after - before), window)
+        ahead = float(((found.u - before) * window.weight) @ tangents[-2])
+        if found.converged and -1e-6 <= ahead <= 1.5 * length and (best is None or ahead < best[0]):
+            best = (ahead, int(k), found.u)
+    return None if best is None else (best[1], best[2])
+
+
+def on_interface(
+    field: FrozenField, region: int, interface: int, guess: Array, window: Window
+) -> Located:
+    """The boundary equilibrium F = 0, h = 0 near a guess."""
+
+    def condition(u: Array) -> tuple[float, Array]:
+        _, _, h, slopes = field.at(region, u)
+        return float(h[interface]), slopes[interface]
+
+    return with_condition(lambda u: field.curve(region, u), condition, guess, window.scale)
+
+
+def _enter(
+    field: FrozenField, region: int, interface: int, corner: Array, window: Window
+) -> tuple[tuple[int, Array] | None, Outcome]:
+    """The region beyond an interface and the tangent that leads into it."""
+    name, where = field.interfaces[interface], _where(field, corner)
+    _, _, h, gradients = field.at(region, corner)
+    size = np.abs(gradients * window.scale).max(axis=1)
+    meeting = [field.interfaces[k] for k in np.flatnonzero(np.abs(h) <= 1e-9 * size)]
+    if len(meeting) > 1:
+        return None, Outcome(
+            "interfaces meet",
+            f"the interfaces {' and '.join(meeting)} meet at the equilibrium {where}; where the "
+            "branch goes on is not unique.",
+            False,
+        )
+    beyond = field.neighbour(region, interface)
+    if beyond is None:
+        return None, Outcome(
+            "no region beyond", f"no region lies beyond {name} = 0 at {where}.", False
+        )
+    rates, slopes = field.curve(beyond, corner)
+    bound = 1e-8 * np.maximum(1.0, np.abs(slopes) @ np.maximum(1.0, np.abs(corner)))
+    if np.any(np.abs(rates) > bound):
+        return None, Outcome(
+            "discontinuous interface",
+            f"the rates jump across {name} = 0 at {where}; beyond it there is no equilibrium of "
+            f"region {field.regions[beyond]} (the field is of Filippov type there).",
+            True,
+        )
+    tangent, single = field.tangent(beyond, corner, window.weight)
+    ahead = field.signs[beyond, interface] * float(gradients[interface] @ tangent)
+    if not single or abs(ahead) < 1e-9 * size[interface]:
+        return None, Outcome(
+            "singular at interface",
+            f"the equilibria of region {field.regions[beyond]} are singular or tangent to "
+            f"{name} = 0 at {where}; a small change of another parameter makes them regular.",
+            False,
+        )
+    return (beyond, tangent if ahead > 0 else -tangent), _closed()
+
+
+def _cut_at_range(
+    field: FrozenField, region: int, u: Array, tangents: Array, window: Window
+) -> tuple[Array, Array]:
+    """Replace the last row, beyond the range, by the point exactly at its end."""
+    last = u[-1, -1]
+    bound = window.lower if last < window.lower else window.upper
+    before = u[-2]
+    part = (bound - before[-1]) / (last - before[-1]) if last != before[-1] else 0.0
+    along = np.zeros(u.shape[1])
+    along[-1] = 1.0
+    found = with_condition(
+        lambda z: field.curve(region, z),
+        lambda z: (z[-1] - bound, along),
+        before + part * (u[-1] - before),
+        window.scale,
+    )
+    if not found.converged or not np.all(np.isfinite(found.u)):
+        return u[:-1], tangents[:-1]
+    u[-1] = found.u
+    u[-1, -1] = bound
+    tangents[-1] = _oriented(field.tangent(region, u[-1], window.weight)[0], tangents[-1], window)
+    if np.abs((u[-1] - u[-2]) / window.scale).max() < 1e-13:
+        return u[:-1], tangents[:-1]
+    return u, tangents
+
+
+def _oriented(tangent: Array, along: Array, window: Window) -> Array:
+    return tangent if (tangent * window.weight) @ along >= 0 else -tangent
+
+
+def _where(field: FrozenField, u: Array) -> str:
+    names = (*field.model.states, field.parameter)
+    return "(" + ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, u, strict=True)) + ")"
+
+
+def _closed() -> Outcome:
+    return Outcome("closed loop", "the branch returned to its start: a closed loop.", True)
+
+
+def _full(field: FrozenField, u: Array, settings: Continuation) -> Outcome:
+    return Outcome(
+        "too many points",
+        f"the branch has {settings.points} rows and goes on at {_where(field, u)}; "
+        "raise Continuation(points=…) or largest_step.",
+        False,
+    )
+
+
+def _outcome(
+    status: int, field: FrozenField, u: Array, tangent: Array, window: Window, settings: Continuation
+) -> Outcome:
+    where = _where(field, u)
+    if status == engine.RANGE:
+        return Outcome(
+            "end of range", f"reached {field.parameter} = {u[-1]:g}, the end of the range.", True
+        )
+    if status == engine.CLOSED:
+        return _closed()
+    if status == engine.WINDOW:
+        k = int(np.argmax(np.abs(u[:-1]) / window.scale[:-1]))
+        return Outcome(
+            "left the window",
+            f"|{field.model.states[k]}| grew beyond {settings.reach * window.scale[k]:.3g} near "
+            f"{where}; raise Continuation(reach=…) to follow it further.",
+            False,
+        )
+    if status == engine.FULL:
+        return _full(field, u, settings)
+    return Outcome(
+        "step too small",
+        f"no next point was found from {where} with steps down to {settings.smallest_step:g}: the "
+        "curve is singular here, or the rates are not defined beyond.",
+        False,
+    )

@@ -1,0 +1,220 @@
+"""Trajectories on their own: time series and phase portraits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.plot.arrows import draw_arrows, length_along
+from fastslow.plot.bands import Bands, draw_bands
+from fastslow.plot.style import MOTION, VERMILION, Drawing, axes_for, typeset
+from fastslow.results.trajectories import Trajectory
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MotionDrawing(Drawing):
+    """A drawn trajectory.
+
+    Parameters
+    ----------
+    ax : Axes
+    x, y : str
+        What the axes show.
+    line : Line2D
+        The trajectory.
+    crossings : Line2D or None
+        One dot for each crossing of an interface.
+    arrows : tuple of Annotation
+        Sense of direction.
+    bands : tuple of Bands
+        Interfaces and regions.
+    """
+
+    x: str
+    y: str
+    line: Line2D
+    crossings: Line2D | None
+    arrows: tuple[Annotation, ...]
+    bands: tuple[Bands, ...]
+
+
+def time_series(
+    run: Trajectory,
+    x: object = None,
+    *,
+    ax: Axes | None = None,
+    crossings: bool = True,
+    interfaces: bool = True,
+    color: str = MOTION,
+    **style: Any,
+) -> MotionDrawing:
+    """Draw one quantity of a trajectory over time.
+
+    Parameters
+    ----------
+    run : Trajectory
+    x : str or Symbol, optional
+        A state or slow quantity, by default the first state.
+    ax : Axes, optional
+        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+    crossings : bool
+        Whether to mark the crossings of interfaces.
+    interfaces : bool
+        Whether to draw interfaces and regions.
+    color : str
+        Colour of the trajectory.
+    **style
+        Properties of the line.
+
+    Returns
+    -------
+    MotionDrawing
+
+    Raises
+    ------
+    UnknownNameError
+        If ``x`` is no state or slow quantity of the trajectory.
+    """
+    name = quantity(run, x, 0)
+    ax = axes_for(ax, height=50 / 25.4)
+    values = run[name]
+    (line,) = ax.plot(run.t, values, **_look(color, style))
+    dots = _dots(ax, run, "t", name) if crossings else None
+    ax.set_xlabel(typeset("t"))
+    ax.set_ylabel(typeset(name))
+    ax.set_xlim(float(run.t[0]), float(run.t[-1]))
+    bands = _bands(ax, run, None, name) if interfaces else ()
+    return MotionDrawing(ax, "t", name, line, dots, (), bands)
+
+
+def phase_portrait(
+    run: Trajectory,
+    x: object = None,
+    y: object = None,
+    *,
+    ax: Axes | None = None,
+    crossings: bool = True,
+    interfaces: bool = True,
+    arrows: int = 3,
+    color: str = MOTION,
+    **style: Any,
+) -> MotionDrawing:
+    """Draw a trajectory in the plane of two of its quantities.
+
+    Parameters
+    ----------
+    run : Trajectory
+    x, y : str or Symbol, optional
+        States or slow quantities, by default the first two states (for a
+        single state, the state over its slow quantity).
+    ax : Axes, optional
+        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+    crossings : bool
+        Whether to mark the crossings of interfaces.
+    interfaces : bool
+        Whether to draw interfaces and regions.
+    arrows : int
+        How many arrow heads show the direction.
+    color : str
+        Colour of the trajectory.
+    **style
+        Properties of the line.
+
+    Returns
+    -------
+    MotionDrawing
+
+    Raises
+    ------
+    UnknownNameError
+        If ``x`` or ``y`` is no state or slow quantity of the trajectory.
+    ArgumentError
+        If there is only one quantity to draw.
+    """
+    names = quantities(run)
+    if len(names) < 2:
+        raise ArgumentError(f"a phase portrait needs two quantities, received {names[0]} alone")
+    if len(run.states) == 1 and x is None and y is None:
+        x, y = names[1], names[0]
+    across, up = quantity(run, x, 0), quantity(run, y, 1)
+    ax = axes_for(ax)
+    (line,) = ax.plot(run[across], run[up], **_look(color, style))
+    dots = _dots(ax, run, across, up) if crossings else None
+    ax.set_xlabel(typeset(across))
+    ax.set_ylabel(typeset(up))
+    bands = _bands(ax, run, across, up) if interfaces else ()
+    u, v = run[across], run[up]
+    fractions = (np.arange(arrows) + 0.5) / max(arrows, 1)
+    heads = draw_arrows(ax, u, v, length_along(ax, u, v), fractions.tolist(), color)
+    return MotionDrawing(ax, across, up, line, dots, heads, bands)
+
+
+def quantities(run: Trajectory) -> list[str]:
+    """Everything of a trajectory that can stand on an axis: states, then slow quantities."""
+    return [*run.states, *(name for name in run.forcing if name not in run.states)]
+
+
+def quantity(run: Trajectory, name: object, default: int) -> str:
+    """The name of a state or slow quantity, by default by its position."""
+    names = quantities(run)
+    if name is None:
+        return names[default]
+    if str(name) not in names:
+        raise unknown_name("state or slow quantity", name, names)
+    return str(name)
+
+
+def at_crossings(run: Trajectory, name: str) -> Values:
+    """Time, a state or a slow quantity at every crossing, shape (number of crossings,)."""
+    times = np.array([c.time for c in run.crossings])
+    if name == "t":
+        return times
+    if name in run.states:
+        index = run.states.index(name)
+        return np.array([c.state[index] for c in run.crossings])
+    return np.interp(times, run.t, run[name])
+
+
+def draw_dots(ax: Axes, x: Values, y: Values) -> Line2D | None:
+    """Mark crossings of interfaces by small dots."""
+    if not len(x):
+        return None
+    (dots,) = ax.plot(
+        x,
+        y,
+        linestyle="none",
+        marker="o",
+        markersize=2.4,
+        markerfacecolor="white",
+        markeredgecolor=VERMILION,
+        markeredgewidth=0.6,
+        zorder=4,
+        label="crossing of an interface",
+    )
+    return dots
+
+
+def _dots(ax: Axes, run: Trajectory, x: str, y: str) -> Line2D | None:
+    return draw_dots(ax, at_crossings(run, x), at_crossings(run, y))
+
+
+def _look(color: str, style: dict[str, Any]) -> dict[str, Any]:
+    return {"color": color, "linewidth": 0.8, "zorder": 3.0, "label": "trajectory", **style}
+
+
+def _bands(ax: Axes, run: Trajectory, across: str | None, up: str) -> tuple[Bands, ...]:
+    upright = () if across is None else (_band(ax, run, across, True),)
+    return (*upright, _band(ax, run, up, False))
+
+
+def _band(ax: Axes, run: Trajectory, state: str, vertical: bool) -> Bands:
+    return draw_bands(ax, state, run.interface_values, run.regions, vertical=vertical)

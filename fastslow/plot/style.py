@@ -1,0 +1,150 @@
+"""Colours, line styles and markers of all figures, and the axes they are drawn into."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+# M. Okabe and K. Ito, Color Universal Design, 2008
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
+GREY = "#8A8A8A"
+
+BRANCH, MOTION = BLACK, BLUE
+
+#: Line style and width of a branch by stability; virtual branches are faint and dotted.
+LINES: dict[str, dict[str, Any]] = {
+    "stable": {"linestyle": "-", "linewidth": 1.5},
+    "unstable": {"linestyle": (0, (3.5, 1.8)), "linewidth": 1.2},
+    "neutral": {"linestyle": (0, (5, 1.5, 1, 1.5)), "linewidth": 0.9},
+    "virtual": {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.45},
+}
+
+#: Marker and colour of a special point by code.
+MARKERS: dict[str, tuple[str, str]] = {
+    "LP": ("o", VERMILION),
+    "HB": ("s", GREEN),
+    "BP": ("D", ORANGE),
+    "NSD": ("P", GREY),
+    "BE": ("^", PURPLE),
+    "UZ": ("x", BLACK),
+    "EP": ("|", BLACK),
+}
+
+#: Marker, colour and legend text of a transition by kind.
+TRANSITIONS: dict[str, tuple[str, str, str]] = {
+    "jump": ("*", VERMILION, "jump at a fold"),
+    "crossing": ("D", ORANGE, "passage of a boundary equilibrium"),
+    "change": ("X", GREY, "other change of sheet"),
+}
+
+#: Light fills of the regions, in turn.
+BANDS = ("#E4F1FA", "#FFFFFF", "#FBF0DC")
+
+MM = 1 / 25.4
+COLUMN, FULL = 85 * MM, 170 * MM
+TEXT, SMALL = 8.0, 7.0
+
+
+GREEK = (
+    "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau "
+    "upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega"
+)
+
+
+def typeset(name: str) -> str:
+    r"""A name as mathematics: Greek letters by their names, subscripts after an underscore.
+
+    Examples
+    --------
+    >>> typeset("x"), typeset("omega_0"), typeset("theta_in"), typeset("load")
+    ('$x$', '$\\\\omega_{0}$', '$\\\\theta_{\\\\mathrm{in}}$', '$\\\\mathrm{load}$')
+    """
+    head, *below = name.split("_")
+    return "$" + _letter(head) + (f"_{{{','.join(map(_letter, below))}}}" if below else "") + "$"
+
+
+def _letter(word: str) -> str:
+    if word in GREEK.split():
+        return f"\\{word}"
+    return word if len(word) < 2 else f"\\mathrm{{{word}}}"
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of a size in inches, outside pyplot."""
+    return Figure(figsize=(width, height), dpi=150, layout="constrained")
+
+
+def dressed(ax: Axes) -> Axes:
+    """Axes of our own figures: small text, thin frame."""
+    ax.tick_params(labelsize=SMALL, width=0.6, length=2.5)
+    ax.xaxis.label.set_fontsize(TEXT)
+    ax.yaxis.label.set_fontsize(TEXT)
+    for spine in ax.spines.values():
+        spine.set_linewidth(0.6)
+    return ax
+
+
+def axes_for(ax: Axes | None, width: float = COLUMN, height: float = 64 * MM) -> Axes:
+    """The axes given, or new ones in a figure of a column's width."""
+    return dressed(new_figure(width, height).add_subplot()) if ax is None else ax
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """What was drawn, and where.
+
+    Parameters
+    ----------
+    ax : Axes
+        The axes drawn into.
+    """
+
+    ax: Axes
+
+    @property
+    def figure(self) -> Figure:
+        """The figure that holds the axes."""
+        return root(self.ax)
+
+    def save(self, path: str | Path, dpi: float = 300) -> Path:
+        """Write the figure, in the format of the suffix, with text kept as text.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to, e.g. ``"overlay.pdf"``; its folder must exist.
+        dpi : float
+            Dots per inch of pixel formats.
+
+        Returns
+        -------
+        Path
+        """
+        return save(self.figure, path, dpi)
+
+    def _repr_png_(self) -> bytes:
+        stream = BytesIO()
+        self.figure.savefig(stream, format="png", dpi=150)
+        return stream.getvalue()
+
+
+def root(ax: Axes) -> Figure:
+    """The outermost figure of axes."""
+    figure = ax.get_figure(root=True)
+    if figure is None:
+        raise ValueError("these axes were removed from their figure")
+    return figure
+
+
+def save(figure: Figure, path: str | Path, dpi: float = 300) -> Path:
+    """Write a figure with fonts that editors and journals can read."""
+    with rc_context({"pdf.fonttype": 42, "svg.fonttype": "none"}):
+        figure.savefig(path, dpi=dpi)
+    return Path(path)

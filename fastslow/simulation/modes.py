@@ -1,0 +1,172 @@
+"""Which smooth motion goes on from a point on one or several interfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fastslow.compiled.pointers import call_address
+from fastslow.simulation.polynomials import first_nonzero, first_strong
+
+EPSILON = float(np.finfo(float).eps)
+
+#: How well a mode agrees with an interface that it starts on.
+AGREES, LEANS, RESTS, LEANS_AWAY, DISAGREES = 3, 2, 1, 0, -1
+
+#: No mode agrees; more than one does.
+NO_MODE, MANY_MODES = -1, -2
+
+
+@njit
+def step_length(W, n_rows, order, tol):
+    """The step whose last terms are as large as the tolerance (Jorba and Zou 2005).
+
+    An error of ``tol * (1 + |y|)`` is allowed in every row. Three terms are
+    looked at, because series of even or odd functions lack every other one.
+
+    Returns
+    -------
+    float
+        Infinite where the series ends, NaN where it is not finite.
+    """
+    columns = order + 1
+    last = before = third = finite = 0.0
+    for i in range(n_rows):
+        row = i * columns
+        scale = 1.0 / (1.0 + abs(W[row]))
+        last = max(last, abs(W[row + order]) * scale)
+        before = max(before, abs(W[row + order - 1]) * scale)
+        third = max(third, abs(W[row + order - 2]) * scale)
+        finite += 0.0 * (W[row + order] + W[row + order - 1])
+    if finite != 0.0:
+        return np.nan
+    length = np.inf
+    if last > 0.0:
+        length = (tol / last) ** (1.0 / order)
+    if before > 0.0 and (length == np.inf or tol < before * length ** (order - 1)):
+        length = min(length, (tol / before) ** (1.0 / (order - 1)))
+    if third > 0.0 and (length == np.inf or tol < third * length ** (order - 2)):
+        length = min(length, (tol / third) ** (1.0 / (order - 2)))
+    return length
+
+
+@njit
+def scaled(W, row, order, h, b):
+    """Coefficients of one row, scaled to the step, and the sum of their moduli without the first."""
+    power = 1.0
+    total = 0.0
+    for k in range(order + 1):
+        b[k] = W[row * (order + 1) + k] * power
+        power *= h
+        if k > 0:
+            total += abs(b[k])
+    return total
+
+
+@njit
+def interface_noise(address, n_modes, j, inputs, parameters, gradient):
+    """Size of h that is rounding error, from the moduli of its terms; fills the gradient."""
+    call_address(address, n_modes + j, inputs, parameters, gradient)
+    return 8.0 * EPSILON * gradient[1]
+
+
+@njit
+def agreement(b, order, noise, side):
+    """How the motion away from an interface agrees with one side of it.
+
+    The first coefficient (Lie derivative) of h above the noise decides; where
+    there is none, the first that is not exactly zero leans; else it rests.
+    """
+    k = first_strong(b, 1, order, noise)
+    if k <= order:
+        return AGREES if b[k] * side > 0.0 else DISAGREES
+    k = first_nonzero(b, 1, order)
+    if k <= order:
+        return LEANS if b[k] * side > 0.0 else LEANS_AWAY
+    return RESTS
+
+
+@njit
+def choose_mode(
+    address, layout, signs, inputs, parameters, tol, longest, on, side, current, W, b, noise
+):
+    """The mode in which the solution goes on.
+
+    Parameters
+    ----------
+    address : int
+        Of the compiled series.
+    layout : tuple of int
+        (n_states, n_forcing, n_interfaces, n_modes, order).
+    signs : int64 array, shape (n_modes, n_interfaces)
+    inputs, parameters : float64 arrays
+        Where.
+    tol, longest : float
+        The step over which rounding is judged: its tolerance and longest length.
+    on : bool array, shape (n_interfaces,)
+        Interfaces on which the point lies.
+    side : int64 array, shape (n_interfaces,)
+        Sign of h for the others.
+    current : int
+        The mode before, preferred where the motion rests on the interface.
+    W, b, noise : float64 arrays
+        Work space; ``noise`` holds the rounding error of each h and grows here.
+
+    Returns
+    -------
+    int
+        The mode, `NO_MODE` or `MANY_MODES`.
+    """
+    n_states, n_forcing, n_interfaces, n_modes, order = layout
+    first_h = n_states + n_forcing
+    drift = first_h + n_interfaces
+    best, best_score, equals = NO_MODE, DISAGREES, 0
+    # two passes: the rounding error is that of the largest motion on either side
+    for judging in (False, True):
+        for mode in range(n_modes):
+            possible = True
+            for j in range(n_interfaces):
+                if not on[j] and signs[mode, j] != side[j]:
+                    possible = False
+            if not possible:
+                continue
+            call_address(address, mode, inputs, parameters, W)
+            h = min(step_length(W, drift, order, tol), longest)
+            if not h > 0.0:
+                continue
+            score = AGREES
+            for j in range(n_interfaces):
+                if not on[j]:
+                    continue
+                total = scaled(W, first_h + j, order, h, b)
+                if not judging:
+                    noise[j] = max(noise[j], 32.0 * EPSILON * min(total, abs(b[1])))
+                    continue
+                if signs[mode, j] != 0:
+                    score = min(score, agreement(b, order, noise[j], signs[mode, j]))
+                else:
+                    score = min(score, slides(W, drift, order, h, b))
+            if not judging:
+                continue
+            if score > best_score:
+                best, best_score, equals = mode, score, 1
+            elif score == best_score and score > DISAGREES:
+                equals += 1
+                if mode == current:
+                    best = mode
+    if equals > 1 and best_score == AGREES:
+        return MANY_MODES
+    return best
+
+
+@njit
+def slides(W, drift, order, h, b):
+    """Whether the fields of both sides point at the interface, a < 0 < b, now or next."""
+    columns = order + 1
+    small = 32.0 * EPSILON * (abs(W[drift * columns]) + abs(W[(drift + 1) * columns]))
+    for k in range(2):
+        scaled(W, drift + k, order, h, b)
+        first = first_strong(b, 0, order, small)
+        if first > order or b[first] * (2 * k - 1) < 0.0:
+            return DISAGREES
+    return AGREES

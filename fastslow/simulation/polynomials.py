@@ -1,0 +1,164 @@
+"""Roots of a step's polynomials: the first crossing of an interface, none missed.
+
+A polynomial is held by its coefficients scaled to the step, b_k = c_k h**k,
+so that the step is 0 <= s <= 1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+#: Intervals of the subdivision are not made shorter than 2 to the power of minus this.
+DEEPEST = 44
+
+
+@njit
+def horner(b, first, last, s):
+    """Value of sum b_k s**(k - first) over first <= k <= last."""
+    value = b[last]
+    for k in range(last - 1, first - 1, -1):
+        value = value * s + b[k]
+    return value
+
+
+@njit
+def slope(b, first, last, s):
+    """Derivative by s of the same sum."""
+    value = 0.0
+    for k in range(last, first, -1):
+        value = value * s + (k - first) * b[k]
+    return value
+
+
+@njit
+def excluded(b, first, last):
+    """Whether the coefficients alone prove that there is no root on (0, 1]."""
+    rest = 0.0
+    for k in range(first + 1, last + 1):
+        rest += abs(b[k])
+    return abs(b[first]) > rest
+
+
+@njit
+def first_root(b, first, last, noise, stack):
+    """First root on (0, 1] of sum b_k s**(k - first), and whether it is a touch.
+
+    The signs of the Bernstein coefficients bound the number of roots of an
+    interval from above, with equality for 0 and 1 (Descartes' rule); an
+    interval with more is halved. Two roots that cannot be told apart from a
+    touch within the noise are returned as one.
+
+    Parameters
+    ----------
+    b : float64 array
+    first, last : int
+    noise : float
+        Size below which a value of the polynomial is rounding error.
+    stack : float64 array, shape (DEEPEST + 2, > last + 3)
+        Work space.
+
+    Returns
+    -------
+    s : float
+        The root, or 2 when there is none.
+    touch : bool
+        Whether the sign is the same on both sides, as far as rounding can tell.
+    """
+    n = last - first
+    # power to Bernstein form
+    for j in range(n + 1):
+        stack[0, j] = 0.0
+    binomial = 1.0
+    for k in range(n + 1):
+        weight = 1.0
+        for j in range(k, n + 1):
+            stack[0, j] += weight * b[first + k] / binomial
+            weight = weight * (j + 1) / (j + 1 - k)
+        binomial = binomial * (n - k) / (k + 1)
+    stack[0, n + 1] = 0.0
+    stack[0, n + 2] = 1.0
+    depth = 1
+    while depth > 0:
+        row = depth - 1
+        low, wide = stack[row, n + 1], stack[row, n + 2]
+        changes, previous, largest = 0, 0.0, 0.0
+        for j in range(n + 1):
+            value = stack[row, j]
+            largest = max(largest, abs(value))
+            if value != 0.0:
+                if value * previous < 0.0:
+                    changes += 1
+                previous = value
+        ends = stack[row, 0] * stack[row, n]
+        if changes == 0:
+            if stack[row, n] == 0.0 and low + wide > 0.0:
+                return low + wide, False
+            depth -= 1
+            continue
+        if changes == 1 and ends < 0.0:
+            return refine(b, first, last, low, low + wide), False
+        if largest <= noise or depth > DEEPEST:
+            if ends < 0.0:
+                return refine(b, first, last, low, low + wide), False
+            if low + wide < 1.0:
+                return low + 0.5 * wide, True
+            return low + wide, True
+        # halve by de Casteljau; the left half goes on top of the stack
+        for j in range(n + 1):
+            stack[row + 1, j] = stack[row, j]
+        for level in range(1, n + 1):
+            for j in range(n, level - 1, -1):
+                stack[row + 1, j] = 0.5 * (stack[row + 1, j] + stack[row + 1, j - 1])
+        for level in range(1, n + 1):
+            for j in range(n - level + 1):
+                stack[row, j] = 0.5 * (stack[row, j] + stack[row, j + 1])
+        half = 0.5 * wide
+        stack[row, n + 1], stack[row, n + 2] = low + half, half
+        stack[row + 1, n + 1], stack[row + 1, n + 2] = low, half
+        depth += 1
+    return 2.0, False
+
+
+@njit
+def refine(b, first, last, low, high):
+    """The root of a sign change on [low, high] to rounding: Newton, kept inside the bracket."""
+    at_low = horner(b, first, last, low)
+    s = 0.5 * (low + high)
+    for _ in range(100):
+        value = horner(b, first, last, s)
+        if value == 0.0:
+            break
+        if (value > 0.0) == (at_low > 0.0):
+            low = s
+        else:
+            high = s
+        rate = slope(b, first, last, s)
+        new = s - value / rate if rate != 0.0 else low - 1.0
+        if not (low < new < high):
+            new = 0.5 * (low + high)
+        if new == s or abs(new - s) <= 1e-16 * abs(new):
+            s = new
+            break
+        s = new
+    return s
+
+
+@njit
+def first_strong(b, first, last, noise):
+    """Index of the first coefficient above the noise, last + 1 when none is."""
+    for k in range(first, last + 1):
+        if abs(b[k]) > noise:
+            return k
+    return last + 1
+
+
+@njit
+def first_nonzero(b, first, last):
+    """Index of the first coefficient that is not exactly zero, last + 1 when none is."""
+    return first_strong(b, first, last, 0.0)
+
+
+def work_space(order: int) -> np.ndarray:
+    """The stack that `first_root` works on."""
+    return np.empty((DEEPEST + 2, order + 4))

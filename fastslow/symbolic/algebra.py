@@ -1,0 +1,265 @@
+"""Expansion, cancelling and factoring within a budget that depends on structure alone.
+
+The same expression is treated the same way on every machine: what is past the
+budget is only expanded, and what is past expansion is left as it is.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import sympy as sp
+
+#: Longest sum, in terms, that is factored or cancelled.
+TERMS = 200
+
+#: In more than three symbols, at most this many terms times symbols.
+TERMS_MANY = 160
+
+#: With roots of symbols, which count as symbols when factoring.
+TERMS_RADICAL = 16
+
+#: Highest total degree that is factored or cancelled.
+DEGREE = 24
+
+#: Parts (nodes of the tree) of an expression that is still expanded.
+PARTS = 2500
+
+#: Most terms that an expansion may be expected to give.
+EXPANDED = 3000
+
+
+def spread(expression: sp.Expr) -> sp.Expr:
+    """Expand with exponentials kept whole; too long an expression is left as it is.
+
+    Examples
+    --------
+    >>> x, a = sp.symbols("x a")
+    >>> spread(x * (a + sp.exp(x + a)))
+    a*x + x*exp(a + x)
+    """
+    if expression.is_Atom or longer(expression, PARTS) or growth(expression) > EXPANDED:
+        return expression
+    return sp.expand(expression, power_exp=False, log=False)
+
+
+def longer(expression: sp.Basic, parts: int) -> bool:
+    """Whether the tree of an expression has more than so many parts, counted no further.
+
+    Examples
+    --------
+    >>> longer(sp.Symbol("x") + 1, 2)
+    True
+    """
+    traversal = sp.preorder_traversal(expression)
+    return any(k >= parts for k, _ in enumerate(traversal))
+
+
+def growth(expression: sp.Expr) -> float:
+    """Give an upper bound for the number of terms after expansion.
+
+    Examples
+    --------
+    >>> x, y = sp.symbols("x y")
+    >>> growth((x + y) ** 3 * (x - 1))
+    8.0
+    """
+    if expression.is_Add:
+        return sum(growth(a) for a in expression.args)
+    if expression.is_Mul:
+        return math.prod(growth(a) for a in expression.args)
+    if expression.is_Pow and expression.exp.is_Integer:
+        base, power = growth(expression.base), abs(int(expression.exp))
+        return float(math.comb(int(min(base, 1e6)) + power - 1, power)) if base > 1 else 1.0
+    return 1.0
+
+
+def generators(expression: sp.Expr) -> set[sp.Basic]:
+    """Transcendental functions in an expression."""
+    return {f for f in expression.atoms(sp.Function, sp.exp) if f.free_symbols}
+
+
+def light(expression: sp.Expr) -> bool:
+    """Whether an expression is within the budget of factoring and cancelling.
+
+    One transcendental function at most, counted as one more symbol.
+
+    Examples
+    --------
+    >>> x = sp.Symbol("x")
+    >>> light(x**3 - sp.exp(x)), light(sp.tanh(x) - sp.cosh(x / 2))
+    (True, False)
+    """
+    if longer(expression, PARTS):
+        return False
+    kinds = generators(expression)
+    if len(kinds) > 1:
+        return False
+    terms = growth(expression)
+    symbols = len(expression.free_symbols) + len(kinds)
+    if terms > TERMS:
+        terms = len(sp.Add.make_args(spread(expression)))
+    most = TERMS_MANY / symbols if symbols > 3 else TERMS
+    if irrational(expression):
+        most = min(most, TERMS_RADICAL)
+    return terms <= most and _degree(expression) <= DEGREE
+
+
+def _degree(expression: sp.Expr) -> float:
+    if expression.is_Add:
+        return max(_degree(a) for a in expression.args)
+    if expression.is_Mul:
+        return sum(_degree(a) for a in expression.args)
+    if expression.is_Pow and expression.exp.is_Rational:
+        return float(abs(expression.exp)) * _degree(expression.base)
+    return 0.0 if expression.is_number else 1.0
+
+
+def tidy(expression: sp.Expr) -> sp.Expr:
+    """Expand over one denominator and cancel where that is within the budget.
+
+    Examples
+    --------
+    >>> x = sp.Symbol("x")
+    >>> tidy((x**2 - 1) / (x - 1))
+    x + 1
+    """
+    expanded = spread(sp.sympify(expression))
+    if whole(expanded) or not light(expression):
+        return expanded
+    return spread(sp.cancel(sp.together(expanded)))
+
+
+def whole(expression: sp.Expr) -> bool:
+    """Whether no sum stands in a denominator."""
+    return all(not p.exp.is_negative or p.base.is_Symbol for p in expression.atoms(sp.Pow))
+
+
+def numerator(expression: sp.Expr) -> sp.Expr:
+    """Give the expression times its denominators.
+
+    Examples
+    --------
+    >>> x = sp.Symbol("x")
+    >>> numerator(x + 1 / (x + 1))
+    x**2 + x + 1
+    """
+    expanded = spread(sp.sympify(expression))
+    if all(not p.exp.is_negative for p in expanded.atoms(sp.Pow)) or not light(expression):
+        return expanded
+    return spread(sp.together(expanded).as_numer_denom()[0])
+
+
+def factors(expression: sp.Expr) -> tuple[sp.Expr, list[tuple[sp.Expr, int]]]:
+    """Constant and irreducible factors with powers; past the budget, the expression itself.
+
+    Examples
+    --------
+    >>> x = sp.Symbol("x")
+    >>> factors(2 * x**2 - 2)
+    (2, [(x - 1, 1), (x + 1, 1)])
+    """
+    if expression.is_number:
+        return expression, []
+    if not light(expression):
+        pieces: list[tuple[sp.Expr, int]] = []
+        constant = sp.S.One
+        for part in sp.Mul.make_args(expression):
+            base, power = part.as_base_exp()
+            if part.is_number:
+                constant *= part
+            elif power.is_Integer and power > 0:
+                pieces.append((base, int(power)))
+            else:
+                pieces.append((part, 1))
+        return constant, pieces
+    try:
+        constant, pieces = sp.factor_list(expression)
+    except sp.PolynomialError:
+        return sp.S.One, [(expression, 1)]
+    return constant, list(pieces)
+
+
+def undefined(expression: sp.Expr) -> bool:
+    """Whether a division by zero stands in an expression."""
+    return bool(expression.has(sp.nan, sp.zoo, sp.oo, -sp.oo))
+
+
+def shortest(expression: sp.Expr) -> sp.Expr:
+    """Factored or expanded, whichever takes fewer operations; as it is when past the budget.
+
+    Examples
+    --------
+    >>> x, a = sp.symbols("x a")
+    >>> shortest(x**3 - a * x**2 + a * x - a**2).func is sp.Mul
+    True
+    """
+    if not light(expression):
+        return expression
+    if generators(expression) or irrational(expression):
+        forms = [expression, spread(expression), sp.factor_terms(expression)]
+    else:
+        forms = [sp.factor(expression), spread(expression), spread(sp.cancel(expression))]
+    return min(forms, key=lambda e: (sp.count_ops(e), len(str(e))))
+
+
+def irrational(expression: sp.Expr) -> bool:
+    """Whether roots of symbols stand in an expression."""
+    return any(not p.exp.is_integer for p in expression.atoms(sp.Pow) if p.base.free_symbols)
+
+
+def determinant(matrix: sp.MatrixBase) -> sp.Expr:
+    """Give determinant of a small matrix by its first row; SymPy's own simplifies without bound.
+
+    Examples
+    --------
+    >>> determinant(sp.Matrix([[1, 2], [3, 4]]))
+    -2
+    """
+    if matrix.rows == 0:
+        return sp.S.One
+    total = sp.S.Zero
+    for k, entry in enumerate(matrix.row(0)):
+        if entry != 0:
+            total += (-1) ** k * entry * determinant(matrix.minor_submatrix(0, k))
+    return spread(total)
+
+
+def adjugate(matrix: sp.MatrixBase) -> sp.MatrixBase:
+    """Transposed cofactors, so that matrix * adjugate = determinant * identity.
+
+    Examples
+    --------
+    >>> adjugate(sp.Matrix([[1, 2], [3, 4]])).tolist()
+    [[4, -2], [-3, 1]]
+    """
+    size = matrix.rows
+    return sp.Matrix(
+        size,
+        size,
+        lambda i, j: (-1) ** (i + j) * determinant(matrix.minor_submatrix(j, i)),
+    )
+
+
+def characteristic_coefficients(matrix: sp.MatrixBase) -> tuple[sp.Expr, ...]:
+    """1, a1, …, an of the characteristic polynomial, by principal minors.
+
+    Examples
+    --------
+    >>> characteristic_coefficients(sp.Matrix([[1, 2], [3, 4]]))
+    (1, -5, -2)
+    """
+    size = matrix.rows
+    return tuple(
+        spread(
+            (-1) ** k
+            * sp.Add(
+                *(
+                    determinant(matrix.extract(list(rows), list(rows)))
+                    for rows in itertools.combinations(range(size), k)
+                )
+            )
+        )
+        for k in range(size + 1)
+    )

@@ -1,0 +1,285 @@
+"""Boundary equilibria in closed form, and the Clarke path through them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import sympy as sp
+from sympy.logic.boolalg import Boolean
+
+from fastslow.model.structure import real
+from fastslow.results.named import Named
+from fastslow.symbolic.algebra import adjugate, determinant, spread, tidy
+from fastslow.symbolic.critical import Setting
+from fastslow.symbolic.families import Family, families
+from fastslow.symbolic.inequalities import implied
+from fastslow.symbolic.location import neat
+from fastslow.symbolic.roots import Root, roots, solved_for
+from fastslow.symbolic.stability import jacobian
+from fastslow.symbolic.verification import all_vanish
+
+#: Kinds of boundary equilibria by the sign of their test.
+TYPES = {1: "persistence", -1: "non-smooth fold", 0: "degenerate"}
+
+
+@dataclass(frozen=True)
+class ClarkeForm:
+    """The path q J₁ + (1 − q) J₂ between the Jacobians on both sides, in closed form.
+
+    Leine and Nijmeijer (2004); di Bernardo, Budd, Champneys, Kowalczyk (2008).
+
+    Parameters
+    ----------
+    regions : tuple of str
+        q = 1 is ``regions[0]``.
+    weight : Symbol
+        q.
+    jacobians : tuple of sympy.Matrix, each of shape (n, n)
+    determinant, trace : sympy.Expr
+        Along the path.
+    determinants : tuple of sympy.Expr
+        Of J₁ and J₂.
+    q_zero : sympy.Expr or None
+        Where the determinant vanishes along the line through J₁ and J₂; in (0, 1) exactly
+        for a non-smooth fold.
+    q_hopf : sympy.Expr or None
+        Planar: where the trace vanishes, when both ends are not known to share its sign.
+    q_complex : tuple of sympy.Expr
+        Planar: where the eigenvalues change between real and complex.
+    """
+
+    regions: tuple[str, str]
+    weight: sp.Symbol
+    jacobians: tuple[sp.ImmutableDenseMatrix, sp.ImmutableDenseMatrix]
+    determinant: sp.Expr
+    trace: sp.Expr
+    determinants: tuple[sp.Expr, sp.Expr]
+    q_zero: sp.Expr | None
+    q_hopf: sp.Expr | None
+    q_complex: tuple[sp.Expr, ...]
+
+    @property
+    def matrix(self) -> sp.ImmutableDenseMatrix:
+        """Q J₁ + (1 − q) J₂, shape (n, n)."""
+        first, second = self.jacobians
+        return sp.ImmutableDenseMatrix(
+            (self.weight * first + (1 - self.weight) * second).applyfunc(sp.expand)
+        )
+
+
+@dataclass(frozen=True)
+class BoundaryForm:
+    """An equilibrium on an interface, in closed form.
+
+    Parameters
+    ----------
+    interface : str
+    regions : tuple of str
+        The two it joins; in a Filippov model the first is the one whose rates vanish.
+    state, parameters : Named of sympy.Expr
+    equations : tuple of sympy.Expr
+        What is left to hold, = 0; empty when the closed form is complete.
+    type : str
+        ``"persistence"``, ``"non-smooth fold"``, ``"degenerate"``, or ``"depends"``.
+    test : sympy.Expr
+        Positive for persistence, negative for a non-smooth fold: det J₁ det J₂,
+        or −CᵀN⁻¹E in a Filippov model.
+    continuous : bool
+        Whether the rates are continuous across the interface.
+    clarke : ClarkeForm or None
+        For a continuous field.
+    singular : Named
+        Region to the condition on one parameter under which its Jacobian is
+        singular here: a fold of that region meets the interface.
+    admissible : Boolean
+        When the point lies on the part of the interface between the regions.
+    possible : bool or None
+    verified : bool
+    """
+
+    interface: str
+    regions: tuple[str, str]
+    state: Named[sp.Expr]
+    parameters: Named[sp.Expr]
+    equations: tuple[sp.Expr, ...]
+    type: str
+    test: sp.Expr
+    continuous: bool
+    clarke: ClarkeForm | None
+    singular: Named[Boolean]
+    admissible: Boolean
+    possible: bool | None
+    verified: bool
+
+
+def boundary_forms(
+    interface: str, function: sp.Expr, sides: tuple[Setting, Setting], continuous: bool
+) -> list[BoundaryForm]:
+    """All boundary equilibria on an interface between two regions.
+
+    Parameters
+    ----------
+    interface : str
+    function : sympy.Expr
+        h, exact coefficients.
+    sides : tuple of Setting
+        The regions where h > 0 and where h < 0.
+    continuous : bool
+        Of a continuous field one side is enough; of a Filippov field each has its own.
+    """
+    found: list[BoundaryForm] = []
+    for own, other in (sides,) if continuous else (sides, sides[::-1]):
+        for place, left in _places(function, own):
+            outward = function if own is sides[0] else -function
+            found.append(_form(interface, outward, own, other, continuous, place, left))
+    return [f for f in found if f.admissible != sp.false]
+
+
+def _places(
+    function: sp.Expr, own: Setting
+) -> list[tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Expr, ...]]]:
+    """Where the rates of a region and h vanish: values of states and of one parameter."""
+    used = set().union(function.free_symbols, *(r.free_symbols for r in own.rates.values()))
+    best: list[tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Expr, ...]]] = []
+    for parameter in own.candidates:
+        if parameter not in used:
+            continue
+        names = (*own.states, parameter.name)
+        signs = own.signs.without(parameter)
+        others = tuple(c for c in own.candidates if c != parameter)
+        result = []
+        for family in families({**own.rates, parameter.name: function}, names, signs, others):
+            result += _solutions(family, names)
+        sign = own.signs.known.get(parameter, 0)
+        result = [
+            (place, left)
+            for place, left in result
+            if not (sign and own.signs.sign(sign * place[parameter]) in (0, -1))
+            and not any(own.signs.nonzero(e) for e in left)
+        ]
+        if result and not any(left for _, left in result):
+            return result
+        best = best or result
+    return best
+
+
+def _solutions(
+    family: Family, names: tuple[str, ...]
+) -> list[tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Expr, ...]]]:
+    unknown = family.unknown
+    options: list[Root | None] = list(family.roots) if family.roots is not None else [None]
+    found = []
+    for root in options:
+        inner = {unknown: root.value} if root is not None and unknown is not None else {}
+        state = family.elimination.state(inner, names)
+        place = {real(n): neat(e) for n, e in zip(names, state, strict=True)}
+        left = () if root is not None else family.equations
+        found.append((place, (*left, *family.condition)))
+    return found
+
+
+def _form(
+    interface: str,
+    outward: sp.Expr,
+    own: Setting,
+    other: Setting,
+    continuous: bool,
+    place: dict[sp.Symbol, sp.Expr],
+    left: tuple[sp.Expr, ...],
+) -> BoundaryForm:
+    states = [real(n) for n in own.states]
+    names = (own.region, other.region)
+    matrices = [_at(jacobian(s.rates, s.states), place) for s in (own, other)]
+    determinants = [tidy(determinant(m)) for m in matrices]
+    if continuous and determinants[0] == 0 and determinants[1] != 0:
+        # q = 1 on the side that is not singular
+        names, matrices, determinants = names[::-1], matrices[::-1], determinants[::-1]
+    if continuous:
+        test = neat(determinants[0] * determinants[1])
+        clarke = _clarke(names, matrices, determinants, own)
+    else:
+        gradient = sp.Matrix([[tidy(outward.diff(s).subs(place)) for s in states]])
+        jump = sp.Matrix(
+            [
+                tidy((other.rates[n] - own.rates[n]).subs(place, simultaneous=True))
+                for n in own.states
+            ]
+        )
+        inverse = adjugate(matrices[0])
+        slope = (gradient * inverse * jump)[0, 0]
+        test = sp.S.Zero if determinants[0] == 0 else neat(-slope / determinants[0])
+        clarke = None
+    sign = own.signs.sign(test)
+    inside = [tidy(e.subs(place, simultaneous=True)) for e in own.inside]
+    admissible = own.holds(e for e in inside if e != 0)
+    zeros = [e.subs(place, simultaneous=True) for e in (*own.rates.values(), outward)]
+    if continuous:
+        zeros += [e.subs(place, simultaneous=True) for e in other.rates.values()]
+    return BoundaryForm(
+        interface,
+        names,
+        Named("state", {s.name: place[s] for s in states}),
+        Named("parameter", {s.name: e for s, e in place.items() if s not in states}),
+        left,
+        "depends" if sign is None else TYPES[sign],
+        test,
+        continuous,
+        clarke,
+        _singular(names, determinants, own),
+        admissible,
+        implied(admissible, own.signs),
+        not left and all_vanish(zeros, own.signs),
+    )
+
+
+def _at(
+    matrix: sp.ImmutableDenseMatrix, place: Mapping[sp.Symbol, sp.Expr]
+) -> sp.ImmutableDenseMatrix:
+    here = matrix.applyfunc(lambda e: tidy(e.subs(place, simultaneous=True)))
+    return sp.ImmutableDenseMatrix(here)
+
+
+def _singular(names: tuple[str, str], determinants: list[sp.Expr], own: Setting) -> Named[Boolean]:
+    conditions: dict[str, Boolean] = {}
+    order = sorted(own.candidates, key=lambda c: c in own.geometry)
+    for name, value in zip(names, determinants, strict=True):
+        if value == 0:
+            conditions[name] = sp.true
+        elif value.is_number:
+            conditions[name] = sp.false
+        else:
+            solved = solved_for(value, order, own.signs)
+            conditions[name] = sp.Eq(value, 0) if solved is None else sp.Eq(solved[0], solved[1])
+    return Named("region", conditions)
+
+
+def _clarke(
+    names: tuple[str, str],
+    matrices: list[sp.ImmutableDenseMatrix],
+    determinants: list[sp.Expr],
+    own: Setting,
+) -> ClarkeForm:
+    first, second = matrices
+    symbols = first.free_symbols | second.free_symbols
+    weight = real("q") if real("q") not in symbols else real("q_c")
+    path = (weight * first + (1 - weight) * second).applyfunc(sp.expand)
+    one, two = determinants
+    # the jump of the Jacobian has rank one, so the determinant is affine in q
+    along = neat(weight * one + (1 - weight) * two)
+    trace = spread(path.trace())
+    difference = tidy(two - one)
+    q_zero = None if difference == 0 or one == 0 or two == 0 else neat(tidy(two / difference))
+    q_hopf, q_complex = None, ()
+    if first.rows == 2:
+        slope = trace.diff(weight)
+        ends = [own.signs.sign(spread(m.trace())) for m in matrices]
+        if slope != 0 and (None in ends or ends[0] != ends[1]):
+            q_hopf = neat(tidy(-trace.subs(weight, 0) / slope))
+        turning = spread(trace**2 - 4 * along)
+        if weight in turning.free_symbols:
+            closed = roots(turning, weight, own.signs) or []
+            q_complex = tuple(neat(r.value) for r in closed)
+    return ClarkeForm(
+        names, weight, (first, second), along, trace, (one, two), q_zero, q_hopf, q_complex
+    )

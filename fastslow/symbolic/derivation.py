@@ -1,0 +1,188 @@
+"""The derivation of a frozen model: every region, and what joins them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+from sympy.core.relational import Relational
+
+from fastslow.errors import ArgumentError
+from fastslow.model.model import Model
+from fastslow.model.structure import TIME, real
+from fastslow.results.named import Named
+from fastslow.symbolic.boundaries import BoundaryForm, boundary_forms
+from fastslow.symbolic.critical import Setting
+from fastslow.symbolic.forms import Continuum, CriticalPoint
+from fastslow.symbolic.inequalities import needed
+from fastslow.symbolic.regions import RegionForms, derive_region
+from fastslow.symbolic.signs import Signs, read_signs
+
+
+@dataclass(frozen=True)
+class Derivation:
+    """What SymPy derives from a frozen model.
+
+    Parameters
+    ----------
+    states : tuple of str
+    free : tuple of str
+        The frozen slow quantities.
+    assumptions : tuple of relations
+        Signs of parameters that were assumed, such as D > 0.
+    regions : Named of RegionForms
+        Also reached as ``law["S1"]``.
+    boundary_equilibria : tuple of BoundaryForm
+        By interface.
+    """
+
+    states: tuple[str, ...]
+    free: tuple[str, ...]
+    assumptions: tuple[Relational, ...]
+    regions: Named[RegionForms]
+    boundary_equilibria: tuple[BoundaryForm, ...]
+
+    def __getitem__(self, region: object) -> RegionForms:
+        return self.regions[region]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.regions)
+
+    def __len__(self) -> int:
+        return len(self.regions)
+
+    @property
+    def folds(self) -> tuple[CriticalPoint, ...]:
+        """Of all regions."""
+        return tuple(p for r in self.regions.values() for p in r.folds)
+
+    @property
+    def hopf(self) -> tuple[CriticalPoint, ...]:
+        """Of all regions."""
+        return tuple(p for r in self.regions.values() for p in r.hopf)
+
+    @property
+    def continua(self) -> tuple[Continuum, ...]:
+        """Of all regions."""
+        return tuple(c for r in self.regions.values() for c in r.continua)
+
+    @property
+    def verified(self) -> bool:
+        """Whether every complete closed form satisfies its equations on substitution."""
+        return all(r.verified for r in self.regions.values()) and all(
+            b.verified for b in self.boundary_equilibria if not b.equations
+        )
+
+    def to_latex(self) -> str:
+        """All of it as LaTeX paragraphs with displayed formulas."""
+        from fastslow.symbolic.typesetting import derivation_latex
+
+        return derivation_latex(self)
+
+    def _repr_latex_(self) -> str:
+        from fastslow.symbolic.typesetting import derivation_display
+
+        return derivation_display(self)
+
+    def __repr__(self) -> str:
+        from fastslow.symbolic.summary import summary
+
+        return summary(self)
+
+
+def derive(model: Model, assume: Any = None) -> Derivation:
+    """Derive equilibria, stability, folds and boundary equilibria in closed form.
+
+    Signs of parameters are assumed as they are at the model's values and are
+    listed with the result. Conditions that hold or fail only because of such a
+    sign are given in general (``A < -D**2``), with ``possible`` saying what the
+    assumptions make of them. Signs of the parameters in interfaces are kept.
+
+    Parameters
+    ----------
+    model : Model
+        A frozen model, or one without forcing and slow states.
+    assume : mapping, relation, str or an iterable of these, optional
+        Signs in place of those of the values: ``{"A": "negative"}``, ``"A < 0"``,
+        ``"A < -D**2"``; the word ``"real"`` assumes nothing.
+
+    Returns
+    -------
+    Derivation
+        Past a structural budget (degree, number of terms) a form stays
+        implicit and its note says so; the time taken plays no part.
+
+    Raises
+    ------
+    ArgumentError
+        If the model is not frozen, or an assumption cannot be read.
+    UnknownNameError
+        If an assumption names no parameter.
+
+    Examples
+    --------
+    >>> x, w, k = sp.symbols("x w k")
+    >>> law = derive(Model({x: w - k * x**3}, forcing={w: sp.sin(sp.Symbol("t"))},
+    ...     parameters={k: 2}).frozen())
+    >>> law["S1"].equilibria[0].parameter["w"], law.assumptions
+    (k*x**3, (k > 0,))
+    """
+    slow = (*model.forcing, *model.slow_states)
+    if slow:
+        raise ArgumentError(
+            f"derive: {', '.join(slow)} still move in time; expected a frozen model: "
+            "derive(model.frozen())"
+        )
+    for name, rate in model.rates.items():
+        if TIME in rate.free_symbols:
+            raise ArgumentError(f"derive: the rate of {name} contains time; expected none")
+    signs = read_signs(model.parameters, assume)
+    functions = {n: _exact(i.function) for n, i in model.interfaces.items()}
+    settings = _settings(model, functions, signs)
+    boundary: list[BoundaryForm] = []
+    for name, function in functions.items():
+        for above, below in _pairs(model, name):
+            sides = (settings[above], settings[below])
+            boundary += boundary_forms(name, function, sides, model.continuous[name])
+    found = tuple(dict.fromkeys(boundary))
+    regions = {name: derive_region(setting, found) for name, setting in settings.items()}
+    return Derivation(model.states, model.free, signs.conditions, Named("region", regions), found)
+
+
+def _settings(model: Model, functions: dict[str, sp.Expr], signs: Signs) -> dict[str, Setting]:
+    candidates = tuple(real(n) for n in (*model.free, *model.parameters))
+    moving = {real(n) for n in (*model.states, *model.free)}
+    used = set().union(set(), *(h.free_symbols for h in functions.values()))
+    geometry = tuple(sorted(used - moving, key=lambda s: s.name))
+    return {
+        name: Setting(
+            name,
+            model.states,
+            Named("state", {s: _exact(region.rates[s]) for s in model.states}),
+            tuple(
+                needed(tuple(sp.expand(region.signs[i] * functions[i]) for i in functions), signs)
+            ),
+            signs,
+            candidates,
+            geometry,
+        )
+        for name, region in model.regions.items()
+    }
+
+
+def _pairs(model: Model, interface: str) -> list[tuple[str, str]]:
+    """Regions that differ in one interface alone, the one where it is positive first."""
+    return [
+        (one.name, other.name)
+        for one in model.regions.values()
+        for other in model.regions.values()
+        if one.signs[interface] > 0
+        and [i for i in model.interfaces if one.signs[i] != other.signs[i]] == [interface]
+    ]
+
+
+def _exact(expression: sp.Expr) -> sp.Expr:
+    """With rational numbers in place of floats, so that polynomials factor."""
+    return sp.nsimplify(expression, rational=True) if expression.has(sp.Float) else expression

@@ -1,0 +1,266 @@
+"""Families of equilibria: the equations rate = 0 split into irreducible parts and solved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import sympy as sp
+
+from fastslow.model.structure import real
+from fastslow.results.named import Named
+from fastslow.symbolic.algebra import (
+    growth,
+    light,
+    numerator,
+    shortest,
+    spread,
+    tidy,
+    undefined,
+)
+from fastslow.symbolic.elimination import Elimination, Nonzero, eliminate
+from fastslow.symbolic.roots import DEGREE, Root, factors_in, roots, solved_for
+from fastslow.symbolic.signs import Signs
+
+#: Terms in all coefficients together, up to which a discriminant is formed.
+COEFFICIENTS = 12
+
+#: More branches of one set of equations than this are not split any further.
+BRANCHES = 24
+
+
+@dataclass(frozen=True)
+class Family:
+    """One irreducible set of solutions of rate = 0, or of any equations in the states.
+
+    Parameters
+    ----------
+    elimination : Elimination
+        Irreducible remaining equations, unknowns, and every other state.
+    parameter : Symbol or None
+        The parameter that the equation was solved for.
+    curve : sympy.Expr or None
+        Its value along the family, in the unknown and the other parameters.
+    roots : tuple of Root or None
+        The unknown in closed form; None where there is no short one.
+    discriminant : sympy.Expr or None
+        Of the remaining polynomial in its unknown, from degree two on.
+    condition : tuple of sympy.Expr
+        Equations without any unknown: the family exists only where they vanish.
+    note : str
+        Why it stayed implicit, and what was divided by.
+    """
+
+    elimination: Elimination
+    parameter: sp.Symbol | None = None
+    curve: sp.Expr | None = None
+    roots: tuple[Root, ...] | None = None
+    discriminant: sp.Expr | None = None
+    condition: tuple[sp.Expr, ...] = ()
+    note: str = ""
+
+    @property
+    def unknown(self) -> sp.Symbol | None:
+        """The one unknown of a univariate family."""
+        return self.elimination.unknowns[0] if self.elimination.is_univariate else None
+
+    @property
+    def equations(self) -> tuple[sp.Expr, ...]:
+        """What is left to hold, = 0."""
+        return self.elimination.remaining
+
+    def reduced(self, expression: sp.Expr) -> sp.Expr:
+        """Give an expression in the states as one in the unknowns, the parameter replaced."""
+        solved = {real(n): e for n, e in self.elimination.solved.items()}
+        inside = expression.subs(solved, simultaneous=True)
+        if self.parameter is not None and self.curve is not None:
+            inside = inside.subs(self.parameter, self.curve)
+        return tidy(inside)
+
+
+def families(
+    rates: Mapping[str, sp.Expr],
+    states: Sequence[str],
+    signs: Signs,
+    candidates: Sequence[sp.Symbol],
+) -> list[Family]:
+    """All families of solutions of rate = 0.
+
+    Parameters
+    ----------
+    rates : mapping
+        State to smooth rate, exact coefficients.
+    states : sequence of str
+    signs : Signs
+        Used to tell which coefficients may be divided by.
+    candidates : sequence of Symbol
+        Parameters that a family may be solved for, best first.
+
+    Returns
+    -------
+    list of Family
+
+    Examples
+    --------
+    >>> x, w = real("x"), real("w")
+    >>> [f.curve for f in families({"x": w - x**3}, ["x"], Signs({}), [w])]
+    [x**3]
+    """
+    return [_solved(elimination, signs, candidates) for elimination in split(rates, states, signs)]
+
+
+def split(rates: Mapping[str, sp.Expr], states: Sequence[str], signs: Signs) -> list[Elimination]:
+    """Eliminate, and take reducible equations apart, until every equation is irreducible.
+
+    Examples
+    --------
+    >>> x, y, r = map(real, "xyr")
+    >>> [e.solved for e in split({"x": y - x, "y": r * x - x * y}, ["x", "y"], Signs({}))]
+    [{x: 0, y: 0}, {x: r, y: r}]
+    """
+    whole = eliminate(rates, states, nonzero=signs.nonzero)
+    done: list[Elimination] = []
+    waiting = [whole]
+    while waiting:
+        current = waiting.pop(0)
+        pieces = _pieces(current)
+        if pieces is None or len(done) + len(waiting) > BRANCHES:
+            done.append(current)
+            continue
+        waiting = [_again(current, equations, signs) for equations in pieces] + waiting
+    return [_ordered(e, states) for e in _generic(done, signs)]
+
+
+def _ordered(elimination: Elimination, states: Sequence[str]) -> Elimination:
+    solved = {n: elimination.solved[n] for n in states if n in elimination.solved}
+    return replace(elimination, solved=Named("solved state", solved))
+
+
+def _pieces(current: Elimination) -> list[tuple[sp.Expr, ...]] | None:
+    for row, equation in enumerate(current.remaining):
+        found = [f for f, _ in factors_in(equation, current.unknowns)]
+        if not found:
+            continue
+        rest = (current.remaining[:row], current.remaining[row + 1 :])
+        if len(found) > 1:
+            return [(*rest[0], f, *rest[1]) for f in found]
+        multiple = tidy(numerator(equation) / found[0])
+        if multiple.free_symbols & set(current.unknowns):
+            return [(*rest[0], found[0], *rest[1])]
+    return None
+
+
+def _again(current: Elimination, equations: tuple[sp.Expr, ...], signs: Signs) -> Elimination:
+    return _joined(current, equations, signs.nonzero)
+
+
+def _joined(current: Elimination, equations: Sequence[sp.Expr], nonzero: Nonzero) -> Elimination:
+    """Eliminate further among equations in the unknowns of an elimination."""
+    names = [u.name for u in current.unknowns]
+    padded = [*equations, *[sp.Integer(0)] * (len(names) - len(equations))]
+    extra = padded[len(names) :]
+    further = eliminate(
+        dict(zip(names, padded, strict=False)),
+        names,
+        nonzero=nonzero,
+    )
+    place = {real(n): e for n, e in further.solved.items()}
+    solved = {n: spread(e.subs(place, simultaneous=True)) for n, e in current.solved.items()}
+    left = tuple(e for e in (tidy(x.subs(place, simultaneous=True)) for x in extra) if e != 0)
+    return Elimination(
+        (*further.remaining, *left),
+        further.unknowns,
+        Named("solved state", {**solved, **dict(further.solved)}),
+        (*current.divisors, *further.divisors),
+    )
+
+
+def _generic(found: list[Elimination], signs: Signs) -> list[Elimination]:
+    """Where several polynomial equations are left, divide by coefficients with states in them."""
+    result: list[Elimination] = []
+    for current in found:
+        several = len(current.remaining) > 1 and len(current.unknowns) > 1
+        if not several or not current.is_polynomial:
+            result.append(current)
+            continue
+        further = _joined(current, current.remaining, lambda e: e != 0)
+        if len(further.unknowns) == len(current.unknowns):
+            result.append(current)
+            continue
+        pieces = _pieces(further)
+        again = [further] if pieces is None else [_again(further, p, signs) for p in pieces]
+        result += [e for e in again if _keeps(e, e.divisors[len(current.divisors) :])]
+    return result
+
+
+def _keeps(elimination: Elimination, divided: Sequence[sp.Expr]) -> bool:
+    """Whether no divisor vanishes all along the family, which would make it spurious."""
+    place = {real(n): e for n, e in elimination.solved.items()}
+    left = [tidy(d.subs(place, simultaneous=True)) for d in divided]
+    if elimination.is_univariate:
+        (equation,), unknowns = elimination.remaining, elimination.unknowns
+        both = [e for e in left if equation.is_polynomial(*unknowns) and light(e) and e != 0]
+        left += [sp.rem(numerator(e), equation, *unknowns) for e in both if light(equation)]
+    return all(e != 0 and not undefined(e) for e in left)
+
+
+def _solved(elimination: Elimination, signs: Signs, candidates: Sequence[sp.Symbol]) -> Family:
+    unknowns = elimination.unknowns
+    free = [e for e in elimination.remaining if not e.free_symbols & set(unknowns)]
+    bound = [e for e in elimination.remaining if e.free_symbols & set(unknowns)]
+    slim = Elimination(tuple(bound), unknowns, elimination.solved, elimination.divisors)
+    note = ""
+    divided = [d for d in elimination.divisors if not signs.nonzero(d)]
+    if divided:
+        note = "found where " + ", ".join(f"{d} ≠ 0" for d in divided)
+    if not slim.is_univariate:
+        if bound:
+            note = _and(note, f"{len(bound)} equations are left; given as they are")
+        return Family(slim, condition=tuple(free), note=note)
+    (equation,), (unknown,) = slim.remaining, unknowns
+    closed = roots(equation, unknown, signs)
+    if closed is not None and sp.degree(equation, unknown) == 1:
+        return _linear(slim, closed[0].value, free, note, signs)
+    solved = solved_for(equation, [c for c in candidates if c != unknown], signs)
+    parameter, curve, slope = solved if solved else (None, None, None)
+    if slope is not None and not signs.nonzero(slope) and slope.free_symbols & {unknown}:
+        note = _and(note, f"the curve holds where {slope} ≠ 0")
+    discriminant = None
+    if equation.is_polynomial(unknown):
+        poly = sp.Poly(equation, unknown)
+        size = sum(growth(spread(c)) for c in poly.all_coeffs())
+        if poly.degree() == 2 or (2 < poly.degree() <= 5 and size <= COEFFICIENTS):
+            discriminant = shortest(sp.discriminant(poly))
+        if closed is None and curve is None:
+            long = "past the budget" if poly.degree() > DEGREE else "no short radicals"
+            note = _and(note, f"degree {poly.degree()} in {unknown}: {long}; given implicitly")
+    elif curve is None:
+        note = _and(note, f"not a polynomial in {unknown}; given implicitly")
+    return Family(
+        slim,
+        parameter,
+        curve,
+        tuple(closed) if closed is not None else None,
+        discriminant,
+        tuple(free),
+        note,
+    )
+
+
+def _linear(
+    slim: Elimination, value: sp.Expr, free: list[sp.Expr], note: str, signs: Signs
+) -> Family:
+    """Give a family whose last unknown has one value, except where its slope vanishes."""
+    (equation,), (unknown,) = slim.remaining, slim.unknowns
+    slope = spread(equation).diff(unknown)
+    solved = {n: tidy(e.subs(unknown, value)) for n, e in slim.solved.items()}
+    whole = Elimination(
+        (), (), Named("solved state", {**solved, unknown.name: value}), slim.divisors
+    )
+    if not signs.nonzero(slope):
+        note = _and(note, f"found where {slope} ≠ 0")
+    return Family(whole, condition=tuple(free), note=note)
+
+
+def _and(first: str, second: str) -> str:
+    return f"{first}; {second}" if first else second

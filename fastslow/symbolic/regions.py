@@ -1,0 +1,360 @@
+"""Everything that is derived inside one region."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy as sp
+from sympy.logic.boolalg import Boolean
+
+from fastslow.model.structure import real
+from fastslow.results.named import Named
+from fastslow.symbolic.algebra import spread, tidy
+from fastslow.symbolic.boundaries import BoundaryForm
+from fastslow.symbolic.critical import (
+    Setting,
+    cusps,
+    folds,
+    hopf_points,
+    state_at,
+)
+from fastslow.symbolic.families import Family, families
+from fastslow.symbolic.forms import Continuum, CriticalPoint, EquilibriumForm
+from fastslow.symbolic.inequalities import (
+    bounds,
+    conjunction,
+    implied,
+    isolated,
+    positive,
+    sign_within,
+)
+from fastslow.symbolic.location import neat
+from fastslow.symbolic.roots import Root, roots, solved_for
+from fastslow.symbolic.signs import Signs
+from fastslow.symbolic.stability import (
+    EIGENVALUE,
+    Stability,
+    jacobian,
+    stability_of_matrix,
+    stability_of_tests,
+)
+from fastslow.symbolic.verification import all_vanish
+
+
+@dataclass(frozen=True)
+class RegionForms:
+    """What SymPy derives in one region.
+
+    Parameters
+    ----------
+    name : str
+    conditions : tuple of Boolean
+        The inequalities that describe the region; those that follow from the
+        others under the assumptions are left out.
+    rates : Named of sympy.Expr
+    equations : tuple of sympy.Expr
+        The eliminated equations, family by family, = 0.
+    equilibria : tuple of EquilibriumForm
+    continua : tuple of Continuum
+    jacobian : sympy.Matrix, shape (n, n)
+    stability : Stability
+        Of the Jacobian anywhere in the region, in states.
+    folds, branch_points, cusps, hopf : tuple of CriticalPoint
+    no_hopf : str
+        Why there is no Hopf point, where that is proved; else empty.
+    boundary_equilibria : tuple of BoundaryForm
+        Those that join this region to another.
+    notes : tuple of str
+        What stayed implicit, and why.
+    """
+
+    name: str
+    conditions: tuple[Boolean, ...]
+    rates: Named[sp.Expr]
+    equations: tuple[sp.Expr, ...]
+    equilibria: tuple[EquilibriumForm, ...]
+    continua: tuple[Continuum, ...]
+    jacobian: sp.ImmutableDenseMatrix
+    stability: Stability
+    folds: tuple[CriticalPoint, ...]
+    branch_points: tuple[CriticalPoint, ...]
+    cusps: tuple[CriticalPoint, ...]
+    hopf: tuple[CriticalPoint, ...]
+    no_hopf: str
+    boundary_equilibria: tuple[BoundaryForm, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def trace(self) -> sp.Expr:
+        """Of the Jacobian."""
+        return self.stability.trace
+
+    @property
+    def determinant(self) -> sp.Expr:
+        """Of the Jacobian."""
+        return self.stability.determinant
+
+    @property
+    def characteristic_polynomial(self) -> sp.Expr:
+        """Of the Jacobian, in λ."""
+        return self.stability.characteristic_polynomial
+
+    @property
+    def routh_hurwitz(self) -> tuple[sp.Expr, ...]:
+        """All positive iff an equilibrium is asymptotically stable."""
+        return self.stability.routh_hurwitz
+
+    @property
+    def verified(self) -> bool:
+        """Whether every complete closed form satisfies its equations."""
+        points = (*self.folds, *self.branch_points, *self.cusps, *self.hopf)
+        return (
+            all(e.verified for e in self.equilibria)
+            and all(c.verified for c in self.continua if not c.equations)
+            and all(p.verified for p in points if not p.equations)
+        )
+
+
+def derive_region(setting: Setting, boundary: tuple[BoundaryForm, ...]) -> RegionForms:
+    """Derive one region.
+
+    Parameters
+    ----------
+    setting : Setting
+    boundary : tuple of BoundaryForm
+        The boundary equilibria of its interfaces.
+    """
+    signs = setting.signs
+    found = families(setting.rates, setting.states, signs, setting.candidates)
+    matrix = jacobian(setting.rates, setting.states)
+    whole = stability_of_matrix(matrix, signs.sign, lambda e: isolated(e, signs, ()))
+    isolated_ones = [f for f in found if not _continuous(f)]
+    forms: list[EquilibriumForm] = []
+    points: list[CriticalPoint] = []
+    reasons: list[str] = []
+    for family in isolated_ones:
+        inner = _stability_along(family, whole, setting)
+        forms += _equilibria(family, inner, setting)
+        others = [f for f in isolated_ones if f is not family]
+        points += folds(family, others, whole, setting) + cusps(family, setting)
+        reason = _no_hopf(inner)
+        if reason:
+            reasons.append(reason)
+        else:
+            points += hopf_points(family, whole, setting)
+    points = list(dict.fromkeys(points))
+    no_hopf = reasons[0] if reasons and len(reasons) == len(isolated_ones) else ""
+    if not isolated_ones:
+        no_hopf = _no_hopf(whole)
+
+    def coded(code: str) -> tuple[CriticalPoint, ...]:
+        return tuple(p for p in points if p.code == code)
+
+    return RegionForms(
+        setting.region,
+        region_conditions(setting),
+        setting.rates,
+        tuple(dict.fromkeys(e for f in found for e in (*f.equations, *f.condition))),
+        tuple(forms),
+        tuple(_continuum(f, whole, setting) for f in found if _continuous(f)),
+        matrix,
+        whole,
+        coded("LP"),
+        coded("BP"),
+        coded("CP"),
+        coded("HB"),
+        no_hopf,
+        tuple(b for b in boundary if setting.region in b.regions),
+        tuple(dict.fromkeys(f.note for f in found if f.note)),
+    )
+
+
+def region_conditions(setting: Setting) -> tuple[Boolean, ...]:
+    """Give the region's inequalities without those that follow from the others."""
+    order = [*map(real, setting.states), *setting.candidates]
+    return tuple(isolated(e, setting.signs, order) for e in setting.inside)
+
+
+def _continuous(family: Family) -> bool:
+    return len(family.elimination.unknowns) > len(family.equations)
+
+
+def _stability_along(family: Family, whole: Stability, setting: Setting) -> Stability:
+    """Give the stability of a family, with signs that hold all along it inside the region."""
+    unknown = family.unknown
+    inside = [family.reduced(e) for e in setting.inside]
+
+    def sign(expression: sp.Expr) -> int | None:
+        if unknown is None:
+            return setting.signs.with_positive(*_open(inside, setting.signs)).sign(expression)
+        return sign_within(expression, unknown, inside, setting.signs)
+
+    def condition(expression: sp.Expr) -> Boolean:
+        if family.elimination.unknowns:
+            return sp.Gt(expression, 0)
+        return positive(expression, setting.signs, setting.candidates)
+
+    tests = tuple(family.reduced(e) for e in whole.routh_hurwitz)
+    coefficients = tuple(family.reduced(a) for a in whole.coefficients)
+    return stability_of_tests(coefficients, tests, sign, condition)
+
+
+def _open(inside: list[sp.Expr], signs: Signs) -> list[sp.Expr]:
+    return [e for e in inside if signs.sign(e) is None]
+
+
+def _no_hopf(stability: Stability) -> str:
+    """Why no pair of eigenvalues of a family can be imaginary inside the region."""
+    test = stability.hopf_test
+    if test is None:
+        return "one state has one real eigenvalue"
+    sign = stability.signs[stability.routh_hurwitz.index(test)]
+    if sign in (1, -1):
+        if stability.dimension == 2:
+            return f"the trace is {stability.trace}, never zero in the region"
+        return f"the Hurwitz determinant {test} is never zero in the region"
+    if stability.signs[stability.dimension - 1] == -1 and stability.dimension == 2:
+        return f"the determinant {stability.determinant} is negative in the region"
+    return ""
+
+
+def _equilibria(family: Family, inner: Stability, setting: Setting) -> list[EquilibriumForm]:
+    """One form for each closed root, else one for the whole family."""
+    if family.unknown is None:
+        return [_form(family, None, inner, setting)]
+    if family.roots is None or (family.curve is not None and not _short(family)):
+        return [_form(family, None, inner, setting)]
+    return [_form(family, root, inner, setting) for root in family.roots]
+
+
+def _short(family: Family) -> bool:
+    """Whether the equation of a family is at most quadratic in its unknown."""
+    unknown = family.unknown
+    (equation,) = family.equations
+    return unknown is not None and bool(sp.degree(equation, unknown) <= 2)
+
+
+def _form(family: Family, root: Root | None, inner: Stability, setting: Setting) -> EquilibriumForm:
+    unknown, signs = family.unknown, setting.signs
+    place = {} if root is None or unknown is None else {unknown: root.value}
+    state = state_at(family, setting, place)
+    curve = {} if family.parameter is None else {family.parameter: family.curve}
+    explicit = root is not None or not family.elimination.unknowns
+    values = {real(n): e for n, e in state.items()}
+    if explicit:
+        exists = setting.real([root.radicand]) if root is not None else sp.true
+        inside = [tidy(e.subs(values, simultaneous=True)) for e in setting.inside]
+        admissible = conjunction((exists, setting.holds(inside)), signs)
+        zeros = [r.subs(values, simultaneous=True) for r in setting.rates.values()]
+        verified = all_vanish(zeros, signs)
+        stability = _at(inner, place, setting, inside) if place else inner
+        possible = implied(admissible, signs)
+    else:
+        exists, stability, possible = sp.true, inner, None
+        inside = [family.reduced(e) for e in setting.inside]
+        order = [*family.elimination.unknowns, *setting.candidates]
+        admissible = sp.And(*(isolated(e, signs, order) for e in inside))
+        verified = _verified_implicit(family, state, setting)
+    kind = "explicit" if explicit else "curve" if family.curve is not None else "implicit"
+    return EquilibriumForm(
+        setting.region,
+        kind,
+        state,
+        () if explicit else family.elimination.unknowns,
+        () if explicit else family.equations,
+        Named("parameter", {s.name: e for s, e in curve.items() if e is not None and not explicit}),
+        exists,
+        admissible,
+        possible,
+        None if explicit else _range(family, inside, setting),
+        stability,
+        family.discriminant,
+        verified,
+        family.note,
+    )
+
+
+def _at(
+    inner: Stability, place: dict[sp.Symbol, sp.Expr], setting: Setting, inside: list[sp.Expr]
+) -> Stability:
+    """Stability at a closed root, with what holds all along the family kept."""
+    known = setting.signs.with_positive(*_open(inside, setting.signs))
+    tests = tuple(tidy(e.subs(place)) for e in inner.routh_hurwitz)
+    settled = {e: s for e, s in zip(tests, inner.signs, strict=True) if s is not None}
+    return stability_of_tests(
+        tuple(tidy(a.subs(place)) for a in inner.coefficients),
+        tests,
+        lambda e: settled[e] if e in settled else known.sign(e),
+        lambda e: positive(e, setting.signs, setting.candidates),
+    )
+
+
+def _verified_implicit(family: Family, state: Named[sp.Expr], setting: Setting) -> bool:
+    """Whether the rates vanish on the curve, or are multiples of what is left."""
+    values = {real(n): e for n, e in state.items()}
+    rates = [r.subs(values, simultaneous=True) for r in setting.rates.values()]
+    if family.parameter is not None and family.curve is not None:
+        return all_vanish([r.subs(family.parameter, family.curve) for r in rates], setting.signs)
+    unknowns = family.elimination.unknowns
+    left = [e for e in family.equations if e.is_polynomial(*unknowns)]
+    for rate in rates:
+        numerator = spread(sp.together(rate).as_numer_denom()[0])
+        if numerator == 0 or any(spread(numerator - k * e) == 0 for e in left for k in (1, -1)):
+            continue
+        if len(left) != len(family.equations) or not numerator.is_polynomial(*unknowns):
+            ratios = [sp.cancel(numerator / e) for e in family.equations]
+            if any(r.free_symbols.isdisjoint(unknowns) for r in ratios):
+                continue
+            return False
+        if sp.reduced(numerator, left, *unknowns)[1] != 0:
+            return False
+    return True
+
+
+def _range(family: Family, inside: list[sp.Expr], setting: Setting) -> Boolean | None:
+    """Give the admissible part of a curve that is monotone in its region, by its parameter."""
+    unknown, curve, parameter = family.unknown, family.curve, family.parameter
+    if unknown is None or curve is None or parameter is None:
+        return None
+    rising = sign_within(tidy(curve.diff(unknown)), unknown, inside, setting.signs)
+    if rising not in (1, -1):
+        return None
+    lower, upper = bounds(unknown, inside, setting.signs)
+    conditions = []
+    for ends, above in ((lower, rising > 0), (upper, rising < 0)):
+        for end in ends:
+            level = neat(curve.subs(unknown, end))
+            conditions.append(parameter > level if above else parameter < level)
+    return sp.And(*conditions) if conditions else None
+
+
+def _continuum(family: Family, whole: Stability, setting: Setting) -> Continuum:
+    place: dict[sp.Symbol, sp.Expr] = {}
+    left = []
+    for equation in family.condition:
+        solved = solved_for(equation.subs(place), setting.candidates, setting.signs)
+        if solved is None:
+            left.append(equation)
+        else:
+            place[solved[0]] = solved[1]
+    state = state_at(family, setting, place)
+    values = {**place, **{real(n): e for n, e in state.items()}}
+    inside = tuple(tidy(e.subs(values, simultaneous=True)) for e in setting.inside)
+    order = [*family.elimination.unknowns, *setting.candidates]
+    polynomial = tidy(whole.characteristic_polynomial.subs(values, simultaneous=True))
+    eigenvalues: list[sp.Expr] = []
+    for factor, power in sp.factor_list(polynomial, EIGENVALUE)[1]:
+        if factor.has(EIGENVALUE):
+            closed = roots(factor, EIGENVALUE, setting.signs)
+            eigenvalues += [r.value for r in closed or () for _ in range(power)]
+    rates = [r.subs(values, simultaneous=True) for r in setting.rates.values()]
+    return Continuum(
+        setting.region,
+        family.elimination.unknowns,
+        state,
+        Named("parameter", {s.name: e for s, e in place.items()}),
+        (*left, *family.equations),
+        tuple(isolated(e, setting.signs, order) for e in inside),
+        tuple(eigenvalues),
+        not left and not family.equations and all_vanish(rates, setting.signs),
+    )

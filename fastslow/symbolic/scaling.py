@@ -1,0 +1,362 @@
+"""Scales that make chosen coefficients one, and what becomes of the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.model import Model
+from fastslow.model.structure import TIME, real
+from fastslow.results.named import Named
+from fastslow.symbolic.algebra import light, spread
+from fastslow.symbolic.verification import vanishes
+
+
+def scale_symbol(name: str) -> sp.Symbol:
+    """Give the positive symbol that stands for a scale while it is sought."""
+    return sp.Symbol(f"{name}_s", positive=True)
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """A model in scaled quantities: quantity = scale × scaled quantity.
+
+    Parameters
+    ----------
+    time : sympy.Expr
+        The scale of time.
+    scales : Named of sympy.Expr
+        Of every state and slow quantity.
+    regions : Named
+        Region name to the smooth rates of the scaled states in scaled time.
+    interfaces : Named of sympy.Expr
+        Each switching function in scaled quantities, divided by its own scale.
+    forcing : Named of sympy.Expr
+        Law of each scaled slow quantity in scaled time.
+    """
+
+    time: sp.Expr
+    scales: Named[sp.Expr]
+    regions: Named[Named[sp.Expr]]
+    interfaces: Named[sp.Expr]
+    forcing: Named[sp.Expr]
+
+
+def nondimensionalise(
+    model: Model,
+    ones: Iterable[tuple[Any, Any]],
+    *,
+    region: str | None = None,
+    replace: Mapping[Any, Any] | None = None,
+) -> Scaling:
+    """Find the scales that make chosen coefficients one, and scale the model with them.
+
+    Every state, every slow quantity and time gets a scale. A coefficient is a
+    product of powers of scales, so that the conditions are linear in the
+    logarithms of the scales and are solved exactly.
+
+    Parameters
+    ----------
+    model : Model
+    ones : iterable of (state, term)
+        The coefficient of the term (a product of states and slow quantities)
+        in the scaled rate of the state is to be one in size.
+    region : str, optional
+        Whose rates are meant; the first region by default.
+    replace : mapping, optional
+        Parameters to expressions that may hold scales (`scale_symbol`), to study
+        what a wrongly scaled factor does.
+
+    Returns
+    -------
+    Scaling
+
+    Raises
+    ------
+    ArgumentError
+        If a term is missing from its rate, or the conditions leave a scale open
+        or contradict.
+    UnknownNameError
+        For a state or region that the model does not have.
+
+    Examples
+    --------
+    >>> x, r, K = sp.symbols("x r K")
+    >>> logistic = Model({x: r * x * (1 - x / K)}, parameters={r: 2, K: 3})
+    >>> scaled = nondimensionalise(logistic, [("x", "x"), ("x", "x**2")])
+    >>> scaled.time, scaled.scales, scaled.regions["S1"]
+    (1/r, {x: K}, {x: -x**2 + x})
+    """
+    quantities = [*model.states, *model.slow_states, *model.forcing, *model.free]
+    scale = {n: scale_symbol(n) for n in (*quantities, "t")}
+    positive = {real(n): sp.Symbol(n, positive=v > 0) for n, v in model.parameters.items() if v > 0}
+    place = {real(n): scale[n] * real(n) for n in quantities}
+    given = {real(str(k)): sp.sympify(e) for k, e in (replace or {}).items()}
+
+    def scaled(state: str, rate: sp.Expr) -> sp.Expr:
+        inside = rate.xreplace(given).xreplace(positive).subs(place, simultaneous=True)
+        return inside * scale["t"] / scale[state]
+
+    whose = region if region is not None else next(iter(model.regions))
+    smooth = model.regions[whose].rates
+    names = {n: real(n) for n in quantities}
+    rows, sides = [], []
+    for state, term in ones:
+        if str(state) not in smooth:
+            raise unknown_name("state", state, smooth)
+        monomial = sp.sympify(term, locals=names)
+        monomial = monomial.xreplace({s: real(s.name) for s in monomial.free_symbols})
+        found = _coefficient(scaled(str(state), smooth[str(state)]), monomial, names.values())
+        if found == 0:
+            raise ArgumentError(f"the rate of {state} has no term {monomial} in region {whose}")
+        powers = found.as_powers_dict()
+        rows.append([powers.get(s, sp.S.Zero) for s in scale.values()])
+        sides.append(found / sp.Mul(*(s ** powers.get(s, 0) for s in scale.values())))
+    values = dict(zip(scale.values(), _solved(rows, sides, list(scale)), strict=True))
+    back = {s: real(s.name) for s in positive.values()}
+
+    def finish(expression: sp.Expr) -> sp.Expr:
+        return sp.sympify(_neat(expression.subs(values, simultaneous=True)).xreplace(back))
+
+    lengths = {n: values[scale[n]] for n in quantities}
+    clock = {TIME: values[scale["t"]] * TIME}
+    return Scaling(
+        values[scale["t"]].xreplace(back),
+        Named("quantity", {n: e.xreplace(back) for n, e in lengths.items()}),
+        Named(
+            "region",
+            {
+                r.name: Named("state", {n: finish(scaled(n, e)) for n, e in r.rates.items()})
+                for r in model.regions.values()
+            },
+        ),
+        Named(
+            "interface",
+            {
+                n: finish(_unit(i.function.xreplace(positive).subs(place), names.values()))
+                for n, i in model.interfaces.items()
+            },
+        ),
+        Named(
+            "slow quantity",
+            {
+                n: finish(law.xreplace(positive).subs(clock, simultaneous=True) / lengths[n])
+                for n, law in model.forcing.items()
+            },
+        ),
+    )
+
+
+def _coefficient(rate: sp.Expr, monomial: sp.Expr, quantities: Iterable[sp.Symbol]) -> sp.Expr:
+    """Size of the coefficient of a monomial, as one product."""
+    moving = list(quantities)
+    total = sp.S.Zero
+    for term in sp.Add.make_args(sp.expand(rate)):
+        constant, rest = term.as_independent(*moving)
+        if rest == monomial:
+            total += constant
+    size = sp.powsimp(sp.factor(sp.together(total))) if light(total) else total
+    return sp.Mul(*(-f if f.is_negative else f for f in sp.Mul.make_args(size)))
+
+
+def _solved(rows: list[list[sp.Expr]], sides: list[sp.Expr], names: list[str]) -> list[sp.Expr]:
+    """Scales S with Π S_j**rows[i][j] · sides[i] = 1, by elimination on the exponents."""
+    matrix = sp.Matrix(rows)
+    _, pivots = matrix.rref()
+    if len(pivots) < len(names):
+        loose = [n for k, n in enumerate(names) if k not in pivots]
+        raise ArgumentError(
+            f"the conditions leave the scale of {', '.join(loose)} open; expected "
+            f"{len(names)} independent coefficients, received {len(rows)}"
+        )
+    if len(rows) > len(names):
+        raise ArgumentError(
+            f"expected {len(names)} coefficients, one for each scale, received {len(rows)}"
+        )
+    inverse = matrix.inv()
+    return [
+        _neat(sp.Mul(*(side ** (-inverse[j, i]) for i, side in enumerate(sides))))
+        for j in range(len(names))
+    ]
+
+
+def _unit(function: sp.Expr, moving: Iterable[sp.Symbol]) -> sp.Expr:
+    """Give a switching function divided by the coefficient of its first moving term."""
+    for symbol in moving:
+        slope = sp.expand(function).diff(symbol)
+        if slope != 0 and symbol not in slope.free_symbols:
+            return sp.expand(function / slope)
+    return function
+
+
+def _neat(expression: sp.Expr) -> sp.Expr:
+    """Powers of positive symbols gathered, each term on its own."""
+    terms = [sp.powdenest(sp.powsimp(t)) for t in sp.Add.make_args(sp.expand(expression))]
+    return sp.Add(*terms)
+
+
+@dataclass(frozen=True)
+class Identification:
+    """A scaled model compared with a dimensionless one, term by term.
+
+    Parameters
+    ----------
+    values : Named of sympy.Expr
+        Parameter of the target to its expression in those of the scaled model.
+    contradictions : tuple of sympy.Expr
+        What would have to vanish besides; empty where the two agree.
+    """
+
+    values: Named[sp.Expr]
+    contradictions: tuple[sp.Expr, ...]
+
+    @property
+    def agrees(self) -> bool:
+        return not self.contradictions
+
+
+def identify(
+    scaling: Scaling,
+    target: Model,
+    names: Mapping[Any, Any],
+    *,
+    regions: Mapping[str, str] | None = None,
+) -> Identification:
+    """Read the parameters of a dimensionless model off a scaled one.
+
+    Rates, interfaces and laws are compared coefficient by coefficient.
+
+    Parameters
+    ----------
+    scaling : Scaling
+    target : Model
+    names : mapping
+        Quantity of the scaled model to that of the target; interfaces follow.
+    regions : mapping, optional
+        Region of the scaled model to that of the target; the same name by default.
+
+    Returns
+    -------
+    Identification
+
+    Examples
+    --------
+    >>> x, y, r, K, a = sp.symbols("x y r K a")
+    >>> logistic = Model({x: r * x * (1 - x / K)}, parameters={r: 2, K: 3})
+    >>> scaled = nondimensionalise(logistic, [("x", "x"), ("x", "x**2")])
+    >>> identify(scaled, Model({y: a * y - y**2}, parameters={a: 1}), {"x": "y"}).values
+    {a: 1}
+    """
+    rename = {real(str(k)): real(str(v)) for k, v in names.items()}
+    wanted = [real(n) for n in target.parameters]
+    inner = {s: sp.Dummy(s.name, real=True) for s in wanted}
+    moving = [*(real(n) for n in (*target.states, *target.free, *target.forcing)), TIME]
+    gaps: list[sp.Expr] = []
+    for region, rates in scaling.regions.items():
+        other = target.regions[(regions or {}).get(region, region)].rates
+        for state, rate in rates.items():
+            mine = other[rename.get(real(state), real(state)).name].xreplace(inner)
+            gaps += _coefficients(rate.xreplace(rename) - mine, moving)
+    for function, interface in zip(
+        scaling.interfaces.values(), target.interfaces.values(), strict=True
+    ):
+        gaps += _coefficients(
+            function.xreplace(rename) - _unit(interface.function.xreplace(inner), moving), moving
+        )
+    for slow, law in scaling.forcing.items():
+        mine = target.forcing[rename.get(real(slow), real(slow)).name].xreplace(inner)
+        gaps += _law_gaps(law, mine)
+    values, left = _matched(gaps, list(inner.values()))
+    return Identification(
+        Named("parameter", {s.name: values[d] for s, d in inner.items() if d in values}),
+        tuple(left),
+    )
+
+
+def _coefficients(difference: sp.Expr, moving: Iterable[sp.Symbol]) -> list[sp.Expr]:
+    poly = sp.Poly(sp.expand(difference), *moving)
+    return [c for c in poly.coeffs() if c != 0]
+
+
+def _law_gaps(law: sp.Expr, other: sp.Expr) -> list[sp.Expr]:
+    """Amplitudes and arguments of two laws in time compared, term by term."""
+    gaps = []
+    mine, yours = _waves(law), _waves(other)
+    for kind in dict.fromkeys([*mine, *yours]):
+        one = mine.get(kind, (sp.S.Zero, sp.S.Zero))
+        two = yours.get(kind, (sp.S.Zero, sp.S.Zero))
+        gaps += [a - b for a, b in zip(one, two, strict=True) if a != b]
+    return gaps
+
+
+def _waves(law: sp.Expr) -> dict[Any, tuple[sp.Expr, sp.Expr]]:
+    """Terms of a law by the function of time in them: (amplitude, its argument)."""
+    found: dict[Any, tuple[sp.Expr, sp.Expr]] = {}
+    for term in sp.Add.make_args(sp.expand(law)):
+        amplitude, wave = term.as_independent(TIME)
+        kind = wave.func if isinstance(wave, sp.Function) else wave
+        argument = wave.args[0] if isinstance(wave, sp.Function) else sp.S.Zero
+        before = found.get(kind, (sp.S.Zero, argument))
+        found[kind] = (before[0] + amplitude, argument)
+    return found
+
+
+def _matched(
+    gaps: list[sp.Expr], unknowns: list[sp.Symbol]
+) -> tuple[dict[sp.Symbol, sp.Expr], list[sp.Expr]]:
+    """Solve the gaps one unknown at a time, the plainest first; what is left must vanish."""
+    values: dict[sp.Symbol, sp.Expr] = {}
+    left = [sp.expand(g.subs(TIME, 1)) for g in gaps]
+    while True:
+        left = [g for g in left if not vanishes(g)]
+        options = [
+            (len(g.free_symbols & set(unknowns)), k, u)
+            for k, g in enumerate(left)
+            for u in unknowns
+            if u in g.free_symbols and not g.diff(u).free_symbols & set(unknowns)
+        ]
+        if not options:
+            return values, left
+        _, k, unknown = min(options, key=lambda o: (o[0], o[1], o[2].name))
+        gap = left.pop(k)
+        value = spread(-gap.subs(unknown, 0) / gap.diff(unknown))
+        values = {u: e.subs(unknown, value) for u, e in values.items()} | {unknown: value}
+        left = [sp.expand(g.subs(unknown, value)) for g in left]
+
+
+def disagreements(one: Mapping[str, Any], other: Mapping[str, Any]) -> Named[sp.Expr]:
+    """Ratios, other to one, of the entries of two scalings that differ.
+
+    Parameters
+    ----------
+    one, other : mapping
+        Name to expression, of scales or of dimensionless parameters.
+
+    Returns
+    -------
+    Named of sympy.Expr
+        Empty where both agree identically.
+
+    Raises
+    ------
+    UnknownNameError
+        If one has an entry that the other has not.
+
+    Examples
+    --------
+    >>> k, J = sp.symbols("k J", positive=True)
+    >>> disagreements({"A": J * k, "B": J}, {"A": J * k**2, "B": J})
+    {A: k}
+    """
+    found = {}
+    for name, value in one.items():
+        if name not in other:
+            raise unknown_name("entry", name, other)
+        mine, yours = sp.sympify(value), sp.sympify(other[name])
+        if not vanishes(mine - yours):
+            found[name] = sp.powsimp(sp.cancel(yours / mine))
+    return Named("entry", found)
