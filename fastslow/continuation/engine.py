@@ -243,3 +243,50 @@ def evaluate(address, modes, points, parameters, width):  # type: ignore[no-unty
     for k in range(points.shape[0]):
         call_address(address, modes[k], points[k], parameters, result[k])
     return result
+
+
+@njit(cache=True, error_model="numpy")
+def newton_from(  # type: ignore[no-untyped-def]
+    address, mode, parameters, starts, value, width, iterations
+):
+    """Newton's method at a fixed last component from many starts.
+
+    A step longer than ten times the state's size is shortened to it.
+
+    Returns
+    -------
+    states : ndarray, shape (m, n)
+        Where each start led.
+    converged : ndarray of bool, shape (m,)
+    """
+    count, n = starts.shape
+    states = starts.copy()
+    converged = np.zeros(count, dtype=np.bool_)
+    u = np.empty(n + 1)
+    out = np.empty(width)
+    matrix = np.empty((n, n))
+    right = np.empty(n)
+    for k in range(count):
+        u[:n] = starts[k]
+        u[n] = value
+        for _ in range(iterations):
+            call_address(address, mode, u, parameters, out)
+            for i in range(n):
+                right[i] = -out[i]
+                for j in range(n):
+                    matrix[i, j] = out[n + i * (n + 1) + j]
+            if not solve(matrix, right):
+                break
+            length = 0.0
+            size = 1.0
+            for i in range(n):
+                length = max(length, abs(right[i]))
+                size = max(size, abs(u[i]))
+            shrink = min(1.0, 10.0 * size / length) if length > 0.0 else 1.0
+            for i in range(n):
+                u[i] += shrink * right[i]
+            if length <= 1e-7 * size:
+                converged[k] = True
+                break
+        states[k] = u[:n]
+    return states, converged

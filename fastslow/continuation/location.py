@@ -66,7 +66,7 @@ def newton(
         slopes = _differenced(equations, z, scale)
         if not np.all(np.isfinite(slopes)):
             return z, float("inf"), False
-        correction = np.linalg.lstsq(slopes * scale, -value, rcond=1e-14)[0]
+        correction = _solved(slopes * scale, -value)
         z = z + correction * scale
         value = equations(z)
         size = float(np.abs(correction).max())
@@ -75,6 +75,13 @@ def newton(
         least = size
     residual = float(np.abs(value).max()) if np.all(np.isfinite(value)) else float("inf")
     return z, residual, bool(size < 1e-8 and np.isfinite(residual))
+
+
+def _solved(matrix: Array, right: Array) -> Array:
+    """Least-norm solution, with every equation brought to size one first."""
+    size = np.abs(matrix).max(axis=1)
+    size[size == 0] = 1.0
+    return np.asarray(np.linalg.lstsq(matrix / size[:, None], right / size, rcond=1e-14)[0])
 
 
 def _differenced(equations: Callable[[Array], Array], z: Array, scale: Array) -> Array:
@@ -110,7 +117,7 @@ def with_condition(
         matrix = np.vstack([slopes, gradient]) * scale
         if not (np.all(np.isfinite(right)) and np.all(np.isfinite(matrix))):
             return Located(u, float("inf"), False, np.empty(0), float("inf"))
-        correction = np.linalg.lstsq(matrix, -right, rcond=1e-14)[0]
+        correction = _solved(matrix, -right)
         u = u + correction * scale
         size = float(np.abs(correction).max())
         if size < 1e-16 or (size < 1e-10 and size >= 0.5 * least):

@@ -45,6 +45,14 @@ def special_points(
         *_marks(field, piece, window, marks),
     ]
     found = [d for d in found if _between(d.located.u, piece, d.row, window)]
+    # where two branches cross the parameter may turn as well: that is no fold
+    crossings = [d.located.u for d in found if d.code == "BP"]
+    found = [
+        d
+        for d in found
+        if d.code != "LP"
+        or all(np.abs((d.located.u - c) / window.scale).max() > 1e-4 for c in crossings)
+    ]
     return sorted(found, key=lambda d: (d.row, _ahead(d.located.u, piece, d.row, window)))
 
 

@@ -166,24 +166,29 @@ class RegionEquations:
         if not (np.isfinite(found.residual) and found.correction < 1e-6):
             return None
         rates, slopes = self.field.curve(self.region, found.u)
-        terms = np.abs(slopes) @ np.maximum(1.0, np.abs(found.u))
+        terms = np.abs(slopes[:, :-1]) @ np.maximum(1.0, np.abs(found.u[:-1]))
         small = np.abs(rates) <= 1e-9 * np.maximum(1.0, terms)
         moved = np.abs(found.u[:-1] - state) / scale[:-1]
-        return found.u[:-1] if small.all() and moved.max() < 1e6 else None
+        there = abs(found.u[-1] - value) <= 1e-12 * scale[-1]
+        return found.u[:-1] if there and small.all() and moved.max() < 1e6 else None
 
     def _searched(self, value: float) -> list[Array]:
         """Newton's method from many states, a fixed sequence spread over several scales."""
-        n = self.field.n
+        from fastslow.continuation.engine import newton_from
+
+        field, n = self.field, self.field.n
         generator = np.random.default_rng(20231)
         spread = 10.0 ** generator.uniform(-2, 1.5, (STARTS, 1))
-        starts = [np.zeros(n), *(generator.standard_normal((STARTS, n)) * spread)]
-        found: list[Array] = []
-        for start in starts:
-            with np.errstate(all="ignore"):
-                solved = self.corrected(start, value)
-            if solved is not None and not any(_same(solved, other) for other in found):
-                found.append(solved)
-        return sorted(found, key=lambda s: tuple(s))
+        starts = np.vstack([np.zeros(n), generator.standard_normal((STARTS, n)) * spread])
+        states, converged = newton_from(
+            field.compiled.address, self.region, field.values, starts, value,
+            field.compiled.size, 100,
+        )  # fmt: skip
+        distinct: list[Array] = []
+        for state in states[converged]:
+            if not any(np.abs(state - o).max() < 1e-5 * max(1.0, np.abs(o).max()) for o in distinct):
+                distinct.append(state)
+        return sorted(self._polished(value, distinct), key=lambda s: tuple(s))
 
 
 def real_roots(coefficients: Array) -> list[float]:

@@ -22,7 +22,7 @@ from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import Corrector, Diagram
-from fastslow.results.points import Equilibrium
+from fastslow.results.points import Equilibrium, SpecialPoint
 
 Array = NDArray[np.float64]
 
@@ -255,16 +255,28 @@ def _passes(
 
 
 def _labelled(branches: list[Branch]) -> tuple[Branch, ...]:
-    """Labels LP1, LP2, … in order along the branches of a diagram."""
+    """Labels LP1, LP2, … in order along the branches; a shared branch point has one label."""
     counts: dict[str, int] = {}
+    shared: list[SpecialPoint] = []
     done = []
     for branch in branches:
         points = []
         for point in branch.special:
-            counts[point.code] = counts.get(point.code, 0) + 1
-            points.append(replace(point, label=f"{point.code}{counts[point.code]}"))
+            known = next((s for s in shared if point.code == "BP" and _near(s, point)), None)
+            if known is None:
+                counts[point.code] = counts.get(point.code, 0) + 1
+            label = known.label if known else f"{point.code}{counts[point.code]}"
+            points.append(replace(point, label=label))
+            if point.code == "BP":
+                shared.append(points[-1])
         done.append(replace(branch, special=tuple(points)))
     return tuple(done)
+
+
+def _near(one: SpecialPoint, other: SpecialPoint) -> bool:
+    first = np.array([*one.state, *one.parameters.values()])
+    second = np.array([*other.state, *other.parameters.values()])
+    return bool(np.all(np.abs(first - second) <= 1e-7 * np.maximum(1.0, np.abs(first))))
 
 
 def _interface_values(model: Model) -> dict[str, tuple[str, float]]:

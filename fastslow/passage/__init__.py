@@ -1,0 +1,1 @@
+"""Slow passage: a trajectory measured against an equilibrium diagram."""

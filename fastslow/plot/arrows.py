@@ -9,8 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
-from fastslow.plot.style import root
-
 Values = NDArray[np.float64]
 
 #: Pixels between the two points that give an arrow its direction.
@@ -36,7 +34,7 @@ def draw_arrows(
     """
     if len(x) < 2 or not along[-1] > along[0]:
         return ()
-    root(ax).draw_without_rendering()
+    ax.autoscale_view()
     pixels = ax.transData.transform(np.column_stack([x, y]))
     frame = ax.get_window_extent()
     drawn = []
@@ -57,7 +55,7 @@ def draw_arrows(
                     "arrowstyle": "-|>",
                     "color": colour,
                     "linewidth": 0.0,
-                    "mutation_scale": 7.0,
+                    "mutation_scale": 8.0,
                     "shrinkA": 0.0,
                     "shrinkB": 0.0,
                 },

@@ -19,11 +19,27 @@ Values = Mapping[str, tuple[str, float]]
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """The interfaces and regions drawn across one axis."""
+    """The interfaces and regions drawn across one axis.
 
-    lines: tuple[Line2D, ...]
-    fills: tuple[Polygon | Rectangle, ...]
-    names: tuple[Text, ...]
+    Parameters
+    ----------
+    lines : tuple of Line2D
+        The interfaces.
+    fills : tuple of Polygon or Rectangle
+        The regions.
+    names : tuple of Text
+        The regions' names, to be placed by `fastslow.plot.labels.place`.
+    spans : tuple of (float, float)
+        Where each named region begins and ends along the axis.
+    vertical : bool
+        Whether the state is on the horizontal axis.
+    """
+
+    lines: tuple[Line2D, ...] = ()
+    fills: tuple[Polygon | Rectangle, ...] = ()
+    names: tuple[Text, ...] = ()
+    spans: tuple[tuple[float, float], ...] = ()
+    vertical: bool = False
 
 
 def draw_bands(
@@ -50,17 +66,18 @@ def draw_bands(
     """
     levels = sorted(value for name, value in values.values() if name == state)
     if not levels:
-        return Bands((), (), ())
+        return Bands(vertical=vertical)
     low, high = ax.get_xlim() if vertical else ax.get_ylim()
     line, fill = (ax.axvline, ax.axvspan) if vertical else (ax.axhline, ax.axhspan)
     edges = np.clip([low, *levels, high], low, high)
     shown = len(levels) == len(values) and len(regions) == len(levels) + 1
-    fills, names = [], []
+    fills, names, spans = [], [], []
     for number, (start, stop) in enumerate(zip(edges[-2::-1], edges[:0:-1], strict=True)):
         if stop > start:
             fills.append(fill(start, stop, facecolor=BANDS[number % 3], edgecolor="none", zorder=0))
             if shown and (stop - start) > 0.08 * (high - low):
                 names.append(_name(ax, regions[number], (start + stop) / 2, vertical))
+                spans.append((float(start), float(stop)))
     lines = tuple(
         line(level, color=GREY, linewidth=0.5, zorder=1) for level in levels if low < level < high
     )
@@ -68,16 +85,11 @@ def draw_bands(
         ax.set_xlim(low, high)
     else:
         ax.set_ylim(low, high)
-    return Bands(lines, tuple(fills), tuple(names))
+    return Bands(lines, tuple(fills), tuple(names), tuple(spans), vertical)
 
 
 def _name(ax: Axes, text: str, middle: float, vertical: bool) -> Text:
-    if vertical:
-        return ax.text(
-            middle, 0.98, text, transform=ax.get_xaxis_transform(),
-            ha="center", va="top", fontsize=SMALL, color=GREY, zorder=1.5,
-        )  # fmt: skip
-    return ax.text(
-        0.985, middle, text, transform=ax.get_yaxis_transform(),
-        ha="right", va="center", fontsize=SMALL, color=GREY, zorder=1.5,
-    )  # fmt: skip
+    at = (middle, 0.95) if vertical else (0.95, middle)
+    frame = ax.get_xaxis_transform() if vertical else ax.get_yaxis_transform()
+    look = {"ha": "center", "va": "center", "fontsize": SMALL, "color": GREY, "zorder": 1.5}
+    return ax.text(*at, text, transform=frame, **look)

@@ -104,6 +104,34 @@ def diagram(
     """
     state = state_name(diagram.states, x)
     own, ax = ax is None, axes_for(ax)
+    drawn = draw_branches(
+        ax,
+        diagram,
+        state,
+        label=label,
+        virtual=virtual,
+        interfaces=interfaces,
+        color=color,
+        **style,
+    )
+    if legend and drawn.handles:
+        drawn = replace(drawn, legend=key(ax, drawn.handles, own))
+    place(ax, drawn.labels, [] if drawn.legend is None else [drawn.legend], [drawn.bands])
+    return drawn
+
+
+def draw_branches(
+    ax: Axes,
+    diagram: Diagram,
+    state: str,
+    *,
+    label: bool,
+    virtual: bool,
+    interfaces: bool,
+    color: str = BRANCH,
+    **style: Any,
+) -> DiagramDrawing:
+    """Draw a diagram without a legend, its labels not placed yet; arguments as for `diagram`."""
     lines: list[Line2D] = []
     for branch in diagram.branches:
         if branch.admissible or virtual:
@@ -114,14 +142,10 @@ def diagram(
     ax.set_xlabel(typeset(diagram.parameter))
     ax.set_ylabel(typeset(state))
     ax.set_xlim(diagram.over)
-    bands = Bands((), (), ())
+    bands = Bands()
     if interfaces:
         bands = draw_bands(ax, state, diagram.interface_values, diagram.regions)
-    drawn = DiagramDrawing(ax, state, tuple(lines), markers, labels, bands, None)
-    if legend and drawn.handles:
-        drawn = replace(drawn, legend=key(ax, drawn.handles, own))
-    place(ax, labels, [] if drawn.legend is None else [drawn.legend])
-    return drawn
+    return DiagramDrawing(ax, state, tuple(lines), markers, labels, bands, None)
 
 
 def runs(branch: Branch) -> Iterator[tuple[str, slice]]:

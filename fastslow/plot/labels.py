@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
-from matplotlib.text import Annotation
+from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
+from fastslow.plot.bands import Bands
 from fastslow.plot.style import BLACK, SMALL, root
 
 Points = NDArray[np.float64]
@@ -22,6 +23,10 @@ Corner = Literal[
 ]
 CORNERS: tuple[Corner, ...] = get_args(Corner)
 TURNS = np.deg2rad([45, 135, -45, -135, 90, -90, 0, 180, 22, 158, -22, -158])
+
+#: Where the name of a region may stand: across its band, and along it in parts of the axes.
+DEPTHS = (0.5, 0.25, 0.75)
+SIDES = (0.95, 0.05, 0.8, 0.2, 0.65, 0.35, 0.5)
 REACH = (7.0, 10.0, 14.0, 19.0, 25.0)
 
 
@@ -40,7 +45,12 @@ def tag(ax: Axes, text: str, at: tuple[float, float]) -> Annotation:
     )
 
 
-def place(ax: Axes, tags: Sequence[Annotation], taken: Sequence[Artist] = ()) -> None:
+def place(
+    ax: Axes,
+    tags: Sequence[Annotation],
+    taken: Sequence[Artist] = (),
+    bands: Sequence[Bands] = (),
+) -> None:
     """Move labels off the curves, off each other, into the axes, and nearest to their own points.
 
     Parameters
@@ -51,14 +61,16 @@ def place(ax: Axes, tags: Sequence[Annotation], taken: Sequence[Artist] = ()) ->
         Labels with offsets in points.
     taken : sequence of Artist
         What else must not be covered, e.g. a legend.
+    bands : sequence of Bands
+        Whose names are moved too, along and within their regions.
     """
-    if not tags:
+    if not tags and not any(b.names for b in bands):
         return
     root(ax).draw_without_rendering()
     frame = ax.get_window_extent()
     ink = covered(ax)
     boxes = [artist.get_window_extent() for artist in taken]
-    anchors = ax.transData.transform([label.xy for label in tags])
+    anchors = ax.transData.transform(np.reshape([label.xy for label in tags], (-1, 2)))
     pixels = root(ax).dpi / 72.0
     for label, anchor in zip(tags, anchors, strict=True):
         label.set_position((0.0, 0.0))
@@ -75,6 +87,31 @@ def place(ax: Axes, tags: Sequence[Annotation], taken: Sequence[Artist] = ()) ->
                     best = cost, offset
         label.set_position(best[1])
         boxes.append(centred.translated(best[1][0] * pixels, best[1][1] * pixels))
+    for drawn in bands:
+        for name, span in zip(drawn.names, drawn.spans, strict=True):
+            _settle(name, span, drawn.vertical, frame, ink, boxes)
+
+
+def _settle(
+    name: Text,
+    span: tuple[float, float],
+    vertical: bool,
+    frame: Bbox,
+    ink: Points,
+    boxes: list[Bbox],
+) -> None:
+    """Move the name of a region to a free place in its band, at an edge of the axes if it can."""
+    best: tuple[float, tuple[float, float]] = (np.inf, name.get_position())
+    for depth in DEPTHS:
+        for side in SIDES:
+            inside = span[0] + depth * (span[1] - span[0])
+            at = (inside, side) if vertical else (side, inside)
+            name.set_position(at)
+            cost = _cost(name.get_window_extent().padded(1.0), frame, ink, boxes)
+            if cost < best[0]:
+                best = cost, at
+    name.set_position(best[1])
+    boxes.append(name.get_window_extent().padded(1.0))
 
 
 def _nearer_to_another(box: Bbox, anchor: Points, anchors: Points) -> int:

@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.plot.arrows import draw_arrows, length_along
-from fastslow.plot.bands import Bands, draw_bands
+from fastslow.plot.bands import Bands, Values, draw_bands
 from fastslow.plot.style import MOTION, VERMILION, Drawing, axes_for, typeset
 from fastslow.results.trajectories import Trajectory
 
-Values = NDArray[np.float64]
+Array = NDArray[np.float64]
+
+LINE: dict[str, Any] = {"linewidth": 0.8, "zorder": 3.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +31,9 @@ class MotionDrawing(Drawing):
     ax : Axes
     x, y : str
         What the axes show.
-    line : Line2D
-        The trajectory.
+    lines : tuple of Line2D
+        The trajectory; in a phase portrait earlier periods, if there are any,
+        and the last one.
     crossings : Line2D or None
         One dot for each crossing of an interface.
     arrows : tuple of Annotation
@@ -41,7 +44,7 @@ class MotionDrawing(Drawing):
 
     x: str
     y: str
-    line: Line2D
+    lines: tuple[Line2D, ...]
     crossings: Line2D | None
     arrows: tuple[Annotation, ...]
     bands: tuple[Bands, ...]
@@ -53,7 +56,7 @@ def time_series(
     *,
     ax: Axes | None = None,
     crossings: bool = True,
-    interfaces: bool = True,
+    interfaces: Values | None = None,
     color: str = MOTION,
     **style: Any,
 ) -> MotionDrawing:
@@ -68,8 +71,9 @@ def time_series(
         Axes to draw into; new ones of a column's width (85 mm) otherwise.
     crossings : bool
         Whether to mark the crossings of interfaces.
-    interfaces : bool
-        Whether to draw interfaces and regions.
+    interfaces : mapping, optional
+        Interface to (state, value), as a diagram's ``interface_values``: these
+        are drawn, with the regions between them.
     color : str
         Colour of the trajectory.
     **style
@@ -86,14 +90,14 @@ def time_series(
     """
     name = quantity(run, x, 0)
     ax = axes_for(ax, height=50 / 25.4)
-    values = run[name]
-    (line,) = ax.plot(run.t, values, **_look(color, style))
+    look = {"color": color, "label": "trajectory", **LINE, **style}
+    lines = tuple(ax.plot(run.t, run[name], **look))
     dots = _dots(ax, run, "t", name) if crossings else None
     ax.set_xlabel(typeset("t"))
     ax.set_ylabel(typeset(name))
     ax.set_xlim(float(run.t[0]), float(run.t[-1]))
-    bands = _bands(ax, run, None, name) if interfaces else ()
-    return MotionDrawing(ax, "t", name, line, dots, (), bands)
+    bands = _bands(ax, run, (None, name), interfaces)
+    return MotionDrawing(ax, "t", name, lines, dots, (), bands)
 
 
 def phase_portrait(
@@ -103,7 +107,7 @@ def phase_portrait(
     *,
     ax: Axes | None = None,
     crossings: bool = True,
-    interfaces: bool = True,
+    interfaces: Values | None = None,
     arrows: int = 3,
     color: str = MOTION,
     **style: Any,
@@ -120,8 +124,9 @@ def phase_portrait(
         Axes to draw into; new ones of a column's width (85 mm) otherwise.
     crossings : bool
         Whether to mark the crossings of interfaces.
-    interfaces : bool
-        Whether to draw interfaces and regions.
+    interfaces : mapping, optional
+        Interface to (state, value), as a diagram's ``interface_values``: these
+        are drawn, with the regions between them.
     arrows : int
         How many arrow heads show the direction.
     color : str
@@ -140,40 +145,53 @@ def phase_portrait(
     ArgumentError
         If there is only one quantity to draw.
     """
-    names = quantities(run)
+    names = run.columns
     if len(names) < 2:
         raise ArgumentError(f"a phase portrait needs two quantities, received {names[0]} alone")
     if len(run.states) == 1 and x is None and y is None:
         x, y = names[1], names[0]
     across, up = quantity(run, x, 0), quantity(run, y, 1)
     ax = axes_for(ax)
-    (line,) = ax.plot(run[across], run[up], **_look(color, style))
+    lines = draw_motion(ax, run.t, run[across], run[up], run.period, color, style)
     dots = _dots(ax, run, across, up) if crossings else None
     ax.set_xlabel(typeset(across))
     ax.set_ylabel(typeset(up))
-    bands = _bands(ax, run, across, up) if interfaces else ()
-    u, v = run[across], run[up]
+    bands = _bands(ax, run, (across, up), interfaces)
+    u, v = lines[-1].get_data()
     fractions = (np.arange(arrows) + 0.5) / max(arrows, 1)
     heads = draw_arrows(ax, u, v, length_along(ax, u, v), fractions.tolist(), color)
-    return MotionDrawing(ax, across, up, line, dots, heads, bands)
-
-
-def quantities(run: Trajectory) -> list[str]:
-    """Everything of a trajectory that can stand on an axis: states, then slow quantities."""
-    return [*run.states, *(name for name in run.forcing if name not in run.states)]
+    return MotionDrawing(ax, across, up, lines, dots, heads, bands)
 
 
 def quantity(run: Trajectory, name: object, default: int) -> str:
     """The name of a state or slow quantity, by default by its position."""
-    names = quantities(run)
     if name is None:
-        return names[default]
-    if str(name) not in names:
-        raise unknown_name("state or slow quantity", name, names)
+        return run.columns[default]
+    if str(name) not in run.columns:
+        raise unknown_name("state or slow quantity", name, run.columns)
     return str(name)
 
 
-def at_crossings(run: Trajectory, name: str) -> Values:
+def draw_motion(
+    ax: Axes,
+    t: Array,
+    x: Array,
+    y: Array,
+    period: float | None,
+    color: str,
+    style: dict[str, Any],
+) -> tuple[Line2D, ...]:
+    """Draw a curve in time, what comes before its last period faintly."""
+    look = {"color": color, **LINE, **style}
+    last = 0
+    if period is not None:
+        last = max(int(np.searchsorted(t, t[-1] - period, side="right")) - 1, 0)
+    earlier = {"label": "earlier periods", **look, "alpha": 0.35, "zorder": 2.9}
+    lines = ax.plot(x[: last + 1], y[: last + 1], **earlier) if last > 0 else []
+    return (*lines, *ax.plot(x[last:], y[last:], **{"label": "trajectory", **look}))
+
+
+def at_crossings(run: Trajectory, name: str) -> Array:
     """Time, a state or a slow quantity at every crossing, shape (number of crossings,)."""
     times = np.array([c.time for c in run.crossings])
     if name == "t":
@@ -184,7 +202,7 @@ def at_crossings(run: Trajectory, name: str) -> Values:
     return np.interp(times, run.t, run[name])
 
 
-def draw_dots(ax: Axes, x: Values, y: Values) -> Line2D | None:
+def draw_dots(ax: Axes, x: Array, y: Array) -> Line2D | None:
     """Mark crossings of interfaces by small dots."""
     if not len(x):
         return None
@@ -207,14 +225,12 @@ def _dots(ax: Axes, run: Trajectory, x: str, y: str) -> Line2D | None:
     return draw_dots(ax, at_crossings(run, x), at_crossings(run, y))
 
 
-def _look(color: str, style: dict[str, Any]) -> dict[str, Any]:
-    return {"color": color, "linewidth": 0.8, "zorder": 3.0, "label": "trajectory", **style}
-
-
-def _bands(ax: Axes, run: Trajectory, across: str | None, up: str) -> tuple[Bands, ...]:
-    upright = () if across is None else (_band(ax, run, across, True),)
-    return (*upright, _band(ax, run, up, False))
-
-
-def _band(ax: Axes, run: Trajectory, state: str, vertical: bool) -> Bands:
-    return draw_bands(ax, state, run.interface_values, run.regions, vertical=vertical)
+def _bands(
+    ax: Axes, run: Trajectory, axes: tuple[str | None, str], interfaces: Values | None
+) -> tuple[Bands, ...]:
+    """Bands across the horizontal and the vertical axis, where these show a state."""
+    return tuple(
+        draw_bands(ax, state, interfaces or {}, run.regions, vertical=vertical)
+        for state, vertical in zip(axes, (True, False), strict=True)
+        if state is not None
+    )

@@ -11,7 +11,7 @@ from matplotlib.legend import Legend
 from fastslow.plot.branches import state_name
 from fastslow.plot.labels import legend_below, place
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
-from fastslow.plot.passages import OverlayDrawing, overlay
+from fastslow.plot.passages import OverlayDrawing, draw_passage
 from fastslow.plot.style import FULL, MM, TEXT, dressed, new_figure, save
 from fastslow.results.overlays import Overlay
 
@@ -86,10 +86,12 @@ def panel(
         ax.set_title(f"({letter})", loc="left", fontsize=TEXT)
     if title:
         figure.suptitle(title, fontsize=TEXT)
-    series = time_series(lay.run, name, ax=axes[0])
-    portrait = phase_portrait(lay.run, ax=axes[1])
-    laid = overlay(lay, name, ax=axes[2], legend=False)
+    values = lay.diagram.interface_values
+    series = time_series(lay.run, name, ax=axes[0], interfaces=values)
+    portrait = phase_portrait(lay.run, ax=axes[1], interfaces=values)
+    laid = draw_passage(axes[2], lay, name)
     legend = legend_below(laid.ax, laid.handles, 4)
-    # the legend took room from the axes: the labels are placed anew
-    place(laid.ax, laid.diagram.labels)
+    place(axes[0], [], bands=series.bands)
+    place(axes[1], [], bands=portrait.bands)
+    place(axes[2], laid.diagram.labels, bands=[laid.diagram.bands])
     return PanelDrawing(figure, series, portrait, laid, legend)

@@ -14,9 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
 from fastslow.plot.arrows import draw_arrows
-from fastslow.plot.branches import DiagramDrawing, diagram, state_name
+from fastslow.plot.branches import DiagramDrawing, draw_branches, state_name
 from fastslow.plot.labels import key, place
-from fastslow.plot.motions import at_crossings, draw_dots
+from fastslow.plot.motions import at_crossings, draw_dots, draw_motion
 from fastslow.plot.style import MOTION, TRANSITIONS, Drawing, axes_for
 from fastslow.results.overlays import Overlay
 
@@ -36,8 +36,8 @@ class OverlayDrawing(Drawing):
         The state on the vertical axis.
     diagram : DiagramDrawing
         The branches beneath.
-    line : Line2D
-        The trajectory.
+    lines : tuple of Line2D
+        The trajectory: earlier periods, if there are any, and the last one.
     crossings : Line2D or None
         One dot for each crossing of an interface.
     transitions : tuple of Line2D
@@ -49,7 +49,7 @@ class OverlayDrawing(Drawing):
 
     state: str
     diagram: DiagramDrawing
-    line: Line2D
+    lines: tuple[Line2D, ...]
     crossings: Line2D | None
     transitions: tuple[Line2D, ...]
     arrows: tuple[Annotation, ...]
@@ -59,7 +59,7 @@ class OverlayDrawing(Drawing):
     def handles(self) -> list[Artist]:
         """What a legend shows: branches, special points, trajectory, crossings, transitions."""
         dots = () if self.crossings is None else (self.crossings,)
-        return [*self.diagram.handles, self.line, *dots, *self.transitions]
+        return [*self.diagram.handles, *self.lines[::-1], *dots, *self.transitions]
 
 
 def overlay(
@@ -114,31 +114,54 @@ def overlay(
     """
     name = state_name(lay.diagram.states, state)
     own, ax = ax is None, axes_for(ax)
+    drawn = draw_passage(
+        ax,
+        lay,
+        name,
+        label=label,
+        crossings=crossings,
+        interfaces=interfaces,
+        virtual=virtual,
+        color=color,
+        **style,
+    )
+    if legend:
+        drawn = replace(drawn, legend=key(ax, drawn.handles, own))
+    below, taken = drawn.diagram, [] if drawn.legend is None else [drawn.legend]
+    place(ax, below.labels, taken, [below.bands])
+    return drawn
+
+
+def draw_passage(
+    ax: Axes,
+    lay: Overlay,
+    name: str,
+    *,
+    label: bool = True,
+    crossings: bool = True,
+    interfaces: bool = True,
+    virtual: bool = False,
+    color: str = MOTION,
+    **style: Any,
+) -> OverlayDrawing:
+    """Draw an overlay without a legend, its labels not placed yet; arguments as for `overlay`."""
     values = lay.state[:, lay.diagram.states.index(name)]
-    look = {"color": color, "linewidth": 0.8, "zorder": 3.0, "label": "trajectory", **style}
-    (line,) = ax.plot(lay.slow, values, **look)
+    lines = draw_motion(ax, lay.time, lay.slow, values, lay.run.period, color, style)
     dots = None
     if crossings:
         dots = draw_dots(ax, at_crossings(lay.run, lay.parameter), at_crossings(lay.run, name))
     changes = _transitions(ax, lay, lay.diagram.states.index(name))
-    # after the trajectory, so that the limits of the bands take it in
-    below = diagram(
-        lay.diagram,
-        name,
-        ax=ax,
-        label=label,
-        legend=False,
-        virtual=virtual,
-        interfaces=interfaces,
+    # after the trajectory, so that the bands take its limits in
+    below = draw_branches(
+        ax, lay.diagram, name, label=label, virtual=virtual, interfaces=interfaces
     )
-    last = _last_period(lay)
-    travel = np.r_[0.0, np.cumsum(np.abs(np.diff(lay.slow[last])))]
-    heads = draw_arrows(ax, lay.slow[last], values[last], travel, ARROWS, color)
-    drawn = OverlayDrawing(ax, name, below, line, dots, changes, heads, None)
-    if legend:
-        drawn = replace(drawn, legend=key(ax, drawn.handles, own))
-    place(ax, below.labels, [] if drawn.legend is None else [drawn.legend])
-    return drawn
+    for line in below.lines:
+        # wide enough to be seen beneath a trajectory that follows it
+        line.set_linewidth(1.6 * line.get_linewidth())
+    slow, height = lines[-1].get_data()
+    travel = np.r_[0.0, np.cumsum(np.abs(np.diff(slow)))]
+    heads = draw_arrows(ax, slow, height, travel, ARROWS, color)
+    return OverlayDrawing(ax, name, below, lines, dots, changes, heads, None)
 
 
 def _transitions(ax: Axes, lay: Overlay, index: int) -> tuple[Line2D, ...]:
@@ -151,19 +174,11 @@ def _transitions(ax: Axes, lay: Overlay, index: int) -> tuple[Line2D, ...]:
                 [t.state[index] for t in met],
                 linestyle="none",
                 marker=marker,
-                markersize=6.5 if marker == "*" else 4.0,
-                markerfacecolor=colour,
-                markeredgecolor="black",
-                markeredgewidth=0.4,
+                markersize=7.0 if marker == "*" else 5.5,
+                markerfacecolor=colour if marker == "*" else "none",
+                markeredgecolor="black" if marker == "*" else colour,
+                markeredgewidth=0.4 if marker == "*" else 1.2,
                 zorder=5.5,
                 label=text,
             )
     return tuple(drawn)
-
-
-def _last_period(lay: Overlay) -> slice:
-    """Rows of the last period, or all where there is none."""
-    period = lay.run.period
-    if period is None:
-        return slice(0, len(lay.time))
-    return slice(int(np.searchsorted(lay.time, lay.time[-1] - period)), len(lay.time))

@@ -41,7 +41,7 @@ MARKERS: dict[str, tuple[str, str]] = {
 TRANSITIONS: dict[str, tuple[str, str, str]] = {
     "jump": ("*", VERMILION, "jump at a fold"),
     "crossing": ("D", ORANGE, "passage of a boundary equilibrium"),
-    "change": ("X", GREY, "other change of sheet"),
+    "change": ("s", GREY, "other change of sheet"),
 }
 
 #: Light fills of the regions, in turn.

@@ -81,7 +81,7 @@ class Overlay:
     run : Trajectory
     time, slow, distance : ndarray, shape (N,)
         Times, the slow quantity there, and the distance of the state from the
-        followed sheet (in units of the diagram's extent of each state).
+        followed sheet (each state in units of the extent it has in the run or the diagram).
     state : ndarray, shape (N, n)
         The fast states at those times.
     sheets : tuple of StableSheet

@@ -9,6 +9,7 @@ from fastslow.compiled.pointers import call_address
 from fastslow.simulation.modes import (
     EPSILON,
     MANY_MODES,
+    NOT_DEFINED,
     choose_mode,
     interface_noise,
     scaled,
@@ -86,6 +87,25 @@ def find_event(address, layout, signs, mode, inputs, parameters, W, h, on, noise
             best, interface, touched = s, j, touch
             depth = undoing(b, order, s, size)
     return best, interface, touched, depth
+
+
+@njit
+def holds(address, layout, mode, inputs, parameters, W, part, tol, work):
+    """Whether the rates at the end of a step are the derivatives of its series."""
+    n_states, order = layout[0], layout[4]
+    columns = order + 1
+    ahead = np.empty(inputs.shape[0])
+    ahead[0] = inputs[0] + part
+    for i in range(n_states):
+        ahead[1 + i] = horner(W[i * columns : (i + 1) * columns], 0, order, part)
+    call_address(address, mode, ahead, parameters, work)
+    for i in range(n_states):
+        row = i * columns
+        rate = work[row + 1]
+        defect = abs(slope(W[row : row + columns], 0, order, part) - rate) * part
+        if not defect <= 100.0 * (tol * (1.0 + abs(ahead[1 + i])) + EPSILON * abs(rate) * part):
+            return False
+    return True
 
 
 @njit
@@ -205,7 +225,7 @@ def drive(
     offsets = np.empty(times.shape[0])
     n_steps = n_crossings = n_samples = crowd = 0
     mode = interface = -1
-    depth, last_event = 1.0, -np.inf
+    depth, last_event, usual = 1.0, -np.inf, 0.0
     code = REACHED_END
     choosing, touched = True, False
     while True:
@@ -223,7 +243,11 @@ def drive(
                 work, b, noise,
             )
             if mode < 0:
-                code = NOT_UNIQUE if mode == MANY_MODES else NO_WAY_ON
+                code = NO_WAY_ON
+                if mode == MANY_MODES:
+                    code = NOT_UNIQUE
+                elif mode == NOT_DEFINED:
+                    code = NOT_FINITE
                 mode = before
                 break
             for j in range(n_interfaces):
@@ -267,13 +291,24 @@ def drive(
             break
         for i in range(n_states, kept):
             inputs[1 + i] = W[i * columns]
-        part = h
-        s, interface, touched, depth = find_event(
-            address, layout, signs, mode, inputs, parameters, W, h, on, noise, b, stack, gradient
-        )
+        while True:
+            s, interface, touched, depth = find_event(
+                address, layout, signs, mode, inputs, parameters, W, h, on, noise, b, stack,
+                gradient,
+            )
+            part = s * h if interface >= 0 else h
+            # a step that grew much: its last terms may be small by accident
+            if part <= 4.0 * usual or holds(
+                address, layout, mode, inputs, parameters, W, part, tol, work
+            ):
+                break
+            h, final = (t + 0.25 * part) - t, False
+        usual = max(part, 0.1 * usual)
+        if h == 0.0:
+            code = STEP_TOO_SMALL
+            break
         begin, lag = t, late
         if interface >= 0:
-            part = s * h
             t = begin + part
             late = lag + (part - (t - begin))
             if s == 1.0 and final:

@@ -13,8 +13,8 @@ EPSILON = float(np.finfo(float).eps)
 #: How well a mode agrees with an interface that it starts on.
 AGREES, LEANS, RESTS, LEANS_AWAY, DISAGREES = 3, 2, 1, 0, -1
 
-#: No mode agrees; more than one does.
-NO_MODE, MANY_MODES = -1, -2
+#: No mode agrees; more than one does; the rates of none that could are finite.
+NO_MODE, MANY_MODES, NOT_DEFINED = -1, -2, -3
 
 
 @njit
@@ -115,12 +115,13 @@ def choose_mode(
     Returns
     -------
     int
-        The mode, `NO_MODE` or `MANY_MODES`.
+        The mode, `NO_MODE`, `MANY_MODES` or `NOT_DEFINED`.
     """
     n_states, n_forcing, n_interfaces, n_modes, order = layout
     first_h = n_states + n_forcing
     drift = first_h + n_interfaces
     best, best_score, equals = NO_MODE, DISAGREES, 0
+    broken = False
     # two passes: the rounding error is that of the largest motion on either side
     for judging in (False, True):
         for mode in range(n_modes):
@@ -133,6 +134,7 @@ def choose_mode(
             call_address(address, mode, inputs, parameters, W)
             h = min(step_length(W, drift, order, tol), longest)
             if not h > 0.0:
+                broken = True
                 continue
             score = AGREES
             for j in range(n_interfaces):
@@ -156,7 +158,7 @@ def choose_mode(
                     best = mode
     if equals > 1 and best_score == AGREES:
         return MANY_MODES
-    return best
+    return NOT_DEFINED if best == NO_MODE and broken else best
 
 
 @njit

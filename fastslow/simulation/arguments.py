@@ -1,0 +1,218 @@
+"""What `simulate` is given, checked before anything is computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.model import Model
+
+
+def initial_state(model: Model, start: Any) -> NDArray[np.float64]:
+    """The initial state as an array in the order states, slow states.
+
+    Parameters
+    ----------
+    model : Model
+    start : sequence of float or mapping
+        Values in order, or by name.
+
+    Raises
+    ------
+    ArgumentError
+        For a wrong number of values, a missing or a non-finite one.
+    UnknownNameError
+        For a name that is no state.
+    """
+    names = (*model.states, *model.slow_states)
+    if isinstance(start, Mapping):
+        given = {str(k): v for k, v in start.items()}
+        for key in given:
+            if key not in names:
+                raise unknown_name("state", key, names)
+        missing = [n for n in names if n not in given]
+        if missing:
+            raise ArgumentError(
+                f"the initial state has no value for {', '.join(missing)}; expected one for each "
+                f"of {', '.join(names)}"
+            )
+        start = [given[n] for n in names]
+    values = _floats("the initial state", start)
+    if values.shape != (len(names),):
+        raise ArgumentError(
+            f"the initial state has shape {values.shape}; expected {len(names)} values, for "
+            + ", ".join(names)
+        )
+    for name, value in zip(names, values, strict=True):
+        if not math.isfinite(value):
+            raise ArgumentError(f"initial {name} = {value}; expected a finite number")
+    return values
+
+
+def time_span(
+    t: Any, periods: Any, start: Any, period: Any, own_period: Callable[[], float | None]
+) -> tuple[tuple[float, float], float | None]:
+    """Start and end of time, and the common period: the given one, else the model's own.
+
+    Raises
+    ------
+    ArgumentError
+        For none or both of ``t`` and ``periods``, an empty or non-finite span, or
+        ``periods`` without a common period.
+    """
+    if (t is None) == (periods is None):
+        received = "both" if t is not None else "neither"
+        raise ArgumentError(f"expected t=(start, end) or periods=, received {received}")
+    if period is not None:
+        period = _positive("period", period)
+    if t is not None:
+        if start != 0:
+            raise ArgumentError("start= goes with periods=; with t=(start, end) it is in t")
+        values = _floats("t", t)
+        if values.shape != (2,):
+            raise ArgumentError(f"t = {t!r}; expected a pair (start, end)")
+        first, last = map(float, values)
+        if not (math.isfinite(first) and math.isfinite(last) and first < last):
+            raise ArgumentError(f"t = ({first:g}, {last:g}); expected finite times, start < end")
+        return (first, last), period if period is not None else own_period()
+    count = _positive("periods", periods)
+    first = float(_floats("start", start))
+    if not math.isfinite(first):
+        raise ArgumentError(f"start = {first}; expected a finite time")
+    if period is None:
+        period = own_period()
+    if period is None:
+        raise ArgumentError(
+            f"periods={periods!r}, but nothing in this model has a common period; give "
+            "t=(start, end), or the period as period="
+        )
+    return (first, first + count * period), period
+
+
+def sample_times(
+    samples: int | Sequence[float] | NDArray[np.float64] | None, span: tuple[float, float]
+) -> NDArray[np.float64]:
+    """Times to sample at: none, a number of them evenly over the span, or as given.
+
+    Raises
+    ------
+    ArgumentError
+        For fewer than two, or for times that do not increase within the span.
+    """
+    if samples is None:
+        return np.empty(0)
+    if isinstance(samples, (int, np.integer)) and not isinstance(samples, bool):
+        if samples < 2:
+            raise ArgumentError(f"samples = {samples}; expected at least 2, or an array of times")
+        return np.linspace(*span, int(samples))
+    times = np.atleast_1d(_floats("samples", samples))
+    if times.ndim != 1 or not np.isfinite(times).all() or np.any(np.diff(times) < 0):
+        raise ArgumentError("samples: expected increasing, finite times")
+    if len(times) and (times[0] < span[0] or times[-1] > span[1]):
+        raise ArgumentError(
+            f"samples from {times[0]:g} to {times[-1]:g} leave the run, [{span[0]:g}, {span[1]:g}]"
+        )
+    return np.ascontiguousarray(times)
+
+
+def tolerance(tol: Any) -> float:
+    """A tolerance between rounding and 0.1."""
+    value = _positive("tol", tol)
+    if not 1e-16 <= value <= 0.1:
+        raise ArgumentError(f"tol = {value:g}; expected a number from 1e-16 to 0.1")
+    return value
+
+
+def whole_number(name: str, value: Any, least: int, most: int) -> int:
+    """An integer within bounds."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise ArgumentError(f"{name} = {value!r}; expected a whole number")
+    if not least <= value <= most:
+        raise ArgumentError(f"{name} = {value}; expected from {least} to {most}")
+    return int(value)
+
+
+def require_values(model: Model) -> None:
+    """Raise unless every parameter has a value."""
+    missing = [name for name in model.free if name not in model.parameters]
+    if missing:
+        example = f"{missing[0]}=0.5"
+        raise ArgumentError(
+            f"{', '.join(missing)} of this frozen model has no value; give one with "
+            f"with_parameters({example}), or simulate the full model"
+        )
+
+
+def gap_regions(model: Model, gap: str | None) -> tuple[str, str, str] | None:
+    """The regions below, inside and above the gap, None for a model without one.
+
+    Parameters
+    ----------
+    model : Model
+    gap : str, optional
+        The region inside; otherwise it is found: three regions between two
+        interfaces that differ by a constant.
+
+    Raises
+    ------
+    UnknownNameError
+        If the named region does not exist.
+    ArgumentError
+        If the named region does not lie between two others.
+    """
+    if gap is not None and str(gap) not in model.regions:
+        raise unknown_name("region", gap, model.regions)
+    sides = {name: tuple(region.signs.values()) for name, region in model.regions.items()}
+    functions = [i.function for i in model.interfaces.values()]
+    if gap is None and not (len(sides) == 3 and len(functions) == 2 and _parallel(model)):
+        return None
+    for inside in sides if gap is None else (str(gap),):
+        below, above = [], []
+        for name, signs in sides.items():
+            differ = [j for j, s in enumerate(signs) if s != sides[inside][j]]
+            if len(differ) == 1:
+                j = differ[0]
+                rising = signs[j] * _growth(model, functions[j]) > 0
+                (above if rising else below).append(name)
+        if len(below) == len(above) == 1:
+            return below[0], inside, above[0]
+    if gap is None:
+        return None
+    raise ArgumentError(f"gap = {gap!r}; expected a region with one region below and one above it")
+
+
+def _parallel(model: Model) -> bool:
+    one, other = (i.function for i in model.interfaces.values())
+    moving = set(model.structure.moving)
+    return any(not sp.expand(one + s * other).free_symbols & moving for s in (1, -1))
+
+
+def _growth(model: Model, function: sp.Expr) -> int:
+    """Whether the first state in an interface function raises or lowers it."""
+    for symbol in model.structure.moving:
+        if symbol in function.free_symbols:
+            rate = function.diff(symbol).subs(model.values)
+            return -1 if rate.is_number and rate.is_negative else 1
+    return 1
+
+
+def _floats(name: str, value: Any) -> NDArray[np.float64]:
+    try:
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{name}: expected numbers, received {value!r}") from None
+
+
+def _positive(name: str, value: Any) -> float:
+    number = _floats(name, value)
+    if number.ndim or not math.isfinite(number) or number <= 0:
+        raise ArgumentError(f"{name} = {value!r}; expected a positive number")
+    return float(number)
+
+

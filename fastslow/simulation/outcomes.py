@@ -1,0 +1,82 @@
+"""What the stepping loop's end means, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.results.outcome import Outcome
+
+#: A state this much larger than where it began counts as a blow-up.
+_BLOW_UP = 1e6
+
+
+def outcome_of(
+    code: int,
+    mode: int,
+    modes: tuple[str, ...],
+    end: NDArray[np.float64],
+    steps: NDArray[np.float64],
+    span: tuple[float, float],
+    limits: tuple[int, int],
+) -> Outcome:
+    """The outcome of a run, from the code of the loop (see `fastslow.simulation.driver`)."""
+    time = f"t = {end[0]:.10g}"
+    if code == 0:
+        return Outcome("end of time", f"reached {time}, the end of the time asked for.", True)
+    if code == 1:
+        return Outcome(
+            "too many steps",
+            f"stopped at {time} after {limits[0]} steps; raise max_steps= or tol=.",
+            False,
+        )
+    if code == 2:
+        return Outcome(
+            "too many crossings",
+            f"stopped at {time} after {limits[1]} crossings; raise max_crossings=.",
+            False,
+        )
+    if code in (3, 4) and len(steps):
+        size = float(np.abs(end[1:]).max())
+        if not np.isfinite(size) or size > _BLOW_UP:
+            return Outcome(
+                "blow-up",
+                f"the state grew to {size:.3g} and leaves every bound at about {time}.",
+                False,
+            )
+        return Outcome(
+            "singular",
+            f"the step was driven to nothing at {time}, where the rates or their derivatives "
+            "are not finite; end the time span before it, or write the rates without a "
+            "singularity there.",
+            False,
+        )
+    if code in (3, 4):
+        return Outcome(
+            "not finite at start",
+            f"the rates or their derivatives are not finite at the initial state, {time}; "
+            "start inside the domain of every function in the rates.",
+            False,
+        )
+    if code == 5:
+        return Outcome(
+            "not unique",
+            f"at {time} several solutions go on: the fields on the sides of an interface point "
+            "away from it; start a little off the interface to choose one.",
+            False,
+        )
+    if code == 6:
+        where = f" after {modes[mode]}" if mode >= 0 else ""
+        return Outcome(
+            "no way on",
+            f"at {time}{where} no region's motion goes on: the point lies outside every region, "
+            "or the flow would slide on several interfaces at once, where Filippov's motion is "
+            "not unique.",
+            False,
+        )
+    return Outcome(
+        "accumulation",
+        f"crossings accumulate at {time}: infinitely many within a finite time; the motion "
+        "beyond is not defined by the regions alone.",
+        False,
+    )

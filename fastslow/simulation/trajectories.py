@@ -1,0 +1,219 @@
+"""Simulating a model: one trajectory with its crossings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.compiled.generic import load_loop
+from fastslow.compiled.series import CompiledSeries, compile_series
+from fastslow.model.model import Model
+from fastslow.results.trajectories import Trajectory
+from fastslow.simulation.arguments import (
+    gap_regions,
+    initial_state,
+    require_values,
+    sample_times,
+    time_span,
+    tolerance,
+    whole_number,
+)
+from fastslow.simulation.outcomes import outcome_of
+
+_ARGUMENTS = (
+    "address",
+    "layout",
+    "sizes",
+    "signs",
+    "parameters",
+    "start",
+    "span",
+    "tol",
+    "times",
+    "sampled_rows",
+    "dense",
+    "limits",
+)
+_SOURCES = (
+    "fastslow.simulation.modes",
+    "fastslow.simulation.polynomials",
+    "fastslow.compiled.pointers",
+)
+
+#: Depth of the work space of the event search.
+_STACK_ROWS = 46
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def _once_a_model(
+    function: Callable[Concatenate[Model, P], R],
+) -> Callable[Concatenate[Model, P], R]:
+    """Keep what was derived from a model for as long as the model lives."""
+    known: WeakKeyDictionary[Model, dict[Any, R]] = WeakKeyDictionary()
+
+    @wraps(function)
+    def remembered(model: Model, /, *args: P.args, **kwargs: P.kwargs) -> R:
+        values = known.setdefault(model, {})
+        if args not in values:
+            values[args] = function(model, *args, **kwargs)
+        return values[args]
+
+    return remembered
+
+
+_gap = _once_a_model(gap_regions)
+_series = _once_a_model(compile_series)
+_period = _once_a_model(Model.period)
+
+
+def simulate(
+    model: Model,
+    state: Sequence[float] | Mapping[Any, float] | NDArray[np.float64],
+    *,
+    t: tuple[float, float] | None = None,
+    periods: float | None = None,
+    start: float = 0.0,
+    period: float | None = None,
+    tol: float = 1e-9,
+    samples: int | Sequence[float] | NDArray[np.float64] | None = None,
+    dense: bool = True,
+    order: int | None = None,
+    gap: str | None = None,
+    max_steps: int = 1_000_000,
+    max_crossings: int = 1_000_000,
+) -> Trajectory:
+    """Follow one trajectory, with every crossing of an interface located.
+
+    Taylor series of the rates, step by step (Jorba and Zou 2005); crossings
+    are roots of the interface functions along the series of a step, so that
+    two crossings within one step are both found.
+
+    Parameters
+    ----------
+    model : Model
+        With forcing, with slow states, or frozen with every parameter given.
+    state : sequence of float, shape (n,), or mapping
+        Initial states and slow states, in order or by name.
+    t : (float, float)
+        Start and end of time.
+    periods : float
+        Instead of ``t``: how many periods of the forcing.
+    start : float
+        Start of time with ``periods``.
+    period : float, optional
+        The period, where the model's own is not wanted or cannot be found.
+    tol : float
+        Error allowed in a step, relative to 1 + |y| for every state y.
+    samples : int or sequence of float, optional
+        How many evenly spaced samples, or at which times. By default the
+        steps themselves are refined enough to plot.
+    dense : bool
+        Whether the series is kept, for evaluation at any time. Without it the
+        memory does not grow with the number of steps by more than 24 bytes each.
+    order : int, optional
+        Order of the series, 4 to 40; by default chosen by the tolerance.
+    gap : str, optional
+        The region that counts as the gap for `Trajectory.regime`.
+    max_steps, max_crossings : int
+        Where to stop.
+
+    Returns
+    -------
+    Trajectory
+        What was computed, whatever the end; ``outcome`` says why it ended.
+
+    Raises
+    ------
+    ArgumentError
+        For a wrong initial state, span, tolerance or sample times, a frozen
+        model without values, or ``periods`` without a common period.
+    UnknownNameError
+        For an initial value or gap that is not in the model.
+    ModelError
+        For a function that has no Taylor recurrence.
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> x, v = sp.symbols("x v")
+    >>> oscillator = Model({x: v, v: -x})
+    >>> run = simulate(oscillator, [1, 0], t=(0, 2 * sp.pi), tol=1e-12)
+    >>> run(sp.pi).round(10) + 0.0
+    array([-1.,  0.])
+    """
+    require_values(model)
+    tol = tolerance(tol)
+    begin = initial_state(model, state)
+    span, period = time_span(t, periods, start, period, lambda: _period(model))
+    times = sample_times(samples, span)
+    if order is None:
+        order = default_order(tol)
+    order = whole_number("order", order, 4, 40)
+    limits = (
+        whole_number("max_steps", max_steps, 1, 2**40),
+        whole_number("max_crossings", max_crossings, 0, 2**40),
+    )
+    between = _gap(model, gap)
+    compiled = _series(model, order)
+    kept = compiled.n_states + compiled.n_forcing
+    rows = compiled.n_states if dense else kept
+    code, mode, end, steps, series, crossings, sampled, reached = drive_loop()(
+        compiled.address,
+        layout_of(compiled),
+        (compiled.n_rows, _STACK_ROWS),
+        compiled.signs,
+        compiled.parameter_array(model),
+        begin,
+        span,
+        tol,
+        times,
+        rows,
+        bool(dense),
+        limits,
+    )
+    return Trajectory(
+        (*model.states, *model.slow_states),
+        tuple(model.forcing),
+        tuple(model.interfaces),
+        tuple(model.regions),
+        dict(model.parameters),
+        period,
+        between,
+        outcome_of(code, mode, compiled.modes, end, steps, span, limits),
+        (span[0], float(end[0])),
+        end,
+        steps,
+        compiled.modes,
+        crossings,
+        series.reshape(len(steps), kept, order + 1) if dense else None,
+        (times[:reached], sampled[:, :reached]) if samples is not None else None,
+    )
+
+
+def default_order(tol: float) -> int:
+    """Order of the series for a tolerance, one of two so that little is compiled."""
+    return 14 if tol >= 1e-11 else 20
+
+
+def layout_of(compiled: CompiledSeries) -> tuple[int, int, int, int, int]:
+    """The numbers that the stepping loop needs of a compiled series."""
+    return (
+        compiled.n_states,
+        compiled.n_forcing,
+        compiled.n_interfaces,
+        len(compiled.modes),
+        compiled.order,
+    )
+
+
+def drive_loop() -> Callable[..., Any]:
+    """The compiled stepping loop."""
+    return load_loop("fastslow.simulation.driver", "drive", _ARGUMENTS, _SOURCES)
