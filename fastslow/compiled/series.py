@@ -188,6 +188,9 @@ def _sliding_modes(equations: _Equations, model: Model) -> Iterator[_Mode]:
         for above, below in pairs:
             a = _drift(equations, equations.interfaces[j], above)
             b = _drift(equations, equations.interfaces[j], below)
+            if sp.expand(a - b) == 0:
+                # h drifts alike on both sides: the flow always crosses
+                continue
             share = _short(a / (a - b))
             rates = tuple(
                 f if f == g else _short(f + share * (g - f))

@@ -73,8 +73,27 @@ def newton(
         if size < 1e-15 or (size < 1e-9 and size >= 0.5 * least):
             break
         least = size
+    z = without_dust(z, scale)
+    value = equations(z)
     residual = float(np.abs(value).max()) if np.all(np.isfinite(value)) else float("inf")
-    return z, residual, bool(size < 1e-8 and np.isfinite(residual))
+    return z, residual, bool(size < 1e-8 and _balanced(value, slopes, z, scale))
+
+
+def _balanced(value: Array, slopes: Array, u: Array, scale: Array) -> bool:
+    """Whether the residual is rounding, measured by what each equation's terms may be."""
+    terms = np.abs(slopes) @ np.maximum(np.abs(u), scale)
+    return bool(np.all(np.abs(value) <= 1e-9 * terms + 1e-300))
+
+
+def without_dust(u: Array, scale: Array) -> Array:
+    """The point with components far below rounding set to zero.
+
+    Examples
+    --------
+    >>> without_dust(np.array([1.0, -3e-38]), np.ones(2)).tolist()
+    [1.0, 0.0]
+    """
+    return np.where(np.abs(u) < 1e-20 * scale, 0.0, u)
 
 
 def _solved(matrix: Array, right: Array) -> Array:
@@ -123,9 +142,10 @@ def with_condition(
         if size < 1e-16 or (size < 1e-10 and size >= 0.5 * least):
             break
         least = size
-    residual = float(np.abs(np.append(curve(u)[0], condition(u)[0])).max())
-    converged = bool(size < 1e-8 and np.isfinite(residual))
-    return Located(u, residual, converged, np.empty(0), size)
+    u = without_dust(u, scale)
+    right = np.append(curve(u)[0], condition(u)[0])
+    converged = bool(size < 1e-8 and _balanced(right, matrix / scale, u, scale))
+    return Located(u, float(np.abs(right).max()), converged, np.empty(0), size)
 
 
 def fold(curve: Curve, start: Array, scale: Array) -> Located:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.compiled.fields import CompiledField, compile_field, parameter_array
+from fastslow.errors import ModelError
 from fastslow.model.model import Model
 
 Array = NDArray[np.float64]
@@ -28,6 +29,15 @@ class FrozenField:
 
     model: Model
     parameter: str
+
+    def __post_init__(self) -> None:
+        names = (*self.model.free, *self.model.parameters)
+        missing = [n for n in names if n not in (*self.model.parameters, self.parameter)]
+        if missing:
+            raise ModelError(
+                f"the frozen slow quantity '{missing[0]}' has no value; give one, "
+                f"as in with_parameters({missing[0]}=…)"
+            )
 
     @cached_property
     def compiled(self) -> CompiledField:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.location import with_condition
 from fastslow.diagrams.fields import FrozenField
-from fastslow.errors import ModelError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.points import Equilibria, Equilibrium
@@ -76,11 +75,18 @@ class RegionEquations:
         return sp.lambdify(p, self.polynomial.all_coeffs(), "math")
 
     @cached_property
-    def _solved(self) -> Any:
+    def _formula(self) -> Any:
         left = self.elimination
         p = real(self.field.parameter)
         states = left.state({}, self.field.model.states)
         return sp.lambdify((p, *left.unknowns), list(states), "math")
+
+    def _whole(self, value: float, *unknowns: float) -> list[Array]:
+        """The full state at values of the unknowns; none outside the domain of the formulas."""
+        try:
+            return [np.array(self._formula(value, *unknowns), dtype=float)]
+        except (ArithmeticError, ValueError, TypeError):
+            return []
 
     @property
     def complete(self) -> bool:
@@ -100,19 +106,16 @@ class RegionEquations:
         """Isolated equilibria of the region's rates at a parameter value, admissible or not."""
         left = self.elimination
         if not left.unknowns:
-            return self._holding(value, [np.array(self._solved(value), dtype=float)])
+            return self._holding(value, self._whole(value))
         if self._conditions is not None:
             return []
         if self.polynomial is None:
             return self._searched(value)
-        coefficients = np.array(self._coefficients(value), dtype=float)
-        found = []
-        for root in real_roots(coefficients):
-            try:
-                state = np.array(self._solved(value, root), dtype=float)
-            except (ZeroDivisionError, ValueError, OverflowError):
-                continue
-            found.append(state)
+        try:
+            coefficients = np.array(self._coefficients(value), dtype=float)
+        except (ArithmeticError, ValueError, TypeError):
+            return []
+        found = [s for root in real_roots(coefficients) for s in self._whole(value, root)]
         return self._polished(value, found)
 
     def continuum(self, value: float) -> bool:
@@ -126,7 +129,7 @@ class RegionEquations:
         """Where a one-parameter continuum of equilibria meets an interface, or its middle."""
         unknowns = self.elimination.unknowns
         if len(unknowns) != 1:
-            return [np.array(self._solved(value, *([0.0] * len(unknowns))), dtype=float)]
+            return self._whole(value, *([0.0] * len(unknowns)))
         ends = []
         for interface in self.field.model.interfaces.values():
             h = interface.function.subs(self._numbers).subs(real(self.field.parameter), value)
@@ -134,8 +137,8 @@ class RegionEquations:
             line = sp.together(h.subs(solved)).as_numer_denom()[0]
             if line.is_polynomial(*unknowns) and line.has(*unknowns):
                 coefficients = np.array(sp.Poly(line, *unknowns).all_coeffs(), dtype=float)
-                ends += [np.array(self._solved(value, r), float) for r in real_roots(coefficients)]
-        return ends or [np.array(self._solved(value, 0.0), dtype=float)]
+                ends += [s for root in real_roots(coefficients) for s in self._whole(value, root)]
+        return ends or self._whole(value, 0.0)
 
     def _holding(self, value: float, states: list[Array]) -> list[Array]:
         """Those states at which equations without unknowns hold too."""
@@ -257,13 +260,7 @@ def equilibria(
     [[2.0], [-2.0]]
     """
     given = model.with_parameters(values, **named)
-    missing = [n for n in given.free if n not in given.parameters]
-    if missing:
-        raise ModelError(
-            f"the frozen slow quantity '{missing[0]}' has no value; "
-            f"give one, as in equilibria(model, {missing[0]}=…)"
-        )
-    name = next(iter((*given.free, *given.parameters)), IDLE)
+    name = next(iter(given.parameters), IDLE)
     return solve_at(FrozenField(given, name), given.parameters.get(name, 0.0), virtual)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
@@ -15,26 +16,23 @@ Values = NDArray[np.float64]
 SPAN = 6.0
 
 
-def draw_arrows(
-    ax: Axes, x: Values, y: Values, along: Values, fractions: Sequence[float], colour: str
-) -> tuple[Annotation, ...]:
+def draw_arrows(line: Line2D, along: Values, fractions: Sequence[float]) -> tuple[Annotation, ...]:
     """Put arrow heads on a curve at fractions of a growing quantity.
 
     Parameters
     ----------
-    ax : Axes
-        With its limits final.
-    x, y : ndarray, shape (N,)
-        The curve.
+    line : Line2D
+        The curve, of N points.
     along : ndarray, shape (N,)
         Grows along the curve, e.g. its length.
     fractions : sequence of float
         Where, between 0 and 1 of ``along``.
-    colour : str
     """
-    if len(x) < 2 or not along[-1] > along[0]:
+    if len(along) < 2 or not along[-1] > along[0]:
         return ()
+    ax = axes_of(line)
     ax.autoscale_view()
+    x, y = points(line).T
     pixels = ax.transData.transform(np.column_stack([x, y]))
     frame = ax.get_window_extent()
     drawn = []
@@ -53,7 +51,7 @@ def draw_arrows(
                 xytext=(x[start], y[start]),
                 arrowprops={
                     "arrowstyle": "-|>",
-                    "color": colour,
+                    "color": line.get_color(),
                     "linewidth": 0.0,
                     "mutation_scale": 8.0,
                     "shrinkA": 0.0,
@@ -65,7 +63,19 @@ def draw_arrows(
     return tuple(drawn)
 
 
-def length_along(ax: Axes, x: Values, y: Values) -> Values:
+def length_along(line: Line2D) -> Values:
     """Length of a curve in pixels up to each of its points, shape (N,)."""
-    pixels = ax.transData.transform(np.column_stack([x, y]))
+    pixels = axes_of(line).transData.transform(points(line))
     return np.r_[0.0, np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))]
+
+
+def points(line: Line2D) -> Values:
+    """Data of a line, shape (N, 2)."""
+    return np.asarray(line.get_xydata(), dtype=float)
+
+
+def axes_of(line: Line2D) -> Axes:
+    """The axes that a line was drawn into."""
+    if not isinstance(line.axes, Axes):
+        raise ValueError("this line was removed from its axes")
+    return line.axes

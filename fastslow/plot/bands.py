@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -91,5 +92,11 @@ def draw_bands(
 def _name(ax: Axes, text: str, middle: float, vertical: bool) -> Text:
     at = (middle, 0.95) if vertical else (0.95, middle)
     frame = ax.get_xaxis_transform() if vertical else ax.get_yaxis_transform()
-    look = {"ha": "center", "va": "center", "fontsize": SMALL, "color": GREY, "zorder": 1.5}
+    look: dict[str, Any] = {
+        "ha": "center",
+        "va": "center",
+        "fontsize": SMALL,
+        "color": GREY,
+        "zorder": 1.5,
+    }
     return ax.text(*at, text, transform=frame, **look)

@@ -15,7 +15,7 @@ from matplotlib.text import Annotation
 
 from fastslow.errors import unknown_name
 from fastslow.plot.bands import Bands, draw_bands
-from fastslow.plot.labels import key, place, tag
+from fastslow.plot.labels import key, place, settle, tag
 from fastslow.plot.style import BRANCH, LINES, MARKERS, Drawing, axes_for, typeset
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import Diagram
@@ -116,6 +116,7 @@ def diagram(
     )
     if legend and drawn.handles:
         drawn = replace(drawn, legend=key(ax, drawn.handles, own))
+    settle(ax)
     place(ax, drawn.labels, [] if drawn.legend is None else [drawn.legend], [drawn.bands])
     return drawn
 

@@ -45,9 +45,14 @@ def tag(ax: Axes, text: str, at: tuple[float, float]) -> Annotation:
     )
 
 
+def settle(ax: Axes) -> None:
+    """Give the axes of a figure their final places."""
+    root(ax).draw_without_rendering()
+
+
 def place(
     ax: Axes,
-    tags: Sequence[Annotation],
+    tags: Sequence[Annotation] = (),
     taken: Sequence[Artist] = (),
     bands: Sequence[Bands] = (),
 ) -> None:
@@ -56,7 +61,7 @@ def place(
     Parameters
     ----------
     ax : Axes
-        With everything drawn and its limits final.
+        With everything drawn, its limits and its layout final.
     tags : sequence of Annotation
         Labels with offsets in points.
     taken : sequence of Artist
@@ -64,9 +69,6 @@ def place(
     bands : sequence of Bands
         Whose names are moved too, along and within their regions.
     """
-    if not tags and not any(b.names for b in bands):
-        return
-    root(ax).draw_without_rendering()
     frame = ax.get_window_extent()
     ink = covered(ax)
     boxes = [artist.get_window_extent() for artist in taken]
@@ -89,10 +91,10 @@ def place(
         boxes.append(centred.translated(best[1][0] * pixels, best[1][1] * pixels))
     for drawn in bands:
         for name, span in zip(drawn.names, drawn.spans, strict=True):
-            _settle(name, span, drawn.vertical, frame, ink, boxes)
+            _move(name, span, drawn.vertical, frame, ink, boxes)
 
 
-def _settle(
+def _move(
     name: Text,
     span: tuple[float, float],
     vertical: bool,
@@ -134,15 +136,15 @@ def legend_below(ax: Axes, handles: Sequence[Artist], columns: int) -> Legend:
         ncols=columns,
         fontsize=SMALL,
         frameon=False,
-        handlelength=2.4,
-        columnspacing=1.2,
+        handlelength=2.2,
+        columnspacing=1.0,
     )
 
 
 def legend_inside(ax: Axes, handles: Sequence[Artist]) -> Legend:
     """A legend inside the axes, at the corner or side where it covers least."""
     legend = ax.legend(handles=list(handles), fontsize=SMALL, framealpha=0.85, loc=CORNERS[0])
-    root(ax).draw_without_rendering()
+    settle(ax)
     frame, box, ink = ax.get_window_extent(), legend.get_window_extent(), covered(ax)
     pad = box.x0 - frame.x0
     costs = []

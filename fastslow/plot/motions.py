@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.plot.arrows import draw_arrows, length_along
 from fastslow.plot.bands import Bands, Values, draw_bands
-from fastslow.plot.style import MOTION, VERMILION, Drawing, axes_for, typeset
+from fastslow.plot.style import MM, MOTION, VERMILION, Drawing, axes_for, typeset
 from fastslow.results.trajectories import Trajectory
 
 Array = NDArray[np.float64]
@@ -89,7 +89,7 @@ def time_series(
         If ``x`` is no state or slow quantity of the trajectory.
     """
     name = quantity(run, x, 0)
-    ax = axes_for(ax, height=50 / 25.4)
+    ax = axes_for(ax, height=50 * MM)
     look = {"color": color, "label": "trajectory", **LINE, **style}
     lines = tuple(ax.plot(run.t, run[name], **look))
     dots = _dots(ax, run, "t", name) if crossings else None
@@ -157,9 +157,8 @@ def phase_portrait(
     ax.set_xlabel(typeset(across))
     ax.set_ylabel(typeset(up))
     bands = _bands(ax, run, (across, up), interfaces)
-    u, v = lines[-1].get_data()
     fractions = (np.arange(arrows) + 0.5) / max(arrows, 1)
-    heads = draw_arrows(ax, u, v, length_along(ax, u, v), fractions.tolist(), color)
+    heads = draw_arrows(lines[-1], length_along(lines[-1]), fractions.tolist())
     return MotionDrawing(ax, across, up, lines, dots, heads, bands)
 
 
@@ -216,7 +215,7 @@ def draw_dots(ax: Axes, x: Array, y: Array) -> Line2D | None:
         markeredgecolor=VERMILION,
         markeredgewidth=0.6,
         zorder=4,
-        label="crossing of an interface",
+        label="interface crossing",
     )
     return dots
 

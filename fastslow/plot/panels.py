@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 
 from fastslow.plot.branches import state_name
-from fastslow.plot.labels import legend_below, place
+from fastslow.plot.labels import legend_below, place, settle
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.passages import OverlayDrawing, draw_passage
 from fastslow.plot.style import FULL, MM, TEXT, dressed, new_figure, save
@@ -91,7 +91,8 @@ def panel(
     portrait = phase_portrait(lay.run, ax=axes[1], interfaces=values)
     laid = draw_passage(axes[2], lay, name)
     legend = legend_below(laid.ax, laid.handles, 4)
-    place(axes[0], [], bands=series.bands)
-    place(axes[1], [], bands=portrait.bands)
+    settle(laid.ax)
+    place(axes[0], bands=series.bands)
+    place(axes[1], bands=portrait.bands)
     place(axes[2], laid.diagram.labels, bands=[laid.diagram.bands])
     return PanelDrawing(figure, series, portrait, laid, legend)

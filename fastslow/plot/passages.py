@@ -13,11 +13,11 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.plot.arrows import draw_arrows
+from fastslow.plot.arrows import draw_arrows, points
 from fastslow.plot.branches import DiagramDrawing, draw_branches, state_name
-from fastslow.plot.labels import key, place
+from fastslow.plot.labels import key, place, settle
 from fastslow.plot.motions import at_crossings, draw_dots, draw_motion
-from fastslow.plot.style import MOTION, TRANSITIONS, Drawing, axes_for
+from fastslow.plot.style import MM, MOTION, TRANSITIONS, Drawing, axes_for
 from fastslow.results.overlays import Overlay
 
 #: Shares of the slow quantity's travel over a period at which an arrow head sits: uneven, so that
@@ -113,7 +113,7 @@ def overlay(
         If ``state`` is no state of the diagram.
     """
     name = state_name(lay.diagram.states, state)
-    own, ax = ax is None, axes_for(ax)
+    own, ax = ax is None, axes_for(ax, height=78 * MM)
     drawn = draw_passage(
         ax,
         lay,
@@ -128,6 +128,7 @@ def overlay(
     if legend:
         drawn = replace(drawn, legend=key(ax, drawn.handles, own))
     below, taken = drawn.diagram, [] if drawn.legend is None else [drawn.legend]
+    settle(ax)
     place(ax, below.labels, taken, [below.bands])
     return drawn
 
@@ -156,11 +157,11 @@ def draw_passage(
         ax, lay.diagram, name, label=label, virtual=virtual, interfaces=interfaces
     )
     for line in below.lines:
-        # wide enough to be seen beneath a trajectory that follows it
-        line.set_linewidth(1.6 * line.get_linewidth())
-    slow, height = lines[-1].get_data()
-    travel = np.r_[0.0, np.cumsum(np.abs(np.diff(slow)))]
-    heads = draw_arrows(ax, slow, height, travel, ARROWS, color)
+        if line.get_label() == "stable":
+            # wide enough to be seen beneath a trajectory that follows it
+            line.set_linewidth(2.2)
+    travel = np.r_[0.0, np.cumsum(np.abs(np.diff(points(lines[-1])[:, 0])))]
+    heads = draw_arrows(lines[-1], travel, ARROWS)
     return OverlayDrawing(ax, name, below, lines, dots, changes, heads, None)
 
 

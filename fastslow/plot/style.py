@@ -39,9 +39,9 @@ MARKERS: dict[str, tuple[str, str]] = {
 
 #: Marker, colour and legend text of a transition by kind.
 TRANSITIONS: dict[str, tuple[str, str, str]] = {
-    "jump": ("*", VERMILION, "jump at a fold"),
-    "crossing": ("D", ORANGE, "passage of a boundary equilibrium"),
-    "change": ("s", GREY, "other change of sheet"),
+    "jump": ("*", VERMILION, "jump at LP"),
+    "crossing": ("D", ORANGE, "passage of BE"),
+    "change": ("s", GREY, "other change"),
 }
 
 #: Light fills of the regions, in turn.
@@ -64,7 +64,7 @@ def typeset(name: str) -> str:
     Examples
     --------
     >>> typeset("x"), typeset("omega_0"), typeset("theta_in"), typeset("load")
-    ('$x$', '$\\\\omega_{0}$', '$\\\\theta_{\\\\mathrm{in}}$', '$\\\\mathrm{load}$')
+    ('$x$', '$\\omega_{0}$', '$\\theta_{\\mathrm{in}}$', '$\\mathrm{load}$')
     """
     head, *below = name.split("_")
     return "$" + _letter(head) + (f"_{{{','.join(map(_letter, below))}}}" if below else "") + "$"

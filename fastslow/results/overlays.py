@@ -50,10 +50,10 @@ class Transition:
     from_sheet, to_sheet : str
         Labels of the sheets.
     special : SpecialPoint or None
-        The special point nearest to where the old sheet was left.
+        The nearest special point that ends the old sheet.
     delay : float
-        How far past the special point the slow quantity has moved, in its own
-        units; positive in its direction of drift; nan without a special point.
+        How far past the special point, away from the old sheet, the slow
+        quantity is, in its own units; nan without a special point.
     """
 
     time: float

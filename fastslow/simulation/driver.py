@@ -48,11 +48,13 @@ def find_event(address, layout, signs, mode, inputs, parameters, W, h, on, noise
         Whether h does not change its sign there.
     depth : float
         Relative change of h that would undo the crossing.
+    floor : float
+        Size of h that is rounding error there.
     """
     n_states, n_forcing, n_interfaces, n_modes, order = layout
     first_h = n_states + n_forcing
     drift = first_h + n_interfaces
-    best, interface, touched, depth = 2.0, -1, False, 1.0
+    best, interface, touched, depth, floor = 2.0, -1, False, 1.0, 0.0
     for j in range(n_interfaces):
         sign = signs[mode, j]
         if sign == 0:
@@ -77,16 +79,18 @@ def find_event(address, layout, signs, mode, inputs, parameters, W, h, on, noise
                 continue
             on[j] = False
         elif b[0] * sign <= 0.0:
-            return 0.0, j, False, 1.0
+            return 0.0, j, False, 1.0, 0.0
         if excluded(b, start, order):
             continue
         small = interface_noise(address, n_modes, j, inputs, parameters, gradient)
+        small = max(small, 8.0 * EPSILON * total)
         s, touch = first_root(b, start, order, small, stack)
+        if s <= 1.0 and not touch:
+            s, touch = turning_point(b, order, s, small, sign)
         if s < best and s <= 1.0:
-            size = max(gradient[1], total)
-            best, interface, touched = s, j, touch
-            depth = undoing(b, order, s, size)
-    return best, interface, touched, depth
+            best, interface, touched, floor = s, j, touch, small
+            depth = undoing(b, order, s, max(gradient[1], total))
+    return best, interface, touched, depth, floor
 
 
 @njit
@@ -109,12 +113,33 @@ def holds(address, layout, mode, inputs, parameters, W, part, tol, work):
 
 
 @njit
+def turning_point(b, order, s, small, sign):
+    """The root again, or where h turns back just there: a touch, as far as rounding can tell."""
+    rate = slope(b, 0, order, s)
+    bend = curvature(b, order, s)
+    if bend * sign <= 0.0 or 0.5 * rate * rate > small * bend * sign:
+        return s, False
+    turn = min(max(s - rate / bend, 0.0), 1.0)
+    beyond = turn + 4.0 * (small / (bend * sign)) ** 0.5
+    if beyond < 1.0 and horner(b, 0, order, beyond) * sign > 0.0:
+        return turn, True
+    return s, False
+
+
+@njit
+def curvature(b, order, s):
+    """Second derivative by s of sum b_k s**k."""
+    value = 0.0
+    for k in range(order, 1, -1):
+        value = value * s + k * (k - 1) * b[k]
+    return value
+
+
+@njit
 def undoing(b, order, s, size):
     """Depth of the parabola that h follows beyond its root, relative to its size."""
     rate = slope(b, 0, order, s)
-    bend = 0.0
-    for k in range(order, 1, -1):
-        bend = bend * s + k * (k - 1) * b[k]
+    bend = curvature(b, order, s)
     if bend == 0.0 or size == 0.0:
         return 1.0
     return min(1.0, 0.5 * rate * rate / (abs(bend) * size))
@@ -155,7 +180,8 @@ def sample(W, columns, rows, s, out, first):
 
 @njit
 def drive(
-    address, layout, sizes, signs, parameters, start, span, tol, times, sampled_rows, dense, limits
+    address, layout, sizes, signs, parameters, start, span, tol, times, sampled_rows, dense,
+    limits, store,
 ):
     """Follow one trajectory from start to end.
 
@@ -180,6 +206,8 @@ def drive(
         Whether the series of every step is kept.
     limits : tuple of int
         Largest numbers of steps and crossings.
+    store : float64 array
+        Room for the series, replaced by a larger one where it does not suffice.
 
     Returns
     -------
@@ -189,7 +217,7 @@ def drive(
         Time and state reached.
     steps : ndarray, shape (n_steps, 3)
         Time, length and mode of every step.
-    series : ndarray
+    store : ndarray
         Coefficients of states and slow quantities, step by step, when ``dense``.
     crossings : ndarray, shape (n_crossings, 6 + n_states)
         Time, interface, direction, mode before, mode after, near-tangential, state.
@@ -209,9 +237,7 @@ def drive(
     inputs = np.empty(1 + kept)
     inputs[0] = t
     inputs[1 : 1 + n_states] = start
-    store = np.empty(64 * stride + size if dense else 0)
-    work = np.empty(size)
-    W = work
+    work, W = np.empty(size), np.empty(size)
     b = np.empty(columns)
     stack = np.empty((stack_rows, columns + 3))
     gradient = np.empty(2 + n_states)
@@ -225,7 +251,7 @@ def drive(
     offsets = np.empty(times.shape[0])
     n_steps = n_crossings = n_samples = crowd = 0
     mode = interface = -1
-    depth, last_event, usual = 1.0, -np.inf, 0.0
+    depth, floor, last_event, usual = 1.0, 0.0, -np.inf, 0.0
     code = REACHED_END
     choosing, touched = True, False
     while True:
@@ -235,6 +261,8 @@ def drive(
                 inputs[1 + i] = work[i * columns]
             for j in range(n_interfaces):
                 noise[j] = interface_noise(address, n_modes, j, inputs, parameters, gradient)
+                if j == interface:
+                    noise[j] = max(noise[j], floor)
                 on[j] = hit[j] or abs(gradient[0]) <= noise[j]
                 side[j] = 1 if gradient[0] > 0.0 else -1
             before = mode
@@ -274,31 +302,32 @@ def drive(
             break
         if dense:
             if n_steps * stride + size > store.shape[0]:
-                larger = np.empty(2 * store.shape[0])
+                larger = np.empty(2 * store.shape[0] + 64 * stride + size)
                 larger[: n_steps * stride] = store[: n_steps * stride]
                 store = larger
             W = store[n_steps * stride : n_steps * stride + size]
         call_address(address, mode, inputs, parameters, W)
-        h = step_length(W, drift, order, tol)
-        if not h > 0.0:
+        longest = step_length(W, drift, order, tol)
+        if not longest > 0.0:
             code = NOT_FINITE
             break
-        final = h >= remaining
+        final = longest >= remaining
         # a step between two times that are exact in floating point loses none of it
-        h = remaining if final else (t + h) - t
+        h = remaining if final else (t + longest) - t
         if h == 0.0:
             code = STEP_TOO_SMALL
             break
         for i in range(n_states, kept):
             inputs[1 + i] = W[i * columns]
         while True:
-            s, interface, touched, depth = find_event(
+            s, interface, touched, depth, floor = find_event(
                 address, layout, signs, mode, inputs, parameters, W, h, on, noise, b, stack,
                 gradient,
             )
             part = s * h if interface >= 0 else h
-            # a step that grew much: its last terms may be small by accident
-            if part <= 4.0 * usual or holds(
+            # where a step grew much its last terms may be small by accident
+            doubtful = part > 2.0 * usual or longest > 4.0 * remaining
+            if not doubtful or holds(
                 address, layout, mode, inputs, parameters, W, part, tol, work
             ):
                 break
@@ -349,7 +378,6 @@ def drive(
     end = np.empty(1 + n_states)
     end[0] = t
     end[1:] = inputs[1 : 1 + n_states]
-    series = store[: n_steps * stride if dense else 0]
     return (
-        code, mode, end, steps[:n_steps], series, crossings[:n_crossings], samples, n_samples
+        code, mode, end, steps[:n_steps], store, crossings[:n_crossings], samples, n_samples
     )

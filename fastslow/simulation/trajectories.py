@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -38,6 +40,7 @@ _ARGUMENTS = (
     "sampled_rows",
     "dense",
     "limits",
+    "store",
 )
 _SOURCES = (
     "fastslow.simulation.modes",
@@ -165,7 +168,7 @@ def simulate(
     compiled = _series(model, order)
     kept = compiled.n_states + compiled.n_forcing
     rows = compiled.n_states if dense else kept
-    code, mode, end, steps, series, crossings, sampled, reached = drive_loop()(
+    code, mode, end, steps, store, crossings, sampled, reached = drive_loop()(
         compiled.address,
         layout_of(compiled),
         (compiled.n_rows, _STACK_ROWS),
@@ -178,6 +181,7 @@ def simulate(
         rows,
         bool(dense),
         limits,
+        _room.store,
     )
     return Trajectory(
         (*model.states, *model.slow_states),
@@ -193,14 +197,36 @@ def simulate(
         steps,
         compiled.modes,
         crossings,
-        series.reshape(len(steps), kept, order + 1) if dense else None,
+        _kept(store, len(steps), kept, order + 1) if dense else None,
         (times[:reached], sampled[:, :reached]) if samples is not None else None,
     )
 
 
+class _Room(threading.local):
+    """Memory for the series of a run, used again by the next one of the same thread."""
+
+    def __init__(self) -> None:
+        self.store = np.empty(2**16)
+
+
+_room = _Room()
+
+#: Larger series (in numbers) are handed over as they are instead of copied.
+_LARGE = 2**23
+
+
+def _kept(store: NDArray[np.float64], *shape: int) -> NDArray[np.float64]:
+    """The series out of the memory it was written to, which is kept for the next run."""
+    series = store[: math.prod(shape)]
+    if store.size <= _LARGE:
+        _room.store = store
+        series = series.copy()
+    return series.reshape(shape)
+
+
 def default_order(tol: float) -> int:
     """Order of the series for a tolerance, one of two so that little is compiled."""
-    return 14 if tol >= 1e-11 else 20
+    return 16 if tol >= 1e-11 else 24
 
 
 def layout_of(compiled: CompiledSeries) -> tuple[int, int, int, int, int]:

@@ -67,14 +67,58 @@ def overlay(diagram: Diagram, run: Trajectory) -> Overlay:
         nothing = np.full(len(time), -1)
         far = np.full(len(time), np.inf)
         return Overlay(diagram, run, time, slow, state, far, (), nothing, ())
-    apart, present = _distances(diagram, sheets, slow, state)
+    extent = _extent(diagram, sheets, state)
+    apart, present = _distances(diagram, sheets, slow, state / extent, extent)
     followed = _followed(apart, present)
-    changes = np.flatnonzero(np.diff(followed)) + 1
-    transitions = tuple(
-        _transition(diagram, sheets, int(k), time, slow, state, followed) for k in changes
-    )
+    transitions = []
+    for row in np.flatnonzero(np.diff(followed)) + 1:
+        left, entered = sheets[followed[row - 1]], sheets[followed[row]]
+        times = np.array([time[row - 1], time[row]])
+        if run.series is not None:
+            times = _narrowed(diagram, run, (left, entered), extent, times)
+            columns = run.dense_columns(times)
+            slow_now = columns[run.columns.index(slow_name)]
+            state_now = columns[[run.columns.index(n) for n in diagram.states], 1]
+        else:
+            slow_now, state_now = slow[row - 1 : row + 1], state[row].copy()
+        transitions.append(
+            _transition(diagram, left, entered, float(times[1]), float(slow_now[1]), state_now)
+        )
     distance = apart[np.arange(len(time)), followed]
-    return Overlay(diagram, run, time, slow, state, distance, sheets, followed, transitions)
+    return Overlay(
+        diagram, run, time, slow, state, distance, sheets, followed, tuple(transitions)
+    )
+
+
+def _extent(diagram: Diagram, sheets: tuple[StableSheet, ...], state: Array) -> Array:
+    """Unit of each state: the larger of its extents in the run and on any sheet."""
+    extent = np.ptp(state, axis=0)
+    for sheet in sheets:
+        rows = diagram.branches[sheet.branch].state[sheet.start : sheet.stop]
+        extent = np.maximum(extent, np.ptp(rows, axis=0))
+    extent[extent == 0] = 1.0
+    return extent
+
+
+def _narrowed(
+    diagram: Diagram,
+    run: Trajectory,
+    pair: tuple[StableSheet, StableSheet],
+    extent: Array,
+    times: Array,
+) -> Array:
+    """Two times between which the second sheet becomes clearly nearer, close to rounding."""
+    for _ in range(9):
+        fine = np.linspace(times[0], times[1], 33)
+        columns = run.dense_columns(fine)
+        slow = columns[run.columns.index(diagram.parameter)]
+        state = columns[[run.columns.index(n) for n in diagram.states]].T
+        apart, present = _distances(diagram, pair, slow, state / extent, extent)
+        nearer = present[:, 1] & (apart[:, 1] < NEARER * apart[:, 0])
+        nearer[0], nearer[-1] = False, True
+        k = int(np.argmax(nearer))
+        times = fine[k - 1 : k + 1]
+    return times
 
 
 def _stable_sheets(diagram: Diagram) -> tuple[StableSheet, ...]:
@@ -103,14 +147,9 @@ def _stable_sheets(diagram: Diagram) -> tuple[StableSheet, ...]:
 
 
 def _distances(
-    diagram: Diagram, sheets: tuple[StableSheet, ...], slow: Array, state: Array
+    diagram: Diagram, sheets: tuple[StableSheet, ...], slow: Array, scaled: Array, extent: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Distance of each sample to each sheet, and whether the sheet exists there."""
-    extent = np.ptp(state, axis=0)
-    for sheet in sheets:
-        rows = diagram.branches[sheet.branch].state[sheet.start : sheet.stop]
-        extent = np.maximum(extent, np.ptp(rows, axis=0))
-    extent[extent == 0] = 1.0
+    """Scaled distance of each sample to each sheet, and whether the sheet exists there."""
     apart = np.empty((len(slow), len(sheets)))
     present = np.empty((len(slow), len(sheets)), dtype=bool)
     for k, sheet in enumerate(sheets):
@@ -119,7 +158,7 @@ def _distances(
         low, high = sorted((values[0], values[-1]))
         present[:, k] = (slow >= low) & (slow <= high)
         nearest = _on_sheet(branch, sheet, np.clip(slow, low, high))
-        apart[:, k] = np.linalg.norm((state - nearest) / extent, axis=1)
+        apart[:, k] = np.linalg.norm(scaled - nearest / extent, axis=1)
     return apart, present
 
 
@@ -154,35 +193,28 @@ def _followed(apart: Array, present: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 def _transition(
     diagram: Diagram,
-    sheets: tuple[StableSheet, ...],
-    row: int,
-    time: Array,
-    slow: Array,
+    left: StableSheet,
+    entered: StableSheet,
+    time: float,
+    value: float,
     state: Array,
-    followed: NDArray[np.intp],
 ) -> Transition:
-    left, entered = sheets[followed[row - 1]], sheets[followed[row]]
-    special = _responsible(diagram, left, float(slow[row]))
-    drift = float(np.sign(slow[row] - slow[row - 1]))
-    delay = drift * (float(slow[row]) - special[diagram.parameter]) if special else float("nan")
-    return Transition(
-        float(time[row]),
-        float(slow[row]),
-        state[row].copy(),
-        left.label,
-        entered.label,
-        special,
-        delay,
-    )
+    special = _responsible(diagram, left, value)
+    delay = float("nan")
+    if special is not None:
+        branch = diagram.branches[left.branch]
+        middle = branch.parameter[(left.start + left.stop - 1) // 2]
+        end = special[diagram.parameter]
+        delay = float(np.sign(end - middle) * (value - end))
+    return Transition(time, value, state, left.label, entered.label, special, delay)
 
 
 def _responsible(diagram: Diagram, left: StableSheet, value: float) -> SpecialPoint | None:
-    """The special point nearest to a value at which a sheet ends, else of the whole branch."""
+    """Of the special points at which a sheet ends, the one nearest to a value."""
     branch = diagram.branches[left.branch]
-    points = [
-        (point, left.start - 1 <= row <= left.stop)
+    ends = [
+        point
         for point, row in zip(branch.special, branch.special_rows, strict=True)
-        if point.code in ENDING
+        if point.code in ENDING and left.start - 1 <= row <= left.stop
     ]
-    ends = [p for p, at_end in points if at_end] or [p for p, _ in points]
     return min(ends, key=lambda p: abs(p[diagram.parameter] - value), default=None)

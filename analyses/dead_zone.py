@@ -1,0 +1,59 @@
+"""The dead zone of the gear (Fig. 1 of the source): what the teeth transmit over the twist."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+import fastslow as fs
+from fastslow.plot.bands import draw_bands
+from fastslow.plot.style import BRANCH, LINES, axes_for, typeset
+
+GAP = 0.25
+
+
+def transmitted(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The dead-zone function f(x), read off the gear's own equations.
+
+    The equation is v' = w − v − (x² + A) f(x), so that f is what is left of v'
+    at w = v = 0, divided by −(x² + A).
+    """
+    gear = fs.systems.harmonic_gear(D=GAP)
+    at = {"w": 0, "v": 0, **gear.parameters}
+    values = np.empty_like(x)
+    for name, inside in {"S1": x > GAP, "S2": abs(x) <= GAP, "S3": x < -GAP}.items():
+        rate = (
+            gear.regions[name].rates["v"].subs({sp.Symbol(k, real=True): v for k, v in at.items()})
+        )
+        values[inside] = sp.lambdify(sp.Symbol("x", real=True), rate)(x[inside])
+    return -values / (x**2 + gear.parameters["A"])
+
+
+def draw() -> fs.plot.Drawing:
+    """The dead zone, one column wide."""
+    x = np.linspace(-1, 1, 401)
+    ax = axes_for(None)
+    ax.plot(x, transmitted(x), color=BRANCH, **LINES["stable"])
+    ax.set_xlim(-1, 1)
+    ax.set_xlabel(typeset("x"))
+    ax.set_ylabel("$f(x)$")
+    values = {"x - D": ("x", GAP), "x + D": ("x", -GAP)}
+    draw_bands(ax, "x", values, ("S1", "S2", "S3"), vertical=True)
+    return fs.plot.Drawing(ax)
+
+
+def main(folder: Path) -> dict[str, float]:
+    """Draw the dead zone into a folder and return f at −1, 0 and 1."""
+    folder.mkdir(parents=True, exist_ok=True)
+    drawing = draw()
+    for suffix in ("png", "pdf"):
+        drawing.save(folder / f"dead_zone.{suffix}")
+    at = np.array([-1.0, 0.0, 1.0])
+    return {f"f({x:g})": float(f) for x, f in zip(at, transmitted(at), strict=True)}
+
+
+if __name__ == "__main__":
+    print(main(Path("figures")))

@@ -1,0 +1,122 @@
+"""What every case of the gear shares: the run, its diagram, the overlay, and a row of numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import fastslow as fs
+
+#: Angular frequency of the load in every case; the source leaves it out.
+OMEGA = 0.01
+PERIODS = 3
+REST = (0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One set of parameters, run over three slow periods and laid over its diagram.
+
+    Parameters
+    ----------
+    name : str
+        What the figure's file is called.
+    title : str
+        What differs from the other cases, as mathematics.
+    stated : str
+        The regime that the source states, or "" where it states none.
+    model : Model
+    lay : Overlay
+    """
+
+    name: str
+    title: str
+    stated: str
+    model: fs.Model
+    lay: fs.Overlay
+
+    @property
+    def run(self) -> fs.Trajectory:
+        return self.lay.run
+
+    @property
+    def diagram(self) -> fs.Diagram:
+        return self.lay.diagram
+
+
+@dataclass(frozen=True)
+class Row:
+    """The numbers of one case.
+
+    Parameters
+    ----------
+    case : str
+    parameters : str
+        A, B, C, D and the frequency of the load.
+    boundary_equilibria, folds, crossings, jumps, passages : int
+        How many: special points of the diagram, crossings of interfaces over
+        three periods, transitions at a fold and at a boundary equilibrium.
+    regime : str
+        Over the last period.
+    stated : str
+        The regime that the source states.
+    largest_delay : float
+        Of all transitions, in units of the load; nan without a transition.
+    """
+
+    case: str
+    parameters: str
+    boundary_equilibria: int
+    folds: int
+    crossings: int
+    jumps: int
+    passages: int
+    regime: str
+    stated: str
+    largest_delay: float
+
+
+def laid(name: str, title: str, model: fs.Model, stated: str = "") -> Case:
+    """Run a gear over three slow periods from rest and lay it over its diagram."""
+    load, swing = model.parameters["B"], model.parameters["C"]
+    # the whole load, and enough below zero to show the gap
+    over = (min(load - 1.1 * swing, -0.3 * swing), load + 1.1 * swing)
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=over)
+    run = fs.simulate(model, REST, periods=PERIODS)
+    return Case(name, title, stated, model, fs.overlay(diagram, run))
+
+
+def row(case: Case) -> Row:
+    """The numbers of a case for the summary table."""
+    delays = np.abs(case.lay.delays)
+    kinds = [t.kind for t in case.lay.transitions]
+    return Row(
+        case.name,
+        ", ".join(f"{k} = {v:.5g}" for k, v in case.model.parameters.items()),
+        len(case.diagram.boundary_equilibria),
+        len(case.diagram.folds),
+        len(case.run.crossings),
+        kinds.count("jump"),
+        kinds.count("crossing"),
+        case.run.regime or "none",
+        case.stated,
+        float(np.nanmax(delays)) if np.isfinite(delays).any() else float("nan"),
+    )
+
+
+def draw(case: Case) -> fs.plot.PanelDrawing:
+    """The panel of a case: time series, phase portrait, overlay."""
+    title = rf"{case.title}, $\omega_\mathrm{{o}} = {OMEGA:g}$, {PERIODS} periods from rest"
+    return fs.plot.panel(case.lay, title=title)
+
+
+def saved(cases: list[Case], folder: Path) -> list[Row]:
+    """Write the panels of several cases, as PNG and PDF, and return their rows."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for case in cases:
+        drawing = draw(case)
+        for suffix in ("png", "pdf"):
+            drawing.save(folder / f"{case.name}.{suffix}")
+    return [row(case) for case in cases]

@@ -1,0 +1,49 @@
+"""Compiled rates and derivatives against SymPy's own numbers."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+from fastslow.compiled.fields import compile_field, parameter_array
+from fastslow.diagrams.fields import FrozenField
+
+
+def test_field_equals_sympy_to_rounding(gear):
+    fast = gear.frozen()
+    field = FrozenField(fast, "w")
+    generator = np.random.default_rng(1)
+    for number, region in enumerate(fast.regions.values()):
+        u = generator.normal(size=3)
+        names = sp.symbols("x v w", real=True)
+        at = {**fast.values, **dict(zip(names, u, strict=True))}
+        rates = sp.Matrix([region.rates["x"], region.rates["v"]])
+        interfaces = sp.Matrix([i.function for i in fast.interfaces.values()])
+        value, slopes, h, gradients = field.at(number, u)
+        for found, expected in (
+            (value, rates),
+            (slopes, rates.jacobian(names)),
+            (h, interfaces),
+            (gradients, interfaces.jacobian(names)),
+        ):
+            exact = np.array(expected.subs(at), dtype=float).reshape(found.shape)
+            np.testing.assert_allclose(found, exact, rtol=1e-13, atol=1e-13)
+
+
+def test_new_parameter_values_compile_nothing(gear):
+    fast = gear.frozen()
+    one = compile_field(fast.freed("w"), "w")
+    other = compile_field(fast.with_parameters(D=0.4, A=3).freed("w"), "w")
+    assert one.address == other.address
+
+
+def test_a_name_that_python_reserves():
+    x, lam = sp.symbols("x lambda")
+    model = fs.Model({x: lam - x}, parameters={lam: 2})
+    assert fs.equilibria(model)[0].state == pytest.approx([2])
+
+
+def test_a_slow_quantity_without_value_is_named(gear):
+    fast = gear.frozen()
+    with pytest.raises(fs.FastSlowError, match=r"'w' has no value"):
+        parameter_array(fast, compile_field(fast, "A"))

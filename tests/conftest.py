@@ -1,0 +1,17 @@
+"""Shared by all tests: the reference models, built once."""
+
+import pytest
+
+import fastslow as fs
+
+
+@pytest.fixture(scope="session")
+def gear():
+    """The harmonic gear at the values of the reference trajectory P1."""
+    return fs.systems.harmonic_gear()
+
+
+@pytest.fixture(scope="session")
+def folded_gear():
+    """The harmonic gear with negative stiffness: A < −D², two folds."""
+    return fs.systems.harmonic_gear(A=-0.6)

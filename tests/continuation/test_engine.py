@@ -1,0 +1,113 @@
+"""The compiled loop and the extended systems against closed forms and NumPy."""
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import fastslow as fs
+from fastslow.continuation import engine
+from fastslow.continuation.location import (
+    branch_point,
+    fold,
+    fold_coefficient,
+    turning_pair,
+    with_condition,
+)
+
+
+@settings(deadline=None)
+@given(
+    st.lists(st.floats(-10, 10), min_size=9, max_size=9),
+    st.lists(st.floats(-10, 10), min_size=3, max_size=3),
+)
+def test_solve_agrees_with_numpy(entries, right):
+    matrix = np.array(entries).reshape(3, 3) + 40 * np.eye(3)
+    expected = np.linalg.solve(matrix, right)
+    found = np.array(right)
+    assert engine.solve(matrix.copy(), found)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
+
+
+def test_solve_reports_a_singular_matrix():
+    assert not engine.solve(np.ones((2, 2)), np.ones(2))
+    assert not engine.solve(np.full((2, 2), np.nan), np.ones(2))
+
+
+def parabola(u):
+    x, y, p = u
+    value = np.array([p - x**2 + y, -y])
+    return value, np.array([[-2 * x, 1.0, 1.0], [0.0, -1.0, 0.0]])
+
+
+def test_fold_of_a_parabola_to_rounding():
+    found = fold(parabola, np.array([0.1, 0.05, 0.02]), np.ones(3))
+    assert found.converged
+    np.testing.assert_allclose(found.u, 0, atol=1e-14)
+    assert fold_coefficient(parabola, found.u, found.extra) == pytest.approx(-1, abs=1e-11)
+
+
+def test_point_with_a_condition():
+    found = with_condition(
+        parabola, lambda u: (u[0] - 2, np.array([1.0, 0, 0])), np.array([1.0, 0, 1]), np.ones(3)
+    )
+    np.testing.assert_allclose(found.u, [2, 0, 4], atol=1e-14)
+    assert found.converged
+    assert found.residual < 1e-14
+
+
+def test_no_solution_is_said_not_hidden():
+    found = with_condition(
+        parabola, lambda u: (u[2] + 1, np.array([0.0, 0, 1])), np.array([1.0, 0, 1]), np.ones(3)
+    )
+    assert not found.converged
+
+
+def spiral(u):
+    """Linear focus with eigenvalues p ± 2i."""
+    x, y, p = u
+    value = np.array([p * x - 2 * y, 2 * x + p * y])
+    return value, np.array([[p, -2.0, x], [2.0, p, y]])
+
+
+def test_hopf_frequency():
+    found = turning_pair(spiral, np.array([0.0, 0.0, 0.1]), np.ones(3), 3.5)
+    np.testing.assert_allclose(found.u, 0, atol=1e-13)
+    assert np.sqrt(found.extra[0]) == pytest.approx(2, abs=1e-12)
+
+
+def transcritical(u):
+    x, p = u
+    return np.array([p * x - x**2]), np.array([[p - 2 * x, x]])
+
+
+def test_transcritical_branch_point():
+    found = branch_point(transcritical, np.array([0.05, 0.1]), np.ones(2))
+    assert found.converged
+    np.testing.assert_allclose(found.u, 0, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"step": 0}, "step=0"),
+        ({"largest_turn": -1}, "largest_turn=-1"),
+        ({"starts": -1}, "starts=-1"),
+        ({"step": 1.0}, "smallest_step ≤ step ≤ largest_step"),
+    ],
+)
+def test_settings_are_checked(wrong, message):
+    with pytest.raises(fs.FastSlowError, match=message):
+        fs.Continuation(**wrong)
+
+
+def test_two_crossings_of_an_interface_within_one_step_are_seen():
+    """The branch x = p dips below h = (x − 0.5)² − 10⁻⁸ for 2·10⁻⁴ of its length only."""
+    x, p = sp.symbols("x p")
+    narrow = sp.Piecewise((1, (x - sp.Rational(1, 2)) ** 2 > sp.Rational(1, 10**8)), (2, True))
+    model = fs.Model({x: (p - x) * narrow}, parameters={p: 0})
+    assert len(model.interfaces) == 2
+    diagram = fs.continue_equilibria(model, "p", (0, 1))
+    values = [b["p"] for b in diagram.boundary_equilibria]
+    np.testing.assert_allclose(values, [0.4999, 0.5001], atol=1e-13)

@@ -1,0 +1,113 @@
+"""What cannot go on ends with a sentence, and what was computed stays."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+
+x, y, p, w, t = sp.symbols("x y p w t")
+
+
+@pytest.fixture(scope="module")
+def line():
+    return fs.Model({x: p - x}, parameters={p: 0})
+
+
+@pytest.mark.parametrize(
+    ("over", "message"),
+    [
+        ((1, 1), r"over=\(1, 1\): expected an increasing range"),
+        ((2, -1), r"did you mean \(-1, 2\)"),
+        ((0, np.inf), "expected finite ends"),
+        ((0, "a"), "expected two numbers"),
+        (3, "expected two numbers"),
+    ],
+)
+def test_range(line, over, message):
+    with pytest.raises(fs.FastSlowError, match=message):
+        fs.continue_equilibria(line, "p", over)
+
+
+def test_unknown_parameter(line):
+    with pytest.raises(fs.FastSlowError, match="unknown parameter 'pp'; did you mean 'p'"):
+        fs.continue_equilibria(line, "pp", (0, 1))
+
+
+def test_a_model_that_is_not_frozen(gear):
+    with pytest.raises(fs.FastSlowError, match=r"'w' still varies in time.*frozen"):
+        fs.continue_equilibria(gear, "A", (0, 1))
+
+
+def test_a_slow_quantity_without_value(gear):
+    with pytest.raises(fs.FastSlowError, match=r"'w' has no value"):
+        fs.continue_equilibria(gear.frozen(), "A", (0, 1))
+    with pytest.raises(fs.FastSlowError, match=r"'w' has no value"):
+        fs.equilibria(gear.frozen())
+
+
+def test_no_equilibrium_at_all():
+    diagram = fs.continue_equilibria(fs.Model({x: 1 + x**2 + p**2}, parameters={p: 0}), p, (0, 1))
+    assert diagram.branches == ()
+    assert diagram.at(p=0.5) == []
+
+
+def test_the_edge_of_a_logarithm():
+    """log p = x: the branch runs off to −∞ as p → 0."""
+    diagram = fs.continue_equilibria(fs.Model({x: sp.log(p) - x}, parameters={p: 1}), p, (-1, 2))
+    (branch,) = diagram.branches
+    assert branch.parameter.min() > 0
+    sure = branch.parameter > 1e-2
+    assert np.abs(np.log(branch.parameter) - branch["x"])[sure].max() < 1e-12
+    assert not branch.outcome.success
+    assert branch.outcome.code in ("left the window", "step too small", "too many points")
+    assert "try" in branch.outcome.message or "singular" in branch.outcome.message or (
+        "raise" in branch.outcome.message
+    )
+
+
+def test_a_pole():
+    """x = 1/p has two branches, each leaving at p = 0."""
+    settings = fs.Continuation(reach=100.0)
+    model = fs.Model({x: 1 - p * x}, parameters={p: 1})
+    diagram = fs.continue_equilibria(model, p, (-1, 1), settings=settings)
+    assert len(diagram.branches) == 2
+    for branch in diagram.branches:
+        assert branch.outcome.code == "left the window"
+        assert "reach" in branch.outcome.message
+
+
+def test_too_many_points_are_said(line):
+    diagram = fs.continue_equilibria(line, p, (0, 1), settings=fs.Continuation(points=10))
+    assert diagram.branches[0].outcome.code == "too many points"
+    assert "Continuation(points" in diagram.branches[0].outcome.message
+
+
+def test_an_equilibrium_where_two_interfaces_meet():
+    bend = sp.Abs(x) + sp.Abs(y)
+    model = fs.Model({x: p - x - bend / 4, y: p - y + bend / 4}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, p, (-1, 1))
+    assert any(o.code == "interfaces meet" for b in diagram.branches for o in b.outcomes)
+    assert all("meet at the equilibrium" in o.message
+               for b in diagram.branches for o in b.outcomes if o.code == "interfaces meet")
+
+
+def test_a_start_exactly_on_an_interface():
+    """At p = 0, an end of the range, the equilibrium of x' = p − x − |x|/2 is on x = 0."""
+    diagram = fs.continue_equilibria(
+        fs.Model({x: p - x - sp.Abs(x) / 2}, parameters={p: 0}), p, (0, 1)
+    )
+    assert [e["x"] for e in diagram.at(p=0.75)] == pytest.approx([0.5], abs=1e-14)
+    assert len(diagram.branches) == 1
+
+
+def test_equilibria_of_a_model_without_parameters():
+    found = fs.equilibria(fs.Model({x: 1 - x**2}))
+    assert [(e["x"], e.stable) for e in found] == [(-1.0, False), (1.0, True)]
+    assert found.coverage == "complete"
+
+
+def test_a_double_root_is_one_equilibrium():
+    found = fs.equilibria(fs.Model({x: (x - 1) ** 2}))
+    assert [e["x"] for e in found] == pytest.approx([1.0], abs=1e-7)
+    assert found[0].stability == "neutral"

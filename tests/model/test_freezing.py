@@ -1,0 +1,104 @@
+"""The fast subsystem, periods, and immutability."""
+
+import math
+import pickle
+
+import pytest
+import sympy as sp
+
+from fastslow import Model, ModelError, UnknownNameError
+
+x, y, v, t, w, z, g = sp.symbols("x y v t w z g")
+A, C, D, omega = sp.symbols("A C D omega")
+
+
+def forced(law, **values):
+    return Model({x: w - x}, forcing={w: law}, parameters=values)
+
+
+def test_parameters_of_the_law_leave(gear):
+    fast = gear.frozen()
+    assert fast.free == ("w",)
+    assert set(fast.parameters) == {"A", "D"}
+    assert list(fast.regions) == ["S1", "S2", "S3"]
+    assert fast.period() is None
+
+
+def test_a_value_for_the_slow_quantity(gear):
+    assert gear.frozen().with_parameters(w=0.5).parameters["w"] == 0.5
+    with pytest.raises(UnknownNameError, match="unknown parameter 'omega'"):
+        gear.frozen().with_parameters(omega=0.5)
+
+
+def test_slow_states_freeze():
+    model = Model({x: y - x**3 / 3 + x}, slow={y: A * (D - x)}, parameters={A: 0.01, D: 0})
+    assert model.frozen().free == ("y",)
+    assert dict(model.frozen().parameters) == {}
+
+
+def test_freezing_along_a_path():
+    u1, u2 = sp.symbols("u1 u2")
+    model = Model(
+        {x: u1 + u2 * x - x**3},
+        forcing={u1: sp.cos(2 * omega * t), u2: sp.cos(omega * t)},
+        parameters={omega: 0.01},
+    )
+    assert model.frozen().free == ("u1", "u2")
+    fast = model.frozen(slow={u1: 2 * g**2 - 1, u2: g})
+    assert fast.free == ("g",)
+    expected = 2 * g**2 - 1 + g * x - x**3
+    assert sp.expand(sp.sympify(str(fast.rates["x"])) - expected) == 0
+    with pytest.raises(UnknownNameError, match="unknown slow quantity 'u3'; did you mean"):
+        model.frozen(slow={"u3": g})
+
+
+def test_time_in_a_rate_cannot_be_frozen():
+    with pytest.raises(ModelError, match="the rate of x contains time itself"):
+        Model({x: sp.sin(t) - x}).frozen()
+
+
+@pytest.mark.parametrize(
+    ("law", "period"),
+    [
+        (sp.sin(omega * t), 2 * math.pi / 0.1),
+        (1 + sp.sin(omega * t) ** 2, math.pi / 0.1),
+        (sp.sin(2 * omega * t) + sp.cos(3 * omega * t), 2 * math.pi / 0.1),
+        (sp.sin(omega * t) * sp.sin(3 * omega * t), math.pi / 0.1),
+        (sp.Abs(sp.sin(omega * t)), 2 * math.pi / 0.1),
+        (sp.exp(sp.sin(omega * t)), 2 * math.pi / 0.1),
+        (omega * t, None),
+        (sp.sin(t) + sp.sin(sp.sqrt(2) * t), None),
+        (sp.sin(t**2), None),
+        (omega, None),
+    ],
+)
+def test_period(law, period):
+    found = forced(law, omega=0.1).period()
+    assert found is None if period is None else found == pytest.approx(period, rel=1e-13)
+
+
+def test_nothing_can_be_changed(gear):
+    with pytest.raises(AttributeError):
+        gear.states = ("y",)
+    with pytest.raises(TypeError):
+        gear.parameters["A"] = 2
+    changed = gear.with_parameters({D: 0.5}, A=1)
+    assert (changed.parameters["D"], changed.parameters["A"]) == (0.5, 1.0)
+    assert (gear.parameters["D"], gear.parameters["A"]) == (0.25, 41.67)
+
+
+def test_a_model_can_be_sent_to_another_process(gear):
+    again = pickle.loads(pickle.dumps(gear))
+    assert repr(again) == repr(gear)
+    assert again.regions["S1"].rates == gear.regions["S1"].rates
+
+
+def test_freezing_keeps_region_names():
+    gap = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
+    model = Model(
+        {x: w - gap},
+        forcing={w: sp.sin(t)},
+        parameters={D: 1},
+        regions={"gap": sp.And(x < D, x > -D)},
+    )
+    assert list(model.regions) == list(model.frozen().regions) == ["S1", "gap", "S2"]

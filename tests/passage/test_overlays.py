@@ -1,0 +1,102 @@
+"""A trajectory laid over its equilibrium diagram."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+
+FOLD_W = 0.0894402097712473
+
+
+@pytest.fixture(scope="module")
+def lay(gear):
+    diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6.5))
+    return fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=3))
+
+
+def test_the_gear_changes_sides_at_the_gap(lay):
+    assert [(t.from_sheet, t.to_sheet) for t in lay.transitions] == [("S1", "S3"), ("S3", "S1")] * 3
+    assert {t.kind for t in lay.transitions} == {"crossing"}
+    assert {t.special.code for t in lay.transitions} == {"BE"}
+
+
+def test_the_delay_lies_between_touching_off_and_landing(lay):
+    """Each change of sheet falls between the crossings of the two interfaces."""
+    for transition in lay.transitions:
+        before = [c for c in lay.run.crossings if c.time <= transition.time][-1]
+        after = next(c for c in lay.run.crossings if c.time > transition.time)
+        assert before.to_region == "S2"
+        assert {before.interface, after.interface} == {"x - D", "x + D"}
+        assert transition.delay > 0
+        assert transition.delay == pytest.approx(abs(transition.value), abs=1e-14)
+
+
+def test_the_change_is_where_the_new_sheet_is_twice_as_near(lay, gear):
+    """Recomputed from the closed form of both sheets, to nine digits of time."""
+    first = lay.transitions[0]
+    a = gear.parameters["A"]
+    low = np.roots([1, 0.25, a, 0.25 * a - first.value])
+    x3 = low[np.abs(low.imag) < 1e-9].real[0]
+    x, v = lay.run(first.time)
+    extent_x = np.ptp(lay.state[:, 0])
+    extent_v = np.ptp(lay.state[:, 1])
+    old = np.hypot((x - 0.25) / extent_x, v / extent_v)
+    new = np.hypot((x - x3) / extent_x, v / extent_v)
+    assert new / old == pytest.approx(0.5, abs=1e-3)
+
+
+def test_distance_is_small_while_a_sheet_is_followed(lay):
+    assert np.median(lay.distance) < 1e-2
+    assert lay.distance.shape == lay.time.shape == lay.followed.shape
+
+
+def test_summary_tells_the_story(lay):
+    text = lay.summary()
+    assert "6 transitions" in text
+    assert "S1 → S3" in text
+    assert "crossing at BE2" in text
+
+
+def test_jumps_at_both_folds():
+    model = fs.Model(**folded_gear_parts(), parameters={"A": -0.6, "D": 0.25, "omega": 0.001})
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(-0.4, 0.4))
+    lay = fs.overlay(diagram, fs.simulate(model, [0.9, 0], periods=2))
+    assert {t.kind for t in lay.transitions} == {"jump"}
+    assert len(lay.transitions) == 3
+    for transition in lay.transitions:
+        assert abs(transition.special["w"]) == pytest.approx(FOLD_W, abs=1e-14)
+        assert 0 < transition.delay < 0.03
+
+
+def folded_gear_parts():
+    x, v, w, t, A, D, omega = sp.symbols("x v w t A D omega")
+    gap = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
+    return {
+        "rates": {x: v, v: w - v - (x**2 + A) * gap},
+        "forcing": {w: sp.Rational(3, 10) * sp.sin(omega * t)},
+    }
+
+
+def test_a_van_der_pol_relaxation_with_a_slow_state():
+    """εx' = y − x³/3 + x, y' = −x: the slow state y drives jumps at the folds y = ±2/3."""
+    x, y, eps = sp.symbols("x y epsilon")
+    model = fs.Model({x: (y - x**3 / 3 + x)}, slow={y: -eps * x}, parameters={eps: 1e-3})
+    diagram = fs.continue_equilibria(model.frozen(), "y", over=(-1, 1))
+    assert sorted(f["y"] for f in diagram.folds) == pytest.approx([-2 / 3, 2 / 3], abs=1e-14)
+    lay = fs.overlay(diagram, fs.simulate(model, [2, 0], t=(0, 4000)))
+    assert len(lay.transitions) >= 4
+    assert {t.kind for t in lay.transitions} == {"jump"}
+    # x' = β + ξ² beside the fold, β drifting with ε: reached infinity at 2.338 ε^(2/3)
+    delays = lay.delays
+    assert np.ptp(delays) < 1e-6
+    assert delays[0] == pytest.approx(2.33810741 * 1e-3 ** (2 / 3), rel=0.2)
+
+
+def test_wrong_pairs_are_refused(lay, gear):
+    other = fs.simulate(gear.with_parameters(D=0.5), [0, 0], t=(0, 1))
+    with pytest.raises(fs.FastSlowError, match=r"D = 0.25, the trajectory 0.5"):
+        fs.overlay(lay.diagram, other)
+    frozen = fs.continue_equilibria(gear.frozen().with_parameters(w=1), "A", (1, 2))
+    with pytest.raises(fs.FastSlowError, match="unknown slow quantity of the trajectory 'A'"):
+        fs.overlay(frozen, lay.run)

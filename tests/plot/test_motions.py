@@ -1,0 +1,65 @@
+"""Time series and phase portraits as drawn."""
+
+import numpy as np
+import pytest
+import sympy as sp
+from matplotlib.figure import Figure
+
+import fastslow as fs
+
+VALUES = {"x - D": ("x", 0.25), "x + D": ("x", -0.25)}
+
+
+def test_time_series(gear_run):
+    ax = Figure().add_subplot()
+    drawn = fs.plot.time_series(gear_run, "x", ax=ax, interfaces=VALUES)
+    (line,) = drawn.lines
+    assert drawn.ax is line.axes is ax
+    assert (drawn.x, drawn.y) == ("t", "x")
+    assert np.array_equal(line.get_ydata(), gear_run["x"])
+    assert len(drawn.crossings.get_xdata()) == len(gear_run.crossings)
+    assert np.allclose(np.abs(drawn.crossings.get_ydata()), 0.25, atol=1e-14)
+    assert len(drawn.bands[0].lines) == 2
+
+
+def test_time_series_of_a_slow_quantity(gear_run):
+    drawn = fs.plot.time_series(gear_run, "w", crossings=False)
+    assert drawn.crossings is None
+    assert drawn.lines[0].get_ydata().max() == pytest.approx(2.372 + 3.546, rel=1e-4)
+
+
+def test_phase_portrait_has_a_direction(gear_run):
+    drawn = fs.plot.phase_portrait(gear_run, interfaces=VALUES)
+    assert (drawn.x, drawn.y) == ("x", "v")
+    assert [line.get_label() for line in drawn.lines] == ["earlier periods", "trajectory"]
+    joined = np.concatenate([line.get_xdata() for line in drawn.lines])
+    assert len(joined) == len(gear_run.t) + 1
+    assert drawn.arrows
+    assert [b.vertical for b in drawn.bands] == [True, False]
+
+
+def test_any_plane(gear_run):
+    drawn = fs.plot.phase_portrait(gear_run, "w", "v")
+    assert (drawn.x, drawn.y) == ("w", "v")
+    assert drawn.ax.get_xlabel() == "$w$"
+
+
+def test_one_state_stands_over_its_slow_quantity():
+    x, p, t = sp.symbols("x p t")
+    run = fs.simulate(fs.Model({x: p - x}, forcing={p: sp.sin(t)}), [0], periods=1)
+    drawn = fs.plot.phase_portrait(run)
+    assert (drawn.x, drawn.y) == ("p", "x")
+
+
+def test_one_quantity_alone_has_no_phase_portrait():
+    x = sp.Symbol("x")
+    run = fs.simulate(fs.Model({x: -x}), [1], t=(0, 1))
+    with pytest.raises(fs.ArgumentError, match="two quantities, received x alone"):
+        fs.plot.phase_portrait(run)
+
+
+def test_unknown_quantities(gear_run):
+    with pytest.raises(fs.UnknownNameError, match="unknown state or slow quantity 'ww'; did you"):
+        fs.plot.time_series(gear_run, "ww")
+    with pytest.raises(fs.UnknownNameError, match=r"\(known: x, v, w\)"):
+        fs.plot.phase_portrait(gear_run, "x", "theta")

@@ -1,0 +1,130 @@
+"""Starts on an interface, rest, and runs that cannot go on."""
+
+import math
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from fastslow.model.model import Model
+from fastslow.simulation.trajectories import simulate
+
+x, v, y = sp.symbols("x v y")
+
+
+@pytest.fixture
+def unloaded(gear):
+    return gear.with_parameters(B=0, C=0)
+
+
+@pytest.mark.parametrize(
+    ("state", "word"),
+    [
+        ([0.25, -0.1], ("S2",)),
+        ([0.25, 0.1], ("S1", "S2")),
+        ([-0.25, 0.1], ("S2",)),
+        ([-0.25, -0.1], ("S3", "S2")),
+    ],
+)
+def test_start_on_an_interface(unloaded, state, word):
+    run = simulate(unloaded, state, t=(0, 5))
+    assert run.outcome
+    assert run.word == word
+    assert len(run.crossings) == len(word) - 1
+
+
+@pytest.mark.parametrize("start", [0.25, -0.25, 0.0, 0.1])
+def test_rest_in_the_closed_gap(unloaded, start):
+    run = simulate(unloaded, [start, 0], t=(0, 1e4))
+    assert run.outcome
+    assert len(run.steps) < 10
+    assert not run.crossings
+    assert run(1e4) == pytest.approx([start, 0], abs=0)
+
+
+@pytest.mark.parametrize("load", [1e-12, -1e-12])
+def test_tiny_drift_from_a_corner(gear, load):
+    run = simulate(gear.with_parameters(B=load, C=0), [0.25, 0], t=(0, 20), tol=1e-13)
+    assert run.word[0] == ("S1" if load > 0 else "S2")
+    if load < 0:
+        # x = D + w (t - 1 + exp(-t)) in the gap
+        expected = 0.25 + load * (20 - 1 + math.exp(-20))
+        assert run(20.0)[0] == pytest.approx(expected, abs=1e-15)
+
+
+def test_a_corner_left_when_the_load_changes_sign(gear):
+    # at rest on the corner; the load is zero at first and then pulls into the gap
+    model = gear.with_parameters(B=0, C=-1e-3)
+    run = simulate(model, [0.25, 0], t=(0, 300))
+    assert run.outcome
+    assert run.word == ("S2",)
+
+
+def test_accumulating_crossings_end_the_run():
+    model = Model({x: v, v: -sp.sign(x) - sp.sign(v) / 2})
+    run = simulate(model, [1, 0], t=(0, 30))
+    assert run.outcome.code in ("accumulation", "no way on")
+    # from x = a the force 1/2 brings x to 0 in sqrt(4 a) at speed sqrt(a), the force 3/2
+    # stops it after sqrt(4 a / 9) at -a / 3: a geometric series of swings
+    limit = (2 + 2 / 3) / (1 - 3**-0.5)
+    assert run.span[1] == pytest.approx(limit, abs=1e-9)
+    assert np.abs(run.end[1:]).max() < 1e-9
+
+
+def test_blow_up():
+    run = simulate(Model({x: x**2}), [1], t=(0, 3))
+    assert run.outcome.code == "blow-up"
+    assert run.span[1] == pytest.approx(1.0, abs=1e-10)
+    assert run(0.5) == pytest.approx([2.0], rel=1e-10)
+
+
+def test_singular_rates_end_the_run():
+    # x = (1 - 3 t / 2)**(2/3)
+    run = simulate(Model({x: -1 / sp.sqrt(x)}), [1], t=(0, 3))
+    assert run.outcome.code == "singular"
+    assert run.span[1] == pytest.approx(2 / 3, abs=1e-8)
+
+
+def test_a_series_that_ends_does_not_leave_its_domain():
+    # x = (1 - t/2)**2 until t = 2, and a polynomial: all later coefficients are zero
+    run = simulate(Model({x: -sp.sqrt(x)}), [1], t=(0, 3))
+    assert run(1.5) == pytest.approx([0.0625], abs=1e-10)
+    assert run.end[1] == pytest.approx(0, abs=1e-7)
+
+
+def test_not_finite_at_the_start():
+    run = simulate(Model({x: -sp.log(x)}), [-1], t=(0, 1))
+    assert run.outcome.code == "not finite at start"
+    assert run.span == (0.0, 0.0)
+    assert not len(run.steps)
+
+
+def test_limits_return_what_was_computed(gear):
+    run = simulate(gear, [0, 0], periods=3, max_crossings=5, samples=1000)
+    assert run.outcome.code == "too many crossings"
+    assert len(run.crossings) == 6
+    assert run.t[-1] <= run.span[1] < 600 * math.pi
+    run = simulate(gear, [0, 0], periods=3, max_steps=50)
+    assert run.outcome.code == "too many steps"
+    assert len(run.steps) == 50
+    assert np.isfinite(run(run.span[1])).all()
+
+
+def test_interface_that_depends_on_the_state_nonlinearly():
+    # a rotation leaves the circle |z| < 1 nowhere and meets x y = 1/4 where sin 2 t = 1/2
+    model = Model({x: -y, y: x}, interfaces={"hyperbola": x * y - sp.Rational(1, 4)})
+    run = simulate(model, [1, 0], t=(0, 3), tol=1e-13)
+    assert [c.time for c in run.crossings] == pytest.approx(
+        [math.pi / 12, 5 * math.pi / 12], abs=1e-13
+    )
+    assert all(abs(c.state[0] * c.state[1] - 0.25) < 1e-16 for c in run.crossings)
+
+
+def test_interface_that_depends_on_time():
+    t = sp.Symbol("t")
+    square = sp.Piecewise((1, sp.sin(t) > 0), (-1, True))
+    run = simulate(Model({x: square}), [0], t=(1, 10), tol=1e-12)
+    assert [c.time for c in run.crossings] == pytest.approx(
+        [math.pi, 2 * math.pi, 3 * math.pi], abs=1e-12
+    )
+    assert run(2 * math.pi) == pytest.approx([-1.0], abs=1e-12)

@@ -1,0 +1,95 @@
+"""Signs and inequalities decided without SymPy's solvers."""
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fastslow.model.structure import real
+from fastslow.symbolic.inequalities import (
+    conjunction,
+    implied,
+    needed,
+    positive,
+    sign_within,
+)
+from fastslow.symbolic.signs import Signs, read_signs
+
+A, B, D, x = map(real, ["A", "B", "D", "x"])
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        (A + D**2, 1),
+        (-A * D, -1),
+        (A - D, None),
+        ((A + D) ** 2 * (A * D + 1), 1),
+        (A / (A + D), 1),
+        (sp.S.Zero, 0),
+        ((A - D) ** 2 + A, 1),
+    ],
+)
+def test_signs(expression, expected):
+    assert Signs({A: 1, D: 1}).sign(expression) == expected
+
+
+def test_a_fact_gives_signs():
+    signs = read_signs({"A": 1.0, "D": 1.0}, "A < -D**2")
+    assert signs.known == {D: 1, A: -1}
+    assert signs.sign(A + D**2) == -1
+    assert signs.sign(D**2 - 3 * A) == 1
+    assert signs.sign(A + 2 * D**2) is None
+
+
+values = st.floats(-3, 3).filter(lambda s: abs(s) > 1e-3)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(a=values, b=values, p=values, q=values)
+def test_conditions_on_radicals_are_equivalent(a, b, p, q):
+    # P + Q√R > 0 with all signs open, against its floating-point value
+    P, Q, R = A + B, A - 2 * B, A + 3 * B
+    condition = positive(P + Q * sp.sqrt(R), Signs({}))
+    inside = a + 3 * b
+    if inside < 1e-3:
+        return
+    value = a + b + (a - 2 * b) * np.sqrt(inside)
+    if abs(value) > 1e-9:
+        assert bool(condition.subs({A: a, B: b})) == (value > 0)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(a=values, d=st.floats(0.01, 3))
+def test_fold_of_the_gear(a, d):
+    fold = (D + sp.sqrt(D**2 - 3 * A)) / 3
+    condition = positive(fold - D, Signs({D: 1}), [A])
+    assert condition == (A < -(D**2))
+    if abs(a + d * d) > 1e-9:
+        numeric = d * d - 3 * a >= 0 and (d + np.sqrt(max(d * d - 3 * a, 0))) / 3 > d
+        assert bool(condition.subs({A: a, D: d})) == numeric
+
+
+def test_products_and_quotients():
+    both = positive(A * B, Signs({}))
+    for a in (-1, 1):
+        for b in (-1, 1):
+            assert bool(both.subs({A: a, B: b})) == (a * b > 0)
+    assert positive((A - 1) / D, Signs({D: 1}), [A]) == (A > 1)
+    assert positive((A - 1) / D, Signs({D: -1}), [A]) == (A < 1)
+
+
+def test_sign_within_bounds():
+    quadratic = 3 * x**2 - 2 * D * x + A
+    assert sign_within(quadratic, x, [x - D], Signs({A: 1, D: 1})) == 1
+    assert sign_within(quadratic, x, [x - D], Signs({D: 1})) is None
+    assert sign_within(x**2 - D**2, x, [x + D, D - x], Signs({D: 1})) == -1
+
+
+def test_superfluous_conditions():
+    assert needed((x - D, x + D), Signs({D: 1})) == [x - D]
+    assert conjunction([A <= D**2, A < -(D**2)], Signs({D: 1})) == (A < -(D**2))
+    assert implied(A < -(D**2), Signs({A: 1, D: 1})) is False
+    assert implied(sp.Or(A > B, A > 0), Signs({A: 1})) is True
+    assert implied(A > B, Signs({A: 1})) is None

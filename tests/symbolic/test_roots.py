@@ -1,0 +1,80 @@
+"""Short closed forms of roots, and the budget."""
+
+import time
+
+import mpmath
+import pytest
+import sympy as sp
+
+from fastslow.model.structure import real
+from fastslow.symbolic.algebra import growth, light, spread, tidy
+from fastslow.symbolic.derivation import derive
+from fastslow.symbolic.roots import roots, solved_for, squares_out
+from fastslow.symbolic.signs import Signs
+from fastslow.symbolic.stability import hurwitz
+from fastslow.symbolic.verification import vanishes
+from tests.symbolic.symbolic_models import four_states, gear, morris_lecar
+
+a, b, x, w = map(real, ["a", "b", "x", "w"])
+
+
+@pytest.mark.parametrize(
+    "equation", [a * x + b, a * x**2 + b * x - 1, x**5 - 3 * x + 1, x**3 - 7, x**4 - 2]
+)
+def test_roots_satisfy_their_equation(equation):
+    found = roots(equation, x, Signs({a: 1, b: 1}))
+    assert found
+    for root in found:
+        assert vanishes(equation.subs(x, root.value))
+
+
+def test_quintic_roots_agree_with_mpmath():
+    found = sorted(float(r.value) for r in roots(x**5 - 3 * x + 1, x, Signs({})))
+    exact = [float(r.real) for r in mpmath.polyroots([1, 0, 0, 0, -3, 1]) if abs(r.imag) < 1e-20]
+    assert found == pytest.approx(sorted(exact), rel=1e-14)
+
+
+def test_a_general_cubic_has_no_short_form():
+    assert roots(x**3 + a * x + b, x, Signs({})) is None
+
+
+def test_squares_leave_the_root():
+    outer, inner = squares_out(12 * a**3 * b**2, Signs({}))
+    assert sp.expand(outer**2 * inner - 12 * a**3 * b**2) == 0
+    assert inner == 3 * a
+
+
+def test_a_known_slope_goes_first():
+    assert solved_for(a * b + x * w, [b, w], Signs({x: 1}))[0] == w
+
+
+def test_hurwitz_determinant_of_a_cubic():
+    assert hurwitz([1, 2, 3, 4], 2) == 2 * 3 - 4
+    assert hurwitz([1, 2, 3, 4, 5], 3) == sp.Matrix([[2, 4, 0], [1, 3, 5], [0, 2, 4]]).det()
+
+
+def test_the_budget_is_structural():
+    assert growth((a + b + x) ** 30) > 400
+    long = sp.Add(*((a + k) ** 9 * sp.sin(k * x) for k in range(5)))
+    assert not light(long)
+    huge = (a + b + x + w) ** 40
+    assert spread(huge) == huge
+    assert tidy(huge) == huge
+
+
+def test_vanishing():
+    root = sp.sqrt(2 + sp.sqrt(3)) - (sp.sqrt(6) + sp.sqrt(2)) / 2
+    assert vanishes(root)
+    assert vanishes(sp.sin(a) ** 2 + sp.cos(a) ** 2 - 1)
+    assert not vanishes(sp.sin(a) - a + a**3 / 6)
+
+
+@pytest.mark.parametrize(
+    ("model", "seconds"), [(gear, 1.0), (four_states, 10.0), (morris_lecar, 10.0)]
+)
+def test_derive_is_quick(model, seconds):
+    fast = model().frozen()
+    start = time.process_time()
+    derive(fast)
+    # processor time, with room for a slower machine
+    assert time.process_time() - start < 3 * seconds

@@ -1,0 +1,121 @@
+"""Source files for other programs: executed, compiled or parsed back."""
+
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from fastslow.errors import ArgumentError, UnknownNameError
+from fastslow.model.model import Model
+from fastslow.symbolic.sources import export
+from tests.symbolic.symbolic_models import auto_ab, gear, lorenz
+
+
+def run(text):
+    space = {}
+    exec(compile(text, "exported", "exec"), space)
+    return space
+
+
+@pytest.mark.parametrize("model", [gear().frozen(), lorenz(), auto_ab().frozen()])
+def test_numpy_source_gives_the_rates(model):
+    for region in model.regions:
+        space = run(export(model, "numpy", region=region)[f"{region}.py"])
+        state = np.linspace(0.3, 0.7, len(model.states))
+        parameters = {**space["PARAMETERS"], **dict.fromkeys(model.free, 0.4)}
+        at = dict(zip(map(sp.Symbol, model.states), state, strict=True)) | {
+            sp.Symbol(n): v for n, v in parameters.items()
+        }
+        named = {s.name: v for s, v in at.items()}
+        expected = [
+            float(e.subs({s: named[s.name] for s in e.free_symbols}))
+            for e in model.regions[region].rates.values()
+        ]
+        assert space["rates"](0.0, state, parameters) == pytest.approx(expected, rel=1e-14)
+        slope = np.empty((len(state), len(state)))
+        for k, step in enumerate(1e-6 * np.eye(len(state))):
+            upper = space["rates"](0.0, state + step, parameters)
+            slope[:, k] = (upper - space["rates"](0.0, state - step, parameters)) / 2e-6
+        assert space["jacobian"](0.0, state, parameters) == pytest.approx(slope, abs=1e-7)
+
+
+def test_numpy_source_holds_the_forcing():
+    space = run(export(gear(), "numpy", region="S2")["S2.py"])
+    load = 2.372 + 3.546 * np.sin(0.01 * 30)
+    assert space["rates"](30.0, [0.1, 0.2])[1] == pytest.approx(load - 0.2, rel=1e-15)
+    assert space["interfaces"](0.0, [0.1, 0.2]) == pytest.approx([-0.15, 0.35])
+    assert space["SIGNS"] == {"x - D": -1, "x + D": 1}
+
+
+def test_xpp_file_parsed_back():
+    fast = gear().frozen()
+    text = export(fast, "xpp", region="S1", values={"w": 0.5})["S1.ode"]
+    assert text.rstrip().endswith("done")
+    lines = text.splitlines()
+    parameters = dict(re.fullmatch(r"par (\w+)=(.*)", s).groups() for s in lines if s[:4] == "par ")
+    assert {n: float(v) for n, v in parameters.items()} == {"w": 0.5, "A": 41.67, "D": 0.25}
+    rates = dict(re.fullmatch(r"(\w+)'=(.*)", s).groups() for s in lines if "'=" in s)
+    real = {s.name: s for s in fast.regions["S1"].rates["v"].free_symbols}
+    for name, written in rates.items():
+        back = sp.sympify(written.replace("^", "**"), locals=real)
+        assert sp.expand(back - fast.regions["S1"].rates[name]) == 0
+
+
+def test_xpp_names_are_apart_without_case():
+    d, D, lam = sp.symbols("d D lambda")
+    text = export(Model({d: D - lam * d}, parameters={D: 1, lam: 2}), "xpp")["S1.ode"]
+    names = re.findall(r"^(?:par )?(\w+)'?=", text, flags=re.M)
+    assert len({n.lower() for n in names}) == len(names) == 3
+
+
+def test_auto_files():
+    files = export(gear().frozen(), "auto", region="S1", start={"x": 0.26})
+    assert set(files) == {"S1.f90", "c.S1"}
+    source = files["S1.f90"]
+    assert source.count("END SUBROUTINE") == 6
+    assert all(len(line) <= 132 for line in source.splitlines())
+    assert "F(1) = U(2)" in source
+    assert "PAR(2) = 41.67d0 ! A" in source
+    constants = files["c.S1"]
+    assert "NDIM = 2" in constants
+    assert "1: 'w'" in constants
+
+
+def test_auto_leaves_its_own_parameters_alone():
+    x = sp.Symbol("x")
+    many = sp.symbols("k0:12")
+    model = Model({x: sum(many) - x}, parameters=dict.fromkeys(many, 1.0))
+    used = set(map(int, re.findall(r"PAR\((\d+)\)", export(model, "auto")["S1.f90"])))
+    assert used == {*range(1, 10), 15, 16, 17}
+
+
+@pytest.mark.skipif(shutil.which("gfortran") is None, reason="gfortran is not installed")
+@pytest.mark.parametrize("model", [gear().frozen(), lorenz(), auto_ab().frozen()])
+def test_auto_source_compiles(model, tmp_path):
+    export(model, "auto", tmp_path, region="S1")
+    subprocess.run(
+        ["gfortran", "-c", "-Wall", "S1.f90", "-o", "S1.o"], cwd=tmp_path, check=True, timeout=60
+    )
+
+
+def test_files_are_written(tmp_path):
+    written = export(gear().frozen(), "numpy", tmp_path / "out")
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["S1.py", "S2.py", "S3.py"]
+    assert (tmp_path / "out" / "S2.py").read_text(encoding="utf-8") == written["S2.py"]
+
+
+def test_bad_requests():
+    with pytest.raises(UnknownNameError, match="did you mean 'numpy'"):
+        export(gear(), "nunpy")
+    with pytest.raises(UnknownNameError):
+        export(gear(), "numpy", region="S9")
+    with pytest.raises(UnknownNameError):
+        export(gear(), "numpy", start={"y": 1})
+    with pytest.raises(ArgumentError, match="frozen"):
+        export(gear(), "auto")
+    x = sp.Symbol("x")
+    with pytest.raises(ArgumentError, match="gamma"):
+        export(Model({x: -sp.gamma(x)}), "xpp")

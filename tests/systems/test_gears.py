@@ -1,0 +1,77 @@
+"""Parameters of the harmonic gear under both scalings, against tabulated numbers."""
+
+import math
+
+import pytest
+import sympy as sp
+
+import fastslow as fs
+from fastslow.systems import gear_scales, harmonic_gear, harmonic_gear_physical
+
+# computed from the source's values with 40 digits, to all digits kept
+CONSISTENT = {"A": "41.6666667", "B": "2.37197934", "C": "3.54545564", "D": "0.298869397"}
+PRINTED = {"A": "12152.7778", "B": "40.5092593", "C": "60.5501824", "D": "5.10416667"}
+
+
+@pytest.mark.parametrize(("scaling", "table"), [("consistent", CONSISTENT), ("printed", PRINTED)])
+def test_parameters_to_all_digits(scaling, table):
+    values = harmonic_gear_physical(scaling, omega=1.0).parameters
+    assert {name: f"{values[name]:.9g}" for name in "ABCD"} == table
+    assert f"{values['omega']:.9g}" == "0.0182252846"
+
+
+def test_equivalent_inertia_and_damping():
+    scales = gear_scales()
+    assert f"{scales.inertia:.9g}" == "0.023915592"
+    assert f"{scales.damping:.9g}" == "1.31222049"
+
+
+def test_the_printed_formulas():
+    values = harmonic_gear_physical("printed", k1=2500, T_m=7, T_am=31, J_o=0.03, k2=19000)
+    p = values.parameters
+    s = gear_scales("printed", J_o=0.03, k2=19000)
+    j, c = s.inertia, s.damping
+    assert p["A"] == pytest.approx(2500 * 19000 * j**2 / c**4, rel=1e-14)
+    assert p["B"] == pytest.approx(19000 * j**2 * 7 / c**4, rel=1e-14)
+    assert p["C"] == pytest.approx(19000 * j**3 * 31 / (c**4 * 0.03), rel=1e-14)
+
+
+def test_the_consistent_scaling_solves_the_physical_equation():
+    s = gear_scales()
+    p = harmonic_gear_physical(omega=0.7, phi=0.01).parameters
+    theta, rate, time = 0.013, 0.2, 0.4
+    torque = 10 + s.inertia / 2.4e-2 * 15 * math.sin(0.7 * time)
+    physical = (torque - s.damping * rate - (3000 + 21000 * theta**2) * (theta - 0.01)) / s.inertia
+    x, v = theta / s.angle, rate * s.time / s.angle
+    load = p["B"] + p["C"] * math.sin(p["omega"] * time / s.time)
+    scaled = load - v - (x**2 + p["A"]) * (x - p["D"])
+    assert scaled * s.angle / s.time**2 == pytest.approx(physical, rel=1e-12)
+
+
+def test_gap_set_directly():
+    assert harmonic_gear_physical(D=0.1).parameters["D"] == 0.1
+
+
+def test_load_ratio_does_not_depend_on_the_scaling():
+    one, other = (harmonic_gear_physical(s, T_am=1.0).parameters for s in ("consistent", "printed"))
+    assert one["C"] / one["B"] == pytest.approx(0.099648300, rel=1e-8)
+    assert other["C"] / other["B"] == pytest.approx(one["C"] / one["B"], rel=1e-14)
+
+
+def test_regions_of_the_gear():
+    gear = harmonic_gear()
+    assert list(gear.regions) == ["S1", "S2", "S3"]
+    assert list(gear.interfaces) == ["x - D", "x + D"]
+    assert gear.regions["S2"].rates["v"] == sp.sympify(
+        "w - v", {n: sp.Symbol(n, real=True) for n in "wv"}
+    )
+    assert gear.period() == pytest.approx(200 * math.pi, rel=1e-14)
+
+
+def test_bad_values():
+    with pytest.raises(fs.UnknownNameError, match="'printd'; did you mean 'printed'"):
+        harmonic_gear_physical("printd")
+    with pytest.raises(fs.ArgumentError, match="k2: expected a positive number, received -1"):
+        harmonic_gear_physical(k2=-1)
+    with pytest.raises(fs.ModelError, match="parameter D: expected a finite number, received nan"):
+        harmonic_gear_physical(D=float("nan"))

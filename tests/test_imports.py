@@ -1,0 +1,150 @@
+"""The direction of imports, the lightness of the package, and names that would hide each other."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import fastslow
+
+ROOT = Path(fastslow.__file__).parent
+FILES = sorted(ROOT.rglob("*.py"))
+PACKAGE_INIT = ROOT / "__init__.py"
+
+# from the top down: a layer may import those that follow it, and itself
+LAYERS = [
+    "systems",
+    "interactive",
+    "plot",
+    "passage",
+    "sweeps",
+    "orbits",
+    "diagrams",
+    "continuation",
+    "simulation",
+    "compiled",
+    "symbolic",
+    "model",
+    "results",
+    "errors",
+]
+
+
+def layer_of(path: Path) -> str:
+    return path.relative_to(ROOT).parts[0].removesuffix(".py")
+
+
+def type_checking(node: ast.AST) -> bool:
+    test = node.test if isinstance(node, ast.If) else None
+    return getattr(test, "id", getattr(test, "attr", "")) == "TYPE_CHECKING"
+
+
+def imports(tree: ast.AST, late: bool = True) -> set[str]:
+    """Dotted names of every module imported, without TYPE_CHECKING blocks."""
+    found: set[str] = set()
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports are absolute"
+            module = node.module or ""
+            inside = {f"{module}.{alias.name}" for alias in node.names}
+            found |= inside if module == "fastslow" else {module}
+        elif type_checking(node):
+            found |= {name for part in node.orelse for name in imports(part, late)}
+        elif late or not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            found |= imports(node, late)
+    return found
+
+
+def modules_of(path: Path, late: bool = True) -> set[str]:
+    return imports(ast.parse(path.read_text(encoding="utf-8")), late)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_point_down(path):
+    if path == PACKAGE_INIT:
+        return
+    layer = layer_of(path)
+    assert layer in LAYERS, f"{layer} is not one of the layers"
+    below = LAYERS[LAYERS.index(layer) :]
+    for name in modules_of(path):
+        if name.startswith("fastslow."):
+            other = name.split(".")[1]
+            assert other in below, f"{path.relative_to(ROOT)} imports {name}, a layer above it"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_third_parties_stay_in_their_layers(path):
+    layer = layer_of(path)
+    own = {"fastslow", *sys.stdlib_module_names}
+    foreign = {name.split(".")[0] for name in modules_of(path)} - own
+    if layer == "results":
+        now = {name.split(".")[0] for name in modules_of(path, late=False)} - own
+        assert now <= {"numpy"}
+    if layer == "plot":
+        assert foreign <= {"matplotlib", "numpy"}
+        assert {n.split(".")[1] for n in modules_of(path) if n.startswith("fastslow.")} <= {
+            "errors",
+            "plot",
+            "results",
+        }
+    if layer == "continuation":
+        assert not any(n.startswith("fastslow.model") for n in modules_of(path))
+    assert "matplotlib" not in foreign or layer in {"plot", "interactive"}
+    assert foreign <= {"llvmlite", "matplotlib", "numba", "numpy", "scipy", "sympy", "tqdm"}
+
+
+def test_no_module_bears_the_name_of_a_public_function():
+    functions = set()
+    for path in FILES:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+                functions.add((path.parent, node.name))
+    functions |= {(ROOT, name) for name in fastslow.__all__ if name not in {"plot", "systems"}}
+    modules = {(path.parent, path.stem) for path in FILES if path.stem != "__init__"}
+    modules |= {(path.parent.parent, path.parent.name) for path in FILES if path.stem == "__init__"}
+    assert sorted(str(folder / name) for folder, name in functions & modules) == []
+
+
+def run(code: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120
+    )
+    return done.stdout.strip()
+
+
+def test_importing_the_package_imports_nothing_heavy():
+    heavy = "{'sympy', 'numba', 'scipy', 'matplotlib', 'numpy'}"
+    assert run(f"import fastslow, sys; print(sorted({heavy} & set(sys.modules)))") == "[]"
+
+
+def test_results_import_numpy_only():
+    heavy = "{'sympy', 'numba', 'scipy', 'matplotlib'}"
+    code = f"import fastslow, sys; fastslow.Diagram; print(sorted({heavy} & set(sys.modules)))"
+    assert run(code) == "[]"
+
+
+def test_plotting_needs_neither_sympy_nor_numba():
+    heavy = "{'sympy', 'numba', 'scipy', 'matplotlib.pyplot'}"
+    code = f"import fastslow, sys; fastslow.plot; print(sorted({heavy} & set(sys.modules)))"
+    assert run(code) == "[]"
+
+
+@pytest.mark.parametrize("name", fastslow.__all__)
+def test_every_public_name_is_there(name):
+    assert getattr(fastslow, name) is not None
+    assert name in dir(fastslow)
+
+
+def test_an_unknown_name_suggests_the_nearest():
+    with pytest.raises(AttributeError, match="unknown name 'simulat'; did you mean 'simulate'"):
+        fastslow.simulat  # noqa: B018
+    with pytest.raises(AttributeError, match="no attribute '__nothing__'"):
+        fastslow.__nothing__  # noqa: B018
+
+
+def test_every_public_name_has_a_home():
+    assert {*fastslow._HOME, "__version__"} == set(fastslow.__all__)
