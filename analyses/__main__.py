@@ -11,7 +11,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from analyses import dead_zone, gap_width, load_amplitude, negative_stiffness, stiffness
-from analyses.passages import Row
+from analyses.passages import OMEGA, PERIODS, Row
 
 PANELS = (gap_width, stiffness, load_amplitude, negative_stiffness)
 
@@ -49,7 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> list[Row]:
         writer = csv.DictWriter(file, [f.name for f in fields(Row)])
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)
-    print(f"{table(rows)}\n\nFigures and summary.csv are in {folder}")
+    print(f"\n{table(rows)}\n")
+    print(f"Load of angular frequency {OMEGA:g} (dimensionless), {PERIODS} periods from rest.")
+    print(f"Figures and summary.csv are in {folder}.")
     return rows
 
 

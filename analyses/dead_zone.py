@@ -38,6 +38,7 @@ def draw() -> fs.plot.Drawing:
     ax = axes_for(None)
     ax.plot(x, transmitted(x), color=BRANCH, **LINES["stable"])
     ax.set_xlim(-1, 1)
+    ax.set_xticks([-1, -GAP, 0, GAP, 1], ["−1", "$-D$", "0", "$D$", "1"])
     ax.set_xlabel(typeset("x"))
     ax.set_ylabel("$f(x)$")
     values = {"x - D": ("x", GAP), "x + D": ("x", -GAP)}

@@ -53,23 +53,29 @@ class Row:
     Parameters
     ----------
     case : str
-    parameters : str
-        A, B, C, D and the frequency of the load.
-    boundary_equilibria, folds, crossings, jumps, passages : int
-        How many: special points of the diagram, crossings of interfaces over
-        three periods, transitions at a fold and at a boundary equilibrium.
+    A, B, C, D : float
+        Parameters of the dimensionless gear.
+    BE, LP : int
+        Boundary equilibria and folds of the diagram.
+    crossings : int
+        Crossings of interfaces over the whole run.
+    jumps, passages : int
+        Transitions at a fold, and at a boundary equilibrium.
     regime : str
         Over the last period.
     stated : str
-        The regime that the source states.
+        The regime that the source states, "" where it states none.
     largest_delay : float
         Of all transitions, in units of the load; nan without a transition.
     """
 
     case: str
-    parameters: str
-    boundary_equilibria: int
-    folds: int
+    A: float
+    B: float
+    C: float
+    D: float
+    BE: int
+    LP: int
     crossings: int
     jumps: int
     passages: int
@@ -90,11 +96,15 @@ def laid(name: str, title: str, model: fs.Model, stated: str = "") -> Case:
 
 def row(case: Case) -> Row:
     """The numbers of a case for the summary table."""
+    values = case.model.parameters
     delays = np.abs(case.lay.delays)
     kinds = [t.kind for t in case.lay.transitions]
     return Row(
         case.name,
-        ", ".join(f"{k} = {v:.5g}" for k, v in case.model.parameters.items()),
+        values["A"],
+        values["B"],
+        values["C"],
+        values["D"],
         len(case.diagram.boundary_equilibria),
         len(case.diagram.folds),
         len(case.run.crossings),

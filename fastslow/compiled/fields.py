@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 import sympy as sp
@@ -75,9 +76,7 @@ def compile_field(model: Model, parameter: str) -> CompiledField:
             )
         bodies.append(_body(rows, len(model.states), rename))
     module = load_generated(_source(bodies, len(names), len(others)), "field")
-    return CompiledField(
-        module.field.address, others, len(model.states), len(model.interfaces)
-    )
+    return CompiledField(module.field.address, others, len(model.states), len(model.interfaces))
 
 
 def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -> list[str]:
@@ -85,7 +84,8 @@ def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -
     unknowns = list(rename)[: n + 1]
     values = [r.xreplace(rename) for r in rows]
     slopes = [[r.diff(u).xreplace(rename) for u in unknowns] for r in rows]
-    ordered = [*values[:n], *sum(slopes[:n], []), *values[n:], *sum(slopes[n:], [])]
+    first, second = (list(chain.from_iterable(rows)) for rows in (slopes[:n], slopes[n:]))
+    ordered = [*values[:n], *first, *values[n:], *second]
     shared, results = sp.cse(ordered, symbols=sp.numbered_symbols("s"))
     printer = PythonCodePrinter({"fully_qualified_modules": True})
     lines = [f"{symbol} = {printer.doprint(value)}" for symbol, value in shared]

@@ -26,9 +26,7 @@ def call_address(  # type: ignore[no-untyped-def]
     typingctx, address, mode, inputs, parameters, outputs
 ):
     """Call the generated function at an address with a mode and three float64 arrays."""
-    signature = types.void(
-        types.int64, types.int64, inputs, parameters, outputs
-    )
+    signature = types.void(types.int64, types.int64, inputs, parameters, outputs)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         double_pointer = ir.DoubleType().as_pointer()

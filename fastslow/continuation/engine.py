@@ -12,16 +12,10 @@ import numpy as np
 from numba import njit
 
 from fastslow.compiled.pointers import call_address
-
-FULL = 0
-RANGE = 1
-INTERFACE = 2
-SMALL_STEP = 3
-WINDOW = 4
-CLOSED = 5
+from fastslow.continuation.loops import CLOSED, FULL, INTERFACE, RANGE, SMALL_STEP, WINDOW
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def solve(matrix, right):  # type: ignore[no-untyped-def]
     """Solve a small dense system in place by elimination with row pivoting.
 
@@ -56,7 +50,7 @@ def solve(matrix, right):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _bordered(out, n, border, weight, matrix):  # type: ignore[no-untyped-def]
     for i in range(n):
         for j in range(n + 1):
@@ -65,7 +59,7 @@ def _bordered(out, n, border, weight, matrix):  # type: ignore[no-untyped-def]
         matrix[n, j] = border[j] * weight[j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _norm(vector, weight):  # type: ignore[no-untyped-def]
     total = 0.0
     for j in range(vector.shape[0]):
@@ -73,7 +67,7 @@ def _norm(vector, weight):  # type: ignore[no-untyped-def]
     return math.sqrt(total)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _dips(h0, s0, h1, s1):  # type: ignore[no-untyped-def]
     """Whether the cubic through two positive values with given slopes is negative between."""
     if not (s0 < 0.0 < s1):
@@ -90,10 +84,26 @@ def _dips(h0, s0, h1, s1):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def trace(  # type: ignore[no-untyped-def]
-    address, mode, parameters, start, tangent, signs, weight, lower, upper, window,
-    step, smallest, largest, turn, tolerance, iterations, points, closing,
+    address,
+    mode,
+    parameters,
+    start,
+    tangent,
+    signs,
+    weight,
+    lower,
+    upper,
+    window,
+    step,
+    smallest,
+    largest,
+    turn,
+    tolerance,
+    iterations,
+    points,
+    closing,
 ):
     """Follow one curve inside one region until something ends it.
 
@@ -158,7 +168,7 @@ def trace(  # type: ignore[no-untyped-def]
             return rows[:count], tangents[:count], SMALL_STEP, step
         for j in range(size):
             guess[j] = last[j] + step * direction[j]
-        for used in range(1, iterations + 1):
+        for used in range(1, iterations + 1):  # noqa: B007  the step size depends on it
             call_address(address, mode, guess, parameters, out)
             along = 0.0
             for j in range(size):
@@ -236,7 +246,7 @@ def trace(  # type: ignore[no-untyped-def]
     return rows[:count], tangents[:count], FULL, step
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def evaluate(address, modes, points, parameters, width):  # type: ignore[no-untyped-def]
     """Output of the generated function at every row of points, shape (N, width)."""
     result = np.empty((points.shape[0], width))
@@ -245,7 +255,7 @@ def evaluate(address, modes, points, parameters, width):  # type: ignore[no-unty
     return result
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def newton_from(  # type: ignore[no-untyped-def]
     address, mode, parameters, starts, value, width, iterations
 ):

@@ -203,9 +203,7 @@ def branch_point(curve: Curve, start: Array, scale: Array) -> Located:
     def equations(z: Array) -> Array:
         value, slopes = curve(z[: n + 1])
         psi, beta = z[n + 1 : 2 * n + 1], z[-1]
-        return np.concatenate(
-            [value + beta * psi, scale * (slopes.T @ psi), [guide @ psi - 1.0]]
-        )
+        return np.concatenate([value + beta * psi, scale * (slopes.T @ psi), [guide @ psi - 1.0]])
 
     z, residual, converged = newton(
         equations,

@@ -76,19 +76,20 @@ def branch_of(
     tables: list[tuple[Array, Array, int]] = []
     rows = 0
     for number, piece in enumerate(curve.pieces):
-        u, tangents = [], []
+        points: list[Array] = []
+        directions: list[Array] = []
         found = special_points(field, piece, window, marks)
         for row in range(len(piece.u)):
-            u.append(piece.u[row])
-            tangents.append(piece.tangents[row])
+            points.append(piece.u[row])
+            directions.append(piece.tangents[row])
             for detected in (d for d in found if d.row == row):
                 point = _point(field, piece, detected, window)
                 special.append(point)
-                at_row.append(rows + len(u))
-                u.append(detected.located.u)
-                tangents.append(point.tangent)
-        tables.append((np.array(u), np.array(tangents), piece.region))
-        rows += len(u)
+                at_row.append(rows + len(points))
+                points.append(detected.located.u)
+                directions.append(point.tangent)
+        tables.append((np.array(points), np.array(directions), piece.region))
+        rows += len(points)
         if number < len(curve.joins):
             special.append(_corner(field, curve, number))
             at_row.append(rows - 1)
@@ -221,7 +222,7 @@ def _with_ends(
             ends.append([_special(field, "EP", piece.region, u, tangent, note=note)])
             continue
         beyond = field.neighbour(piece.region, interface)
-        names = (field.regions[piece.region],)
+        names: tuple[str, ...] = (field.regions[piece.region],)
         if beyond is not None:
             names = (*names, field.regions[beyond])
         point = _special(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +60,7 @@ def special_points(
 def _changes(test: Array) -> Iterator[tuple[int, int]]:
     """Pairs of rows, next to each other but for zeros, between which a test changes sign."""
     rows = np.flatnonzero(test != 0)
-    for before, after in zip(rows[:-1], rows[1:], strict=True):
+    for before, after in pairwise(rows):
         if test[before] * test[after] < 0:
             yield int(before), int(after)
 
@@ -115,9 +116,7 @@ def _turning_pairs(field: FrozenField, piece: Piece, window: Window) -> Iterator
         near = before if abs(test[before]) < abs(test[after]) else after
         pair = int(np.argmin(np.abs(sums[near])))
         squared = float((eigenvalues[near, first[pair]] * eigenvalues[near, second[pair]]).real)
-        located = turning_pair(
-            lambda u: field.curve(piece.region, u), guess, window.scale, squared
-        )
+        located = turning_pair(lambda u: field.curve(piece.region, u), guess, window.scale, squared)
         kappa = float(located.extra[0])
         if kappa > 0:
             yield Detected(before, "HB", located, frequency=float(np.sqrt(kappa)))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.compiled.fields import CompiledField, compile_field, parameter_array
+from fastslow.continuation.loops import loop
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
 
@@ -68,12 +69,10 @@ class FrozenField:
 
     def at(self, region: int, points: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """F (…, n), [F_x F_p] (…, n, n + 1), h (…, m) and ∇h (…, m, n + 1) at points u."""
-        from fastslow.continuation.engine import evaluate
-
         u = np.asarray(points, dtype=float)
         rows = np.atleast_2d(u)
         modes = np.full(len(rows), region, dtype=np.int64)
-        out = evaluate(self.compiled.address, modes, rows, self.values, self.compiled.size)
+        out = loop("evaluate")(self.compiled.address, modes, rows, self.values, self.compiled.size)
         n, m = self.n, self.compiled.m
         parts = np.split(out, np.cumsum([n, n * (n + 1), m]), axis=1)
         lead = u.shape[:-1]

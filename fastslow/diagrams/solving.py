@@ -12,6 +12,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.continuation.location import with_condition
+from fastslow.continuation.loops import loop
 from fastslow.diagrams.fields import FrozenField
 from fastslow.model.model import Model
 from fastslow.model.structure import real
@@ -47,9 +48,7 @@ class RegionEquations:
     @cached_property
     def _numbers(self) -> dict[sp.Symbol, sp.Rational]:
         values = self.field.model.parameters
-        return {
-            real(n): sp.Rational(v) for n, v in values.items() if n != self.field.parameter
-        }
+        return {real(n): sp.Rational(v) for n, v in values.items() if n != self.field.parameter}
 
     @cached_property
     def elimination(self) -> Elimination:
@@ -72,14 +71,14 @@ class RegionEquations:
     def _coefficients(self) -> Any:
         assert self.polynomial is not None
         p = real(self.field.parameter)
-        return sp.lambdify(p, self.polynomial.all_coeffs(), "math")
+        return sp.lambdify(p, [sp.N(c, 17) for c in self.polynomial.all_coeffs()], "math")
 
     @cached_property
     def _formula(self) -> Any:
         left = self.elimination
         p = real(self.field.parameter)
         states = left.state({}, self.field.model.states)
-        return sp.lambdify((p, *left.unknowns), list(states), "math")
+        return sp.lambdify((p, *left.unknowns), [sp.N(s, 17) for s in states], "math")
 
     def _whole(self, value: float, *unknowns: float) -> list[Array]:
         """The full state at values of the unknowns; none outside the domain of the formulas."""
@@ -177,19 +176,18 @@ class RegionEquations:
 
     def _searched(self, value: float) -> list[Array]:
         """Newton's method from many states, a fixed sequence spread over several scales."""
-        from fastslow.continuation.engine import newton_from
-
         field, n = self.field, self.field.n
         generator = np.random.default_rng(20231)
         spread = 10.0 ** generator.uniform(-2, 1.5, (STARTS, 1))
         starts = np.vstack([np.zeros(n), generator.standard_normal((STARTS, n)) * spread])
-        states, converged = newton_from(
+        states, converged = loop("newton_from")(
             field.compiled.address, self.region, field.values, starts, value,
             field.compiled.size, 100,
         )  # fmt: skip
         distinct: list[Array] = []
         for state in states[converged]:
-            if not any(np.abs(state - o).max() < 1e-5 * max(1.0, np.abs(o).max()) for o in distinct):
+            near = (np.abs(state - o).max() / max(1.0, np.abs(o).max()) for o in distinct)
+            if min(near, default=1.0) > 1e-5:
                 distinct.append(state)
         return sorted(self._polished(value, distinct), key=lambda s: tuple(s))
 
@@ -202,7 +200,7 @@ def real_roots(coefficients: Array) -> list[float]:
 
     Examples
     --------
-    >>> real_roots(np.array([1.0, 0.0, -4.0]))
+    >>> [round(r, 12) for r in real_roots(np.array([1.0, 0.0, -4.0]))]
     [-2.0, 2.0]
     """
     size = np.abs(coefficients).max(initial=0.0)
@@ -219,7 +217,11 @@ def _same(one: Array, other: Array) -> bool:
 
 
 def equilibria(
-    model: Model, values: Mapping[Any, float] | None = None, /, *, virtual: bool = False,
+    model: Model,
+    values: Mapping[Any, float] | None = None,
+    /,
+    *,
+    virtual: bool = False,
     **named: float,
 ) -> Equilibria:
     """All equilibria of a frozen model at given values of its slow quantities.
@@ -261,7 +263,8 @@ def equilibria(
     """
     given = model.with_parameters(values, **named)
     name = next(iter(given.parameters), IDLE)
-    return solve_at(FrozenField(given, name), given.parameters.get(name, 0.0), virtual)
+    value = given.parameters[name] if given.parameters else 0.0
+    return solve_at(FrozenField(given, name), value, virtual)
 
 
 def solve_at(field: FrozenField, value: float, virtual: bool = False) -> Equilibria:

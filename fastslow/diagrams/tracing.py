@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.continuation.location import with_condition
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.assembly import Curve, branch_of, joined, rising
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.solving import point_at, region_equations, solve_at
-from fastslow.diagrams.walking import Piece, Walk, Window, walk
+from fastslow.diagrams.walking import Piece, Window, beside, walk
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
@@ -75,7 +75,7 @@ def continue_equilibria(
     >>> model = Model({x: w + x - x**3}, forcing={w: sp.sin(t)}).frozen()
     >>> diagram = continue_equilibria(model, "w", (-1, 1))
     >>> [round(p["w"], 12) for p in diagram.folds]
-    [0.3849001794598, -0.3849001794598]
+    [0.38490017946, -0.38490017946]
     """
     name = str(parameter)
     lower, upper = _range(name, over)
@@ -119,9 +119,7 @@ def _range(name: str, over: Any) -> tuple[float, float]:
     try:
         lower, upper = (float(v) for v in over)
     except (TypeError, ValueError):
-        raise ArgumentError(
-            f"over={over!r}: expected two numbers, the range of {name}"
-        ) from None
+        raise ArgumentError(f"over={over!r}: expected two numbers, the range of {name}") from None
     if not (math.isfinite(lower) and math.isfinite(upper)):
         raise ArgumentError(f"over=({lower:g}, {upper:g}): expected finite ends of the range")
     if lower >= upper:
@@ -146,9 +144,7 @@ class _Starts:
     def at(self, value: float, admissible: bool) -> list[Equilibrium]:
         if value not in self._found:
             self._found[value] = solve_at(self._field, value, virtual=True)
-        return [
-            e for e in self._found[value] if e.admissible == admissible and not e.continuum
-        ]
+        return [e for e in self._found[value] if e.admissible == admissible and not e.continuum]
 
     def values(self, branches: list[Branch]) -> Iterable[float]:
         """The first values, then one between each two special points found so far."""
@@ -158,9 +154,7 @@ class _Starts:
             special = {p[b.parameter_name] for b in branches for p in b.special}
             levels = sorted({*self._over, *special})
             gap = 1e-6 * (self._over[1] - self._over[0])
-            middles = {
-                0.5 * (a + b) for a, b in zip(levels[:-1], levels[1:], strict=True) if b - a > gap
-            }
+            middles = {0.5 * (a + b) for a, b in pairwise(levels) if b - a > gap}
             fresh = sorted(middles - done)
             if not fresh or len(done) > 200:
                 return
@@ -188,22 +182,11 @@ def _traced(
     region = field.regions.index(start.region)
     u = np.append(start.state, value)
     tangent, _ = field.tangent(region, u, window.weight)
-    forward = _walk(field, region, u, tangent, window, settings, bounded)
+    forward = walk(field, region, u, tangent, window, settings, bounded=bounded)
     if forward.closed:
         return joined(None, forward)
-    return rising(joined(_walk(field, region, u, -tangent, window, settings, bounded), forward))
-
-
-def _walk(
-    field: FrozenField,
-    region: int,
-    u: Array,
-    tangent: Array,
-    window: Window,
-    settings: Continuation,
-    bounded: bool,
-) -> Walk:
-    return walk(field, region, u, tangent, window, settings, bounded=bounded)
+    backward = walk(field, region, u, -tangent, window, settings, bounded=bounded)
+    return rising(joined(backward, forward))
 
 
 def _branches(
@@ -243,12 +226,7 @@ def _passes(
     for k in np.flatnonzero(apart < 1e-2):
         region = field.regions.index(str(branch.region[k]))
         normal = chords[k] / np.sqrt(length[k]) / window.scale
-        found = with_condition(
-            lambda z, region=region: field.curve(region, z),
-            lambda z, normal=normal: (float((z - u * window.scale) @ normal), normal),
-            near[k] * window.scale,
-            window.scale,
-        )
+        found = beside(field, region, u * window.scale, normal, near[k] * window.scale, window)
         if found.converged and np.abs(found.u / window.scale - u).max() < 1e-6:
             return True
     return False

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation import engine
+from fastslow.continuation import loops
 from fastslow.continuation.location import Located, with_condition
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.fields import FrozenField
@@ -93,7 +93,7 @@ def walk(
     step = settings.step
     while len(pieces) < PIECES:
         signs = field.signs[region] if bounded else np.zeros(len(field.interfaces))
-        u, tangents, status, step = engine.trace(
+        u, tangents, status, step = loops.loop("trace")(
             field.compiled.address, region, field.values, start, tangent, signs,
             window.weight, window.lower, window.upper, settings.reach * window.scale[:-1],
             max(step, 10 * settings.smallest_step), settings.smallest_step,
@@ -101,23 +101,23 @@ def walk(
             settings.iterations, settings.points, not joins,
         )  # fmt: skip
         met = None
-        if status == engine.INTERFACE:
+        if status == loops.INTERFACE:
             met = _first_interface(field, region, u, tangents, window)
             if met is None:
-                status = engine.SMALL_STEP
+                status = loops.SMALL_STEP
                 u, tangents = u[:-1], tangents[:-1]
             elif not window.lower <= met[1][-1] <= window.upper:
-                status = engine.RANGE
-        if status == engine.RANGE:
+                status = loops.RANGE
+        if status == loops.RANGE:
             u, tangents = _cut_at_range(field, region, u, tangents, window)
-        if status != engine.INTERFACE or met is None:
-            if status == engine.WINDOW:
+        if status != loops.INTERFACE or met is None:
+            if status == loops.WINDOW:
                 u, tangents = u[:-1], tangents[:-1]
             pieces.append(Piece(region, u, tangents))
-            closed = status == engine.CLOSED
+            closed = status == loops.CLOSED
             if closed:
                 u[-1], tangents[-1] = first[0], first[1]
-            outcome = _outcome(status, field, u[-1], tangents[-1], window, settings)
+            outcome = _outcome(status, field, u[-1], window, settings)
             return Walk(tuple(pieces), tuple(joins), outcome, closed=closed)
         interface, corner = met
         end = _oriented(field.tangent(region, corner, window.weight)[0], tangents[-1], window)
@@ -164,6 +164,18 @@ def on_interface(
         return float(h[interface]), slopes[interface]
 
     return with_condition(lambda u: field.curve(region, u), condition, guess, window.scale)
+
+
+def beside(
+    field: FrozenField, region: int, point: Array, normal: Array, guess: Array, window: Window
+) -> Located:
+    """Where the curve meets the plane through a point with a given normal."""
+    return with_condition(
+        lambda z: field.curve(region, z),
+        lambda z: (float((z - point) @ normal), normal),
+        guess,
+        window.scale,
+    )
 
 
 def _enter(
@@ -256,16 +268,20 @@ def _full(field: FrozenField, u: Array, settings: Continuation) -> Outcome:
 
 
 def _outcome(
-    status: int, field: FrozenField, u: Array, tangent: Array, window: Window, settings: Continuation
+    status: int,
+    field: FrozenField,
+    u: Array,
+    window: Window,
+    settings: Continuation,
 ) -> Outcome:
     where = _where(field, u)
-    if status == engine.RANGE:
+    if status == loops.RANGE:
         return Outcome(
             "end of range", f"reached {field.parameter} = {u[-1]:g}, the end of the range.", True
         )
-    if status == engine.CLOSED:
+    if status == loops.CLOSED:
         return _closed()
-    if status == engine.WINDOW:
+    if status == loops.WINDOW:
         k = int(np.argmax(np.abs(u[:-1]) / window.scale[:-1]))
         return Outcome(
             "left the window",
@@ -273,7 +289,7 @@ def _outcome(
             f"{where}; raise Continuation(reach=…) to follow it further.",
             False,
         )
-    if status == engine.FULL:
+    if status == loops.FULL:
         return _full(field, u, settings)
     return Outcome(
         "step too small",

@@ -21,7 +21,7 @@ def affine_rows(
         if any(slope.free_symbols for slope in slopes):
             rows.append(None)
             continue
-        rest = function.subs({z: 0 for z in moving})
+        rest = function.subs(dict.fromkeys(moving, 0))
         row = np.array([*map(float, slopes), float(rest)])
         size = np.abs(row[:-1]).max(initial=0.0)
         rows.append(row / size if size else row)

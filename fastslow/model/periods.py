@@ -100,9 +100,7 @@ def _harmonics(
     return sorted(frequencies)
 
 
-def _slope(
-    phase: sp.Expr, time: sp.Symbol, values: Mapping[sp.Symbol, float]
-) -> float | None:
+def _slope(phase: sp.Expr, time: sp.Symbol, values: Mapping[sp.Symbol, float]) -> float | None:
     slope = phase.diff(time)
     if time in slope.free_symbols:
         return None

@@ -180,9 +180,7 @@ def smooth(
             if _holds(condition, signs, moving, values):
                 return smooth(value, signs, moving, values)
         pattern = ", ".join(f"{h} {'>' if s > 0 else '<'} 0" for h, s in signs.items())
-        raise ModelError(
-            f"{expression} has no branch where {pattern}; end it with (value, True)"
-        )
+        raise ModelError(f"{expression} has no branch where {pattern}; end it with (value, True)")
     return expression.func(*[smooth(a, signs, moving, values) for a in expression.args])
 
 

@@ -91,7 +91,10 @@ class Structure:
         return {n: smooth(e, signs, self.moving, values) for n, e in written.items()}
 
     def _named(
-        self, interfaces: Sequence[Interface], patterns: Mapping[Pattern, list[Cell]], values: Values
+        self,
+        interfaces: Sequence[Interface],
+        patterns: Mapping[Pattern, list[Cell]],
+        values: Values,
     ) -> dict[Pattern, str]:
         """A name for each pattern: asked for, kept from before, or the next free number."""
         named: dict[Pattern, str] = {}
@@ -204,14 +207,10 @@ def read_structure(
         raise ModelError("a model needs at least one state with its rate")
     laws = {str(n): _checked(f"law of {n}", e, {*parameters, "t"}) for n, e in forcing.items()}
     known = {*seen, "t"}
-    equations = {
-        str(n): _checked(f"rate of {n}", e, known) for n, e in {**rates, **slow}.items()
-    }
+    equations = {str(n): _checked(f"rate of {n}", e, known) for n, e in {**rates, **slow}.items()}
     moving = (*(real(n) for kind, names in groups.items() if kind != "parameter" for n in names),)
     moving = (*moving, TIME)
-    listed = {
-        str(n): _checked(f"interface {n}", h, known) for n, h in interfaces.items()
-    }
+    listed = {str(n): _checked(f"interface {n}", h, known) for n, h in interfaces.items()}
     found = [Interface(n, _irreducible(n, h, moving)) for n, h in listed.items()]
     shapes = {_shape(i.function, moving) for i in found}
     for expression in (*equations.values(), *laws.values()):
@@ -220,9 +219,7 @@ def read_structure(
                 if _shape(function, moving) not in shapes:
                     shapes.add(_shape(function, moving))
                     found.append(Interface(_written(function, moving), function))
-    conditions = {
-        str(n): _checked_condition(f"region {n}", c, known) for n, c in regions.items()
-    }
+    conditions = {str(n): _checked_condition(f"region {n}", c, known) for n, c in regions.items()}
     return Structure(
         tuple(groups["state"]),
         tuple(groups["slow state"]),

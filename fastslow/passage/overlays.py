@@ -85,9 +85,7 @@ def overlay(diagram: Diagram, run: Trajectory) -> Overlay:
             _transition(diagram, left, entered, float(times[1]), float(slow_now[1]), state_now)
         )
     distance = apart[np.arange(len(time)), followed]
-    return Overlay(
-        diagram, run, time, slow, state, distance, sheets, followed, tuple(transitions)
-    )
+    return Overlay(diagram, run, time, slow, state, distance, sheets, followed, tuple(transitions))
 
 
 def _extent(diagram: Diagram, sheets: tuple[StableSheet, ...], state: Array) -> Array:

@@ -73,10 +73,11 @@ def draw_bands(
     edges = np.clip([low, *levels, high], low, high)
     shown = len(levels) == len(values) and len(regions) == len(levels) + 1
     fills, names, spans = [], [], []
+    least = 0.13 if vertical else 0.07  # of the axis, for a name to fit in
     for number, (start, stop) in enumerate(zip(edges[-2::-1], edges[:0:-1], strict=True)):
         if stop > start:
             fills.append(fill(start, stop, facecolor=BANDS[number % 3], edgecolor="none", zorder=0))
-            if shown and (stop - start) > 0.08 * (high - low):
+            if shown and (stop - start) > least * (high - low):
                 names.append(_name(ax, regions[number], (start + stop) / 2, vertical))
                 spans.append((float(start), float(stop)))
     lines = tuple(

@@ -90,7 +90,7 @@ def panel(
     series = time_series(lay.run, name, ax=axes[0], interfaces=values)
     portrait = phase_portrait(lay.run, ax=axes[1], interfaces=values)
     laid = draw_passage(axes[2], lay, name)
-    legend = legend_below(laid.ax, laid.handles, 4)
+    legend = legend_below(laid.ax, laid.handles, 4 if len(laid.handles) <= 8 else 5)
     settle(laid.ax)
     place(axes[0], bands=series.bands)
     place(axes[1], bands=portrait.bands)

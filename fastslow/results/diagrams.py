@@ -188,7 +188,7 @@ class Diagram:
             for point in branch.special:
                 if point.code != "EP":
                     at = f"{self.parameter} = {point.parameters[self.parameter]:.6g}"
-                    lines.append(f"{stem}   {point.label}: {at}, {repr(point)[13:-1].split(': ', 1)[1]}")
+                    lines.append(f"{stem}   {point.label}: {at}, {point.description}")
         return "\n".join(lines)
 
 
@@ -210,10 +210,7 @@ def hermite(
         m0 = branch.tangent[rows, :-1] / branch.tangent[rows, -1:] * width[:, None]
         m1 = branch.tangent[rows + 1, :-1] / branch.tangent[rows + 1, -1:] * width[:, None]
         cubic = (
-            x0
-            + part * m0
-            + part**2 * (3 * chord - 2 * m0 - m1)
-            + part**3 * (m0 + m1 - 2 * chord)
+            x0 + part * m0 + part**2 * (3 * chord - 2 * m0 - m1) + part**3 * (m0 + m1 - 2 * chord)
         )
     bound = 3.0 * np.abs(chord) + 1e-12
     mild = np.all((np.abs(m0) <= bound) & (np.abs(m1) <= bound), axis=1, keepdims=True)

@@ -28,17 +28,15 @@ class Named(Mapping[str, V], Generic[V]):
     >>> values = Named("parameter", {"A": 1.0, "omega": 0.1})
     >>> values["A"]
     1.0
-    >>> values["omga"]
+    >>> values["omga"]  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
-    fastslow.errors.UnknownNameError: unknown parameter 'omga'; did you mean 'omega'? (known: A, omega)
+    fastslow.errors.UnknownNameError: unknown parameter 'omga'; did you mean 'omega'? ...
     """
 
     __slots__ = ("_items", "kind")
 
-    def __init__(
-        self, kind: str, items: Mapping[str, V] | Iterable[tuple[str, V]] = ()
-    ) -> None:
+    def __init__(self, kind: str, items: Mapping[str, V] | Iterable[tuple[str, V]] = ()) -> None:
         self.kind = kind
         pairs = items.items() if isinstance(items, Mapping) else items
         self._items: dict[str, V] = {str(key): value for key, value in pairs}

@@ -117,20 +117,20 @@ class Overlay:
         name = self.parameter
         weight = np.diff(self.time)
         total = float(weight.sum()) or 1.0
-        lines = [f"{len(self.transitions)} transitions over t = {self.time[0]:g} to {self.time[-1]:g}"]
+        lines = [
+            f"{len(self.transitions)} transitions over t = {self.time[0]:g} to {self.time[-1]:g}"
+        ]
         for index, sheet in enumerate(self.sheets):
             share = float(weight[self.followed[:-1] == index].sum()) / total
             if share > 0:
                 lines.append(f"  on {sheet.label}: {share:.1%} of the time")
         for t in self.transitions:
-            past = (
-                f"{t.kind} at {t.special.label} ({name} = {t.special[name]:.6g}), delay {t.delay:.3g}"
-                if t.special is not None
-                else "no special point nearby"
-            )
-            lines.append(
-                f"  t = {t.time:.6g}: {t.from_sheet} → {t.to_sheet} at {name} = {t.value:.6g}; {past}"
-            )
+            past = "no special point ends the sheet left"
+            if t.special is not None:
+                at = f"{name} = {t.special[name]:.6g}"
+                past = f"{t.kind} at {t.special.label} ({at}), delay {t.delay:.3g}"
+            change = f"{t.from_sheet} → {t.to_sheet} at {name} = {t.value:.6g}"
+            lines.append(f"  t = {t.time:.6g}: {change}; {past}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:

@@ -39,9 +39,7 @@ def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
     scale = np.maximum(1.0, np.abs(values).max(axis=-1))
     largest = values.real.max(axis=-1)
     small = NEUTRAL * scale
-    return np.where(
-        largest < -small, "stable", np.where(largest > small, "unstable", "neutral")
-    )
+    return np.where(largest < -small, "stable", np.where(largest > small, "unstable", "neutral"))
 
 
 def type_of(eigenvalues: ArrayLike) -> str:
@@ -136,7 +134,9 @@ class Equilibrium(_Point):
         return type_of(self.eigenvalues)
 
     def __repr__(self) -> str:
-        kind = f"{self.stability} {self.type}" if self.type != "non-hyperbolic" else "non-hyperbolic"
+        kind = (
+            f"{self.stability} {self.type}" if self.type != "non-hyperbolic" else "non-hyperbolic"
+        )
         seat = "in" if self.admissible else "virtual, of"
         more = ", one of a continuum" if self.continuum else ""
         return f"Equilibrium({self._values()}; {seat} {self.region}; {kind}{more})"
@@ -266,9 +266,14 @@ class SpecialPoint(_Point):
     frequency: float | None = None
     note: str = ""
 
-    def __repr__(self) -> str:
+    @property
+    def description(self) -> str:
+        """What it is and where, in words."""
         kind = CODE_NAMES.get(self.code, self.code)
         if self.subtype:
             kind += f", {self.subtype}"
         on = f" on {self.interface}" if self.interface else ""
-        return f"SpecialPoint({self.label}: {kind}{on}; {self._values()})"
+        return f"{kind}{on}; {self._values()}"
+
+    def __repr__(self) -> str:
+        return f"SpecialPoint({self.label}: {self.description})"

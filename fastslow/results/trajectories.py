@@ -191,9 +191,7 @@ class Trajectory:
         values = self._evaluate(row, flat - self.steps[row, 0])
         return values.reshape(len(self.columns), *where.shape)
 
-    def _evaluate(
-        self, row: NDArray[np.intp], offset: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _evaluate(self, row: NDArray[np.intp], offset: NDArray[np.float64]) -> NDArray[np.float64]:
         """Columns at offsets into given steps, shape (n + n_forcing, N)."""
         assert self.series is not None
         value = self.series[row, :, -1].T
@@ -293,8 +291,7 @@ class Trajectory:
         lines = [
             f"Trajectory of {', '.join(self.columns)} for t from {low:.6g} to {high:.6g}",
             f"  {len(self.steps)} steps, {len(self.crossing_table)} crossings, "
-            f"{len(self.segments)} segments"
-            + (f", regime {self.regime}" if self.regime else ""),
+            f"{len(self.segments)} segments" + (f", regime {self.regime}" if self.regime else ""),
             f"  {self.outcome}",
         ]
         return "\n".join(lines)

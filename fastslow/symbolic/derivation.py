@@ -13,12 +13,13 @@ from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
 from fastslow.results.named import Named
+from fastslow.symbolic.assumptions import read_signs
 from fastslow.symbolic.boundaries import BoundaryForm, boundary_forms
 from fastslow.symbolic.critical import Setting
 from fastslow.symbolic.forms import Continuum, CriticalPoint
 from fastslow.symbolic.inequalities import needed
 from fastslow.symbolic.regions import RegionForms, derive_region
-from fastslow.symbolic.signs import Signs, read_signs
+from fastslow.symbolic.signs import Signs
 
 
 @dataclass(frozen=True)

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import sympy as sp
 from sympy.core.relational import Relational
 
-from fastslow.errors import ArgumentError, unknown_name
-from fastslow.model.structure import real
-from fastslow.symbolic.algebra import factors, light, spread, tidy, undefined
+from fastslow.symbolic.algebra import factors, light, longer, spread, tidy, undefined
 
-#: Functions that an assumption given as text may use.
-FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tanh")
+#: Parts of an expression up to which more than the signs of its terms is tried.
+PARTS = 300
 
-WORDS = {"positive": 1, "negative": -1, "real": None}
+#: Degree up to which the real roots of a polynomial in one parameter are counted.
+DEGREE = 24
 
 
 @dataclass(frozen=True)
@@ -49,6 +46,7 @@ class Signs:
 
         Examples
         --------
+        >>> from fastslow.model.structure import real
         >>> A, D = real("A"), real("D")
         >>> Signs({A: 1, D: 1}).without(A).conditions
         (D > 0,)
@@ -60,13 +58,14 @@ class Signs:
 
     def with_positive(self, *facts: sp.Expr) -> Signs:
         """Give the same with more expressions taken as positive."""
-        return _read_facts(self, facts)
+        return with_facts(self, facts)
 
     def sign(self, expression: sp.Expr) -> int | None:
         """Sign of a real expression where the assumptions settle it, else None.
 
         Examples
         --------
+        >>> from fastslow.model.structure import real
         >>> A, D = real("A"), real("D")
         >>> signs = Signs({A: 1, D: 1})
         >>> signs.sign(A + D**2), signs.sign(-A * D), signs.sign(A - D)
@@ -84,9 +83,9 @@ class Signs:
     def _sign(self, expression: sp.Expr) -> int | None:
         if undefined(expression):
             return None
-        at_once = _plain_sign(self._signed(expression))
-        if at_once is not None or expression.is_number:
-            return at_once
+        found = self._by_terms(expression)
+        if found is not None or expression.is_number or longer(expression, PARTS):
+            return found
         sign = 1
         for part, power in parts(expression):
             one = self._part_sign(part)
@@ -95,28 +94,173 @@ class Signs:
             sign *= one if power % 2 else abs(one)
         return sign
 
+    def _by_terms(self, expression: sp.Expr) -> int | None:
+        """Sign of a sum whose terms all have one sign, as it stands or expanded."""
+        found = _definite(term_bound(expression, self.known))
+        if found is not None or not expression.is_Add or longer(expression, PARTS):
+            return found
+        expanded = spread(expression)
+        return None if expanded == expression else _definite(term_bound(expanded, self.known))
+
     def _part_sign(self, part: sp.Expr) -> int | None:
-        found = _plain_sign(self._signed(part))
+        found = self._by_terms(part)
         if found is not None:
             return found
         for fact in self.facts:
-            side = _plain_sign(self._signed(tidy(part / fact)))
+            side = self._by_terms(tidy(part / fact))
             if side is not None:
                 return side
             for multiple in _multiples(part, fact):
-                rest = _plain_sign(self._signed(spread(part - multiple * fact)))
+                rest = self._by_terms(spread(part - multiple * fact))
                 if rest is not None and rest * multiple >= 0:
                     return 1 if multiple > 0 else -1
-        return None
+        return self._by_counting(part)
 
-    def _signed(self, expression: sp.Expr) -> sp.Expr:
-        """Give the expression in symbols that carry their signs."""
-        place = {
-            s: side * sp.Symbol(s.name, positive=True)
-            for s, side in self.known.items()
-            if s in expression.free_symbols
-        }
-        return sp.sympify(expression.xreplace(place))
+    def _by_counting(self, part: sp.Expr) -> int | None:
+        """Sign of a polynomial in one parameter that has no root where the parameter may lie."""
+        if len(part.free_symbols) != 1:
+            return None
+        (symbol,) = part.free_symbols
+        if not part.is_polynomial(symbol):
+            return None
+        polynomial = sp.Poly(part, symbol)
+        if not polynomial.domain.is_QQ and not polynomial.domain.is_ZZ:
+            return None
+        if polynomial.degree() > DEGREE:
+            return None
+        low, high = self.interval(symbol)
+        return definite_within(polynomial, low, high)
+
+    def interval(self, symbol: sp.Symbol) -> tuple[sp.Expr, sp.Expr]:
+        """Open interval of one parameter, from its sign and from facts about it alone.
+
+        Examples
+        --------
+        >>> from fastslow.model.structure import real
+        >>> a = real("a")
+        >>> Signs({a: 1}, (3 - 2 * a,)).interval(a)
+        (0, 3/2)
+        """
+        side = self.known.get(symbol)
+        low = sp.S.Zero if side == 1 or symbol.is_positive else -sp.oo
+        high = sp.S.Zero if side == -1 else sp.oo
+        for fact in self.facts:
+            slope = fact.diff(symbol)
+            if fact.free_symbols == {symbol} and slope.is_Rational and slope != 0:
+                end = -fact.subs(symbol, 0) / slope
+                if end.is_Rational:
+                    low, high = (max(low, end), high) if slope > 0 else (low, min(high, end))
+        return low, high
+
+
+def definite_within(polynomial: sp.Poly, low: sp.Expr, high: sp.Expr) -> int | None:
+    """Sign of a polynomial with rational coefficients on an open interval, if it has just one.
+
+    Real roots are counted by Sturm's theorem; none is computed.
+
+    Examples
+    --------
+    >>> x = sp.Symbol("x")
+    >>> definite_within(sp.Poly(x**5 - 3 * x + 3, x), sp.Integer(0), sp.oo)
+    1
+    >>> definite_within(sp.Poly(x**5 - 3 * x + 1, x), sp.Integer(0), sp.oo) is None
+    True
+    """
+    if low >= high:
+        return None
+    symbol = polynomial.gen
+    for end in (low, high):
+        while end.is_finite and polynomial.degree() > 0 and polynomial.eval(end) == 0:
+            polynomial = polynomial.quo(sp.Poly(symbol - end, symbol))
+            # what was divided out is negative on the whole interval below its end
+            polynomial = -polynomial if end == high else polynomial
+    if polynomial.degree() > 0 and polynomial.count_roots(low, high) > 0:
+        return None
+    if low.is_finite and high.is_finite:
+        middle = (low + high) / 2
+    else:
+        middle = low + 1 if low.is_finite else high - 1 if high.is_finite else sp.S.Zero
+    return int(sp.sign(polynomial.eval(middle)))
+
+
+def term_bound(expression: sp.Expr, known: Mapping[sp.Symbol, int]) -> int | None:
+    """What the signs of symbols say of an expression without rewriting it.
+
+    2 positive, 1 not negative, 0 zero, −1 not positive, −2 negative, None open.
+    One pass over the tree, so that it is cheap for long sums too.
+
+    Examples
+    --------
+    >>> from fastslow.model.structure import real
+    >>> A, x = real("A"), real("x")
+    >>> term_bound(A + x**2, {A: 1}), term_bound(-(x**2), {}), term_bound(A - x**2, {A: 1})
+    (2, -1, None)
+    """
+    if expression.is_Symbol:
+        side = known.get(expression)
+        return 2 * side if side is not None else 2 if expression.is_positive else None
+    if expression.is_Rational:
+        return 2 * int(sp.sign(expression))
+    if expression.is_Mul:
+        found: int | None = 2
+        for factor in expression.args:
+            one = term_bound(factor, known)
+            if one == 0 or one is None:
+                found = one
+                break
+            assert found is not None
+            found = found * one // 2 if 2 in (abs(found), abs(one)) else (found * one)
+    elif expression.is_Add:
+        each = [b for b in _until_mixed(expression.args, known) if b != 0]
+        found = None if None in each else max(each, key=abs, default=0)
+    elif expression.is_Pow:
+        found = _power_bound(expression.base, expression.exp, known)
+    elif isinstance(expression, sp.exp):
+        found = 2 if expression.args[0].is_real else None
+    else:
+        place = {s: k * sp.Symbol(s.name, positive=True) for s, k in known.items()}
+        found = _assumed(expression.xreplace(place))
+    return _assumed(expression) if found is None and expression.is_number else found
+
+
+def _until_mixed(terms: Iterable[sp.Expr], known: Mapping[sp.Symbol, int]) -> Iterable[int | None]:
+    """Bounds of terms; None ends them where one is open or two have opposite signs."""
+    side = 0
+    for term in terms:
+        one = term_bound(term, known)
+        if one is None or one * side < 0:
+            yield None
+            return
+        side = one or side
+        yield one
+
+
+def _power_bound(base: sp.Expr, power: sp.Expr, known: Mapping[sp.Symbol, int]) -> int | None:
+    inside = term_bound(base, known)
+    if power.is_Integer:
+        if inside == 0:
+            return 0 if power.is_positive else None
+        if inside is None:
+            even = power.is_even and base.is_extended_real
+            return (1 if power.is_positive else 2) if even else None
+        size = abs(inside) if power.is_positive else 2
+        return size if power.is_even or inside > 0 else -size
+    if power.is_Rational:
+        return inside if inside in (1, 2) and power.is_positive else 2 if inside == 2 else None
+    return 2 if inside == 2 and power.is_real else None
+
+
+def _assumed(expression: sp.Expr) -> int | None:
+    """Bound from what SymPy knows."""
+    if expression.is_positive:
+        return 2
+    if expression.is_negative:
+        return -2
+    return 0 if expression.is_zero else None
+
+
+def _definite(bound: int | None) -> int | None:
+    return {2: 1, 0: 0, -2: -1}.get(bound) if bound is not None else None
 
 
 def _multiples(part: sp.Expr, fact: sp.Expr) -> list[sp.Expr]:
@@ -134,6 +278,7 @@ def parts(expression: sp.Expr) -> list[tuple[sp.Expr, int]]:
 
     Examples
     --------
+    >>> from fastslow.model.structure import real
     >>> x = real("x")
     >>> parts((x**2 - 1) / 3)
     [(x - 1, 1), (x + 1, 1), (3, 1)]
@@ -146,69 +291,16 @@ def parts(expression: sp.Expr) -> list[tuple[sp.Expr, int]]:
     return [(f, p) for f, p in found if f != 1]
 
 
-def _plain_sign(expression: sp.Expr) -> int | None:
-    if expression.is_zero:
-        return 0
-    if expression.is_positive:
-        return 1
-    if expression.is_negative:
-        return -1
-    if isinstance(expression, sp.Add):
-        return None if expression.is_number else _plain_terms(expression)
-    return None
-
-
-def _plain_terms(expression: sp.Expr) -> int | None:
-    """Sign of a sum whose expanded terms all have one sign."""
-    expanded = spread(expression)
-    if expanded.is_positive:
-        return 1
-    return -1 if expanded.is_negative else None
-
-
-def read_signs(values: Mapping[str, float], assume: Any = None) -> Signs:
-    """Signs as the parameter values have them, with the given ones in their place.
-
-    Parameters
-    ----------
-    values : mapping
-        Parameter name to value; one that is zero is left without a sign.
-    assume : mapping, relation, str or an iterable of these, optional
-        ``{"A": "negative"}``, ``A < 0``, ``"A < -D**2"``. A name with the
-        word ``"real"`` (or None) is left without a sign. A relation other than
-        a sign is kept as a fact, and the parameters in it lose the signs that
-        their values gave them where the two contradict.
-
-    Raises
-    ------
-    UnknownNameError
-        For a name that is no parameter.
-    ArgumentError
-        For an assumption that is not a strict inequality or a known word.
+def with_facts(signs: Signs, facts: Iterable[sp.Expr]) -> Signs:
+    """Give signs with more positive expressions; those that contradict a sign set it aside.
 
     Examples
     --------
-    >>> read_signs({"A": 41.67, "D": 0.25}, "A < 0").conditions
-    (A < 0, D > 0)
+    >>> from fastslow.model.structure import real
+    >>> A, D = real("A"), real("D")
+    >>> with_facts(Signs({A: 1, D: 1}), [-A - D**2]).conditions
+    (D > 0, A < 0, -A - D**2 > 0)
     """
-    signs: dict[sp.Symbol, int] = {
-        real(n): (1 if v > 0 else -1) for n, v in values.items() if v != 0
-    }
-    facts: list[sp.Expr] = []
-    for item in _items(assume):
-        if isinstance(item, tuple):
-            symbol, side = _named(values, *item)
-        else:
-            fact = _positive_part(item, values)
-            if not isinstance(fact if fact.is_Symbol else -fact, sp.Symbol):
-                facts.append(fact)
-                continue
-            symbol, side = (fact, 1) if fact.is_Symbol else (-fact, -1)
-        signs.pop(symbol, None) if side is None else signs.update({symbol: side})
-    return _read_facts(Signs(signs), facts)
-
-
-def _read_facts(signs: Signs, facts: Iterable[sp.Expr]) -> Signs:
     for fact in facts:
         side = signs.sign(fact)
         if side == 1:
@@ -229,42 +321,3 @@ def _deduced(signs: Signs, fact: sp.Expr) -> dict[sp.Symbol, int]:
         if slope.is_number and signs.sign(fact - slope * symbol) in (0, -1):
             found[symbol] = 1 if slope > 0 else -1
     return found
-
-
-def _items(assume: Any) -> list[Any]:
-    if assume is None:
-        return []
-    if isinstance(assume, Mapping):
-        return list(assume.items())
-    if isinstance(assume, (str, sp.Basic)):
-        return [assume]
-    return [part for item in assume for part in _items(item)]
-
-
-def _named(values: Mapping[str, float], name: Any, word: Any) -> tuple[sp.Symbol, int | None]:
-    if str(name) not in values:
-        raise unknown_name("parameter", name, values)
-    if isinstance(word, str) and word in WORDS:
-        return real(str(name)), WORDS[word]
-    if word is None or word in (1, -1):
-        return real(str(name)), word
-    raise ArgumentError(
-        f"assume: {name} is {word!r}; expected 'positive', 'negative', 'real', 1, -1 or None"
-    )
-
-
-def _positive_part(item: Any, values: Mapping[str, float]) -> sp.Expr:
-    """Give the expression that an assumed strict inequality says is positive."""
-    words = re.findall(r"[^\W\d]\w*", item) if isinstance(item, str) else []
-    names = {n: real(n) for n in (*values, *words) if n not in FUNCTIONS}
-    try:
-        relation = sp.sympify(item, locals=names)
-    except (sp.SympifyError, TypeError, SyntaxError, AttributeError) as trouble:
-        raise ArgumentError(f"assume: cannot read {item!r} as an inequality") from trouble
-    if not isinstance(relation, (sp.StrictGreaterThan, sp.StrictLessThan)):
-        raise ArgumentError(f"assume: expected a strict inequality such as A > 0, received {item}")
-    for symbol in sorted(relation.free_symbols, key=lambda s: s.name):
-        if symbol.name not in values:
-            raise unknown_name("parameter", symbol.name, values)
-    gap = relation.gts - relation.lts
-    return sp.expand(gap.xreplace({s: real(s.name) for s in gap.free_symbols}))

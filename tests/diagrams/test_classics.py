@@ -140,10 +140,8 @@ def test_filippov_boundary_equilibria_end_the_branch(sign, kind):
 
 def test_slowly_forced_van_der_pol():
     """x'' − μ(1 − x²)x' + x = w: equilibrium x = w, Hopf at w = ±1 with ω = 1."""
-    v, w, t = sp.symbols("x' w t")
-    model = fs.Model(
-        {x: y, y: (1 - x**2) * y - x + w}, forcing={w: 2 * sp.sin(t / 100)}
-    ).frozen()
+    w, t = sp.symbols("w t")
+    model = fs.Model({x: y, y: (1 - x**2) * y - x + w}, forcing={w: 2 * sp.sin(t / 100)}).frozen()
     diagram = fs.continue_equilibria(model, "w", (-2, 2))
     assert [h["w"] for h in diagram.special("HB")] == pytest.approx([-1, 1], abs=1e-13)
     assert [h.frequency for h in diagram.special("HB")] == pytest.approx([1, 1], abs=1e-13)

@@ -61,8 +61,10 @@ def test_the_edge_of_a_logarithm():
     assert np.abs(np.log(branch.parameter) - branch["x"])[sure].max() < 1e-12
     assert not branch.outcome.success
     assert branch.outcome.code in ("left the window", "step too small", "too many points")
-    assert "try" in branch.outcome.message or "singular" in branch.outcome.message or (
-        "raise" in branch.outcome.message
+    assert (
+        "try" in branch.outcome.message
+        or "singular" in branch.outcome.message
+        or ("raise" in branch.outcome.message)
     )
 
 
@@ -88,8 +90,12 @@ def test_an_equilibrium_where_two_interfaces_meet():
     model = fs.Model({x: p - x - bend / 4, y: p - y + bend / 4}, parameters={p: 0})
     diagram = fs.continue_equilibria(model, p, (-1, 1))
     assert any(o.code == "interfaces meet" for b in diagram.branches for o in b.outcomes)
-    assert all("meet at the equilibrium" in o.message
-               for b in diagram.branches for o in b.outcomes if o.code == "interfaces meet")
+    assert all(
+        "meet at the equilibrium" in o.message
+        for b in diagram.branches
+        for o in b.outcomes
+        if o.code == "interfaces meet"
+    )
 
 
 def test_a_start_exactly_on_an_interface():

@@ -49,7 +49,7 @@ def test_tiny_drift_from_a_corner(gear, load):
     if load < 0:
         # x = D + w (t - 1 + exp(-t)) in the gap
         expected = 0.25 + load * (20 - 1 + math.exp(-20))
-        assert run(20.0)[0] == pytest.approx(expected, abs=1e-15)
+        assert run(20.0)[0] == pytest.approx(expected, abs=1e-14)
 
 
 def test_a_corner_left_when_the_load_changes_sign(gear):

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fastslow.model.structure import real
+from fastslow.symbolic.assumptions import read_signs
 from fastslow.symbolic.inequalities import (
     conjunction,
     implied,
@@ -14,7 +15,7 @@ from fastslow.symbolic.inequalities import (
     positive,
     sign_within,
 )
-from fastslow.symbolic.signs import Signs, read_signs
+from fastslow.symbolic.signs import Signs
 
 A, B, D, x = map(real, ["A", "B", "D", "x"])
 

@@ -1,0 +1,126 @@
+"""The numbers behind the figures of the gear."""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from analyses import __main__ as everything
+from analyses import dead_zone, gap_width, load_amplitude, negative_stiffness, stiffness
+from analyses.passages import OMEGA
+
+
+@pytest.fixture(scope="module")
+def everything_drawn(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("figures")
+    return folder, {row.case: row for row in everything.main([str(folder)])}
+
+
+@pytest.fixture(scope="module")
+def gaps():
+    return gap_width.cases()
+
+
+@pytest.fixture(scope="module")
+def folded():
+    (case,) = negative_stiffness.cases()
+    return case
+
+
+def test_every_figure_is_written(everything_drawn):
+    folder, rows = everything_drawn
+    for name in ("dead_zone", *rows):
+        for suffix in ("png", "pdf"):
+            assert (folder / f"{name}.{suffix}").stat().st_size > 5000
+    with (folder / "summary.csv").open(encoding="utf-8") as file:
+        assert [line["case"] for line in csv.DictReader(file)] == list(rows)
+    assert len(rows) == 10
+
+
+def test_what_the_runs_show(everything_drawn):
+    _, rows = everything_drawn
+    assert all(row.BE == 2 for row in rows.values())
+    assert {name for name, row in rows.items() if row.LP} == {"negative_stiffness"}
+    regimes = {name: row.regime for name, row in rows.items() if row.regime != "bilateral"}
+    # the source states the opposite: bilateral at 10 N m, unilateral at 50, 100 and at D = 0.5
+    assert regimes == {"load_amplitude_10": "meshed upper"}
+    assert rows["load_amplitude_10"].stated == "bilateral"
+    assert rows["load_amplitude_100"].stated == rows["gap_width_0.5"].stated == "unilateral"
+    assert rows["load_amplitude_10"].passages == 0
+    assert math.isnan(rows["load_amplitude_10"].largest_delay)
+
+
+def test_the_table_has_a_line_for_each_case(everything_drawn):
+    _, rows = everything_drawn
+    lines = everything.table(list(rows.values())).splitlines()
+    assert len(lines) == 2 + len(rows)
+    assert lines[0].split()[:7] == ["case", "A", "B", "C", "D", "BE", "LP"]
+
+
+def test_dead_zone():
+    x = np.array([-1.0, -0.25, -0.1, 0.0, 0.25, 0.3, 1.0])
+    assert dead_zone.transmitted(x) == pytest.approx([-0.75, 0, 0, 0, 0, 0.05, 0.75], abs=1e-14)
+
+
+def test_the_gap_is_passed_as_late_as_slow_theory_says(gaps):
+    # crossing the gap takes √(4D/s) + 1 at the slope s of the load where it is zero
+    for case in gaps:
+        p = case.model.parameters
+        slope = OMEGA * math.sqrt(p["C"] ** 2 - p["B"] ** 2)
+        leave, reach = next(
+            (one.time, other.time)
+            for one, other in zip(case.run.crossings, case.run.crossings[1:], strict=False)
+            if (one.interface, other.interface) == ("x - D", "x + D")
+        )
+        assert reach - leave == pytest.approx(math.sqrt(4 * p["D"] / slope) + 1, rel=0.05)
+
+
+def test_wider_gaps_delay_more(gaps):
+    delays = [np.nanmax(np.abs(case.lay.delays)) for case in gaps]
+    assert delays == sorted(delays)
+    assert all(len(case.lay.transitions) == 6 for case in gaps)
+    assert {t.kind for case in gaps for t in case.lay.transitions} == {"crossing"}
+
+
+def test_the_natural_frequency_falls_with_the_stiffness():
+    frequencies = []
+    for case in stiffness.cases():
+        (point,) = case.diagram.at(w=2.0)
+        p, x = case.model.parameters, point["x"]
+        expected = math.sqrt(3 * x**2 - 2 * p["D"] * x + p["A"] - 0.25)
+        assert np.abs(point.eigenvalues.imag) == pytest.approx([expected] * 2, rel=1e-10)
+        frequencies.append(expected)
+    assert frequencies == sorted(frequencies)
+
+
+def test_the_smallest_load_amplitude_never_unloads():
+    cases = load_amplitude.cases()
+    lowest = [float(case.run["w"].min()) for case in cases]
+    assert lowest[0] == pytest.approx(0.00834, abs=1e-4)
+    assert max(lowest[1:]) < -9
+    assert cases[0].run.word[-1] == "S1"
+    assert cases[0].run.crossings[-1].time < 5
+    sizes = [float(np.ptp(case.run["x"][case.run.t > 1000])) for case in cases]
+    assert sizes == sorted(sizes)
+
+
+def test_folds_and_jumps(folded):
+    loads = sorted(point["w"] for point in folded.diagram.folds)
+    assert loads == pytest.approx([-0.0894402097712473, 0.0894402097712473], rel=1e-12)
+    assert [t.kind for t in folded.lay.transitions] == ["jump"] * 5
+    for jump in folded.lay.transitions:
+        # past the fold, in the direction in which the load drifts
+        assert jump.delay > 0
+        assert abs(jump.value) > 0.0894402097712473
+        assert jump.value * jump.state[0] > 0
+
+
+def test_the_figure_of_the_readme_is_the_one_drawn(everything_drawn):
+    folder, _ = everything_drawn
+    drawn = imread(folder / "negative_stiffness.png")
+    shown = imread(Path(everything.__file__).parents[1] / "docs/figures/overlay.png")
+    assert shown.shape == drawn.shape
+    assert np.abs(shown - drawn).mean() < 0.02

@@ -1,0 +1,98 @@
+"""What a trajectory answers."""
+
+import pickle
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from fastslow.errors import ArgumentError, UnknownNameError
+from fastslow.model.model import Model
+from fastslow.simulation.trajectories import simulate
+
+
+@pytest.fixture(scope="module")
+def run():
+    x, v, w, t = sp.symbols("x v w t")
+    D, b, c = sp.symbols("D b c")
+    dead_zone = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
+    model = Model(
+        {x: v, v: w - v - 40 * dead_zone},
+        forcing={w: b + c * sp.sin(t / 10)},
+        parameters={D: 0.25, b: 1, c: 3},
+    )
+    return simulate(model, [0, 0], periods=2)
+
+
+def test_columns_by_name_and_symbol(run):
+    assert run.columns == ("x", "v", "w")
+    assert np.array_equal(run["x"], run[sp.Symbol("x")])
+    assert run["x"].shape == run["w"].shape == run.t.shape
+    assert np.abs(run["w"] - (1 + 3 * np.sin(run.t / 10))).max() < 1e-9
+    with pytest.raises(UnknownNameError, match="unknown column 'q'"):
+        run["q"]
+
+
+def test_dense_output_shapes(run):
+    times = np.linspace(*run.span, 7)
+    assert run(times).shape == (2, 7)
+    assert run(1.0).shape == (2,)
+    assert run(times.reshape(7, 1)).shape == (2, 7, 1)
+    assert run.dense_columns(times).shape == (3, 7)
+    assert run(run.span[1]) == pytest.approx(run.end[1:], abs=1e-12)
+
+
+@pytest.mark.parametrize("time", [-0.1, 1e6, np.nan])
+def test_times_outside_the_run(run, time):
+    with pytest.raises(ArgumentError, match="outside the run"):
+        run(time)
+
+
+def test_segments_cover_the_run(run):
+    assert run.segments[0].start == run.span[0]
+    assert run.segments[-1].end == run.span[1]
+    for one, other in zip(run.segments[:-1], run.segments[1:], strict=True):
+        assert one.end == other.start and one.region != other.region
+    assert len(run.segments) == len(run.crossings) + 1
+    assert run.word == tuple(s.region for s in run.segments)
+    for crossing, segment in zip(run.crossings, run.segments[1:], strict=True):
+        assert crossing.time == segment.start
+        assert crossing.to_region == segment.region
+        assert run(crossing.time) == pytest.approx(crossing.state, abs=1e-12)
+
+
+def test_times_are_fine_enough_to_plot(run):
+    assert np.all(np.diff(run.t) >= 0)
+    assert run.t[0] == run.span[0] and run.t[-1] == run.span[1]
+    middle = 0.5 * (run.t[1:] + run.t[:-1])
+    straight = 0.5 * (run["x"][1:] + run["x"][:-1])
+    assert np.abs(run(middle)[0] - straight).max() < 5e-4 * np.ptp(run["x"])
+    assert {c.time for c in run.crossings} <= set(run.t)
+
+
+def test_regime_is_that_of_the_last_period(run):
+    assert run.gap == ("S3", "S2", "S1")
+    assert run.regime == "bilateral"
+
+
+def test_pickle(run):
+    run.crossings, run.t  # fills what is computed once
+    again = pickle.loads(pickle.dumps(run))
+    assert np.array_equal(again.t, run.t)
+    assert again.word == run.word and again.outcome == run.outcome
+    assert [c.time for c in again.crossings] == [c.time for c in run.crossings]
+
+
+def test_repr(run):
+    text = repr(run)
+    assert "Trajectory of x, v, w for t from 0 to 125.664" in text
+    assert "regime bilateral" in text and "end of the time" in text
+    assert "x - D upwards, S2 → S1" in repr(run.crossings[0])
+
+
+def test_without_dense_output():
+    x = sp.Symbol("x")
+    light = simulate(Model({x: -x}), [1], t=(0, 1), dense=False, samples=[0, 0.5, 1])
+    assert light["x"] == pytest.approx(np.exp([0, -0.5, -1]), abs=1e-9)
+    with pytest.raises(ArgumentError, match="kept no dense output"):
+        light(0.5)

@@ -1,0 +1,88 @@
+"""Bad input: each an error that names the value and what was expected."""
+
+import math
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from fastslow.errors import ArgumentError, UnknownNameError
+from fastslow.model.model import Model
+from fastslow.simulation.trajectories import simulate
+
+
+@pytest.mark.parametrize(
+    ("state", "message"),
+    [
+        ([0], r"shape \(1,\); expected 2 values, for x, v"),
+        ([0, 0, 0], r"shape \(3,\)"),
+        ([[0, 0]], r"shape \(1, 2\)"),
+        ([0, math.nan], "initial v = nan; expected a finite number"),
+        ([math.inf, 0], "initial x = inf"),
+        (["a", 0], "expected numbers"),
+        ({"x": 1}, "no value for v"),
+    ],
+)
+def test_initial_state(gear, state, message):
+    with pytest.raises(ArgumentError, match=message):
+        simulate(gear, state, t=(0, 1))
+
+
+def test_initial_state_by_unknown_name(gear):
+    with pytest.raises(UnknownNameError, match="unknown state 'w'"):
+        simulate(gear, {"x": 0, "w": 0}, t=(0, 1))
+
+
+@pytest.mark.parametrize(
+    ("keywords", "message"),
+    [
+        ({}, "received neither"),
+        ({"t": (0, 1), "periods": 2}, "received both"),
+        ({"t": (1, 0)}, "start < end"),
+        ({"t": (0, 0)}, "start < end"),
+        ({"t": (0, math.inf)}, "finite times"),
+        ({"t": 5}, r"expected a pair \(start, end\)"),
+        ({"t": (0, 1), "start": 2}, "start= goes with periods="),
+        ({"periods": 0}, "periods = 0; expected a positive number"),
+        ({"periods": 1, "period": -1}, "period = -1; expected a positive"),
+        ({"periods": 1, "start": math.nan}, "start = nan"),
+        ({"t": (0, 1), "tol": 0}, "tol = 0; expected a positive number"),
+        ({"t": (0, 1), "tol": 1}, "tol = 1; expected a number from"),
+        ({"t": (0, 1), "order": 2}, "order = 2; expected from 4 to 40"),
+        ({"t": (0, 1), "order": 8.5}, "order = 8.5; expected a whole number"),
+        ({"t": (0, 1), "samples": 1}, "samples = 1"),
+        ({"t": (0, 1), "samples": [0.5, 0.2]}, "increasing"),
+        ({"t": (0, 1), "samples": [0.5, 2.0]}, r"leave the run, \[0, 1\]"),
+        ({"t": (0, 1), "max_steps": 0}, "max_steps = 0"),
+        ({"t": (0, 1), "gap": "S1"}, "gap = 'S1'; expected a region with one region below"),
+    ],
+)
+def test_span_and_settings(gear, keywords, message):
+    with pytest.raises(ArgumentError, match=message):
+        simulate(gear, [0, 0], **keywords)
+
+
+def test_unknown_gap(gear):
+    with pytest.raises(UnknownNameError, match="unknown region 'S9'"):
+        simulate(gear, [0, 0], t=(0, 1), gap="S9")
+
+
+def test_no_common_period():
+    x, w, t = sp.symbols("x w t")
+    model = Model({x: w - x}, forcing={w: sp.sin(t) + sp.sin(sp.sqrt(2) * t)})
+    with pytest.raises(ArgumentError, match=r"give t=\(start, end\), or the period as period="):
+        simulate(model, [0], periods=2)
+    run = simulate(model, [0], periods=2, period=3.0, start=1.0)
+    assert run.span == (1.0, 7.0)
+
+
+def test_frozen_model_without_a_value(gear):
+    with pytest.raises(ArgumentError, match="w of this frozen model has no value"):
+        simulate(gear.frozen(), [0, 0], t=(0, 1))
+
+
+def test_symbols_and_arrays_are_welcome(gear):
+    x, v = sp.symbols("x v")
+    one = simulate(gear, {x: 0.1, v: 0}, t=(0, sp.pi))
+    other = simulate(gear, np.array([0.1, 0]), t=np.array([0, math.pi]))
+    assert np.array_equal(one.end, other.end)
