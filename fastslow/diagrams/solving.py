@@ -63,8 +63,7 @@ class RegionEquations:
         left = self.elimination
         if not (left.is_univariate and left.is_polynomial):
             return None
-        equation = sp.together(left.remaining[0]).as_numer_denom()[0]
-        polynomial = sp.Poly(equation, left.unknowns[0])
+        polynomial = sp.Poly(left.remaining[0], left.unknowns[0])
         return polynomial if polynomial.degree() <= DEGREE else None
 
     @cached_property

@@ -6,16 +6,15 @@ import numpy as np
 from numba import njit
 
 from fastslow.compiled.pointers import call_address
+from fastslow.simulation.events import find_event, holds, put_on
 from fastslow.simulation.modes import (
-    EPSILON,
     MANY_MODES,
     NOT_DEFINED,
     choose_mode,
     interface_noise,
-    scaled,
     step_length,
 )
-from fastslow.simulation.polynomials import excluded, first_root, first_strong, horner, slope
+from fastslow.simulation.polynomials import ZERO, horner
 
 #: How the loop ended.
 REACHED_END = 0
@@ -35,133 +34,12 @@ TANGENTIAL = 1e-6
 
 
 @njit
-def find_event(address, layout, signs, mode, inputs, parameters, W, h, on, noise, b, stack, gradient):
-    """The first time in a step at which its motion ends, as a part of the step.
-
-    Returns
-    -------
-    s : float
-        Above 1 when the whole step is free of events.
-    j : int
-        The interface (that is slid along, where sliding ends), -1 for none.
-    touch : bool
-        Whether h does not change its sign there.
-    depth : float
-        Relative change of h that would undo the crossing.
-    floor : float
-        Size of h that is rounding error there.
-    """
-    n_states, n_forcing, n_interfaces, n_modes, order = layout
-    first_h = n_states + n_forcing
-    drift = first_h + n_interfaces
-    best, interface, touched, depth, floor = 2.0, -1, False, 1.0, 0.0
-    for j in range(n_interfaces):
-        sign = signs[mode, j]
-        if sign == 0:
-            for k in range(2):
-                scaled(W, drift + k, order, h, b)
-                small = 32.0 * EPSILON * abs(b[0])
-                start = 0
-                if b[0] * (2 * k - 1) <= 0.0:
-                    start = first_strong(b, 1, order, small)
-                    if start > order:
-                        continue
-                if not excluded(b, start, order):
-                    s, touch = first_root(b, start, order, small, stack)
-                    if s < best and not touch:
-                        best, interface, touched, depth = s, j, False, 1.0
-            continue
-        total = scaled(W, first_h + j, order, h, b)
-        start = 0
-        if on[j]:
-            start = first_strong(b, 1, order, noise[j])
-            if start > order:
-                continue
-            on[j] = False
-        elif b[0] * sign <= 0.0:
-            return 0.0, j, False, 1.0, 0.0
-        if excluded(b, start, order):
-            continue
-        small = interface_noise(address, n_modes, j, inputs, parameters, gradient)
-        small = max(small, 8.0 * EPSILON * total)
-        s, touch = first_root(b, start, order, small, stack)
-        if s <= 1.0 and not touch:
-            s, touch = turning_point(b, order, s, small, sign)
-        if s < best and s <= 1.0:
-            best, interface, touched, floor = s, j, touch, small
-            depth = undoing(b, order, s, max(gradient[1], total))
-    return best, interface, touched, depth, floor
-
-
-@njit
-def holds(address, layout, mode, inputs, parameters, W, part, tol, work):
-    """Whether the rates at the end of a step are the derivatives of its series."""
-    n_states, order = layout[0], layout[4]
-    columns = order + 1
-    ahead = np.empty(inputs.shape[0])
-    ahead[0] = inputs[0] + part
-    for i in range(n_states):
-        ahead[1 + i] = horner(W[i * columns : (i + 1) * columns], 0, order, part)
-    call_address(address, mode, ahead, parameters, work)
-    for i in range(n_states):
-        row = i * columns
-        rate = work[row + 1]
-        defect = abs(slope(W[row : row + columns], 0, order, part) - rate) * part
-        if not defect <= 100.0 * (tol * (1.0 + abs(ahead[1 + i])) + EPSILON * abs(rate) * part):
-            return False
-    return True
-
-
-@njit
-def turning_point(b, order, s, small, sign):
-    """The root again, or where h turns back just there: a touch, as far as rounding can tell."""
-    rate = slope(b, 0, order, s)
-    bend = curvature(b, order, s)
-    if bend * sign <= 0.0 or 0.5 * rate * rate > small * bend * sign:
-        return s, False
-    turn = min(max(s - rate / bend, 0.0), 1.0)
-    beyond = turn + 4.0 * (small / (bend * sign)) ** 0.5
-    if beyond < 1.0 and horner(b, 0, order, beyond) * sign > 0.0:
-        return turn, True
-    return s, False
-
-
-@njit
-def curvature(b, order, s):
-    """Second derivative by s of sum b_k s**k."""
-    value = 0.0
-    for k in range(order, 1, -1):
-        value = value * s + k * (k - 1) * b[k]
-    return value
-
-
-@njit
-def undoing(b, order, s, size):
-    """Depth of the parabola that h follows beyond its root, relative to its size."""
-    rate = slope(b, 0, order, s)
-    bend = curvature(b, order, s)
-    if bend == 0.0 or size == 0.0:
-        return 1.0
-    return min(1.0, 0.5 * rate * rate / (abs(bend) * size))
-
-
-@njit
-def put_on(address, n_modes, j, inputs, parameters, gradient, n_states):
-    """Move the state onto an interface, by Newton along its gradient."""
-    call_address(address, n_modes + j, inputs, parameters, gradient)
-    square = 0.0
-    for i in range(n_states):
-        square += gradient[2 + i] * gradient[2 + i]
-    if square > 0.0:
-        for i in range(n_states):
-            inputs[1 + i] -= gradient[0] * gradient[2 + i] / square
-
-
-@njit
 def grown(array):
     """A copy with room for twice as many rows."""
     larger = np.empty((2 * array.shape[0] + 16, array.shape[1]))
-    larger[: array.shape[0]] = array
+    for i in range(array.shape[0]):
+        for j in range(array.shape[1]):
+            larger[i, j] = array[i, j]
     return larger
 
 
@@ -236,7 +114,8 @@ def drive(
     whole = stop - t
     inputs = np.empty(1 + kept)
     inputs[0] = t
-    inputs[1 : 1 + n_states] = start
+    for i in range(n_states):
+        inputs[1 + i] = start[i]
     work, W = np.empty(size), np.empty(size)
     b = np.empty(columns)
     stack = np.empty((stack_rows, columns + 3))
@@ -249,8 +128,8 @@ def drive(
     crossings = np.empty((16, 6 + n_states))
     samples = np.empty((sampled_rows, times.shape[0]))
     offsets = np.empty(times.shape[0])
-    n_steps = n_crossings = n_samples = crowd = 0
-    mode = interface = -1
+    n_steps = n_crossings = n_samples = crowd = ZERO
+    mode = interface = np.int64(-1)
     depth, floor, last_event, usual = 1.0, 0.0, -np.inf, 0.0
     code = REACHED_END
     choosing, touched = True, False
@@ -283,12 +162,15 @@ def drive(
                 if changed or (touched and mode == before and j == interface):
                     if n_crossings == crossings.shape[0]:
                         crossings = grown(crossings)
-                    entry = crossings[n_crossings]
-                    entry[0], entry[1] = t, j
-                    entry[2] = np.sign(signs[mode, j] - signs[before, j])
-                    entry[3], entry[4] = before, mode
-                    entry[5] = depth < TANGENTIAL or not changed
-                    entry[6:] = inputs[1 : 1 + n_states]
+                    turn = signs[mode, j] - signs[before, j]
+                    crossings[n_crossings, 0] = t
+                    crossings[n_crossings, 1] = j
+                    crossings[n_crossings, 2] = min(max(turn, -1), 1)
+                    crossings[n_crossings, 3] = before
+                    crossings[n_crossings, 4] = mode
+                    crossings[n_crossings, 5] = depth < TANGENTIAL or not changed
+                    for i in range(n_states):
+                        crossings[n_crossings, 6 + i] = inputs[1 + i]
                     n_crossings += 1
             if n_crossings > limits[1]:
                 code = TOO_MANY_CROSSINGS
@@ -303,7 +185,8 @@ def drive(
         if dense:
             if n_steps * stride + size > store.shape[0]:
                 larger = np.empty(2 * store.shape[0] + 64 * stride + size)
-                larger[: n_steps * stride] = store[: n_steps * stride]
+                for i in range(n_steps * stride):
+                    larger[i] = store[i]
                 store = larger
             W = store[n_steps * stride : n_steps * stride + size]
         call_address(address, mode, inputs, parameters, W)
@@ -358,8 +241,7 @@ def drive(
             if n_samples > first:
                 sample(W, columns, sampled_rows, offsets[first:n_samples], samples, first)
             for i in range(kept):
-                row = i * columns
-                inputs[1 + i] = horner(W[row : row + columns], 0, order, part)
+                inputs[1 + i] = horner(W, i * columns, i * columns + order, part)
         inputs[0] = t
         for j in range(n_interfaces):
             hit[j] = signs[mode, j] == 0
@@ -377,7 +259,8 @@ def drive(
                 break
     end = np.empty(1 + n_states)
     end[0] = t
-    end[1:] = inputs[1 : 1 + n_states]
+    for i in range(n_states):
+        end[1 + i] = inputs[1 + i]
     return (
         code, mode, end, steps[:n_steps], store, crossings[:n_crossings], samples, n_samples
     )

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from fastslow.compiled.pointers import call_address
-from fastslow.simulation.polynomials import first_nonzero, first_strong
+from fastslow.simulation.polynomials import ONE, ZERO, first_nonzero, first_strong
 
 EPSILON = float(np.finfo(float).eps)
 
@@ -77,10 +77,10 @@ def agreement(b, order, noise, side):
     The first coefficient (Lie derivative) of h above the noise decides; where
     there is none, the first that is not exactly zero leans; else it rests.
     """
-    k = first_strong(b, 1, order, noise)
+    k = first_strong(b, ONE, order, noise)
     if k <= order:
         return AGREES if b[k] * side > 0.0 else DISAGREES
-    k = first_nonzero(b, 1, order)
+    k = first_nonzero(b, ONE, order)
     if k <= order:
         return LEANS if b[k] * side > 0.0 else LEANS_AWAY
     return RESTS
@@ -168,7 +168,7 @@ def slides(W, drift, order, h, b):
     small = 32.0 * EPSILON * (abs(W[drift * columns]) + abs(W[(drift + 1) * columns]))
     for k in range(2):
         scaled(W, drift + k, order, h, b)
-        first = first_strong(b, 0, order, small)
+        first = first_strong(b, ZERO, order, small)
         if first > order or b[first] * (2 * k - 1) < 0.0:
             return DISAGREES
     return AGREES

@@ -12,6 +12,9 @@ from numba import njit
 #: Intervals of the subdivision are not made shorter than 2 to the power of minus this.
 DEEPEST = 44
 
+# plain integers would be literal types to Numba, and every function compiled once for each
+ZERO, ONE = np.int64(0), np.int64(1)
+
 
 @njit
 def horner(b, first, last, s):
@@ -28,6 +31,15 @@ def slope(b, first, last, s):
     value = 0.0
     for k in range(last, first, -1):
         value = value * s + (k - first) * b[k]
+    return value
+
+
+@njit
+def curvature(b, order, s):
+    """Second derivative by s of sum b_k s**k."""
+    value = 0.0
+    for k in range(order, 1, -1):
+        value = value * s + k * (k - 1) * b[k]
     return value
 
 
@@ -157,8 +169,3 @@ def first_strong(b, first, last, noise):
 def first_nonzero(b, first, last):
     """Index of the first coefficient that is not exactly zero, last + 1 when none is."""
     return first_strong(b, first, last, 0.0)
-
-
-def work_space(order: int) -> np.ndarray:
-    """The stack that `first_root` works on."""
-    return np.empty((DEEPEST + 2, order + 4))

@@ -43,6 +43,7 @@ _ARGUMENTS = (
     "store",
 )
 _SOURCES = (
+    "fastslow.simulation.events",
     "fastslow.simulation.modes",
     "fastslow.simulation.polynomials",
     "fastslow.compiled.pointers",

@@ -24,10 +24,10 @@ TERMS_RADICAL = 16
 DEGREE = 24
 
 #: Parts (nodes of the tree) of an expression that is still expanded.
-PARTS = 2500
+PARTS = 1500
 
 #: Most terms that an expansion may be expected to give.
-EXPANDED = 3000
+EXPANDED = 800
 
 
 def spread(expression: sp.Expr) -> sp.Expr:

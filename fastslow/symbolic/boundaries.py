@@ -202,7 +202,7 @@ def _form(
         gradient = sp.Matrix([[tidy(outward.diff(s).subs(place)) for s in states]])
         jump = sp.Matrix(
             [
-                tidy((other.rates[n] - own.rates[n]).subs(place, simultaneous=True))
+                tidy((other.rates[n] - own.rates[n]).xreplace(place))
                 for n in own.states
             ]
         )
@@ -211,11 +211,11 @@ def _form(
         test = sp.S.Zero if determinants[0] == 0 else neat(-slope / determinants[0])
         clarke = None
     sign = own.signs.sign(test)
-    inside = [tidy(e.subs(place, simultaneous=True)) for e in own.inside]
+    inside = [tidy(e.xreplace(place)) for e in own.inside]
     admissible = own.holds(e for e in inside if e != 0)
-    zeros = [e.subs(place, simultaneous=True) for e in (*own.rates.values(), outward)]
+    zeros = [e.xreplace(place) for e in (*own.rates.values(), outward)]
     if continuous:
-        zeros += [e.subs(place, simultaneous=True) for e in other.rates.values()]
+        zeros += [e.xreplace(place) for e in other.rates.values()]
     return BoundaryForm(
         interface,
         names,
@@ -236,7 +236,7 @@ def _form(
 def _at(
     matrix: sp.ImmutableDenseMatrix, place: Mapping[sp.Symbol, sp.Expr]
 ) -> sp.ImmutableDenseMatrix:
-    here = matrix.applyfunc(lambda e: tidy(e.subs(place, simultaneous=True)))
+    here = matrix.applyfunc(lambda e: tidy(e.xreplace(place)))
     return sp.ImmutableDenseMatrix(here)
 
 

@@ -69,7 +69,7 @@ def state_at(family: Family, setting: Setting, place: dict[sp.Symbol, sp.Expr]) 
 
 
 def _put(expression: sp.Expr, place: dict[sp.Symbol, sp.Expr]) -> sp.Expr:
-    return sp.sympify(expression.subs(place, simultaneous=True))
+    return sp.sympify(expression.xreplace(place))
 
 
 def fold_condition(family: Family) -> sp.Expr | None:
@@ -150,9 +150,9 @@ def _passes(other: Family, point: CriticalPoint, setting: Setting) -> bool:
     if point.equations:
         return False
     place = {real(n): e for n, e in {**point.parameters, **point.state}.items()}
-    gaps = [e.subs(place, simultaneous=True) for e in other.equations]
+    gaps = [e.xreplace(place) for e in other.equations]
     for name, value in other.elimination.solved.items():
-        gaps.append(sp.sympify(value.subs(place, simultaneous=True)) - point.state[name])
+        gaps.append(sp.sympify(value.xreplace(place)) - point.state[name])
     return all_vanish(gaps, setting.signs)
 
 

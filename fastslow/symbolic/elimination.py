@@ -68,7 +68,7 @@ class Elimination:
     ) -> tuple[sp.Expr, ...]:
         """Give the full state vector, in the order of names, at values of the unknowns."""
         whole = {u: values.get(u, u) for u in self.unknowns}
-        solved = {n: e.subs(whole, simultaneous=True) for n, e in self.solved.items()}
+        solved = {n: e.xreplace(whole) for n, e in self.solved.items()}
         return tuple(sp.sympify(solved.get(n, whole.get(real(n)))) for n in names)
 
 
@@ -122,7 +122,7 @@ def eliminate(
     best = _best(start, known)
     solved: dict[sp.Symbol, sp.Expr] = {}
     for symbol, value in reversed(best.solved):
-        solved[symbol] = _flat(value.subs(solved, simultaneous=True))
+        solved[symbol] = _flat(value.xreplace(solved))
     return Elimination(
         tuple(e for e in best.equations if e != 0),
         tuple(s for s in symbols if s not in solved),

@@ -72,7 +72,7 @@ class Family:
     def reduced(self, expression: sp.Expr) -> sp.Expr:
         """Give an expression in the states as one in the unknowns, the parameter replaced."""
         solved = {real(n): e for n, e in self.elimination.solved.items()}
-        inside = expression.subs(solved, simultaneous=True)
+        inside = expression.xreplace(solved)
         if self.parameter is not None and self.curve is not None:
             inside = inside.subs(self.parameter, self.curve)
         return tidy(inside)
@@ -165,8 +165,8 @@ def _joined(current: Elimination, equations: Sequence[sp.Expr], nonzero: Nonzero
         nonzero=nonzero,
     )
     place = {real(n): e for n, e in further.solved.items()}
-    solved = {n: spread(e.subs(place, simultaneous=True)) for n, e in current.solved.items()}
-    left = tuple(e for e in (tidy(x.subs(place, simultaneous=True)) for x in extra) if e != 0)
+    solved = {n: spread(e.xreplace(place)) for n, e in current.solved.items()}
+    left = tuple(e for e in (tidy(x.xreplace(place)) for x in extra) if e != 0)
     return Elimination(
         (*further.remaining, *left),
         further.unknowns,
@@ -196,7 +196,7 @@ def _generic(found: list[Elimination], signs: Signs) -> list[Elimination]:
 def _keeps(elimination: Elimination, divided: Sequence[sp.Expr]) -> bool:
     """Whether no divisor vanishes all along the family, which would make it spurious."""
     place = {real(n): e for n, e in elimination.solved.items()}
-    left = [tidy(d.subs(place, simultaneous=True)) for d in divided]
+    left = [tidy(d.xreplace(place)) for d in divided]
     if elimination.is_univariate:
         (equation,), unknowns = elimination.remaining, elimination.unknowns
         both = [e for e in left if equation.is_polynomial(*unknowns) and light(e) and e != 0]

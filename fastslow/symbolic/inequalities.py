@@ -11,11 +11,14 @@ from collections.abc import Callable, Iterable, Sequence
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
-from fastslow.symbolic.algebra import light, spread, tidy, undefined
+from fastslow.symbolic.algebra import light, longer, spread, tidy, undefined
 from fastslow.symbolic.signs import Signs, parts
 
 #: A radical with more terms under it is left as it is.
 TERMS = 60
+
+#: A longer expression, in parts of its tree, is said to be positive as it stands.
+PARTS = 250
 
 
 def positive(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol] = ()) -> Boolean:
@@ -51,6 +54,8 @@ def positive(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol] = ())
     side = signs.sign(expression)
     if side is not None:
         return sp.true if side > 0 else sp.false
+    if longer(expression, PARTS):
+        return above_zero(expression)
     flip, open_parts, avoided = 1, [], []
     for part, power in parts(expression):
         side = signs.sign(part)
@@ -84,7 +89,7 @@ def _one(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean:
     slope = spread(part).coeff(root, 1)
     rest = spread(spread(part) - slope * root)
     if rest.has(root) or slope.has(root) or len(sp.Add.make_args(inside)) > TERMS:
-        return sp.Gt(part, 0)
+        return above_zero(part)
     # P + Q√R > 0: by the signs of P and Q, and of Q²R − P² where they differ
     excess = spread(slope**2 * inside - rest**2)
     p, q = signs.sign(rest), signs.sign(slope)
@@ -131,6 +136,8 @@ def isolated(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean
     >>> isolated(-3 * A - 3 * D**2, Signs({}), [A, D])
     A < -D**2
     """
+    if longer(part, PARTS):
+        return above_zero(part)
     for symbol in [*order, *sorted(part.free_symbols - set(order), key=lambda s: s.name)]:
         if symbol not in part.free_symbols:
             continue
@@ -143,7 +150,20 @@ def isolated(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean
             if undefined(level):
                 continue
             return sp.Gt(symbol, level) if side > 0 else sp.Lt(symbol, level)
-    return sp.Gt(part, 0)
+    return above_zero(part)
+
+
+def above_zero(expression: sp.Expr) -> Boolean:
+    """Expression > 0 as it stands; a long one is not looked at by SymPy.
+
+    Examples
+    --------
+    >>> above_zero(sp.Symbol("a") - 1)
+    a - 1 > 0
+    """
+    if undefined(expression):
+        return sp.false
+    return sp.Gt(expression, 0, evaluate=not longer(expression, PARTS))
 
 
 def radical(expression: sp.Expr) -> sp.Pow | None:

@@ -21,6 +21,7 @@ from fastslow.symbolic.critical import (
 from fastslow.symbolic.families import Family, families
 from fastslow.symbolic.forms import Continuum, CriticalPoint, EquilibriumForm
 from fastslow.symbolic.inequalities import (
+    above_zero,
     bounds,
     conjunction,
     implied,
@@ -191,7 +192,7 @@ def _stability_along(family: Family, whole: Stability, setting: Setting) -> Stab
 
     def condition(expression: sp.Expr) -> Boolean:
         if family.elimination.unknowns:
-            return sp.Gt(expression, 0)
+            return above_zero(expression)
         return positive(expression, setting.signs, setting.candidates)
 
     tests = tuple(family.reduced(e) for e in whole.routh_hurwitz)
@@ -243,9 +244,9 @@ def _form(family: Family, root: Root | None, inner: Stability, setting: Setting)
     values = {real(n): e for n, e in state.items()}
     if explicit:
         exists = setting.real([root.radicand]) if root is not None else sp.true
-        inside = [tidy(e.subs(values, simultaneous=True)) for e in setting.inside]
+        inside = [tidy(e.xreplace(values)) for e in setting.inside]
         admissible = conjunction((exists, setting.holds(inside)), signs)
-        zeros = [r.subs(values, simultaneous=True) for r in setting.rates.values()]
+        zeros = [r.xreplace(values) for r in setting.rates.values()]
         verified = all_vanish(zeros, signs)
         stability = _at(inner, place, setting, inside) if place else inner
         possible = implied(admissible, signs)
@@ -292,7 +293,7 @@ def _at(
 def _verified_implicit(family: Family, state: Named[sp.Expr], setting: Setting) -> bool:
     """Whether the rates vanish on the curve, or are multiples of what is left."""
     values = {real(n): e for n, e in state.items()}
-    rates = [r.subs(values, simultaneous=True) for r in setting.rates.values()]
+    rates = [r.xreplace(values) for r in setting.rates.values()]
     if family.parameter is not None and family.curve is not None:
         return all_vanish([r.subs(family.parameter, family.curve) for r in rates], setting.signs)
     unknowns = family.elimination.unknowns
@@ -339,15 +340,15 @@ def _continuum(family: Family, whole: Stability, setting: Setting) -> Continuum:
             place[solved[0]] = solved[1]
     state = state_at(family, setting, place)
     values = {**place, **{real(n): e for n, e in state.items()}}
-    inside = tuple(tidy(e.subs(values, simultaneous=True)) for e in setting.inside)
+    inside = tuple(tidy(e.xreplace(values)) for e in setting.inside)
     order = [*family.elimination.unknowns, *setting.candidates]
-    polynomial = tidy(whole.characteristic_polynomial.subs(values, simultaneous=True))
+    polynomial = tidy(whole.characteristic_polynomial.xreplace(values))
     eigenvalues: list[sp.Expr] = []
     for factor, power in sp.factor_list(polynomial, EIGENVALUE)[1]:
         if factor.has(EIGENVALUE):
             closed = roots(factor, EIGENVALUE, setting.signs)
             eigenvalues += [r.value for r in closed or () for _ in range(power)]
-    rates = [r.subs(values, simultaneous=True) for r in setting.rates.values()]
+    rates = [r.xreplace(values) for r in setting.rates.values()]
     return Continuum(
         setting.region,
         family.elimination.unknowns,

@@ -21,8 +21,8 @@ from fastslow.symbolic.algebra import (
 #: The variable of characteristic polynomials.
 EIGENVALUE = sp.Symbol("lambda")
 
-#: A Hurwitz determinant that may have more terms than this stays in the coefficients.
-HURWITZ = 12000
+#: A Hurwitz determinant that may have more terms than this is not expanded.
+HURWITZ = 400
 
 SignOf = Callable[[sp.Expr], "int | None"]
 ConditionOf = Callable[[sp.Expr], Boolean]
@@ -40,7 +40,7 @@ class Stability:
         All of them are positive iff the equilibrium is asymptotically stable
         (Liénard and Chipart 1914: every coefficient and every second Hurwitz
         determinant, counted down from the last but one). A determinant past the
-        budget is given in the coefficients, as a[1], …, a[n].
+        budget is left as products of coefficients.
     signs : tuple of int or None
         Sign of each under the assumptions and in the region; None where open.
     conditions : tuple of Boolean
@@ -133,11 +133,13 @@ def stability_of_matrix(matrix: sp.MatrixBase, sign: SignOf, positive: Condition
     n = len(coefficients) - 1
     tests = list(coefficients[1:])
     sizes = [growth(a) for a in coefficients]
-    names = [sp.S.One, *(sp.Symbol(f"a[{k}]", real=True) for k in range(1, n + 1))]
+    names = [sp.S.One, *(sp.Dummy(f"a{k}", real=True) for k in range(1, n + 1))]
+    place = dict(zip(names, coefficients, strict=True))
     for order in range(n - 1, 1, -2):
         # the product of the longest coefficients bounds the length of the determinant
         short = math.prod(sorted(sizes)[-order:]) <= HURWITZ
-        tests.append(tidy(hurwitz(coefficients if short else names, order)))
+        test = hurwitz(coefficients if short else names, order)
+        tests.append(tidy(test) if short else test.xreplace(place))
     return stability_of_tests(coefficients, tuple(tests), sign, positive)
 
 

@@ -1,0 +1,133 @@
+"""Where within a step its smooth motion ends."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fastslow.compiled.pointers import call_address
+from fastslow.simulation.modes import EPSILON, interface_noise, scaled
+from fastslow.simulation.polynomials import (
+    ONE,
+    ZERO,
+    curvature,
+    excluded,
+    first_root,
+    first_strong,
+    horner,
+    slope,
+)
+
+
+@njit
+def find_event(address, layout, signs, mode, inputs, parameters, W, h, on, noise, b, stack, gradient):
+    """The first time in a step at which its motion ends, as a part of the step.
+
+    Returns
+    -------
+    s : float
+        Above 1 when the whole step is free of events.
+    j : int
+        The interface (that is slid along, where sliding ends), -1 for none.
+    touch : bool
+        Whether h does not change its sign there.
+    depth : float
+        Relative change of h that would undo the crossing.
+    floor : float
+        Size of h that is rounding error there.
+    """
+    n_states, n_forcing, n_interfaces, n_modes, order = layout
+    first_h = n_states + n_forcing
+    drift = first_h + n_interfaces
+    best, interface, touched, depth, floor = 2.0, np.int64(-1), False, 1.0, 0.0
+    for j in range(n_interfaces):
+        sign = signs[mode, j]
+        if sign == 0:
+            for k in range(2):
+                scaled(W, drift + k, order, h, b)
+                small = 32.0 * EPSILON * abs(b[0])
+                start = ZERO
+                if b[0] * (2 * k - 1) <= 0.0:
+                    start = first_strong(b, ONE, order, small)
+                    if start > order:
+                        continue
+                if not excluded(b, start, order):
+                    s, touch = first_root(b, start, order, small, stack)
+                    if s < best and not touch:
+                        best, interface, touched, depth = s, j, False, 1.0
+            continue
+        total = scaled(W, first_h + j, order, h, b)
+        start = ZERO
+        if on[j]:
+            start = first_strong(b, ONE, order, noise[j])
+            if start > order:
+                continue
+            on[j] = False
+        elif b[0] * sign <= 0.0:
+            return 0.0, j, False, 1.0, 0.0
+        if excluded(b, start, order):
+            continue
+        small = interface_noise(address, n_modes, j, inputs, parameters, gradient)
+        small = max(small, 8.0 * EPSILON * total)
+        s, touch = first_root(b, start, order, small, stack)
+        if s <= 1.0 and not touch:
+            s, touch = turning_point(b, order, s, small, sign)
+        if s < best and s <= 1.0:
+            best, interface, touched, floor = s, j, touch, small
+            depth = undoing(b, order, s, max(gradient[1], total))
+    return best, interface, touched, depth, floor
+
+
+@njit
+def holds(address, layout, mode, inputs, parameters, W, part, tol, work):
+    """Whether the rates at the end of a step are the derivatives of its series."""
+    n_states, order = layout[0], layout[4]
+    columns = order + 1
+    ahead = np.empty(inputs.shape[0])
+    ahead[0] = inputs[0] + part
+    for i in range(n_states):
+        ahead[1 + i] = horner(W, i * columns, i * columns + order, part)
+    call_address(address, mode, ahead, parameters, work)
+    for i in range(n_states):
+        row = i * columns
+        rate = work[row + 1]
+        defect = abs(slope(W, row, row + order, part) - rate) * part
+        if not defect <= 100.0 * (tol * (1.0 + abs(ahead[1 + i])) + EPSILON * abs(rate) * part):
+            return False
+    return True
+
+
+@njit
+def turning_point(b, order, s, small, sign):
+    """The root again, or where h turns back just there: a touch, as far as rounding can tell."""
+    rate = slope(b, ZERO, order, s)
+    bend = curvature(b, order, s)
+    if bend * sign <= 0.0 or 0.5 * rate * rate > small * bend * sign:
+        return s, False
+    turn = min(max(s - rate / bend, 0.0), 1.0)
+    beyond = turn + 4.0 * (small / (bend * sign)) ** 0.5
+    if beyond < 1.0 and horner(b, ZERO, order, beyond) * sign > 0.0:
+        return turn, True
+    return s, False
+
+
+@njit
+def undoing(b, order, s, size):
+    """Depth of the parabola that h follows beyond its root, relative to its size."""
+    rate = slope(b, ZERO, order, s)
+    bend = curvature(b, order, s)
+    if bend == 0.0 or size == 0.0:
+        return 1.0
+    return min(1.0, 0.5 * rate * rate / (abs(bend) * size))
+
+
+@njit
+def put_on(address, n_modes, j, inputs, parameters, gradient, n_states):
+    """Move the state onto an interface, by Newton along its gradient."""
+    call_address(address, n_modes + j, inputs, parameters, gradient)
+    square = 0.0
+    for i in range(n_states):
+        square += gradient[2 + i] * gradient[2 + i]
+    if square > 0.0:
+        for i in range(n_states):
+            inputs[1 + i] -= gradient[0] * gradient[2 + i] / square
