@@ -11,7 +11,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from analyses import dead_zone, gap_width, load_amplitude, negative_stiffness, stiffness
-from analyses.passages import OMEGA, PERIODS, Row
+from analyses.passages import OMEGA, PERIODS, Row, saved
 
 PANELS = (gap_width, stiffness, load_amplitude, negative_stiffness)
 
@@ -36,14 +36,15 @@ def main(arguments: Sequence[str] | None = None) -> list[Row]:
     parser = argparse.ArgumentParser(prog="python -m analyses", description=__doc__)
     parser.add_argument("folder", nargs="?", type=Path, default=Path("figures"))
     folder: Path = parser.parse_args(arguments).folder
+    settings = [setting for analysis in PANELS for setting in analysis.settings()]
     rows: list[Row] = []
-    with tqdm(total=1 + len(PANELS), unit="analysis") as bar:
+    with tqdm(total=1 + len(settings), unit="figure") as bar:
         bar.set_description("dead_zone")
         dead_zone.main(folder)
         bar.update()
-        for analysis in PANELS:
-            bar.set_description(analysis.__name__.split(".")[-1])
-            rows += analysis.main(folder)
+        for setting in settings:
+            bar.set_description(setting.name)
+            rows.append(saved(setting, folder))
             bar.update()
     with (folder / "summary.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [f.name for f in fields(Row)])

@@ -8,23 +8,23 @@ from __future__ import annotations
 from pathlib import Path
 
 import fastslow as fs
-from analyses.passages import OMEGA, Case, Row, laid, saved
+from analyses.passages import OMEGA, Row, Setting, saved
 
 STATED = {0.1: "bilateral", 0.25: "bilateral", 0.5: "unilateral"}
 
 
-def cases() -> list[Case]:
+def settings() -> list[Setting]:
     """The three widths, all else from the source's physical values."""
     gear = fs.systems.harmonic_gear_physical().with_parameters(omega=OMEGA)
     return [
-        laid(f"gap_width_{D}", f"$D = {D}$", gear.with_parameters(D=D), stated)
+        Setting(f"gap_width_{D}", f"$D = {D}$", gear.with_parameters(D=D), stated)
         for D, stated in STATED.items()
     ]
 
 
 def main(folder: Path) -> list[Row]:
     """Draw the panels into a folder and return their numbers."""
-    return saved(cases(), folder)
+    return [saved(setting, folder) for setting in settings()]
 
 
 if __name__ == "__main__":

@@ -10,16 +10,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import fastslow as fs
-from analyses.passages import OMEGA, Case, Row, laid, saved
+from analyses.passages import OMEGA, Row, Setting, saved
 
 STATED = {10: "bilateral", 50: "unilateral", 100: "unilateral"}
 GAP = 0.25
 
 
-def cases() -> list[Case]:
+def settings() -> list[Setting]:
     """The three amplitudes at D = 0.25, all else from the source's physical values."""
     return [
-        laid(
+        Setting(
             f"load_amplitude_{T_am}",
             rf"$T_\mathrm{{am}} = {T_am}\,\mathrm{{N\,m}}$, $D = {GAP}$",
             fs.systems.harmonic_gear_physical(T_am=T_am, D=GAP).with_parameters(omega=OMEGA),
@@ -31,7 +31,7 @@ def cases() -> list[Case]:
 
 def main(folder: Path) -> list[Row]:
     """Draw the panels into a folder and return their numbers."""
-    return saved(cases(), folder)
+    return [saved(setting, folder) for setting in settings()]
 
 
 if __name__ == "__main__":

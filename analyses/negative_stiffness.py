@@ -10,21 +10,21 @@ from __future__ import annotations
 from pathlib import Path
 
 import fastslow as fs
-from analyses.passages import OMEGA, Case, Row, laid, saved
+from analyses.passages import OMEGA, Row, Setting, saved
 
 STIFFNESS, GAP, SWING = -0.6, 0.25, 0.4
 
 
-def cases() -> list[Case]:
+def settings() -> list[Setting]:
     """One case: the load swings across both folds."""
     gear = fs.systems.harmonic_gear(A=STIFFNESS, B=0.0, C=SWING, D=GAP, omega=OMEGA)
     title = f"$A = {STIFFNESS}$, $D = {GAP}$, $B = 0$, $C = {SWING}$"
-    return [laid("negative_stiffness", title, gear)]
+    return [Setting("negative_stiffness", title, gear)]
 
 
 def main(folder: Path) -> list[Row]:
     """Draw the panel into a folder and return its numbers."""
-    return saved(cases(), folder)
+    return [saved(setting, folder) for setting in settings()]
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What every case of the gear shares: the run, its diagram, the overlay, and a row of numbers."""
+"""What all cases of the gear share: the run, its diagram, the overlay, and a row of numbers."""
 
 from __future__ import annotations
 
@@ -16,25 +16,31 @@ REST = (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
-    """One set of parameters, run over three slow periods and laid over its diagram.
+class Setting:
+    """One set of parameters of the gear.
 
     Parameters
     ----------
     name : str
         What the figure's file is called.
     title : str
-        What differs from the other cases, as mathematics.
+        What differs from the other settings, as mathematics.
+    model : Model
     stated : str
         The regime that the source states, or "" where it states none.
-    model : Model
-    lay : Overlay
     """
 
     name: str
     title: str
-    stated: str
     model: fs.Model
+    stated: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A setting, run over three slow periods and laid over its diagram."""
+
+    setting: Setting
     lay: fs.Overlay
 
     @property
@@ -84,23 +90,24 @@ class Row:
     largest_delay: float
 
 
-def laid(name: str, title: str, model: fs.Model, stated: str = "") -> Case:
+def laid(setting: Setting) -> Case:
     """Run a gear over three slow periods from rest and lay it over its diagram."""
+    model = setting.model
     load, swing = model.parameters["B"], model.parameters["C"]
     # the whole load, and enough below zero to show the gap
     over = (min(load - 1.1 * swing, -0.3 * swing), load + 1.1 * swing)
     diagram = fs.continue_equilibria(model.frozen(), "w", over=over)
     run = fs.simulate(model, REST, periods=PERIODS)
-    return Case(name, title, stated, model, fs.overlay(diagram, run))
+    return Case(setting, fs.overlay(diagram, run))
 
 
 def row(case: Case) -> Row:
     """The numbers of a case for the summary table."""
-    values = case.model.parameters
+    values = case.setting.model.parameters
     delays = np.abs(case.lay.delays)
     kinds = [t.kind for t in case.lay.transitions]
     return Row(
-        case.name,
+        case.setting.name,
         values["A"],
         values["B"],
         values["C"],
@@ -111,22 +118,22 @@ def row(case: Case) -> Row:
         kinds.count("jump"),
         kinds.count("crossing"),
         case.run.regime or "none",
-        case.stated,
+        case.setting.stated,
         float(np.nanmax(delays)) if np.isfinite(delays).any() else float("nan"),
     )
 
 
 def draw(case: Case) -> fs.plot.PanelDrawing:
     """The panel of a case: time series, phase portrait, overlay."""
-    title = rf"{case.title}, $\omega_\mathrm{{o}} = {OMEGA:g}$, {PERIODS} periods from rest"
-    return fs.plot.panel(case.lay, title=title)
+    load = rf"$\omega_\mathrm{{o}} = {OMEGA:g}$, {PERIODS} periods from rest"
+    return fs.plot.panel(case.lay, title=f"{case.setting.title}, {load}")
 
 
-def saved(cases: list[Case], folder: Path) -> list[Row]:
-    """Write the panels of several cases, as PNG and PDF, and return their rows."""
+def saved(setting: Setting, folder: Path) -> Row:
+    """Compute a setting, write its panel as PNG and PDF, and return its numbers."""
     folder.mkdir(parents=True, exist_ok=True)
-    for case in cases:
-        drawing = draw(case)
-        for suffix in ("png", "pdf"):
-            drawing.save(folder / f"{case.name}.{suffix}")
-    return [row(case) for case in cases]
+    case = laid(setting)
+    drawing = draw(case)
+    for suffix in ("png", "pdf"):
+        drawing.save(folder / f"{setting.name}.{suffix}")
+    return row(case)

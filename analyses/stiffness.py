@@ -9,15 +9,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import fastslow as fs
-from analyses.passages import OMEGA, Case, Row, laid, saved
+from analyses.passages import OMEGA, Row, Setting, saved
 
 STIFFNESSES = (1000, 3000, 7000)
 
 
-def cases() -> list[Case]:
+def settings() -> list[Setting]:
     """The three stiffnesses, all else from the source's physical values."""
     return [
-        laid(
+        Setting(
             f"stiffness_{k1}",
             rf"$k_1 = {k1}\,\mathrm{{N\,m/rad}}$, $D = 0.1$",
             fs.systems.harmonic_gear_physical(k1=k1, D=0.1).with_parameters(omega=OMEGA),
@@ -28,7 +28,7 @@ def cases() -> list[Case]:
 
 def main(folder: Path) -> list[Row]:
     """Draw the panels into a folder and return their numbers."""
-    return saved(cases(), folder)
+    return [saved(setting, folder) for setting in settings()]
 
 
 if __name__ == "__main__":

@@ -14,8 +14,8 @@ from fastslow.results.trajectories import Trajectory
 
 Array = NDArray[np.float64]
 
-#: A new sheet is followed once it is nearer than this times the distance to the old one.
-NEARER = 0.5
+#: A new sheet is followed once this part of the way to it from the old one is done.
+WAY = 2.0 / 3.0
 
 #: Codes at which a stable sheet can end.
 ENDING = ("LP", "HB", "BP", "BE")
@@ -24,10 +24,11 @@ ENDING = ("LP", "HB", "BP", "BE")
 def overlay(diagram: Diagram, run: Trajectory) -> Overlay:
     """Lay a trajectory over the equilibrium diagram of its frozen model.
 
-    At each time the followed sheet is the stable one nearest in state; past
-    its end a sheet is continued by its end state, and another sheet takes over
-    only when it is clearly nearer, so that the answer does not flicker while
-    the trajectory is between two.
+    At first the followed sheet is the stable one nearest in state. Past its
+    end a sheet is continued by its end state, and another one takes over when
+    two thirds of the way to it are done, measured along the line between the
+    two: what the state has off that line, such as the velocity of the drift,
+    does not count, and the answer does not flicker halfway.
 
     Parameters
     ----------
@@ -68,8 +69,8 @@ def overlay(diagram: Diagram, run: Trajectory) -> Overlay:
         far = np.full(len(time), np.inf)
         return Overlay(diagram, run, time, slow, state, far, (), nothing, ())
     extent = _extent(diagram, sheets, state)
-    apart, present = _distances(diagram, sheets, slow, state / extent, extent)
-    followed = _followed(apart, present)
+    places, present = _places(diagram, sheets, slow, extent)
+    followed = _followed(state / extent, places, present)
     transitions = []
     for row in np.flatnonzero(np.diff(followed)) + 1:
         left, entered = sheets[followed[row - 1]], sheets[followed[row]]
@@ -84,7 +85,7 @@ def overlay(diagram: Diagram, run: Trajectory) -> Overlay:
         transitions.append(
             _transition(diagram, left, entered, float(times[1]), float(slow_now[1]), state_now)
         )
-    distance = apart[np.arange(len(time)), followed]
+    distance = np.linalg.norm(state / extent - places[np.arange(len(time)), followed], axis=1)
     return Overlay(diagram, run, time, slow, state, distance, sheets, followed, tuple(transitions))
 
 
@@ -105,16 +106,16 @@ def _narrowed(
     extent: Array,
     times: Array,
 ) -> Array:
-    """Two times between which the second sheet becomes clearly nearer, close to rounding."""
+    """Two times, close to rounding, between which the second sheet takes over."""
     for _ in range(9):
         fine = np.linspace(times[0], times[1], 33)
         columns = run.dense_columns(fine)
         slow = columns[run.columns.index(diagram.parameter)]
         state = columns[[run.columns.index(n) for n in diagram.states]].T
-        apart, present = _distances(diagram, pair, slow, state / extent, extent)
-        nearer = present[:, 1] & (apart[:, 1] < NEARER * apart[:, 0])
-        nearer[0], nearer[-1] = False, True
-        k = int(np.argmax(nearer))
+        places, present = _places(diagram, pair, slow, extent)
+        over = present[:, 1] & (_way(state / extent, places[:, 0], places[:, 1]) > WAY)
+        over[0], over[-1] = False, True
+        k = int(np.argmax(over))
         times = fine[k - 1 : k + 1]
     return times
 
@@ -144,20 +145,19 @@ def _stable_sheets(diagram: Diagram) -> tuple[StableSheet, ...]:
     return tuple(sheets)
 
 
-def _distances(
-    diagram: Diagram, sheets: tuple[StableSheet, ...], slow: Array, scaled: Array, extent: Array
+def _places(
+    diagram: Diagram, sheets: tuple[StableSheet, ...], slow: Array, extent: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Scaled distance of each sample to each sheet, and whether the sheet exists there."""
-    apart = np.empty((len(slow), len(sheets)))
+    """Scaled state of each sheet at each sample (N, sheets, n), and whether it exists there."""
+    places = np.empty((len(slow), len(sheets), len(extent)))
     present = np.empty((len(slow), len(sheets)), dtype=bool)
     for k, sheet in enumerate(sheets):
         branch = diagram.branches[sheet.branch]
         values = branch.parameter[sheet.start : sheet.stop]
         low, high = sorted((values[0], values[-1]))
         present[:, k] = (slow >= low) & (slow <= high)
-        nearest = _on_sheet(branch, sheet, np.clip(slow, low, high))
-        apart[:, k] = np.linalg.norm(scaled - nearest / extent, axis=1)
-    return apart, present
+        places[:, k] = _on_sheet(branch, sheet, np.clip(slow, low, high)) / extent
+    return places, present
 
 
 def _on_sheet(branch: Branch, sheet: StableSheet, slow: Array) -> Array:
@@ -170,8 +170,17 @@ def _on_sheet(branch: Branch, sheet: StableSheet, slow: Array) -> Array:
     return hermite(branch, rows, slow)
 
 
-def _followed(apart: Array, present: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """The followed sheet at each sample, with hysteresis."""
+def _way(scaled: Array, old: Array, new: Array) -> Array:
+    """Which part of the way from the old sheet to the new one a state has done."""
+    chord = new - old
+    length = (chord**2).sum(axis=-1)
+    done = ((scaled - old) * chord).sum(axis=-1)
+    return np.asarray(done / np.where(length > 0, length, np.inf))
+
+
+def _followed(scaled: Array, places: Array, present: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """The followed sheet at each sample."""
+    apart = np.linalg.norm(scaled[:, None] - places, axis=2)
     candidate = np.where(present, apart, np.inf)
     first = candidate[0] if np.isfinite(candidate[0]).any() else apart[0]
     current = int(np.argmin(first))
@@ -180,12 +189,15 @@ def _followed(apart: Array, present: NDArray[np.bool_]) -> NDArray[np.intp]:
     while done < len(apart):
         rivals = candidate[done:].copy()
         rivals[:, current] = np.inf
-        nearer = rivals.min(axis=1) < NEARER * apart[done:, current]
-        change = int(np.argmax(nearer)) if nearer.any() else len(nearer)
+        best = np.argmin(rivals, axis=1)
+        ahead = np.arange(done, len(apart))
+        way = _way(scaled[done:], places[done:, current], places[ahead, best])
+        over = np.isfinite(rivals.min(axis=1)) & (way > WAY)
+        change = int(np.argmax(over)) if over.any() else len(over)
         followed[done : done + change] = current
         done += change
         if done < len(apart):
-            current = int(np.argmin(rivals[change]))
+            current = int(best[change])
     return followed
 
 

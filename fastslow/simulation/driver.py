@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
-
+from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
 from fastslow.simulation.events import find_event, holds, put_on
 from fastslow.simulation.modes import (
@@ -33,7 +32,7 @@ CROWD = 40
 TANGENTIAL = 1e-6
 
 
-@njit
+@part
 def grown(array):
     """A copy with room for twice as many rows."""
     larger = np.empty((2 * array.shape[0] + 16, array.shape[1]))
@@ -43,20 +42,31 @@ def grown(array):
     return larger
 
 
-@njit(fastmath={"contract"})
+@part
 def sample(W, columns, rows, s, out, first):
     """Evaluate rows of a step at the offsets s, into the columns of ``out`` from the first."""
     n = s.shape[0]
     for i in range(rows):
         top = i * columns + columns - 1
-        for c in range(n):
-            value = W[top]
+        # four at a time, because each waits for its own last product
+        for c in range(0, n - 3, 4):
+            s0, s1, s2, s3 = s[c], s[c + 1], s[c + 2], s[c + 3]
+            v0 = v1 = v2 = v3 = W[top]
             for k in range(1, columns):
-                value = value * s[c] + W[top - k]
-            out[i, first + c] = value
+                coefficient = W[top - k]
+                v0 = v0 * s0 + coefficient
+                v1 = v1 * s1 + coefficient
+                v2 = v2 * s2 + coefficient
+                v3 = v3 * s3 + coefficient
+            out[i, first + c] = v0
+            out[i, first + c + 1] = v1
+            out[i, first + c + 2] = v2
+            out[i, first + c + 3] = v3
+        for c in range(n - n % 4, n):
+            out[i, first + c] = horner(W, top - columns + 1, top, s[c])
 
 
-@njit
+@part
 def drive(
     address, layout, sizes, signs, parameters, start, span, tol, times, sampled_rows, dense,
     limits, store,
@@ -182,13 +192,6 @@ def drive(
         if n_steps == limits[0]:
             code = TOO_MANY_STEPS
             break
-        if dense:
-            if n_steps * stride + size > store.shape[0]:
-                larger = np.empty(2 * store.shape[0] + 64 * stride + size)
-                for i in range(n_steps * stride):
-                    larger[i] = store[i]
-                store = larger
-            W = store[n_steps * stride : n_steps * stride + size]
         call_address(address, mode, inputs, parameters, W)
         longest = step_length(W, drift, order, tol)
         if not longest > 0.0:
@@ -233,6 +236,14 @@ def drive(
             if n_steps == steps.shape[0]:
                 steps = grown(steps)
             steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, part, mode
+            if dense:
+                if (n_steps + 1) * stride > store.shape[0]:
+                    larger = np.empty(2 * store.shape[0] + 64 * stride)
+                    for i in range(n_steps * stride):
+                        larger[i] = store[i]
+                    store = larger
+                for i in range(stride):
+                    store[n_steps * stride + i] = W[i]
             n_steps += 1
             first = n_samples
             while n_samples < times.shape[0] and times[n_samples] <= t:

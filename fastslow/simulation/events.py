@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
-
+from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
 from fastslow.simulation.modes import EPSILON, interface_noise, scaled
 from fastslow.simulation.polynomials import (
@@ -15,11 +14,12 @@ from fastslow.simulation.polynomials import (
     first_root,
     first_strong,
     horner,
+    kept_away,
     slope,
 )
 
 
-@njit
+@part
 def find_event(address, layout, signs, mode, inputs, parameters, W, h, on, noise, b, stack, gradient):
     """The first time in a step at which its motion ends, as a part of the step.
 
@@ -56,6 +56,9 @@ def find_event(address, layout, signs, mode, inputs, parameters, W, h, on, noise
                     if s < best and not touch:
                         best, interface, touched, depth = s, j, False, 1.0
             continue
+        row = (first_h + j) * (order + 1)
+        if W[row] * sign > 0.0 and not on[j] and kept_away(W, row, row + order, h):
+            continue
         total = scaled(W, first_h + j, order, h, b)
         start = ZERO
         if on[j]:
@@ -78,7 +81,7 @@ def find_event(address, layout, signs, mode, inputs, parameters, W, h, on, noise
     return best, interface, touched, depth, floor
 
 
-@njit
+@part
 def holds(address, layout, mode, inputs, parameters, W, part, tol, work):
     """Whether the rates at the end of a step are the derivatives of its series."""
     n_states, order = layout[0], layout[4]
@@ -97,7 +100,7 @@ def holds(address, layout, mode, inputs, parameters, W, part, tol, work):
     return True
 
 
-@njit
+@part
 def turning_point(b, order, s, small, sign):
     """The root again, or where h turns back just there: a touch, as far as rounding can tell."""
     rate = slope(b, ZERO, order, s)
@@ -111,7 +114,7 @@ def turning_point(b, order, s, small, sign):
     return s, False
 
 
-@njit
+@part
 def undoing(b, order, s, size):
     """Depth of the parabola that h follows beyond its root, relative to its size."""
     rate = slope(b, ZERO, order, s)
@@ -121,7 +124,7 @@ def undoing(b, order, s, size):
     return min(1.0, 0.5 * rate * rate / (abs(bend) * size))
 
 
-@njit
+@part
 def put_on(address, n_modes, j, inputs, parameters, gradient, n_states):
     """Move the state onto an interface, by Newton along its gradient."""
     call_address(address, n_modes + j, inputs, parameters, gradient)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
-
+from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
 from fastslow.simulation.polynomials import ONE, ZERO, first_nonzero, first_strong
 
@@ -17,7 +16,7 @@ AGREES, LEANS, RESTS, LEANS_AWAY, DISAGREES = 3, 2, 1, 0, -1
 NO_MODE, MANY_MODES, NOT_DEFINED = -1, -2, -3
 
 
-@njit
+@part
 def step_length(W, n_rows, order, tol):
     """The step whose last terms are as large as the tolerance (Jorba and Zou 2005).
 
@@ -50,7 +49,7 @@ def step_length(W, n_rows, order, tol):
     return length
 
 
-@njit
+@part
 def scaled(W, row, order, h, b):
     """Coefficients of one row, scaled to the step, and the sum of their moduli without the first."""
     power = 1.0
@@ -63,14 +62,14 @@ def scaled(W, row, order, h, b):
     return total
 
 
-@njit
+@part
 def interface_noise(address, n_modes, j, inputs, parameters, gradient):
     """Size of h that is rounding error, from the moduli of its terms; fills the gradient."""
     call_address(address, n_modes + j, inputs, parameters, gradient)
     return 8.0 * EPSILON * gradient[1]
 
 
-@njit
+@part
 def agreement(b, order, noise, side):
     """How the motion away from an interface agrees with one side of it.
 
@@ -86,7 +85,7 @@ def agreement(b, order, noise, side):
     return RESTS
 
 
-@njit
+@part
 def choose_mode(
     address, layout, signs, inputs, parameters, tol, longest, on, side, current, W, b, noise
 ):
@@ -161,7 +160,7 @@ def choose_mode(
     return NOT_DEFINED if best == NO_MODE and broken else best
 
 
-@njit
+@part
 def slides(W, drift, order, h, b):
     """Whether the fields of both sides point at the interface, a < 0 < b, now or next."""
     columns = order + 1

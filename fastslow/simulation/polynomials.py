@@ -7,7 +7,8 @@ so that the step is 0 <= s <= 1.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from fastslow.compiled.parts import part
 
 #: Intervals of the subdivision are not made shorter than 2 to the power of minus this.
 DEEPEST = 44
@@ -16,7 +17,7 @@ DEEPEST = 44
 ZERO, ONE = np.int64(0), np.int64(1)
 
 
-@njit
+@part
 def horner(b, first, last, s):
     """Value of sum b_k s**(k - first) over first <= k <= last."""
     value = b[last]
@@ -25,7 +26,7 @@ def horner(b, first, last, s):
     return value
 
 
-@njit
+@part
 def slope(b, first, last, s):
     """Derivative by s of the same sum."""
     value = 0.0
@@ -34,7 +35,7 @@ def slope(b, first, last, s):
     return value
 
 
-@njit
+@part
 def curvature(b, order, s):
     """Second derivative by s of sum b_k s**k."""
     value = 0.0
@@ -43,7 +44,16 @@ def curvature(b, order, s):
     return value
 
 
-@njit
+@part
+def kept_away(c, first, last, h):
+    """Whether |c_0| > sum |c_k| h**k, so that there is no root on [0, h]."""
+    rest = abs(c[last])
+    for k in range(last - 1, first, -1):
+        rest = rest * h + abs(c[k])
+    return abs(c[first]) > rest * h
+
+
+@part
 def excluded(b, first, last):
     """Whether the coefficients alone prove that there is no root on (0, 1]."""
     rest = 0.0
@@ -52,7 +62,7 @@ def excluded(b, first, last):
     return abs(b[first]) > rest
 
 
-@njit
+@part
 def first_root(b, first, last, noise, stack):
     """First root on (0, 1] of sum b_k s**(k - first), and whether it is a touch.
 
@@ -78,16 +88,14 @@ def first_root(b, first, last, noise, stack):
         Whether the sign is the same on both sides, as far as rounding can tell.
     """
     n = last - first
-    # power to Bernstein form
-    for j in range(n + 1):
-        stack[0, j] = 0.0
+    # power to Bernstein form: divide by the binomials, then sum as in Pascal's triangle
     binomial = 1.0
     for k in range(n + 1):
-        weight = 1.0
-        for j in range(k, n + 1):
-            stack[0, j] += weight * b[first + k] / binomial
-            weight = weight * (j + 1) / (j + 1 - k)
+        stack[0, k] = b[first + k] / binomial
         binomial = binomial * (n - k) / (k + 1)
+    for level in range(1, n + 1):
+        for j in range(n, level - 1, -1):
+            stack[0, j] += stack[0, j - 1]
     stack[0, n + 1] = 0.0
     stack[0, n + 2] = 1.0
     depth = 1
@@ -132,7 +140,7 @@ def first_root(b, first, last, noise, stack):
     return 2.0, False
 
 
-@njit
+@part
 def refine(b, first, last, low, high):
     """The root of a sign change on [low, high] to rounding: Newton, kept inside the bracket."""
     at_low = horner(b, first, last, low)
@@ -156,7 +164,7 @@ def refine(b, first, last, low, high):
     return s
 
 
-@njit
+@part
 def first_strong(b, first, last, noise):
     """Index of the first coefficient above the noise, last + 1 when none is."""
     for k in range(first, last + 1):
@@ -165,7 +173,7 @@ def first_strong(b, first, last, noise):
     return last + 1
 
 
-@njit
+@part
 def first_nonzero(b, first, last):
     """Index of the first coefficient that is not exactly zero, last + 1 when none is."""
     return first_strong(b, first, last, 0.0)

@@ -46,6 +46,7 @@ _SOURCES = (
     "fastslow.simulation.events",
     "fastslow.simulation.modes",
     "fastslow.simulation.polynomials",
+    "fastslow.compiled.parts",
     "fastslow.compiled.pointers",
 )
 

@@ -17,7 +17,7 @@ from fastslow.symbolic.inequalities import implied
 from fastslow.symbolic.location import neat
 from fastslow.symbolic.roots import Root, roots, solved_for
 from fastslow.symbolic.stability import jacobian
-from fastslow.symbolic.verification import all_vanish
+from fastslow.symbolic.verification import OPEN, checked
 
 #: Kinds of boundary equilibria by the sign of their test.
 TYPES = {1: "persistence", -1: "non-smooth fold", 0: "degenerate"}
@@ -95,7 +95,9 @@ class BoundaryForm:
     admissible : Boolean
         When the point lies on the part of the interface between the regions.
     possible : bool or None
-    verified : bool
+    check : str
+        How it is known that the rates and the switching function vanish on
+        substitution; empty where equations are left.
     """
 
     interface: str
@@ -110,7 +112,12 @@ class BoundaryForm:
     singular: Named[Boolean]
     admissible: Boolean
     possible: bool | None
-    verified: bool
+    check: str
+
+    @property
+    def verified(self) -> bool:
+        """Whether the closed form is complete and satisfies its equations."""
+        return bool(self.check)
 
 
 def boundary_forms(
@@ -201,10 +208,7 @@ def _form(
     else:
         gradient = sp.Matrix([[tidy(outward.diff(s).subs(place)) for s in states]])
         jump = sp.Matrix(
-            [
-                tidy((other.rates[n] - own.rates[n]).xreplace(place))
-                for n in own.states
-            ]
+            [tidy((other.rates[n] - own.rates[n]).xreplace(place)) for n in own.states]
         )
         inverse = adjugate(matrices[0])
         slope = (gradient * inverse * jump)[0, 0]
@@ -213,9 +217,9 @@ def _form(
     sign = own.signs.sign(test)
     inside = [tidy(e.xreplace(place)) for e in own.inside]
     admissible = own.holds(e for e in inside if e != 0)
-    zeros = [e.xreplace(place) for e in (*own.rates.values(), outward)]
+    zeros = [*own.rates.values(), outward]
     if continuous:
-        zeros += [e.xreplace(place) for e in other.rates.values()]
+        zeros += other.rates.values()
     return BoundaryForm(
         interface,
         names,
@@ -229,7 +233,7 @@ def _form(
         _singular(names, determinants, own),
         admissible,
         implied(admissible, own.signs),
-        not left and all_vanish(zeros, own.signs),
+        OPEN if left else checked(zeros, place, own.signs),
     )
 
 

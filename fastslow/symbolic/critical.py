@@ -17,7 +17,7 @@ from fastslow.symbolic.inequalities import conjunction, general, implied, nonneg
 from fastslow.symbolic.location import Located, locate, neat, parameters_where
 from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.stability import Stability
-from fastslow.symbolic.verification import all_vanish
+from fastslow.symbolic.verification import OPEN, all_vanish, checked
 
 
 @dataclass(frozen=True)
@@ -240,9 +240,9 @@ def critical_point(
             exists = sp.And(exists, setting.holds([frequency]))
     inside = [tidy(_put(e, place)) for e in setting.inside]
     admissible = conjunction((exists, setting.holds(inside)), setting.signs)
-    zeros = [_put(e, place) for e in (*setting.rates.values(), condition)]
+    zeros = (*setting.rates.values(), condition)
     # an equation that is left holds by itself, so only its absence can be verified
-    verified = not located.equations and all_vanish(zeros, setting.signs)
+    check = OPEN if located.equations else checked(zeros, place, setting.signs)
     return CriticalPoint(
         code,
         setting.region,
@@ -253,7 +253,7 @@ def critical_point(
         admissible,
         implied(sp.And(admissible, *_agreeing(parameters, setting.signs)), setting.signs),
         frequency,
-        verified,
+        check,
     )
 
 

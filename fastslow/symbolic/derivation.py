@@ -20,6 +20,7 @@ from fastslow.symbolic.forms import Continuum, CriticalPoint
 from fastslow.symbolic.inequalities import needed
 from fastslow.symbolic.regions import RegionForms, derive_region
 from fastslow.symbolic.signs import Signs
+from fastslow.symbolic.verification import weakest
 
 
 @dataclass(frozen=True)
@@ -72,9 +73,13 @@ class Derivation:
     @property
     def verified(self) -> bool:
         """Whether every complete closed form satisfies its equations on substitution."""
-        return all(r.verified for r in self.regions.values()) and all(
-            b.verified for b in self.boundary_equilibria if not b.equations
-        )
+        return bool(self.check)
+
+    @property
+    def check(self) -> str:
+        """How that is known: ``"exact"``, else ``"50 digits"`` (at points), or empty."""
+        points = [b.check for b in self.boundary_equilibria if not b.equations]
+        return weakest([*(r.check for r in self.regions.values()), *points])
 
     def to_latex(self) -> str:
         """All of it as LaTeX paragraphs with displayed formulas."""

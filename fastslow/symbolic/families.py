@@ -12,6 +12,7 @@ from fastslow.results.named import Named
 from fastslow.symbolic.algebra import (
     growth,
     light,
+    longer,
     numerator,
     shortest,
     spread,
@@ -19,11 +20,15 @@ from fastslow.symbolic.algebra import (
     undefined,
 )
 from fastslow.symbolic.elimination import Elimination, Nonzero, eliminate
+from fastslow.symbolic.linear import cramer
 from fastslow.symbolic.roots import DEGREE, Root, factors_in, roots, solved_for
 from fastslow.symbolic.signs import Signs
 
 #: Terms in all coefficients together, up to which a discriminant is formed.
 COEFFICIENTS = 12
+
+#: Longer divisors, in parts of their tree, are not written out in a note.
+PARTS = 100
 
 #: More branches of one set of equations than this are not split any further.
 BRANCHES = 24
@@ -106,6 +111,15 @@ def families(
     >>> [f.curve for f in families({"x": w - x**3}, ["x"], Signs({}), [w])]
     [x**3]
     """
+    direct = cramer(rates, states)
+    if isinstance(direct, tuple):
+        values, below = direct
+        solved = Elimination((), (), Named("solved state", values), (below,))
+        return [_solved(solved, signs, candidates)]
+    if direct is not None:
+        unknowns = tuple(real(n) for n in states)
+        whole = Elimination(tuple(rates.values()), unknowns, Named("solved state", {}))
+        return [Family(whole, note=direct)]
     return [_solved(elimination, signs, candidates) for elimination in split(rates, states, signs)]
 
 
@@ -212,7 +226,7 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Sequence[sp.Symb
     note = ""
     divided = [d for d in elimination.divisors if not signs.nonzero(d)]
     if divided:
-        note = "found where " + ", ".join(f"{d} ≠ 0" for d in divided)
+        note = "found where " + ", ".join(f"{_short(d)} ≠ 0" for d in divided)
     if not slim.is_univariate:
         if bound:
             note = _and(note, f"{len(bound)} equations are left; given as they are")
@@ -224,7 +238,7 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Sequence[sp.Symb
     solved = solved_for(equation, [c for c in candidates if c != unknown], signs)
     parameter, curve, slope = solved if solved else (None, None, None)
     if slope is not None and not signs.nonzero(slope) and slope.free_symbols & {unknown}:
-        note = _and(note, f"the curve holds where {slope} ≠ 0")
+        note = _and(note, f"the curve holds where {_short(slope)} ≠ 0")
     discriminant = None
     if equation.is_polynomial(unknown):
         poly = sp.Poly(equation, unknown)
@@ -258,8 +272,12 @@ def _linear(
         (), (), Named("solved state", {**solved, unknown.name: value}), slim.divisors
     )
     if not signs.nonzero(slope):
-        note = _and(note, f"found where {slope} ≠ 0")
+        note = _and(note, f"found where {_short(slope)} ≠ 0")
     return Family(whole, condition=tuple(free), note=note)
+
+
+def _short(expression: sp.Expr) -> str:
+    return "(a long expression)" if longer(expression, PARTS) else str(expression)
 
 
 def _and(first: str, second: str) -> str:

@@ -38,8 +38,9 @@ class EquilibriumForm:
     stability : Stability
     discriminant : sympy.Expr or None
         Of the equation of the unknown.
-    verified : bool
-        Whether the rates vanish on substitution.
+    check : str
+        How it is known that the rates vanish on substitution: ``"exact"``,
+        ``"50 digits"`` (at fixed points), or empty where it is not known.
     note : str
     """
 
@@ -55,8 +56,13 @@ class EquilibriumForm:
     parameter_range: Boolean | None
     stability: Stability
     discriminant: sp.Expr | None
-    verified: bool
+    check: str
     note: str = ""
+
+    @property
+    def verified(self) -> bool:
+        """Whether the rates vanish on substitution."""
+        return bool(self.check)
 
 
 @dataclass(frozen=True)
@@ -78,7 +84,8 @@ class Continuum:
         a continuous model.
     eigenvalues : tuple of sympy.Expr
         Those with a short closed form; zero is among them.
-    verified : bool
+    check : str
+        As in `EquilibriumForm`.
     """
 
     region: str
@@ -88,7 +95,12 @@ class Continuum:
     equations: tuple[sp.Expr, ...]
     conditions: tuple[Boolean, ...]
     eigenvalues: tuple[sp.Expr, ...]
-    verified: bool
+    check: str
+
+    @property
+    def verified(self) -> bool:
+        """Whether the closed form is complete and satisfies its equations."""
+        return bool(self.check)
 
 
 @dataclass(frozen=True)
@@ -114,8 +126,9 @@ class CriticalPoint:
         Whether that holds under the assumptions; None where that is open.
     frequency_squared : sympy.Expr or None
         At a Hopf point.
-    verified : bool
-        Whether rates and defining condition vanish on substitution.
+    check : str
+        As in `EquilibriumForm`, for the rates and the defining condition; empty
+        where equations are left.
     """
 
     code: str
@@ -127,4 +140,9 @@ class CriticalPoint:
     admissible: Boolean
     possible: bool | None
     frequency_squared: sp.Expr | None
-    verified: bool
+    check: str
+
+    @property
+    def verified(self) -> bool:
+        """Whether the closed form is complete and satisfies its equations."""
+        return bool(self.check)

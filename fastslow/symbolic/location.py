@@ -7,11 +7,14 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from fastslow.symbolic.algebra import generators, irrational, light, shortest, spread, tidy
+from fastslow.symbolic.algebra import generators, irrational, light, longer, shortest, spread, tidy
 from fastslow.symbolic.families import Family
 from fastslow.symbolic.roots import Root, factors_in, roots, solved_for
 from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.verification import vanishes
+
+#: A longer condition, in parts of its tree, is left as an equation.
+PARTS = 500
 
 #: Resultants are formed up to this degree of the eliminated unknown.
 RESULTANT = 6
@@ -71,6 +74,8 @@ def locate(
     if unknown is None and family.elimination.unknowns:
         return [Located({}, equations=(*family.equations, family.reduced(condition)))]
     reduced = family.reduced(condition)
+    if longer(reduced, PARTS):
+        return [Located({}, equations=(*family.equations, reduced))]
     if unknown is None:
         return parameters_where(reduced, {}, (), signs, candidates)
     if family.curve is not None and family.parameter is not None:
@@ -115,7 +120,10 @@ def _at_root(
 ) -> list[Located]:
     unknown = family.unknown
     assert unknown is not None
-    at = tidy(reduced.subs(unknown, root.value))
+    at = reduced.xreplace({unknown: root.value})
+    if longer(at, PARTS):
+        return [Located({unknown: root.value}, (root.radicand,), (at,))]
+    at = tidy(at)
     if irrational(at):
         (equation,) = family.equations
         polys = equation.is_polynomial(unknown) and reduced.is_polynomial(unknown)
@@ -147,6 +155,8 @@ def parameters_where(
     >>> parameters_where(a - 1, {x: a**2}, (), Signs({}), [a])[0].place
     {x: 1, a: 1}
     """
+    if longer(condition, PARTS):
+        return [Located(dict(known), radicands, (condition,))]
     result = []
     for factor in _open(condition, list(candidates), signs):
         solved = solved_for(factor, candidates, signs)

@@ -9,7 +9,7 @@ from sympy.logic.boolalg import Boolean
 
 from fastslow.model.structure import real
 from fastslow.results.named import Named
-from fastslow.symbolic.algebra import spread, tidy
+from fastslow.symbolic.algebra import tidy
 from fastslow.symbolic.boundaries import BoundaryForm
 from fastslow.symbolic.critical import (
     Setting,
@@ -39,7 +39,7 @@ from fastslow.symbolic.stability import (
     stability_of_matrix,
     stability_of_tests,
 )
-from fastslow.symbolic.verification import all_vanish
+from fastslow.symbolic.verification import OPEN, checked, weakest
 
 
 @dataclass(frozen=True)
@@ -106,14 +106,16 @@ class RegionForms:
         return self.stability.routh_hurwitz
 
     @property
+    def check(self) -> str:
+        """How it is known that every complete closed form satisfies its equations."""
+        points = (*self.folds, *self.branch_points, *self.cusps, *self.hopf)
+        complete = [f for f in (*self.continua, *points) if not f.equations]
+        return weakest(f.check for f in (*self.equilibria, *complete))
+
+    @property
     def verified(self) -> bool:
         """Whether every complete closed form satisfies its equations."""
-        points = (*self.folds, *self.branch_points, *self.cusps, *self.hopf)
-        return (
-            all(e.verified for e in self.equilibria)
-            and all(c.verified for c in self.continua if not c.equations)
-            and all(p.verified for p in points if not p.equations)
-        )
+        return bool(self.check)
 
 
 def derive_region(setting: Setting, boundary: tuple[BoundaryForm, ...]) -> RegionForms:
@@ -246,8 +248,7 @@ def _form(family: Family, root: Root | None, inner: Stability, setting: Setting)
         exists = setting.real([root.radicand]) if root is not None else sp.true
         inside = [tidy(e.xreplace(values)) for e in setting.inside]
         admissible = conjunction((exists, setting.holds(inside)), signs)
-        zeros = [r.xreplace(values) for r in setting.rates.values()]
-        verified = all_vanish(zeros, signs)
+        check = checked(setting.rates.values(), values, signs)
         stability = _at(inner, place, setting, inside) if place else inner
         possible = implied(admissible, signs)
     else:
@@ -255,7 +256,10 @@ def _form(family: Family, root: Root | None, inner: Stability, setting: Setting)
         inside = [family.reduced(e) for e in setting.inside]
         order = [*family.elimination.unknowns, *setting.candidates]
         admissible = sp.And(*(isolated(e, signs, order) for e in inside))
-        verified = _verified_implicit(family, state, setting)
+        curve_at = {s: e for s, e in curve.items() if e is not None}
+        equations = () if curve_at else family.equations
+        unknowns = family.elimination.unknowns
+        check = checked(setting.rates.values(), {**values, **curve_at}, signs, equations, unknowns)
     kind = "explicit" if explicit else "curve" if family.curve is not None else "implicit"
     return EquilibriumForm(
         setting.region,
@@ -270,7 +274,7 @@ def _form(family: Family, root: Root | None, inner: Stability, setting: Setting)
         None if explicit else _range(family, inside, setting),
         stability,
         family.discriminant,
-        verified,
+        check,
         family.note,
     )
 
@@ -288,28 +292,6 @@ def _at(
         lambda e: settled[e] if e in settled else known.sign(e),
         lambda e: positive(e, setting.signs, setting.candidates),
     )
-
-
-def _verified_implicit(family: Family, state: Named[sp.Expr], setting: Setting) -> bool:
-    """Whether the rates vanish on the curve, or are multiples of what is left."""
-    values = {real(n): e for n, e in state.items()}
-    rates = [r.xreplace(values) for r in setting.rates.values()]
-    if family.parameter is not None and family.curve is not None:
-        return all_vanish([r.subs(family.parameter, family.curve) for r in rates], setting.signs)
-    unknowns = family.elimination.unknowns
-    left = [e for e in family.equations if e.is_polynomial(*unknowns)]
-    for rate in rates:
-        numerator = spread(sp.together(rate).as_numer_denom()[0])
-        if numerator == 0 or any(spread(numerator - k * e) == 0 for e in left for k in (1, -1)):
-            continue
-        if len(left) != len(family.equations) or not numerator.is_polynomial(*unknowns):
-            ratios = [sp.cancel(numerator / e) for e in family.equations]
-            if any(r.free_symbols.isdisjoint(unknowns) for r in ratios):
-                continue
-            return False
-        if sp.reduced(numerator, left, *unknowns)[1] != 0:
-            return False
-    return True
 
 
 def _range(family: Family, inside: list[sp.Expr], setting: Setting) -> Boolean | None:
@@ -348,7 +330,9 @@ def _continuum(family: Family, whole: Stability, setting: Setting) -> Continuum:
         if factor.has(EIGENVALUE):
             closed = roots(factor, EIGENVALUE, setting.signs)
             eigenvalues += [r.value for r in closed or () for _ in range(power)]
-    rates = [r.xreplace(values) for r in setting.rates.values()]
+    check = OPEN
+    if not left and not family.equations:
+        check = checked(setting.rates.values(), values, setting.signs)
     return Continuum(
         setting.region,
         family.elimination.unknowns,
@@ -357,5 +341,5 @@ def _continuum(family: Family, whole: Stability, setting: Setting) -> Continuum:
         (*left, *family.equations),
         tuple(isolated(e, setting.signs, order) for e in inside),
         tuple(eigenvalues),
-        not left and not family.equations and all_vanish(rates, setting.signs),
+        check,
     )

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from fastslow.symbolic.algebra import factors, numerator, shortest, spread
+from fastslow.symbolic.algebra import factors, longer, numerator, shortest, spread
 from fastslow.symbolic.signs import Signs
+
+#: A longer equation, in parts of its tree, is not solved for a symbol.
+PARTS = 400
 
 #: Polynomials of a higher degree stay implicit.
 DEGREE = 16
@@ -151,6 +154,8 @@ def solved_for(
     (w, (A + x**2)*(-D + x), 1)
     """
     spare = None
+    if longer(equation, PARTS):
+        return None
     for symbol in candidates:
         slope = spread(equation).diff(symbol)
         if slope == 0 or symbol in slope.free_symbols:

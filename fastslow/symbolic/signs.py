@@ -78,6 +78,8 @@ class Signs:
 
     def nonzero(self, expression: sp.Expr) -> bool:
         """Whether the assumptions show that an expression does not vanish."""
+        if longer(expression, PARTS // 4):
+            return abs(term_bound(expression, self.known) or 0) == 2
         return bool(expression.is_nonzero) or self.sign(expression) in (1, -1)
 
     def _sign(self, expression: sp.Expr) -> int | None:

@@ -1,12 +1,13 @@
-"""Whether an expression is identically zero: exactly where that is cheap, else at points."""
+"""Whether closed forms satisfy their equations: exactly where that is cheap, else at points."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
+import mpmath
 import sympy as sp
 
-from fastslow.symbolic.algebra import numerator
+from fastslow.symbolic.algebra import longer, numerator, undefined
 from fastslow.symbolic.signs import Signs
 
 #: Points at which an expression that does not reduce exactly is evaluated.
@@ -15,13 +16,21 @@ POINTS = 4
 #: Digits of that evaluation; what is left must be below 10**-(DIGITS - 15) of the largest term.
 DIGITS = 50
 
+#: Longer expressions, in parts of their tree, are only evaluated.
+PARTS = 400
+
+#: How something was verified, the stronger first; the empty string where it was not.
+EXACT, NUMERIC, OPEN = "exact", f"{DIGITS} digits", ""
+
+Place = Mapping[sp.Symbol, sp.Expr]
+
 
 def vanishes(expression: sp.Expr, signs: Signs | None = None) -> bool:
     """Whether an expression is zero for all values that the assumptions allow.
 
     Expansion over one denominator settles rational expressions and single
     radicals. What is left over is evaluated with 50 digits at four fixed
-    points where it is real.
+    points.
 
     Examples
     --------
@@ -30,37 +39,146 @@ def vanishes(expression: sp.Expr, signs: Signs | None = None) -> bool:
     >>> vanishes(sp.sqrt(A + 1)**2 - A - 1), vanishes(sp.sqrt(A) - A)
     (True, False)
     """
-    expression = sp.sympify(expression)
-    if expression == 0:
-        return True
-    if not expression.has(sp.polys.rootoftools.ComplexRootOf) and numerator(expression) == 0:
-        return True
-    return _at_points(expression, signs or Signs({}))
+    return all_vanish([expression], signs)
 
 
 def all_vanish(expressions: Iterable[sp.Expr], signs: Signs | None = None) -> bool:
     """Whether every one of them does."""
-    return all(vanishes(e, signs) for e in expressions)
+    return checked(expressions, {}, signs) != OPEN
 
 
-def _at_points(expression: sp.Expr, signs: Signs) -> bool:
-    symbols = sorted(expression.free_symbols, key=lambda s: s.name)
+def weakest(checks: Iterable[str]) -> str:
+    """Give the weakest of several ways of verification.
+
+    Examples
+    --------
+    >>> weakest(["exact", "50 digits"])
+    '50 digits'
+    """
+    each = set(checks)
+    return OPEN if OPEN in each else NUMERIC if NUMERIC in each else EXACT
+
+
+def checked(
+    expressions: Iterable[sp.Expr],
+    place: Place,
+    signs: Signs | None = None,
+    equations: Sequence[sp.Expr] = (),
+    unknowns: Sequence[sp.Symbol] = (),
+) -> str:
+    """Say how it is known that expressions vanish where symbols have the values of a closed form.
+
+    Parameters
+    ----------
+    expressions : iterable of sympy.Expr
+    place : mapping
+        Symbol to value, in unknowns and other symbols.
+    signs : Signs, optional
+    equations : sequence of sympy.Expr
+        Hold among the unknowns, = 0; there a root is found at each point.
+    unknowns : sequence of Symbol
+
+    Returns
+    -------
+    str
+        ``"exact"``, ``"50 digits"`` or, where it does not hold or is not known, ``""``.
+
+    Examples
+    --------
+    >>> x, a = sp.symbols("x a")
+    >>> checked([x**2 - a**2], {x: -a}), checked([x - a], {x: -a})
+    ('exact', '')
+    """
+    values = {s: e for s, e in place.items() if s != e}
+    left = []
+    for expression in map(sp.sympify, expressions):
+        if not _exactly(expression, values):
+            left.append(expression)
+    if not left:
+        return EXACT
+    known = signs.known if signs is not None else {}
+    return NUMERIC if _at_points(left, values, known, equations, unknowns) else OPEN
+
+
+def _exactly(expression: sp.Expr, values: Place) -> bool:
+    if expression == 0:
+        return True
+    inside = [values[s] for s in expression.free_symbols if s in values]
+    if longer(expression, PARTS) or any(longer(e, PARTS // 4) for e in inside):
+        return False
+    whole = expression.xreplace(dict(values))
+    return not whole.has(sp.polys.rootoftools.ComplexRootOf) and numerator(whole) == 0
+
+
+def _at_points(
+    expressions: Sequence[sp.Expr],
+    values: Place,
+    known: Mapping[sp.Symbol, int],
+    equations: Sequence[sp.Expr],
+    unknowns: Sequence[sp.Symbol],
+) -> bool:
+    everything = (*expressions, *values.values(), *equations)
+    if any(undefined(e) for e in everything):
+        return False
+    symbols = set().union(*(e.free_symbols for e in everything)) - set(values)
+    if equations:
+        symbols -= set(unknowns)
+    ordered = sorted(symbols, key=lambda s: s.name)
     seen = 0
     for k in range(6 * POINTS):
         # quotients of primes, spread over four decades
-        place = {
+        point: dict[sp.Symbol, sp.Expr] = {
             s: sp.Rational(sp.prime(3 * k + 5 * j + 7), sp.prime(11 + 2 * j + k))
             * sp.Integer(10) ** ((k + j) % 4 - 2)
-            * signs.known.get(s, (-1) ** (k // (j + 1)))
-            for j, s in enumerate(symbols)
+            * known.get(s, (-1) ** (k // (j + 1)))
+            for j, s in enumerate(ordered)
         }
-        terms = [t.subs(place).evalf(DIGITS) for t in sp.Add.make_args(expression)]
-        if not all(t.is_number and t.is_finite for t in terms):
+        if equations:
+            found = _root([e.xreplace(point) for e in equations], unknowns, k)
+            if found is None:
+                continue
+            point |= found
+        point |= {s: e.xreplace(point).evalf(DIGITS + 10) for s, e in values.items()}
+        sizes = [_left_over(e, point) for e in expressions]
+        if None in sizes:
             continue
-        size = max((abs(t) for t in terms), default=sp.Integer(0))
-        if abs(sp.Add(*terms)) > size * sp.Float(10) ** (15 - DIGITS):
+        if not all(sizes):
             return False
         seen += 1
-        if seen == POINTS or not symbols:
+        if seen == POINTS or not ordered:
             break
     return seen > 0
+
+
+def _left_over(expression: sp.Expr, point: Place) -> bool | None:
+    """Whether the terms of a sum cancel at a point; None where they have no value."""
+    terms = [t.xreplace(dict(point)).evalf(DIGITS) for t in sp.Add.make_args(expression)]
+    if not all(t.is_number and t.is_finite for t in terms):
+        return None
+    size = max((abs(t) for t in terms), default=sp.Integer(0))
+    total = abs(sp.Add(*terms).evalf(DIGITS))
+    return bool(total <= size * sp.Float(10) ** (15 - DIGITS))
+
+
+def _root(
+    equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol], start: int
+) -> dict[sp.Symbol, sp.Expr] | None:
+    """One root, real or complex, by Newton's method with extra digits; None where it fails."""
+    with mpmath.workdps(DIGITS + 10):
+        function = sp.lambdify(list(unknowns), list(equations), "mpmath")
+        for attempt in range(3):
+            first = [
+                mpmath.mpc(1 + (start + j) % 3 - attempt, (attempt + 1) / (j + 2))
+                for j in range(len(unknowns))
+            ]
+            try:
+                found = mpmath.findroot(
+                    function, first, solver="mdnewton", tol=mpmath.mpf(10) ** -(DIGITS + 2)
+                )
+            except (ValueError, ZeroDivisionError, OverflowError):
+                continue
+            return {
+                u: sp.Float(z.real, DIGITS + 10) + sp.I * sp.Float(z.imag, DIGITS + 10)
+                for u, z in zip(unknowns, map(mpmath.mpc, found), strict=True)
+            }
+    return None

@@ -10,7 +10,7 @@ from matplotlib.image import imread
 
 from analyses import __main__ as everything
 from analyses import dead_zone, gap_width, load_amplitude, negative_stiffness, stiffness
-from analyses.passages import OMEGA
+from analyses.passages import OMEGA, laid
 
 
 @pytest.fixture(scope="module")
@@ -21,13 +21,13 @@ def everything_drawn(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def gaps():
-    return gap_width.cases()
+    return [laid(setting) for setting in gap_width.settings()]
 
 
 @pytest.fixture(scope="module")
 def folded():
-    (case,) = negative_stiffness.cases()
-    return case
+    (setting,) = negative_stiffness.settings()
+    return laid(setting)
 
 
 def test_every_figure_is_written(everything_drawn):
@@ -68,7 +68,7 @@ def test_dead_zone():
 def test_the_gap_is_passed_as_late_as_slow_theory_says(gaps):
     # crossing the gap takes √(4D/s) + 1 at the slope s of the load where it is zero
     for case in gaps:
-        p = case.model.parameters
+        p = case.setting.model.parameters
         slope = OMEGA * math.sqrt(p["C"] ** 2 - p["B"] ** 2)
         leave, reach = next(
             (one.time, other.time)
@@ -87,9 +87,9 @@ def test_wider_gaps_delay_more(gaps):
 
 def test_the_natural_frequency_falls_with_the_stiffness():
     frequencies = []
-    for case in stiffness.cases():
+    for case in map(laid, stiffness.settings()):
         (point,) = case.diagram.at(w=2.0)
-        p, x = case.model.parameters, point["x"]
+        p, x = case.setting.model.parameters, point["x"]
         expected = math.sqrt(3 * x**2 - 2 * p["D"] * x + p["A"] - 0.25)
         assert np.abs(point.eigenvalues.imag) == pytest.approx([expected] * 2, rel=1e-10)
         frequencies.append(expected)
@@ -97,7 +97,7 @@ def test_the_natural_frequency_falls_with_the_stiffness():
 
 
 def test_the_smallest_load_amplitude_never_unloads():
-    cases = load_amplitude.cases()
+    cases = [laid(setting) for setting in load_amplitude.settings()]
     lowest = [float(case.run["w"].min()) for case in cases]
     assert lowest[0] == pytest.approx(0.00834, abs=1e-4)
     assert max(lowest[1:]) < -9
