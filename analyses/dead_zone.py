@@ -24,12 +24,19 @@ def transmitted(x: NDArray[np.float64]) -> NDArray[np.float64]:
     gear = fs.systems.harmonic_gear(D=GAP)
     at = {"w": 0, "v": 0, **gear.parameters}
     values = np.empty_like(x)
-    for name, inside in {"S1": x > GAP, "S2": abs(x) <= GAP, "S3": x < -GAP}.items():
+    where = regions_of(x)
+    for name in gear.regions:
+        inside = where == name
         rate = (
             gear.regions[name].rates["v"].subs({sp.Symbol(k, real=True): v for k, v in at.items()})
         )
         values[inside] = sp.lambdify(sp.Symbol("x", real=True), rate)(x[inside])
     return -values / (x**2 + gear.parameters["A"])
+
+
+def regions_of(x: NDArray[np.float64]) -> NDArray[np.str_]:
+    """The region of each twist; the interfaces count to the gap."""
+    return np.where(x > GAP, "S1", np.where(x < -GAP, "S3", "S2"))
 
 
 def draw() -> fs.plot.Drawing:
@@ -42,7 +49,7 @@ def draw() -> fs.plot.Drawing:
     ax.set_xlabel(typeset("x"))
     ax.set_ylabel("$f(x)$")
     values = {"x - D": ("x", GAP), "x + D": ("x", -GAP)}
-    draw_bands(ax, "x", values, ("S1", "S2", "S3"), vertical=True)
+    draw_bands(ax, "x", values, x, regions_of(x), vertical=True)
     return fs.plot.Drawing(ax)
 
 

@@ -2,7 +2,8 @@
 
 The source states bilateral impacts at 10 and unilateral ones at 50 and 100.
 The load is w = B + C sin(ω t) with C/B = 0.0996 T_am/(N m): at 10 it never
-changes sign, at 50 and 100 it does.
+changes sign, and the teeth stay in mesh; at 50 and 100 it does, and impacts are
+bilateral.
 """
 
 from __future__ import annotations

@@ -1,8 +1,13 @@
 """Shared by all tests: the reference models, built once."""
 
 import pytest
+from hypothesis import settings
 
 import fastslow as fs
+
+# SymPy's first use of a function is slow; the time of one example says nothing
+settings.register_profile("fastslow", deadline=None)
+settings.load_profile("fastslow")
 
 
 @pytest.fixture(scope="session")

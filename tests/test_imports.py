@@ -94,7 +94,16 @@ def test_third_parties_stay_in_their_layers(path):
     if layer == "continuation":
         assert not any(n.startswith("fastslow.model") for n in modules_of(path))
     assert "matplotlib" not in foreign or layer in {"plot", "interactive"}
-    assert foreign <= {"llvmlite", "matplotlib", "numba", "numpy", "scipy", "sympy", "tqdm"}
+    assert foreign <= {
+        "llvmlite",
+        "matplotlib",
+        "mpmath",
+        "numba",
+        "numpy",
+        "scipy",
+        "sympy",
+        "tqdm",
+    }
 
 
 def test_no_module_bears_the_name_of_a_public_function():

@@ -11,15 +11,15 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 #: Wrappers for calls from Python would double the time to compile what only loops call.
 #: Products and sums are fused, which is faster and rounds once less; nothing is reordered.
-_decorate = njit(
-    no_cpython_wrapper=True,
-    no_cfunc_wrapper=True,
-    error_model="numpy",
-    fastmath={"contract"},
-)
+_OPTIONS: dict[str, Any] = {
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+}
 
 
 def part(function: F) -> F:
     """Let a function be compiled into the loops that call it; it is not called from Python."""
-    decorated: F = _decorate(function)
+    decorated: F = njit(**_OPTIONS)(function)
     return decorated

@@ -204,9 +204,7 @@ class Recurrences:
             value += f" + {self.scalar(constant)}"
         value = value.removeprefix(" + ")
         general = "".join(f"{f}{self.at(r)}" for f, r in terms).removeprefix(" + ")
-        return self._add(
-            expression, value, [f"{{}} = {general}"], tuple(r for _, r in terms)
-        )
+        return self._add(expression, value, [f"{{}} = {general}"], tuple(r for _, r in terms))
 
     def _factor(self, factor: sp.Expr) -> str:
         if factor == 1:
@@ -221,7 +219,9 @@ class Recurrences:
             row = self.row(body)
             name = self.scalar(factor)
             return self._add(
-                expression, f"{name} * {self.at(row, '0')}", [f"{{}} = {name} * {self.at(row)}"],
+                expression,
+                f"{name} * {self.at(row, '0')}",
+                [f"{{}} = {name} * {self.at(row)}"],
                 (row,),
             )
         above = [f for f in body.args if not _inverse(f)]
@@ -260,6 +260,7 @@ class Recurrences:
     def _quotient(self, expression: sp.Expr, above: sp.Expr, below: sp.Expr) -> int:
         b = self.row(below)
         B = b * (self.order + 1)
+        needs: tuple[int, ...]
         if self.is_scalar(above):
             name = self.scalar(above)
             needs, value, start = (b,), f"{name} / W[{B}]", "0.0"
@@ -294,9 +295,7 @@ class Recurrences:
         u = self.row(base)
         U = u * (self.order + 1)
         p = self.scalar(exponent)
-        value = (
-            f"math.sqrt(W[{U}])" if exponent == sp.Rational(1, 2) else f"math.pow(W[{U}], {p})"
-        )
+        value = f"math.sqrt(W[{U}])" if exponent == sp.Rational(1, 2) else f"math.pow(W[{U}], {p})"
         row = self._place(expression)
         R = row * (self.order + 1)
         lines = [

@@ -104,7 +104,7 @@ class _Equations:
         return tuple(sorted(s.name for s in used - {*self.states, *self.quantities, TIME}))
 
     def renamed(self) -> _Equations:
-        """The same with symbols that are valid in any source: y0, w0, p0, …"""
+        """The same with symbols that are valid in any source: y0, w0, p0, …."""
         groups = {"y": self.states, "w": self.quantities, "p": map(real, self.parameters)}
         new = {s: real(f"{g}{i}") for g, symbols in groups.items() for i, s in enumerate(symbols)}
 
@@ -288,9 +288,7 @@ def _mode_source(equations: _Equations, mode: _Mode) -> tuple[list[str], int]:
 def _gradient_source(equations: _Equations, function: sp.Expr) -> list[str]:
     m = len(equations.states)
     symbols = (TIME, *equations.states, *equations.quantities)
-    body = [
-        f"{s.name} = inputs[{i}]" for i, s in enumerate(symbols) if s in function.free_symbols
-    ]
+    body = [f"{s.name} = inputs[{i}]" for i, s in enumerate(symbols) if s in function.free_symbols]
     terms = [scalar_code(term) for term in sp.Add.make_args(function)]
     body.append("W[0] = " + " + ".join(f"({term})" for term in terms))
     body.append("W[1] = " + " + ".join(f"abs({term})" for term in terms))

@@ -46,7 +46,8 @@ class RegionEquations:
     region: int
 
     @cached_property
-    def _numbers(self) -> dict[sp.Symbol, sp.Rational]:
+    def numbers(self) -> dict[sp.Symbol, sp.Rational]:
+        """Exact value of every parameter but the one that varies."""
         values = self.field.model.parameters
         return {real(n): sp.Rational(v) for n, v in values.items() if n != self.field.parameter}
 
@@ -54,7 +55,7 @@ class RegionEquations:
     def elimination(self) -> Elimination:
         """Of the rates with every other parameter a number, so that its sign is known."""
         region = self.field.model.regions[self.field.regions[self.region]]
-        rates = {n: region.rates[n].subs(self._numbers) for n in self.field.model.states}
+        rates = {n: region.rates[n].subs(self.numbers) for n in self.field.model.states}
         return eliminate(rates, self.field.model.states)
 
     @cached_property
@@ -130,8 +131,8 @@ class RegionEquations:
             return self._whole(value, *([0.0] * len(unknowns)))
         ends = []
         for interface in self.field.model.interfaces.values():
-            h = interface.function.subs(self._numbers).subs(real(self.field.parameter), value)
-            solved = {real(n): e.subs(self._numbers) for n, e in self.elimination.solved.items()}
+            h = interface.function.subs(self.numbers).subs(real(self.field.parameter), value)
+            solved = {real(n): e.subs(self.numbers) for n, e in self.elimination.solved.items()}
             line = sp.together(h.subs(solved)).as_numer_denom()[0]
             if line.is_polynomial(*unknowns) and line.has(*unknowns):
                 coefficients = np.array(sp.Poly(line, *unknowns).all_coeffs(), dtype=float)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.assembly import Curve, branch_of, joined, rising
+from fastslow.diagrams.critical import critical_values
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.solving import point_at, region_equations, solve_at
 from fastslow.diagrams.walking import Piece, Window, beside, walk
@@ -100,13 +101,15 @@ def continue_equilibria(
                 if not any(_passes(field, b, start, value, window) for b in branches):
                     curve = _traced(field, start, value, window, settings, admissible)
                     branches += _branches(field, curve, window, marks, admissible)
+    ends = (o for branch in branches for o in branch.outcomes)
+    traced = all(o.success for o in ends)
     return Diagram(
         model.states,
         name,
         (lower, upper),
         dict(field.model.parameters),
         _labelled(branches),
-        "found",
+        "complete" if starts.complete and traced else "found",
         field.interfaces,
         field.regions,
         _interface_values(field.model),
@@ -138,7 +141,12 @@ class _Starts:
         self._over = (lower, upper)
         # the golden ratio keeps the values clear of each other and of round numbers
         parts = [(0.5 + k * 0.6180339887498949) % 1.0 for k in range(inside)]
-        self._first = [lower, upper, *(lower + p * (upper - lower) for p in parts)]
+        spread = [lower + p * (upper - lower) for p in parts]
+        between = [critical_values(e, lower, upper) for e in region_equations(field)]
+        self.complete = all(b is not None for b in between)
+        levels = sorted({lower, upper, *(v for b in between for v in b or ())})
+        middles = [0.5 * (a + b) for a, b in pairwise(levels)]
+        self._first = [lower, upper, *(middles if self.complete else [*middles, *spread])]
         self._found: dict[float, list[Equilibrium]] = {}
 
     def at(self, value: float, admissible: bool) -> list[Equilibrium]:

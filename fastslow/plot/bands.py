@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon, Rectangle
 from matplotlib.text import Text
+from numpy.typing import NDArray
 
 from fastslow.plot.style import BANDS, GREY, SMALL
 
@@ -44,13 +45,17 @@ class Bands:
 
 
 def draw_bands(
-    ax: Axes, state: str, values: Values, regions: Sequence[str], *, vertical: bool = False
+    ax: Axes,
+    state: str,
+    values: Values,
+    heights: NDArray[np.float64],
+    regions: NDArray[np.str_],
+    *,
+    vertical: bool = False,
 ) -> Bands:
     """Draw the interfaces at values of one state and tint the regions between them.
 
-    Regions are named only where every region is one band: where all interfaces
-    are values of this state. They are then in descending order of the state,
-    as lexicographic order of the sign patterns, + before −, makes them.
+    A band is named where all results drawn in it lie in one region.
 
     Parameters
     ----------
@@ -60,8 +65,10 @@ def draw_bands(
         The state on the axis.
     values : mapping
         Interface to (state, value).
-    regions : sequence of str
-        Names of the model's regions, in its order.
+    heights : ndarray, shape (N,)
+        Values of the state in the results drawn.
+    regions : ndarray of str, shape (N,)
+        The region of each.
     vertical : bool
         Whether the state is on the horizontal axis.
     """
@@ -71,14 +78,16 @@ def draw_bands(
     low, high = ax.get_xlim() if vertical else ax.get_ylim()
     line, fill = (ax.axvline, ax.axvspan) if vertical else (ax.axhline, ax.axhspan)
     edges = np.clip([low, *levels, high], low, high)
-    shown = len(levels) == len(values) and len(regions) == len(levels) + 1
     fills, names, spans = [], [], []
-    least = 0.13 if vertical else 0.07  # of the axis, for a name to fit in
+    least = (0.13 if vertical else 0.07) * (high - low)  # for a name to fit in
+    margin = 1e-9 * (high - low)
     for number, (start, stop) in enumerate(zip(edges[-2::-1], edges[:0:-1], strict=True)):
         if stop > start:
             fills.append(fill(start, stop, facecolor=BANDS[number % 3], edgecolor="none", zorder=0))
-            if shown and (stop - start) > least * (high - low):
-                names.append(_name(ax, regions[number], (start + stop) / 2, vertical))
+            inside = (heights > start + margin) & (heights < stop - margin)
+            met = set(regions[inside].tolist())
+            if len(met) == 1 and stop - start > least:
+                names.append(_name(ax, met.pop(), (start + stop) / 2, vertical))
                 spans.append((float(start), float(stop)))
     lines = tuple(
         line(level, color=GREY, linewidth=0.5, zorder=1) for level in levels if low < level < high

@@ -144,8 +144,11 @@ def draw_branches(
     ax.set_ylabel(typeset(state))
     ax.set_xlim(diagram.over)
     bands = Bands()
-    if interfaces:
-        bands = draw_bands(ax, state, diagram.interface_values, diagram.regions)
+    met = [b for b in diagram.branches if b.admissible]
+    if interfaces and met:
+        heights = np.concatenate([b[state] for b in met])
+        regions = np.concatenate([b.region for b in met])
+        bands = draw_bands(ax, state, diagram.interface_values, heights, regions)
     return DiagramDrawing(ax, state, tuple(lines), markers, labels, bands, None)
 
 

@@ -166,7 +166,8 @@ def covered(ax: Axes) -> Points:
         pixels = line.get_transform().transform(np.asarray(line.get_xydata(), dtype=float))
         pixels = pixels[np.isfinite(pixels).all(axis=1)]
         drawn = line.get_linestyle() not in ("None", "", " ")
-        parts.append(_dense(pixels) if drawn else _rounded(pixels, line.get_markersize()))
+        radius = line.get_markersize() * root(ax).dpi / 144.0
+        parts.append(_dense(pixels) if drawn else _rounded(pixels, radius))
     return np.vstack(parts) if parts else np.empty((0, 2))
 
 
@@ -179,10 +180,10 @@ def _dense(pixels: Points) -> Points:
     return np.column_stack([np.interp(where, along, pixels[:, k]) for k in range(2)])
 
 
-def _rounded(pixels: Points, size: float) -> Points:
+def _rounded(pixels: Points, radius: float) -> Points:
     """Markers as their centre and eight points around it."""
     turns = np.linspace(0, 2 * np.pi, 8, endpoint=False)
-    around = 0.7 * size * np.column_stack([np.cos(turns), np.sin(turns)])
+    around = radius * np.column_stack([np.cos(turns), np.sin(turns)])
     return (pixels[:, None] + np.vstack([[0.0, 0.0], around])).reshape(-1, 2)
 
 

@@ -228,8 +228,13 @@ def _bands(
     ax: Axes, run: Trajectory, axes: tuple[str | None, str], interfaces: Values | None
 ) -> tuple[Bands, ...]:
     """Bands across the horizontal and the vertical axis, where these show a state."""
+    starts = np.array([segment.start for segment in run.segments])
+    names = np.array([segment.region for segment in run.segments])
+    if not len(starts):
+        return ()
+    regions = names[np.maximum(np.searchsorted(starts, run.t, side="right") - 1, 0)]
     return tuple(
-        draw_bands(ax, state, interfaces or {}, run.regions, vertical=vertical)
+        draw_bands(ax, state, interfaces or {}, run[state], regions, vertical=vertical)
         for state, vertical in zip(axes, (True, False), strict=True)
         if state is not None
     )

@@ -173,7 +173,8 @@ def gap_regions(model: Model, gap: str | None) -> tuple[str, str, str] | None:
     if gap is None and not (len(sides) == 3 and len(functions) == 2 and _parallel(model)):
         return None
     for inside in sides if gap is None else (str(gap),):
-        below, above = [], []
+        below: list[str] = []
+        above: list[str] = []
         for name, signs in sides.items():
             differ = [j for j, s in enumerate(signs) if s != sides[inside][j]]
             if len(differ) == 1:
@@ -214,5 +215,3 @@ def _positive(name: str, value: Any) -> float:
     if number.ndim or not math.isfinite(number) or number <= 0:
         raise ArgumentError(f"{name} = {value!r}; expected a positive number")
     return float(number)
-
-

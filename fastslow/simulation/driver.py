@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
 from fastslow.simulation.events import find_event, holds, put_on
@@ -68,8 +69,19 @@ def sample(W, columns, rows, s, out, first):
 
 @part
 def drive(
-    address, layout, sizes, signs, parameters, start, span, tol, times, sampled_rows, dense,
-    limits, store,
+    address,
+    layout,
+    sizes,
+    signs,
+    parameters,
+    start,
+    span,
+    tol,
+    times,
+    sampled_rows,
+    dense,
+    limits,
+    store,
 ):
     """Follow one trajectory from start to end.
 
@@ -156,8 +168,19 @@ def drive(
                 side[j] = 1 if gradient[0] > 0.0 else -1
             before = mode
             mode = choose_mode(
-                address, layout, signs, inputs, parameters, tol, whole, on, side, before,
-                work, b, noise,
+                address,
+                layout,
+                signs,
+                inputs,
+                parameters,
+                tol,
+                whole,
+                on,
+                side,
+                before,
+                work,
+                b,
+                noise,
             )
             if mode < 0:
                 code = NO_WAY_ON
@@ -207,15 +230,24 @@ def drive(
             inputs[1 + i] = W[i * columns]
         while True:
             s, interface, touched, depth, floor = find_event(
-                address, layout, signs, mode, inputs, parameters, W, h, on, noise, b, stack,
+                address,
+                layout,
+                signs,
+                mode,
+                inputs,
+                parameters,
+                W,
+                h,
+                on,
+                noise,
+                b,
+                stack,
                 gradient,
             )
             part = s * h if interface >= 0 else h
             # where a step grew much its last terms may be small by accident
             doubtful = part > 2.0 * usual or longest > 4.0 * remaining
-            if not doubtful or holds(
-                address, layout, mode, inputs, parameters, W, part, tol, work
-            ):
+            if not doubtful or holds(address, layout, mode, inputs, parameters, W, part, tol, work):
                 break
             h, final = (t + 0.25 * part) - t, False
         usual = max(part, 0.1 * usual)
@@ -259,7 +291,7 @@ def drive(
             if hit[j]:
                 put_on(address, n_modes, j, inputs, parameters, gradient, n_states)
             # still on an interface after a whole step: it rests there, so look again
-            choosing = choosing or on[j] and signs[mode, j] != 0
+            choosing = choosing or (on[j] and signs[mode, j] != 0)
         if interface >= 0:
             hit[interface] = choosing = True
             put_on(address, n_modes, interface, inputs, parameters, gradient, n_states)
@@ -272,6 +304,4 @@ def drive(
     end[0] = t
     for i in range(n_states):
         end[1 + i] = inputs[1 + i]
-    return (
-        code, mode, end, steps[:n_steps], store, crossings[:n_crossings], samples, n_samples
-    )
+    return (code, mode, end, steps[:n_steps], store, crossings[:n_crossings], samples, n_samples)

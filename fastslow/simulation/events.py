@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
 from fastslow.simulation.modes import EPSILON, interface_noise, scaled
@@ -20,7 +21,9 @@ from fastslow.simulation.polynomials import (
 
 
 @part
-def find_event(address, layout, signs, mode, inputs, parameters, W, h, on, noise, b, stack, gradient):
+def find_event(
+    address, layout, signs, mode, inputs, parameters, W, h, on, noise, b, stack, gradient
+):
     """The first time in a step at which its motion ends, as a part of the step.
 
     Returns
@@ -39,7 +42,7 @@ def find_event(address, layout, signs, mode, inputs, parameters, W, h, on, noise
     n_states, n_forcing, n_interfaces, n_modes, order = layout
     first_h = n_states + n_forcing
     drift = first_h + n_interfaces
-    best, interface, touched, depth, floor = 2.0, np.int64(-1), False, 1.0, 0.0
+    best, interface, touched, depth, floor = 2.0, ZERO - 1, False, 1.0, 0.0
     for j in range(n_interfaces):
         sign = signs[mode, j]
         if sign == 0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
 from fastslow.simulation.polynomials import ONE, ZERO, first_nonzero, first_strong
@@ -51,7 +52,7 @@ def step_length(W, n_rows, order, tol):
 
 @part
 def scaled(W, row, order, h, b):
-    """Coefficients of one row, scaled to the step, and the sum of their moduli without the first."""
+    """Scale the coefficients of one row to the step, and sum their moduli but the first."""
     power = 1.0
     total = 0.0
     for k in range(order + 1):

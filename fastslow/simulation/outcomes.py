@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fastslow.results.outcome import Outcome
 
-#: A state this much larger than where it began counts as a blow-up.
+#: A state this much larger than where it began counts as a blow-up, where a run cannot go on.
 _BLOW_UP = 1e6
 
 
@@ -17,33 +17,33 @@ def outcome_of(
     modes: tuple[str, ...],
     end: NDArray[np.float64],
     steps: NDArray[np.float64],
-    span: tuple[float, float],
     limits: tuple[int, int],
+    start_size: float,
 ) -> Outcome:
     """The outcome of a run, from the code of the loop (see `fastslow.simulation.driver`)."""
     time = f"t = {end[0]:.10g}"
     if code == 0:
         return Outcome("end of time", f"reached {time}, the end of the time asked for.", True)
-    if code == 1:
-        return Outcome(
-            "too many steps",
-            f"stopped at {time} after {limits[0]} steps; raise max_steps= or tol=.",
-            False,
-        )
     if code == 2:
         return Outcome(
             "too many crossings",
             f"stopped at {time} after {limits[1]} crossings; raise max_crossings=.",
             False,
         )
+    size = float(np.abs(end[1:]).max())
+    if code in (1, 3, 4) and len(steps) and not size <= _BLOW_UP * (1.0 + start_size):
+        return Outcome(
+            "blow-up",
+            f"the state grew to {size:.3g} by {time}, in {len(steps)} steps, and leaves every bound.",
+            False,
+        )
+    if code == 1:
+        return Outcome(
+            "too many steps",
+            f"stopped at {time} after {limits[0]} steps; raise max_steps= or tol=.",
+            False,
+        )
     if code in (3, 4) and len(steps):
-        size = float(np.abs(end[1:]).max())
-        if not np.isfinite(size) or size > _BLOW_UP:
-            return Outcome(
-                "blow-up",
-                f"the state grew to {size:.3g} and leaves every bound at about {time}.",
-                False,
-            )
         return Outcome(
             "singular",
             f"the step was driven to nothing at {time}, where the rates or their derivatives "
@@ -65,13 +65,19 @@ def outcome_of(
             "away from it; start a little off the interface to choose one.",
             False,
         )
+    if code == 6 and mode >= 0:
+        return Outcome(
+            "not unique",
+            f"at {time}, after {modes[mode]}, the flow slides on several interfaces at once, where "
+            "Filippov's motion is not unique; perturb a parameter or the initial state to see "
+            "which interface comes first.",
+            False,
+        )
     if code == 6:
-        where = f" after {modes[mode]}" if mode >= 0 else ""
         return Outcome(
             "no way on",
-            f"at {time}{where} no region's motion goes on: the point lies outside every region, "
-            "or the flow would slide on several interfaces at once, where Filippov's motion is "
-            "not unique.",
+            f"no region's motion goes on from the initial state at {time}: it lies outside every "
+            "region, or on several interfaces that all attract; start a little off them.",
             False,
         )
     return Outcome(

@@ -6,6 +6,8 @@ so that the step is 0 <= s <= 1.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from fastslow.compiled.parts import part
@@ -14,7 +16,8 @@ from fastslow.compiled.parts import part
 DEEPEST = 44
 
 # plain integers would be literal types to Numba, and every function compiled once for each
-ZERO, ONE = np.int64(0), np.int64(1)
+ZERO: Any = np.int64(0)
+ONE: Any = np.int64(1)
 
 
 @part

@@ -193,7 +193,7 @@ def simulate(
         dict(model.parameters),
         period,
         between,
-        outcome_of(code, mode, compiled.modes, end, steps, span, limits),
+        outcome_of(code, mode, compiled.modes, end, steps, limits, float(np.abs(begin).max())),
         (span[0], float(end[0])),
         end,
         steps,

@@ -24,7 +24,7 @@ TERMS_RADICAL = 16
 DEGREE = 24
 
 #: Parts (nodes of the tree) of an expression that is still expanded.
-PARTS = 1500
+PARTS = 600
 
 #: Most terms that an expansion may be expected to give.
 EXPANDED = 800
@@ -125,6 +125,8 @@ def tidy(expression: sp.Expr) -> sp.Expr:
     >>> tidy((x**2 - 1) / (x - 1))
     x + 1
     """
+    if longer(expression, PARTS):
+        return expression
     expanded = spread(sp.sympify(expression))
     if whole(expanded) or not light(expression):
         return expanded

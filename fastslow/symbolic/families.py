@@ -120,7 +120,24 @@ def families(
         unknowns = tuple(real(n) for n in states)
         whole = Elimination(tuple(rates.values()), unknowns, Named("solved state", {}))
         return [Family(whole, note=direct)]
-    return [_solved(elimination, signs, candidates) for elimination in split(rates, states, signs)]
+    poles = _poles(rates, states)
+    return [
+        _solved(elimination, signs, candidates)
+        for elimination in split(rates, states, signs)
+        if not poles or _keeps(elimination, poles)
+    ]
+
+
+def _poles(rates: Mapping[str, sp.Expr], states: Sequence[str]) -> list[sp.Expr]:
+    """Denominators with states in them; where one vanishes there is no equilibrium."""
+    moving = {real(n) for n in states}
+    found = {
+        p.base
+        for rate in rates.values()
+        for p in rate.atoms(sp.Pow)
+        if p.exp.is_negative and p.base.free_symbols & moving
+    }
+    return sorted(found, key=str)
 
 
 def split(rates: Mapping[str, sp.Expr], states: Sequence[str], signs: Signs) -> list[Elimination]:
@@ -194,7 +211,7 @@ def _generic(found: list[Elimination], signs: Signs) -> list[Elimination]:
     result: list[Elimination] = []
     for current in found:
         several = len(current.remaining) > 1 and len(current.unknowns) > 1
-        if not several or not current.is_polynomial:
+        if not several:
             result.append(current)
             continue
         further = _joined(current, current.remaining, lambda e: e != 0)

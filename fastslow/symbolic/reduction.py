@@ -10,6 +10,7 @@ import sympy as sp
 from fastslow.errors import ArgumentError
 from fastslow.model.structure import real
 from fastslow.results.named import Named
+from fastslow.symbolic.reading import read_formula
 
 
 def reduce_to(rates: Mapping[Any, Any], combinations: Mapping[Any, Any]) -> Named[sp.Expr]:
@@ -69,7 +70,7 @@ def reduce_to(rates: Mapping[Any, Any], combinations: Mapping[Any, Any]) -> Name
 
 
 def _real(expression: Any) -> sp.Expr:
-    written = sp.sympify(expression)
+    written = read_formula(expression) if isinstance(expression, str) else sp.sympify(expression)
     return sp.sympify(written.xreplace({s: real(s.name) for s in written.free_symbols}))
 
 

@@ -13,6 +13,7 @@ from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
 from fastslow.results.named import Named
 from fastslow.symbolic.algebra import light, spread
+from fastslow.symbolic.reading import read_formula
 from fastslow.symbolic.verification import vanishes
 
 
@@ -95,7 +96,7 @@ def nondimensionalise(
     scale = {n: scale_symbol(n) for n in (*quantities, "t")}
     positive = {real(n): sp.Symbol(n, positive=v > 0) for n, v in model.parameters.items() if v > 0}
     place = {real(n): scale[n] * real(n) for n in quantities}
-    given = {real(str(k)): sp.sympify(e) for k, e in (replace or {}).items()}
+    given = {real(str(k)): _formula(e) for k, e in (replace or {}).items()}
 
     def scaled(state: str, rate: sp.Expr) -> sp.Expr:
         inside = rate.xreplace(given).xreplace(positive).subs(place, simultaneous=True)
@@ -108,7 +109,7 @@ def nondimensionalise(
     for state, term in ones:
         if str(state) not in smooth:
             raise unknown_name("state", state, smooth)
-        monomial = sp.sympify(term, locals=names)
+        monomial = _formula(term)
         monomial = monomial.xreplace({s: real(s.name) for s in monomial.free_symbols})
         found = _coefficient(scaled(str(state), smooth[str(state)]), monomial, names.values())
         if found == 0:
@@ -149,6 +150,10 @@ def nondimensionalise(
             },
         ),
     )
+
+
+def _formula(given: Any) -> sp.Expr:
+    return read_formula(given) if isinstance(given, str) else sp.sympify(given)
 
 
 def _coefficient(rate: sp.Expr, monomial: sp.Expr, quantities: Iterable[sp.Symbol]) -> sp.Expr:

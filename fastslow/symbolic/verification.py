@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import mpmath
 import sympy as sp
 
-from fastslow.symbolic.algebra import longer, numerator, undefined
+from fastslow.symbolic.algebra import longer, numerator, spread, undefined
 from fastslow.symbolic.signs import Signs
 
 #: Points at which an expression that does not reduce exactly is evaluated.
@@ -18,6 +18,9 @@ DIGITS = 50
 
 #: Longer expressions, in parts of their tree, are only evaluated.
 PARTS = 400
+
+#: Newton steps from one start.
+STEPS = 40
 
 #: How something was verified, the stronger first; the empty string where it was not.
 EXACT, NUMERIC, OPEN = "exact", f"{DIGITS} digits", ""
@@ -92,7 +95,7 @@ def checked(
     values = {s: e for s, e in place.items() if s != e}
     left = []
     for expression in map(sp.sympify, expressions):
-        if not _exactly(expression, values):
+        if not _exactly(expression, values, equations):
             left.append(expression)
     if not left:
         return EXACT
@@ -100,11 +103,14 @@ def checked(
     return NUMERIC if _at_points(left, values, known, equations, unknowns) else OPEN
 
 
-def _exactly(expression: sp.Expr, values: Place) -> bool:
+def _exactly(expression: sp.Expr, values: Place, equations: Sequence[sp.Expr]) -> bool:
     if expression == 0:
         return True
-    inside = [values[s] for s in expression.free_symbols if s in values]
-    if longer(expression, PARTS) or any(longer(e, PARTS // 4) for e in inside):
+    if equations:
+        inside = spread(expression.xreplace(dict(values)))
+        return inside == 0 or any(inside in (e, spread(-e)) for e in equations)
+    used = [values[s] for s in expression.free_symbols if s in values]
+    if longer(expression, PARTS) or any(longer(e, PARTS // 4) for e in used):
         return False
     whole = expression.xreplace(dict(values))
     return not whole.has(sp.polys.rootoftools.ComplexRootOf) and numerator(whole) == 0
@@ -172,8 +178,9 @@ def _root(
                 for j in range(len(unknowns))
             ]
             try:
+                tolerance = mpmath.mpf(10) ** -(DIGITS + 2)
                 found = mpmath.findroot(
-                    function, first, solver="mdnewton", tol=mpmath.mpf(10) ** -(DIGITS + 2)
+                    function, first, solver="mdnewton", tol=tolerance, maxsteps=STEPS
                 )
             except (ValueError, ZeroDivisionError, OverflowError):
                 continue

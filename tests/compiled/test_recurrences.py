@@ -77,7 +77,7 @@ def test_every_operation():
 
 
 def test_a_function_without_recurrence_is_named():
-    with pytest.raises(ModelError, match="gamma.*has no Taylor recurrence"):
+    with pytest.raises(ModelError, match=r"gamma.*has no Taylor recurrence"):
         compile_series(Model({x: sp.gamma(1 + x**2)}), 12)
 
 

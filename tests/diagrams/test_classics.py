@@ -103,6 +103,27 @@ def test_an_isolated_loop_is_found_and_closed():
     assert sorted(e["x"] for e in diagram.at(p=0.6)) == pytest.approx([-0.8, 0.8], abs=1e-14)
 
 
+def test_a_tiny_loop_is_found_because_its_critical_values_are_known():
+    """A circle of radius 10⁻³ in a range of length 4."""
+    loop = (p - sp.Rational(1, 3)) ** 2 + x**2 - sp.Rational(1, 10**6)
+    diagram = fs.continue_equilibria(fs.Model({x: loop}, parameters={p: 0}), "p", (-2, 2))
+    assert diagram.coverage == "complete"
+    assert [b.closed for b in diagram.branches] == [True]
+    assert sorted(f["p"] for f in diagram.folds) == pytest.approx(
+        [1 / 3 - 1e-3, 1 / 3 + 1e-3], abs=1e-14
+    )
+
+
+def test_coverage_is_claimed_only_where_it_is_proved(reactor):
+    assert fs.continue_equilibria(reactor, p1, (0, 0.2)).coverage == "found"
+    cut = fs.continue_equilibria(
+        fs.Model({x: p - x}, parameters={p: 0}), p, (0, 1), settings=fs.Continuation(points=10)
+    )
+    assert cut.coverage == "found"
+    cusp = fs.Model({x: p + q * x - x**3}, parameters={p: 0, q: 1})
+    assert fs.continue_equilibria(cusp, "p", (-1, 1)).coverage == "complete"
+
+
 def test_non_smooth_fold_turns_the_branch_back():
     """x' = p + |x|: two equilibria for p < 0, none for p > 0 (Leine and Nijmeijer 2004)."""
     model = fs.Model({x: p + sp.Abs(x)}, parameters={p: 0})

@@ -3,6 +3,7 @@
 import matplotlib as mpl
 import numpy as np
 import pytest
+import sympy as sp
 from matplotlib.colors import same_color
 from matplotlib.figure import Figure
 
@@ -139,3 +140,19 @@ def test_a_column_wide(s_curve):
 def test_unknown_state(gear_diagram):
     with pytest.raises(fs.UnknownNameError, match="unknown state 'vv'; did you mean 'v'"):
         fs.plot.diagram(gear_diagram, "vv")
+
+
+def test_bands_are_named_by_what_lies_in_them(gear):
+    # an interface given the other way round turns the order of the regions
+    written = dict(zip(gear.states, gear.rates.values(), strict=True))
+    turned = fs.Model(
+        written,
+        forcing=gear.forcing,
+        parameters=gear.parameters,
+        interfaces={"top": sp.sympify("D - x"), "bottom": sp.sympify("x + D")},
+    )
+    above = next(n for n, r in turned.regions.items() if r.signs["top"] < 0)
+    drawn = fs.plot.diagram(fs.continue_equilibria(turned.frozen(), "w", over=(-2, 6)))
+    names = [name.get_text() for name in drawn.bands.names]
+    assert names[0] == above != "S1"
+    assert sorted(names) == ["S1", "S2", "S3"]

@@ -46,7 +46,7 @@ def test_summary(gear):
     assert lines[0] == "2 transitions over t = 0 to 10"
     assert lines[1:3] == ["  on S3: 30.0% of the time", "  on S1: 70.0% of the time"]
     assert "crossing at BE1 (w = 0.5), delay 0.1" in lines[3]
-    assert "no special point nearby" in lines[4]
+    assert "no special point" in lines[4]
     assert lay.delays == pytest.approx([0.1, np.nan], nan_ok=True)
     assert lay.parameter == "w"
     assert repr(lay).startswith("Overlay on w")

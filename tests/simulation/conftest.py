@@ -25,9 +25,7 @@ def linear():
     """x'' + k x = 0 with another k on each side of two interfaces, damped by c."""
     k1, k2, k3, c = sp.symbols("k1 k2 k3 c")
     force = sp.Piecewise((k1 * (x - D), x > D), (k3 * (x + D), x < -D), (k2 * x, True))
-    return Model(
-        {x: v, v: -c * v - force}, parameters={k1: 1, k2: 0, k3: 1, c: 0, D: 0.25}
-    )
+    return Model({x: v, v: -c * v - force}, parameters={k1: 1, k2: 0, k3: 1, c: 0, D: 0.25})
 
 
 @pytest.fixture(scope="session")

@@ -56,9 +56,9 @@ def test_sliding_on_a_curve_stays_on_it():
     assert np.abs(np.hypot(*z) - 1).max() < 1e-14
     # alpha = a / (a - b) = 1/3: angular speed 2/3 + 4/3
     turned = np.unwrap(np.arctan2(z[1], z[0]))
-    assert (turned[1] - turned[0] - 10.0) % (2 * math.pi) == pytest.approx(
-        0.0, abs=1e-10
-    ) or (turned[1] - turned[0] - 10.0) % (2 * math.pi) == pytest.approx(2 * math.pi, abs=1e-10)
+    assert (turned[1] - turned[0] - 10.0) % (2 * math.pi) == pytest.approx(0.0, abs=1e-10) or (
+        turned[1] - turned[0] - 10.0
+    ) % (2 * math.pi) == pytest.approx(2 * math.pi, abs=1e-10)
 
 
 def test_crossing_a_discontinuity_without_sliding():

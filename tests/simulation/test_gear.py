@@ -106,7 +106,8 @@ def test_a_frozen_model_at_a_value(gear):
     run = simulate(frozen, {"x": 0.0, "v": 0.0}, t=(0, 60))
     end = run(60.0)
     assert (end[0] ** 2 + 41.67) * (end[0] - 0.25) == pytest.approx(1.0, abs=1e-7)
-    assert run.period is None and run.regime is None
+    assert run.period is None
+    assert run.regime is None
 
 
 def test_regimes(gear):

@@ -52,7 +52,7 @@ def kinked():
     right, top = sp.Max(x - 1, 0), sp.Max(y + sp.Rational(1, 2), 0)
     return Model(
         {x: a * x + b * y + p * right + q * top, y: c * x + d * y + e + r * right + s * top},
-        parameters={k: 0 for k in (a, b, c, d, e, p, q, r, s)},
+        parameters=dict.fromkeys((a, b, c, d, e, p, q, r, s), 0),
     )
 
 
@@ -114,4 +114,6 @@ def test_near_tangential_crossings_are_marked():
     model = Model({x: 1, y: 2 * x}, interfaces={"floor": y})
     run = simulate(model, [-1, 1 - 1e-9], t=(0, 2))
     assert [c.tangential for c in run.crossings] == [True, True]
-    assert [c.time for c in run.crossings] == pytest.approx([1 - 1e-9**0.5, 1 + 1e-9**0.5], abs=1e-11)
+    assert [c.time for c in run.crossings] == pytest.approx(
+        [1 - 1e-9**0.5, 1 + 1e-9**0.5], abs=1e-11
+    )
