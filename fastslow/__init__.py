@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from fastslow.errors import (
         ArgumentError,
         FastSlowError,
-        FileFormatError,
         ModelError,
         UnknownNameError,
     )
@@ -40,7 +39,6 @@ _HOME = {
     "Diagram": "results.diagrams",
     "Equilibrium": "results.points",
     "FastSlowError": "errors",
-    "FileFormatError": "errors",
     "Model": "model.model",
     "ModelError": "errors",
     "Overlay": "results.overlays",
@@ -63,7 +61,6 @@ __all__ = [
     "Diagram",
     "Equilibrium",
     "FastSlowError",
-    "FileFormatError",
     "Model",
     "ModelError",
     "Overlay",

@@ -25,10 +25,6 @@ class ArgumentError(FastSlowError, ValueError):
     """An argument has the wrong value, shape or range."""
 
 
-class FileFormatError(FastSlowError, OSError):
-    """A stored file is foreign, damaged, or from another version."""
-
-
 def unknown_name(kind: str, name: object, valid: Iterable[object]) -> UnknownNameError:
     """Build the error for a name that is not valid, with the nearest valid one.
 

@@ -249,6 +249,15 @@ class Model:
                         return False
         return True
 
+    def to_latex(self) -> str:
+        """The equations of every region as LaTeX, for a document with amsmath."""
+        from fastslow.model.typesetting import model_latex
+
+        return model_latex(self)
+
+    def _repr_latex_(self) -> str:
+        return self.to_latex()
+
     def __repr__(self) -> str:
         lines = [
             f"Model of {', '.join((*self.states, *self.slow_states))}"

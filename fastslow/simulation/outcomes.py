@@ -34,7 +34,7 @@ def outcome_of(
     if code in (1, 3, 4) and len(steps) and not size <= _BLOW_UP * (1.0 + start_size):
         return Outcome(
             "blow-up",
-            f"the state grew to {size:.3g} by {time}, in {len(steps)} steps, and leaves every bound.",
+            f"the state grew to {size:.3g} within {len(steps)} steps, by {time}.",
             False,
         )
     if code == 1:

@@ -75,7 +75,7 @@ def test_regions_that_contradict():
 
 
 def test_errors_have_one_base():
-    for error in (ArgumentError, ModelError, UnknownNameError, fs.FileFormatError):
+    for error in (ArgumentError, ModelError, UnknownNameError):
         assert issubclass(error, FastSlowError)
     assert issubclass(UnknownNameError, KeyError)
     assert issubclass(ModelError, ValueError)

@@ -116,6 +116,73 @@ def four_states() -> Model:
     )
 
 
+def dense_linear() -> Model:
+    """Four states, eight free parameters, no zero in the matrix."""
+    states = sp.symbols("x1:5")
+    a, b, c, d, e, f, g, h = sp.symbols("k1:9")
+    w = sp.Symbol("w")
+    matrix = sp.Matrix([[a, b, c, d], [e, f, g, h], [1, a, e, 2], [b, 3, f, h]])
+    rates = matrix * sp.Matrix(states) + sp.Matrix([w, 1, 2, 3])
+    values = {k: (-1) ** n * (n + 1) for n, k in enumerate((a, b, c, d, e, f, g, h))}
+    return Model(dict(zip(states, rates, strict=True)), forcing={w: sp.sin(t)}, parameters=values)
+
+
+def food_chain() -> Model:
+    """Prey, predator with a Holling type II response, top predator."""
+    x, y, z, r, K, a, b, e, m, d, h = sp.symbols("x y z r K a b e m d h")
+    eaten = a * x * y / (1 + h * x)
+    return Model(
+        {x: r * x * (1 - x / K) - eaten, y: e * eaten - m * y - b * y * z, z: b * y * z - d * z},
+        parameters={r: 1, K: 2, a: 2, b: 1, e: 0.5, m: 0.2, d: 0.1, h: 1},
+    )
+
+
+def quadratic() -> Model:
+    """Three states with all quadratic terms."""
+    x, y, z, w = sp.symbols("x y z w")
+    terms = [x**2, x * y, y**2, y * z, z**2, x * z, x, y, z]
+    names = sp.symbols("q0:27")
+    values = {q: (-1) ** n * sp.Rational(2 * n + 1, 5) for n, q in enumerate(names)}
+    rates = [sum(q * s for q, s in zip(names[k : k + 9], terms, strict=True)) for k in (0, 9, 18)]
+    return Model(
+        {x: rates[0] + w, y: rates[1], z: rates[2]}, forcing={w: sp.sin(t)}, parameters=values
+    )
+
+
+def hodgkin_huxley() -> Model:
+    v, m, h, n, current, g_na, g_k, g_l = sp.symbols("v m h n I g_Na g_K g_L")
+    exp = sp.exp
+    opening_m = (v + 40) / 10 / (1 - exp(-(v + 40) / 10))
+    opening_n = (v + 55) / 100 / (1 - exp(-(v + 55) / 10))
+    ionic = g_na * m**3 * h * (v - 50) + g_k * n**4 * (v + 77) + g_l * (v + 54)
+    return Model(
+        {
+            v: current - ionic,
+            m: opening_m * (1 - m) - 4 * exp(-(v + 65) / 18) * m,
+            h: exp(-(v + 65) / 20) * (1 - h) * 7 / 100 - h / (1 + exp(-(v + 35) / 10)),
+            n: opening_n * (1 - n) - exp(-(v + 65) / 80) * n / 8,
+        },
+        forcing={current: sp.sin(t)},
+        parameters={g_na: 120, g_k: 36, g_l: 0.3},
+    )
+
+
+def coupled_oscillators() -> Model:
+    x1, v1, x2, v2, w = sp.symbols("x1 v1 x2 v2 w")
+    k1, k2, k3, b1, b2, d1, d2, m = sp.symbols("k1 k2 k3 b1 b2 d1 d2 m")
+    pull = k3 * (x1 - x2)
+    return Model(
+        {
+            x1: v1,
+            v1: w - d1 * v1 - k1 * x1 - b1 * x1**3 - pull,
+            x2: v2,
+            v2: (pull - d2 * v2 - k2 * x2 - b2 * x2**3) / m,
+        },
+        forcing={w: sp.sin(t)},
+        parameters={k1: 1, k2: 2, k3: 0.5, b1: 1, b2: 0.3, d1: 0.1, d2: 0.2, m: 1.5},
+    )
+
+
 @cache
 def law(name: str) -> Derivation:
     """The derivation of one of the models above, by the name of its function."""

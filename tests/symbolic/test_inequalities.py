@@ -6,6 +6,7 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fastslow.errors import ArgumentError
 from fastslow.model.structure import real
 from fastslow.symbolic.assumptions import read_signs
 from fastslow.symbolic.inequalities import (
@@ -94,3 +95,40 @@ def test_superfluous_conditions():
     assert implied(A < -(D**2), Signs({A: 1, D: 1})) is False
     assert implied(sp.Or(A > B, A > 0), Signs({A: 1})) is True
     assert implied(A > B, Signs({A: 1})) is None
+
+
+def test_signs_by_counting_roots():
+    # x⁵ − 3x + 3 has its minimum 3 − 12/5 (3/5)^(1/4) > 0 for x > 0, and one root below
+    quintic = A**5 - 3 * A + 3
+    assert Signs({A: 1}).sign(quintic) == 1
+    assert Signs({A: -1}).sign(quintic) is None
+    assert Signs({A: 1}).sign(A**5 - 3 * A + 1) is None
+    # 1 < A < 6/5 lies between its roots 0.3347 and 1.2146
+    between = Signs({A: 1}, (A - 1, 6 - 5 * A))
+    assert between.sign(A**5 - 3 * A + 1) == -1
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "__import__('os').getcwd() > 0",
+        "A.__class__ > 0",
+        "(lambda: A)() > 0",
+        "[A for A in (1,)] > 0",
+        "9**9**9 > A",
+        "A > 0 > B",
+        "A == 0",
+        "",
+    ],
+)
+def test_assumptions_never_run_code(text):
+    with pytest.raises(ArgumentError):
+        read_signs({"A": 1.0, "B": 2.0}, text)
+
+
+def test_assumptions_as_text_and_as_relations_agree():
+    values = {"A": 1.0, "D": 2.0}
+    text, relation = read_signs(values, "A < -sqrt(2)*D**2"), sp.Lt(A, -sp.sqrt(2) * D**2)
+    assert text == read_signs(values, relation)
+    with pytest.raises(ArgumentError, match="received 5"):
+        read_signs(values, 5)

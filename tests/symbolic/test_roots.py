@@ -1,19 +1,15 @@
 """Short closed forms of roots, and the budget."""
 
-import time
-
 import mpmath
 import pytest
 import sympy as sp
 
 from fastslow.model.structure import real
 from fastslow.symbolic.algebra import growth, light, spread, tidy
-from fastslow.symbolic.derivation import derive
 from fastslow.symbolic.roots import roots, solved_for, squares_out
 from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.stability import hurwitz
 from fastslow.symbolic.verification import vanishes
-from tests.symbolic.symbolic_models import four_states, gear, morris_lecar
 
 a, b, x, w = map(real, ["a", "b", "x", "w"])
 
@@ -67,14 +63,3 @@ def test_vanishing():
     assert vanishes(root)
     assert vanishes(sp.sin(a) ** 2 + sp.cos(a) ** 2 - 1)
     assert not vanishes(sp.sin(a) - a + a**3 / 6)
-
-
-@pytest.mark.parametrize(
-    ("model", "seconds"), [(gear, 1.0), (four_states, 10.0), (morris_lecar, 10.0)]
-)
-def test_derive_is_quick(model, seconds):
-    fast = model().frozen()
-    start = time.process_time()
-    derive(fast)
-    # processor time, with room for a slower machine
-    assert time.process_time() - start < 3 * seconds

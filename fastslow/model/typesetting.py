@@ -1,0 +1,38 @@
+"""A model as LaTeX."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import sympy as sp
+
+from fastslow.model.structure import TIME, real
+
+if TYPE_CHECKING:
+    from fastslow.model.model import Model
+
+
+def model_latex(model: Model) -> str:
+    r"""Typeset the equations of a model region by region, as one aligned display.
+
+    Examples
+    --------
+    >>> from fastslow.model.model import Model
+    >>> x = sp.Symbol("x")
+    >>> print(model_latex(Model({x: -x})))
+    \begin{align*}
+      & \dot{x} = - x
+    \end{align*}
+    """
+    rows = []
+    for region in model.regions.values():
+        rates = r",\quad ".join(
+            rf"\dot{{{sp.latex(real(name))}}} = {sp.latex(rate)}"
+            for name, rate in region.rates.items()
+        )
+        where = r",\ ".join(sp.latex(c) for c in region.conditions)
+        rows.append(rates + rf"&&\text{{{region.name}}}:\ {where}" if where else rates)
+    for name, law in model.forcing.items():
+        rows.append(rf"{sp.latex(real(name))}({sp.latex(TIME)}) = {sp.latex(law)}")
+    body = " \\\\\n".join(f"  & {row}" for row in rows)
+    return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"

@@ -1,0 +1,68 @@
+"""Systems whose closed forms grow long: what is past the budget is implicit, and verified."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from fastslow.model.structure import real
+from fastslow.symbolic.linear import NOTE, cramer
+from fastslow.symbolic.verification import checked, weakest
+from tests.symbolic.symbolic_models import dense_linear, food_chain, law
+
+x, y, a = map(real, ("x", "y", "a"))
+
+
+@pytest.mark.parametrize(
+    "name", ["dense_linear", "food_chain", "quadratic", "hodgkin_huxley", "coupled_oscillators"]
+)
+def test_every_form_is_verified_and_says_how(name):
+    derivation = law(name)
+    assert derivation.verified
+    assert derivation.check in ("exact", "50 digits")
+
+
+@pytest.mark.parametrize("name", ["quadratic", "hodgkin_huxley"])
+def test_implicit_forms_say_so(name):
+    region = law(name)["S1"]
+    assert [e.kind for e in region.equilibria] == ["implicit"]
+    assert any("equations are left" in note for note in region.notes)
+
+
+def test_dense_linear_system_against_numpy():
+    values = {real(n): v for n, v in dense_linear().parameters.items()} | {real("w"): 0.5}
+    (form,) = law("dense_linear")["S1"].equilibria
+    assert form.kind == "explicit"
+    mine = [float(e.subs(values)) for e in form.state.values()]
+    region = law("dense_linear")["S1"]
+    matrix = np.array(region.jacobian.subs(values), dtype=float)
+    assert mine == pytest.approx(np.linalg.solve(matrix, -np.array([0.5, 1, 2, 3])), rel=1e-12)
+    signs = [float(e.subs(values)) > 0 for e in form.stability.routh_hurwitz]
+    assert all(signs) == bool(np.linalg.eigvals(matrix).real.max() < 0)
+
+
+def test_linear_system_past_the_budget():
+    names = [f"x{k}" for k in range(6)]
+    rates = {n: sum(real(f"a{n}{m}") * real(m) for m in names) - 1 for n in names}
+    assert cramer(rates, names) == NOTE
+
+
+def test_food_chain_has_no_equilibrium_at_a_pole():
+    # x = −1/h clears the denominators but not the rates
+    states = [form.state["x"] for form in law("food_chain")["S1"].equilibria]
+    assert -1 / real("h") not in states
+    values = {real(n): v for n, v in food_chain().parameters.items()}
+    for form in law("food_chain")["S1"].equilibria:
+        place = {real(n): e.subs(values) for n, e in form.state.items()}
+        for rate in law("food_chain")["S1"].rates.values():
+            assert abs(complex(rate.subs(values).subs(place))) < 1e-12
+
+
+def test_verification_says_how():
+    assert checked([x**2 - a], {x: sp.sqrt(a)}) == "exact"
+    assert checked([sp.sin(x) ** 2 + sp.cos(x) ** 2 - 1], {}) == "50 digits"
+    assert checked([x**2 - a], {x: a}) == ""
+    # on a circle, where nothing is solved for
+    circle = x**2 + y**2 - a
+    assert checked([sp.exp(circle) - 1], {}, None, [circle], [x]) == "50 digits"
+    assert checked([x - y], {}, None, [circle], [x]) == ""
+    assert weakest(["exact", "", "50 digits"]) == ""
