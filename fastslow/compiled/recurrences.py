@@ -94,7 +94,7 @@ def scalar_code(expression: sp.Expr) -> str:
     --------
     >>> A = sp.Symbol("A", real=True)
     >>> scalar_code(A**2 / 3)
-    '0.3333333333333333*(A * A)'
+    '(0.3333333333333333)*((A) * (A))'
     """
     return str(ScalarPrinter({"fully_qualified_modules": True}).doprint(expression))
 

@@ -76,20 +76,17 @@ def branch_of(
     tables: list[tuple[Array, Array, int]] = []
     rows = 0
     for number, piece in enumerate(curve.pieces):
-        points: list[Array] = []
-        directions: list[Array] = []
+        u, tangents = piece.u, piece.tangents
         found = special_points(field, piece, window, marks)
-        for row in range(len(piece.u)):
-            points.append(piece.u[row])
-            directions.append(piece.tangents[row])
-            for detected in (d for d in found if d.row == row):
-                point = _point(field, piece, detected, window)
-                special.append(point)
-                at_row.append(rows + len(points))
-                points.append(detected.located.u)
-                directions.append(point.tangent)
-        tables.append((np.array(points), np.array(directions), piece.region))
-        rows += len(points)
+        if found:
+            points = [_point(field, piece, d, window) for d in found]
+            places = [d.row + 1 for d in found]
+            u = np.insert(u, places, [d.located.u for d in found], axis=0)
+            tangents = np.insert(tangents, places, [p.tangent for p in points], axis=0)
+            special += points
+            at_row += [rows + place + k for k, place in enumerate(places)]
+        tables.append((u, tangents, piece.region))
+        rows += len(u)
         if number < len(curve.joins):
             special.append(_corner(field, curve, number))
             at_row.append(rows - 1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,9 +59,9 @@ def special_points(
 def _changes(test: Array) -> Iterator[tuple[int, int]]:
     """Pairs of rows, next to each other but for zeros, between which a test changes sign."""
     rows = np.flatnonzero(test != 0)
-    for before, after in pairwise(rows):
-        if test[before] * test[after] < 0:
-            yield int(before), int(after)
+    signs = np.sign(test[rows])
+    for k in np.flatnonzero(signs[:-1] * signs[1:] < 0):
+        yield int(rows[k]), int(rows[k + 1])
 
 
 def _meeting(test: Array, piece: Piece, before: int, after: int) -> Array:

@@ -114,7 +114,7 @@ class Trajectory:
     >>> run.word
     ('S1', 'S2')
     >>> run(3.0).round(12)
-    array([0. , 1. ])
+    array([0., 1.])
     """
 
     states: tuple[str, ...]
@@ -281,6 +281,69 @@ class Trajectory:
             side = "upper" if upper else "lower"
             return f"unilateral {side}" if inside else f"meshed {side}"
         return "free" if inside else None
+
+    @property
+    def residence(self) -> dict[str, float]:
+        """The part of the run spent in every region (and in every sliding motion)."""
+        total = self.span[1] - self.span[0]
+        spent = dict.fromkeys(self.regions, 0.0)
+        for segment in self.segments:
+            spent[segment.region] = spent.get(segment.region, 0.0) + segment.duration / total
+        return spent
+
+    def hits(self, interface: object, direction: int | None = None) -> int:
+        """How often an interface was crossed, upwards (+1), downwards (−1) or either way.
+
+        Raises
+        ------
+        UnknownNameError
+            For an interface that is not in the model.
+        """
+        if str(interface) not in self.interfaces:
+            raise unknown_name("interface", interface, self.interfaces)
+        table = self.crossing_table
+        mine = table[table[:, 1] == self.interfaces.index(str(interface)), 2]
+        return int(np.count_nonzero(mine != 0 if direction is None else mine == direction))
+
+    def extremes(self, name: object, since: float | None = None) -> tuple[float, float]:
+        """Minimum and maximum of a column from a time to the end, to rounding.
+
+        Every step's polynomial is maximised where its coefficients allow more
+        than the extremes at the ends of the steps.
+
+        Parameters
+        ----------
+        name : str or Symbol
+        since : float, optional
+            By default the start of the run.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no column.
+        ArgumentError
+            For a time outside the run, or without dense output.
+        """
+        if str(name) not in self.columns:
+            raise unknown_name("column", name, self.columns)
+        row = self.columns.index(str(name))
+        begin = self.span[0] if since is None else float(since)
+        ends = self.dense_columns([begin, self.span[1]])[row]
+        assert self.series is not None
+        used = np.flatnonzero(self.steps[:, 0] + self.steps[:, 1] > begin)
+        length = self.steps[used, 1]
+        scaled = self.series[used, row] * length[:, None] ** np.arange(self.series.shape[2])
+        after = np.maximum(begin - self.steps[used, 0], 0.0) / length
+        inside = scaled[after == 0, 0]
+        low, high = float(np.append(ends, inside).min()), float(np.append(ends, inside).max())
+        reach = np.abs(scaled[:, 1:]).sum(axis=1)
+        for i in np.flatnonzero((scaled[:, 0] + reach > high) | (scaled[:, 0] - reach < low)):
+            roots = np.polynomial.polynomial.polyroots(np.polynomial.polynomial.polyder(scaled[i]))
+            turning = roots.real[np.abs(roots.imag) < 1e-6]
+            turning = turning[(turning >= after[i]) & (turning <= 1)]
+            values = np.polynomial.polynomial.polyval(turning, scaled[i])
+            low, high = float(np.append(values, low).min()), float(np.append(values, high).max())
+        return low, high
 
     def __getstate__(self) -> dict[str, Any]:
         names = self.__dataclass_fields__

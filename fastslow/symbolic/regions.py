@@ -109,8 +109,9 @@ class RegionForms:
     def check(self) -> str:
         """How it is known that every complete closed form satisfies its equations."""
         points = (*self.folds, *self.branch_points, *self.cusps, *self.hopf)
-        complete = [f for f in (*self.continua, *points) if not f.equations]
-        return weakest(f.check for f in (*self.equilibria, *complete))
+        checks = [e.check for e in self.equilibria]
+        checks += [c.check for c in self.continua if not c.equations]
+        return weakest([*checks, *(p.check for p in points if not p.equations)])
 
     @property
     def verified(self) -> bool:

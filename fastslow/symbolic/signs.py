@@ -213,8 +213,7 @@ def term_bound(expression: sp.Expr, known: Mapping[sp.Symbol, int]) -> int | Non
             assert found is not None
             found = found * one // 2 if 2 in (abs(found), abs(one)) else (found * one)
     elif expression.is_Add:
-        each = [b for b in _until_mixed(expression.args, known) if b != 0]
-        found = None if None in each else max(each, key=abs, default=0)
+        found = _sum_bound(expression.args, known)
     elif expression.is_Pow:
         found = _power_bound(expression.base, expression.exp, known)
     elif isinstance(expression, sp.exp):
@@ -225,16 +224,15 @@ def term_bound(expression: sp.Expr, known: Mapping[sp.Symbol, int]) -> int | Non
     return _assumed(expression) if found is None and expression.is_number else found
 
 
-def _until_mixed(terms: Iterable[sp.Expr], known: Mapping[sp.Symbol, int]) -> Iterable[int | None]:
-    """Bounds of terms; None ends them where one is open or two have opposite signs."""
-    side = 0
+def _sum_bound(terms: Iterable[sp.Expr], known: Mapping[sp.Symbol, int]) -> int | None:
+    """Bound of a sum: open as soon as one term is, or two have opposite signs."""
+    total = 0
     for term in terms:
         one = term_bound(term, known)
-        if one is None or one * side < 0:
-            yield None
-            return
-        side = one or side
-        yield one
+        if one is None or one * total < 0:
+            return None
+        total = one if abs(one) > abs(total) else total
+    return total
 
 
 def _power_bound(base: sp.Expr, power: sp.Expr, known: Mapping[sp.Symbol, int]) -> int | None:

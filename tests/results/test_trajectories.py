@@ -100,3 +100,35 @@ def test_without_dense_output():
     assert light["x"] == pytest.approx(np.exp([0, -0.5, -1]), abs=1e-9)
     with pytest.raises(ArgumentError, match="kept no dense output"):
         light(0.5)
+
+
+def test_contact_statistics(run):
+    assert sum(run.residence.values()) == pytest.approx(1.0, abs=1e-12)
+    assert set(run.residence) == {"S1", "S2", "S3"}
+    both = run.hits("x - D") + run.hits("x + D")
+    assert both == len(run.crossings)
+    assert run.hits("x - D", 1) + run.hits("x - D", -1) == run.hits("x - D")
+    with pytest.raises(UnknownNameError, match="unknown interface 'x-D'; did you mean 'x - D'"):
+        run.hits("x-D")
+
+
+def test_extremes_are_exact():
+    x, v = sp.symbols("x v")
+    swing = simulate(Model({x: v, v: -x}), [0.3, 0.4], t=(0, 7), tol=1e-13)
+    assert swing.extremes("x") == pytest.approx((-0.5, 0.5), abs=1e-12)
+    assert swing.extremes("v") == pytest.approx((-0.5, 0.5), abs=1e-12)
+    # from the last downward zero of x on: the minimum is not passed by again
+    assert swing.extremes("x", since=6.9)[1] == pytest.approx(
+        max(0.5 * np.cos([6.9 - np.arctan2(4, 3), 7 - np.arctan2(4, 3)])), abs=1e-12
+    )
+    with pytest.raises(UnknownNameError, match="unknown column"):
+        swing.extremes("z")
+
+
+def test_extremes_match_a_fine_table(run):
+    table = run(np.linspace(*run.span, 200001))
+    for name, values in zip("xv", table, strict=True):
+        low, high = run.extremes(name)
+        assert low <= values.min() + 1e-14
+        assert high >= values.max() - 1e-14
+        assert (low, high) == pytest.approx((values.min(), values.max()), abs=1e-6)
