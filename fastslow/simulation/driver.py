@@ -145,6 +145,7 @@ def drive(
     noise = np.zeros(n_interfaces)
     on = np.zeros(n_interfaces, dtype=np.bool_)
     hit = np.zeros(n_interfaces, dtype=np.bool_)
+    rests = np.zeros(n_interfaces, dtype=np.bool_)
     side = np.zeros(n_interfaces, dtype=np.int64)
     steps = np.empty((64, 3))
     crossings = np.empty((16, 6 + n_states))
@@ -205,7 +206,7 @@ def drive(
                     for i in range(n_states):
                         crossings[n_crossings, 6 + i] = inputs[1 + i]
                     n_crossings += 1
-            if n_crossings > limits[1]:
+            if n_crossings >= limits[1]:
                 code = TOO_MANY_CROSSINGS
                 break
             choosing = touched = False
@@ -239,35 +240,40 @@ def drive(
                 W,
                 h,
                 on,
+                rests,
                 noise,
                 b,
                 stack,
                 gradient,
             )
-            part = s * h if interface >= 0 else h
+            taken = s * h if interface >= 0 else h
             # where a step grew much its last terms may be small by accident
-            doubtful = part > 2.0 * usual or longest > 4.0 * remaining
-            if not doubtful or holds(address, layout, mode, inputs, parameters, W, part, tol, work):
+            doubtful = taken > 2.0 * usual or longest > 4.0 * remaining
+            if (
+                h == 0.0
+                or not doubtful
+                or holds(address, layout, mode, inputs, parameters, W, taken, tol, work)
+            ):
                 break
-            h, final = (t + 0.25 * part) - t, False
-        usual = max(part, 0.1 * usual)
+            h, final = (t + 0.25 * taken) - t, False
+        usual = max(taken, 0.1 * usual)
         if h == 0.0:
             code = STEP_TOO_SMALL
             break
         begin, lag = t, late
         if interface >= 0:
-            t = begin + part
-            late = lag + (part - (t - begin))
+            t = begin + taken
+            late = lag + (taken - (t - begin))
             if s == 1.0 and final:
                 t, late = stop, 0.0
         elif final:
             t, late = stop, 0.0
         else:
             t = begin + h
-        if part > 0.0:
+        if taken > 0.0:
             if n_steps == steps.shape[0]:
                 steps = grown(steps)
-            steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, part, mode
+            steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, taken, mode
             if dense:
                 if (n_steps + 1) * stride > store.shape[0]:
                     larger = np.empty(2 * store.shape[0] + 64 * stride)
@@ -284,14 +290,15 @@ def drive(
             if n_samples > first:
                 sample(W, columns, sampled_rows, offsets[first:n_samples], samples, first)
             for i in range(kept):
-                inputs[1 + i] = horner(W, i * columns, i * columns + order, part)
+                inputs[1 + i] = horner(W, i * columns, i * columns + order, taken)
         inputs[0] = t
         for j in range(n_interfaces):
             hit[j] = signs[mode, j] == 0
             if hit[j]:
                 put_on(address, n_modes, j, inputs, parameters, gradient, n_states)
-            # still on an interface after a whole step: it rests there, so look again
-            choosing = choosing or (on[j] and signs[mode, j] != 0)
+            # a motion that rests on an interface may leave it in the next step: look again
+            on[j] = rests[j]
+            choosing = choosing or rests[j]
         if interface >= 0:
             hit[interface] = choosing = True
             put_on(address, n_modes, interface, inputs, parameters, gradient, n_states)

@@ -22,7 +22,7 @@ from fastslow.simulation.polynomials import (
 
 @part
 def find_event(
-    address, layout, signs, mode, inputs, parameters, W, h, on, noise, b, stack, gradient
+    address, layout, signs, mode, inputs, parameters, W, h, on, rests, noise, b, stack, gradient
 ):
     """The first time in a step at which its motion ends, as a part of the step.
 
@@ -44,6 +44,7 @@ def find_event(
     drift = first_h + n_interfaces
     best, interface, touched, depth, floor = 2.0, ZERO - 1, False, 1.0, 0.0
     for j in range(n_interfaces):
+        rests[j] = False
         sign = signs[mode, j]
         if sign == 0:
             for k in range(2):
@@ -67,8 +68,8 @@ def find_event(
         if on[j]:
             start = first_strong(b, ONE, order, noise[j])
             if start > order:
+                rests[j] = True
                 continue
-            on[j] = False
         elif b[0] * sign <= 0.0:
             return 0.0, j, False, 1.0, 0.0
         if excluded(b, start, order):
@@ -85,20 +86,20 @@ def find_event(
 
 
 @part
-def holds(address, layout, mode, inputs, parameters, W, part, tol, work):
+def holds(address, layout, mode, inputs, parameters, W, taken, tol, work):
     """Whether the rates at the end of a step are the derivatives of its series."""
     n_states, order = layout[0], layout[4]
     columns = order + 1
     ahead = np.empty(inputs.shape[0])
-    ahead[0] = inputs[0] + part
+    ahead[0] = inputs[0] + taken
     for i in range(n_states):
-        ahead[1 + i] = horner(W, i * columns, i * columns + order, part)
+        ahead[1 + i] = horner(W, i * columns, i * columns + order, taken)
     call_address(address, mode, ahead, parameters, work)
     for i in range(n_states):
         row = i * columns
         rate = work[row + 1]
-        defect = abs(slope(W, row, row + order, part) - rate) * part
-        if not defect <= 100.0 * (tol * (1.0 + abs(ahead[1 + i])) + EPSILON * abs(rate) * part):
+        defect = abs(slope(W, row, row + order, taken) - rate) * taken
+        if not defect <= 100.0 * (tol * (1.0 + abs(ahead[1 + i])) + EPSILON * abs(rate) * taken):
             return False
     return True
 

@@ -164,7 +164,7 @@ def simulate(
     order = whole_number("order", order, 4, 40)
     limits = (
         whole_number("max_steps", max_steps, 1, 2**40),
-        whole_number("max_crossings", max_crossings, 0, 2**40),
+        whole_number("max_crossings", max_crossings, 1, 2**40),
     )
     between = _gap(model, gap)
     compiled = _series(model, order)

@@ -197,7 +197,7 @@ def shortest(expression: sp.Expr) -> sp.Expr:
     >>> shortest(x**3 - a * x**2 + a * x - a**2).func is sp.Mul
     True
     """
-    if longer(expression, PARTS // 2) or not light(expression):
+    if not light(expression):
         return expression
     if generators(expression) or irrational(expression):
         forms = [expression, spread(expression), sp.factor_terms(expression)]

@@ -14,7 +14,7 @@ from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.verification import vanishes
 
 #: A longer condition, in parts of its tree, is left as an equation.
-PARTS = 300
+PARTS = 500
 
 #: Resultants are formed up to this degree of the eliminated unknown.
 RESULTANT = 6
