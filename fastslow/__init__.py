@@ -28,7 +28,10 @@ if TYPE_CHECKING:
     from fastslow.results.points import Equilibrium, SpecialPoint
     from fastslow.results.trajectories import Trajectory
     from fastslow.simulation.trajectories import simulate
-    from fastslow.symbolic.derivation import derive
+    from fastslow.symbolic.derivation import Derivation, derive
+    from fastslow.symbolic.reduction import reduce_to
+    from fastslow.symbolic.scaling import disagreements, nondimensionalise
+    from fastslow.symbolic.sources import export
 
 __version__ = "0.1.0"
 
@@ -36,6 +39,7 @@ _HOME = {
     "ArgumentError": "errors",
     "Branch": "results.branches",
     "Continuation": "continuation.settings",
+    "Derivation": "symbolic.derivation",
     "Diagram": "results.diagrams",
     "Equilibrium": "results.points",
     "FastSlowError": "errors",
@@ -47,9 +51,13 @@ _HOME = {
     "UnknownNameError": "errors",
     "continue_equilibria": "diagrams.tracing",
     "derive": "symbolic.derivation",
+    "disagreements": "symbolic.scaling",
     "equilibria": "diagrams.solving",
+    "export": "symbolic.sources",
+    "nondimensionalise": "symbolic.scaling",
     "overlay": "passage.overlays",
     "plot": "",
+    "reduce_to": "symbolic.reduction",
     "simulate": "simulation.trajectories",
     "systems": "",
 }
@@ -58,6 +66,7 @@ __all__ = [
     "ArgumentError",
     "Branch",
     "Continuation",
+    "Derivation",
     "Diagram",
     "Equilibrium",
     "FastSlowError",
@@ -70,9 +79,13 @@ __all__ = [
     "__version__",
     "continue_equilibria",
     "derive",
+    "disagreements",
     "equilibria",
+    "export",
+    "nondimensionalise",
     "overlay",
     "plot",
+    "reduce_to",
     "simulate",
     "systems",
 ]

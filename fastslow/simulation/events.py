@@ -26,6 +26,8 @@ def find_event(
 ):
     """The first time in a step at which its motion ends, as a part of the step.
 
+    Fills ``rests``: the interfaces that it began on and does not leave.
+
     Returns
     -------
     s : float

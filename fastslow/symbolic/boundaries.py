@@ -12,11 +12,11 @@ from fastslow.model.structure import real
 from fastslow.results.named import Named
 from fastslow.symbolic.algebra import adjugate, determinant, spread, tidy
 from fastslow.symbolic.critical import Setting
-from fastslow.symbolic.families import Family, families
 from fastslow.symbolic.inequalities import implied
 from fastslow.symbolic.location import neat
-from fastslow.symbolic.roots import Root, roots, solved_for
+from fastslow.symbolic.solution_families import Family, families
 from fastslow.symbolic.stability import jacobian
+from fastslow.symbolic.univariate import Root, roots, solved_for
 from fastslow.symbolic.verification import OPEN, checked
 
 #: Kinds of boundary equilibria by the sign of their test.

@@ -11,11 +11,11 @@ from sympy.logic.boolalg import Boolean
 from fastslow.model.structure import real
 from fastslow.results.named import Named
 from fastslow.symbolic.algebra import spread, tidy, undefined
-from fastslow.symbolic.families import Family
 from fastslow.symbolic.forms import CriticalPoint
 from fastslow.symbolic.inequalities import conjunction, general, implied, nonnegative
 from fastslow.symbolic.location import Located, locate, neat, parameters_where
 from fastslow.symbolic.signs import Signs
+from fastslow.symbolic.solution_families import Family
 from fastslow.symbolic.stability import Stability
 from fastslow.symbolic.verification import OPEN, all_vanish, checked
 

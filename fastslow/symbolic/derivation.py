@@ -93,7 +93,7 @@ class Derivation:
         return derivation_display(self)
 
     def __repr__(self) -> str:
-        from fastslow.symbolic.summary import summary
+        from fastslow.symbolic.wording import summary
 
         return summary(self)
 

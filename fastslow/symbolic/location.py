@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import sympy as sp
 
 from fastslow.symbolic.algebra import generators, irrational, light, longer, shortest, spread, tidy
-from fastslow.symbolic.families import Family
-from fastslow.symbolic.roots import Root, factors_in, roots, solved_for
 from fastslow.symbolic.signs import Signs
+from fastslow.symbolic.solution_families import Family
+from fastslow.symbolic.univariate import Root, factors_in, roots, solved_for
 from fastslow.symbolic.verification import vanishes
 
 #: A longer condition, in parts of its tree, is left as an equation.
@@ -63,7 +63,7 @@ def locate(
     Examples
     --------
     >>> from fastslow.model.structure import real
-    >>> from fastslow.symbolic.families import families
+    >>> from fastslow.symbolic.solution_families import families
     >>> x, w, q = map(real, "xwq")
     >>> signs = Signs({q: 1})
     >>> (cubic,) = families({"x": w + q * x - x**3}, ["x"], signs, [w, q])

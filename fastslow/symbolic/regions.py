@@ -18,7 +18,6 @@ from fastslow.symbolic.critical import (
     hopf_points,
     state_at,
 )
-from fastslow.symbolic.families import Family, families
 from fastslow.symbolic.forms import Continuum, CriticalPoint, EquilibriumForm
 from fastslow.symbolic.inequalities import (
     above_zero,
@@ -30,8 +29,8 @@ from fastslow.symbolic.inequalities import (
     sign_within,
 )
 from fastslow.symbolic.location import neat
-from fastslow.symbolic.roots import Root, roots, solved_for
 from fastslow.symbolic.signs import Signs
+from fastslow.symbolic.solution_families import Family, families
 from fastslow.symbolic.stability import (
     EIGENVALUE,
     Stability,
@@ -39,6 +38,7 @@ from fastslow.symbolic.stability import (
     stability_of_matrix,
     stability_of_tests,
 )
+from fastslow.symbolic.univariate import Root, roots, solved_for
 from fastslow.symbolic.verification import OPEN, checked, weakest
 
 

@@ -1,4 +1,4 @@
-"""A derivation and a model as LaTeX."""
+"""A derivation as LaTeX."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 
 import sympy as sp
 
-from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.symbolic.algebra import longer
 from fastslow.symbolic.forms import Continuum, CriticalPoint, EquilibriumForm
 from fastslow.symbolic.stability import Stability
-from fastslow.symbolic.summary import PARTS, POINT_NAMES
+from fastslow.symbolic.wording import PARTS, POINT_NAMES
 
 if TYPE_CHECKING:
     from fastslow.symbolic.boundaries import BoundaryForm
@@ -39,29 +38,6 @@ def derivation_display(law: Derivation) -> str:
         rows.append(f"\\textbf{{{heading}}}")
         rows += [f"\\quad {f}" for f in formulas]
     return "$\\displaystyle \\begin{array}{l}\n" + " \\\\\n".join(rows) + "\n\\end{array}$"
-
-
-def model_latex(model: Model) -> str:
-    r"""Typeset the equations of a model, region by region, as one aligned display.
-
-    Examples
-    --------
-    >>> x = sp.Symbol("x")
-    >>> print(model_latex(Model({x: -x})))
-    \begin{align*}
-      & \dot{x} = - x
-    \end{align*}
-    """
-    rows = []
-    for region in model.regions.values():
-        if len(model.regions) > 1:
-            rows.append(_named(region.name) + r":\quad " + _comma(region.conditions))
-        for name, rate in region.rates.items():
-            rows.append(rf"\dot{{{_tex(real(name))}}} = {_tex(rate)}")
-    for name, law in model.forcing.items():
-        rows.append(rf"{_tex(real(name))} = {_tex(law)}")
-    body = " \\\\\n".join(f"  & {row}" for row in rows)
-    return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"
 
 
 def _blocks(law: Derivation) -> list[Block]:

@@ -7,9 +7,9 @@ import sympy as sp
 from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
-from fastslow.symbolic.geartrain import dimensionless_model, gear_scaling, physical_model
 from fastslow.symbolic.reduction import reduce_to
 from fastslow.symbolic.scaling import disagreements, identify, nondimensionalise
+from fastslow.systems.geartrain import dimensionless_model, gear_scaling, physical_model
 
 #: J_eq and C_eq from J_i = 6.8e-4, J_o = 2.4e-2, N = 100, ξ = 0.05, K_HD = 7200.
 J_EQ = 100**2 * 6.8e-4 * 2.4e-2 / (100**2 * 6.8e-4 + 2.4e-2)

@@ -6,9 +6,9 @@ import sympy as sp
 
 from fastslow.model.structure import real
 from fastslow.symbolic.algebra import growth, light, spread, tidy
-from fastslow.symbolic.roots import roots, solved_for, squares_out
 from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.stability import hurwitz
+from fastslow.symbolic.univariate import roots, solved_for, squares_out
 from fastslow.symbolic.verification import vanishes
 
 a, b, x, w = map(real, ["a", "b", "x", "w"])

@@ -21,8 +21,8 @@ from fastslow.symbolic.algebra import (
 )
 from fastslow.symbolic.elimination import Elimination, Nonzero, eliminate
 from fastslow.symbolic.linear import cramer
-from fastslow.symbolic.roots import DEGREE, Root, factors_in, roots, solved_for
 from fastslow.symbolic.signs import Signs
+from fastslow.symbolic.univariate import DEGREE, Root, factors_in, roots, solved_for
 
 #: Terms in all coefficients together, up to which a discriminant is formed.
 COEFFICIENTS = 12
