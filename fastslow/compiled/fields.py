@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
 import sympy as sp
+from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.pycode import PythonCodePrinter
 
 from fastslow.compiled.store import load_generated
@@ -88,8 +90,16 @@ def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -
     ordered = [*values[:n], *first, *values[n:], *second]
     shared, results = sp.cse(ordered, symbols=sp.numbered_symbols("s"))
     printer = PythonCodePrinter({"fully_qualified_modules": True})
-    lines = [f"{symbol} = {printer.doprint(value)}" for symbol, value in shared]
-    lines += [f"out[{k}] = {_float(printer.doprint(v))}" for k, v in enumerate(results)]
+    try:
+        lines = [f"{symbol} = {printer.doprint(value)}" for symbol, value in shared]
+        lines += [f"out[{k}] = {_float(printer.doprint(v))}" for k, v in enumerate(results)]
+    except PrintMethodNotImplementedError:
+        names = {str(f.func) for v in ordered for f in v.atoms(sp.Function)}
+        known = {f for f in names if f in vars(math) or f in ("Abs", "sign")}
+        raise ModelError(
+            f"the rates or their derivatives contain {', '.join(sorted(names - known))}, which "
+            "cannot be compiled; expected elementary functions"
+        ) from None
     return lines
 
 

@@ -179,7 +179,8 @@ def smooth(
         for value, condition in expression.args:
             if _holds(condition, signs, moving, values):
                 return smooth(value, signs, moving, values)
-        pattern = ", ".join(f"{h} {'>' if s > 0 else '<'} 0" for h, s in signs.items())
+        above = [h for h, sign in signs.items() if sign > 0]
+        pattern = ", ".join(f"{h} > 0" for h in above) or "anything else"
         raise ModelError(f"{expression} has no branch where {pattern}; end it with (value, True)")
     return expression.func(*[smooth(a, signs, moving, values) for a in expression.args])
 

@@ -233,7 +233,10 @@ def read_structure(
 
 
 def _checked(what: str, expression: Any, known: set[str]) -> sp.Expr:
-    written = sp.sympify(expression)
+    try:
+        written = sp.sympify(expression)
+    except (sp.SympifyError, TypeError, SyntaxError):
+        written = None
     if not isinstance(written, sp.Expr):
         raise ModelError(f"{what}: expected an expression, received {expression!r}")
     written = written.xreplace({s: real(s.name) for s in written.free_symbols})
@@ -262,7 +265,10 @@ def _irreducible(name: str, function: sp.Expr, moving: Sequence[sp.Symbol]) -> s
 
 
 def _checked_condition(what: str, condition: Any, known: set[str]) -> Boolean:
-    written = sp.sympify(condition)
+    try:
+        written = sp.sympify(condition)
+    except (sp.SympifyError, TypeError, SyntaxError):
+        written = None
     if not isinstance(written, Boolean):
         raise ModelError(f"{what}: expected a condition such as x > D, received {condition!r}")
     for symbol in sorted(written.free_symbols, key=lambda s: s.name):

@@ -47,3 +47,11 @@ def test_a_slow_quantity_without_value_is_named(gear):
     fast = gear.frozen()
     with pytest.raises(fs.FastSlowError, match=r"'w' has no value"):
         parameter_array(fast, compile_field(fast, "A"))
+
+
+def test_a_function_that_cannot_be_compiled_is_named():
+    x = sp.Symbol("x")
+    with pytest.raises(fs.FastSlowError, match=r"contain .*polygamma.* cannot be compiled"):
+        fs.equilibria(fs.Model({x: sp.gamma(x) - 2}))
+    with pytest.raises(fs.FastSlowError, match=r"contain .*g.* cannot be compiled"):
+        fs.equilibria(fs.Model({x: sp.Function("g")(x) - x}))
