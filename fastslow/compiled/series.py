@@ -57,6 +57,8 @@ class CompiledSeries:
         Side of each interface in every mode, 0 on the interface that is slid along.
     modes : tuple of str
         Region names; sliding between A and B is named ``"A|B"``.
+    continuous : ndarray of bool, shape (n_interfaces,)
+        Whether the rates are continuous across each interface.
     """
 
     address: int
@@ -68,6 +70,7 @@ class CompiledSeries:
     n_rows: int
     signs: NDArray[np.int64]
     modes: tuple[str, ...]
+    continuous: NDArray[np.bool_]
 
     def parameter_array(self, model: Model) -> NDArray[np.float64]:
         """Parameter values in the order that the compiled function expects, never empty."""
@@ -146,7 +149,10 @@ def compile_series(model: Model, order: int) -> CompiledSeries:
     equations = _equations(model, order)
     if equations not in _compiled:
         sliding = tuple(_sliding_modes(equations, model))
-        _compiled[equations] = _compile(replace(equations, modes=equations.modes + sliding))
+        whole = replace(equations, modes=equations.modes + sliding)
+        _compiled[equations] = _compile(
+            whole, np.array(list(model.continuous.values()), dtype=bool)
+        )
     return _compiled[equations]
 
 
@@ -215,7 +221,7 @@ def _short(expression: sp.Expr) -> sp.Expr:
     return sp.cancel(expression) if sp.count_ops(expression) <= 150 else expression
 
 
-def _compile(equations: _Equations) -> CompiledSeries:
+def _compile(equations: _Equations, continuous: NDArray[np.bool_]) -> CompiledSeries:
     parameters = equations.parameters
     source, n_rows = _source(equations.renamed(), len(parameters))
     module = load_generated(source, "series")
@@ -231,6 +237,7 @@ def _compile(equations: _Equations) -> CompiledSeries:
         n_rows,
         signs.reshape(len(equations.modes), p),
         tuple(mode.name for mode in equations.modes),
+        continuous,
     )
 
 

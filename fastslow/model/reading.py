@@ -179,8 +179,8 @@ def smooth(
         for value, condition in expression.args:
             if _holds(condition, signs, moving, values):
                 return smooth(value, signs, moving, values)
-        above = [h for h, sign in signs.items() if sign > 0]
-        pattern = ", ".join(f"{h} > 0" for h in above) or "anything else"
+        shown = {h: s for h, s in signs.items() if not h.could_extract_minus_sign()}
+        pattern = ", ".join(f"{h} {'>' if s > 0 else '<'} 0" for h, s in shown.items())
         raise ModelError(f"{expression} has no branch where {pattern}; end it with (value, True)")
     return expression.func(*[smooth(a, signs, moving, values) for a in expression.args])
 

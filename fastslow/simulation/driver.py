@@ -73,6 +73,7 @@ def drive(
     layout,
     sizes,
     signs,
+    continuous,
     parameters,
     start,
     span,
@@ -94,6 +95,7 @@ def drive(
     sizes : tuple of int
         (number of rows that the series fills, work space for the event search).
     signs : int64 array, shape (n_modes, n_interfaces)
+    continuous : bool array, shape (n_interfaces,)
     parameters, start : float64 arrays
     span : tuple of float
         Start and end of time.
@@ -172,6 +174,7 @@ def drive(
                 address,
                 layout,
                 signs,
+                continuous,
                 inputs,
                 parameters,
                 tol,

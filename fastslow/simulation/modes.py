@@ -88,7 +88,20 @@ def agreement(b, order, noise, side):
 
 @part
 def choose_mode(
-    address, layout, signs, inputs, parameters, tol, longest, on, side, current, W, b, noise
+    address,
+    layout,
+    signs,
+    continuous,
+    inputs,
+    parameters,
+    tol,
+    longest,
+    on,
+    side,
+    current,
+    W,
+    b,
+    noise,
 ):
     """The mode in which the solution goes on.
 
@@ -99,6 +112,8 @@ def choose_mode(
     layout : tuple of int
         (n_states, n_forcing, n_interfaces, n_modes, order).
     signs : int64 array, shape (n_modes, n_interfaces)
+    continuous : bool array, shape (n_interfaces,)
+        Where the rates are continuous there is one way on, and doubt is rounding.
     inputs, parameters : float64 arrays
         Where.
     tol, longest : float
@@ -121,8 +136,14 @@ def choose_mode(
     first_h = n_states + n_forcing
     drift = first_h + n_interfaces
     best, best_score, equals = NO_MODE, DISAGREES, 0
-    broken = False
-    # two passes: the rounding error is that of the largest motion on either side
+    broken, certain = False, True
+    for j in range(n_interfaces):
+        certain = certain and (continuous[j] or not on[j])
+    if certain:
+        # even the worst is then only as wrong as rounding
+        best_score = DISAGREES - 1
+    # two passes: every mode is judged over the same step, and by the largest rounding error
+    shared = longest
     for judging in (False, True):
         for mode in range(n_modes):
             possible = True
@@ -132,31 +153,32 @@ def choose_mode(
             if not possible:
                 continue
             call_address(address, mode, inputs, parameters, W)
-            h = min(step_length(W, drift, order, tol), longest)
-            if not h > 0.0:
+            length = step_length(W, drift, order, tol)
+            if not length > 0.0:
                 broken = True
+                continue
+            if not judging:
+                shared = min(shared, length)
+                for j in range(n_interfaces):
+                    drop = abs(W[(first_h + j) * (order + 1) + 1]) * min(length, longest)
+                    noise[j] = max(noise[j], 32.0 * EPSILON * drop)
                 continue
             score = AGREES
             for j in range(n_interfaces):
                 if not on[j]:
                     continue
-                total = scaled(W, first_h + j, order, h, b)
-                if not judging:
-                    noise[j] = max(noise[j], 32.0 * EPSILON * min(total, abs(b[1])))
-                    continue
                 if signs[mode, j] != 0:
+                    scaled(W, first_h + j, order, shared, b)
                     score = min(score, agreement(b, order, noise[j], signs[mode, j]))
                 else:
-                    score = min(score, slides(W, drift, order, h, b))
-            if not judging:
-                continue
+                    score = min(score, slides(W, drift, order, shared, b))
             if score > best_score:
                 best, best_score, equals = mode, score, 1
-            elif score == best_score and score > DISAGREES:
+            elif score == best_score and best != NO_MODE:
                 equals += 1
                 if mode == current:
                     best = mode
-    if equals > 1 and best_score == AGREES:
+    if equals > 1 and best_score == AGREES and not certain:
         return MANY_MODES
     return NOT_DEFINED if best == NO_MODE and broken else best
 
