@@ -17,15 +17,20 @@ from fastslow.diagrams.assembly import Curve, branch_of, joined, rising
 from fastslow.diagrams.critical import critical_values
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.solving import point_at, region_equations, solve_at
-from fastslow.diagrams.walking import Piece, Window, beside, walk
+from fastslow.diagrams.walking import Piece, Window, beside, on_interface, walk
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import Corrector, Diagram
+from fastslow.results.outcome import Outcome
 from fastslow.results.points import Equilibrium, SpecialPoint
 
 Array = NDArray[np.float64]
+
+ADMISSIBLE = Outcome(
+    "becomes admissible", "the virtual branch meets the interface and is admissible beyond.", True
+)
 
 
 def continue_equilibria(
@@ -211,9 +216,35 @@ def _branches(
         if inside[rows[0]] or len(rows) < 2:
             continue
         part = Piece(piece.region, piece.u[rows], piece.tangents[rows])
-        cut = Curve((part,), (), curve.outcomes, (None, None), curve.closed and len(edges) == 0)
+        first, last = curve.outcomes
+        if rows[0] > 0:
+            part = _led_to_interface(field, part, piece.u[rows[0] - 1], 0, window)
+            first = ADMISSIBLE
+        if rows[-1] < len(inside) - 1:
+            part = _led_to_interface(field, part, piece.u[rows[-1] + 1], -1, window)
+            last = ADMISSIBLE
+        cut = Curve((part,), (), (first, last), (None, None), curve.closed and not len(edges))
         found.append(branch_of(field, cut, window, marks, False))
     return found
+
+
+def _led_to_interface(
+    field: FrozenField, part: Piece, inside: Array, end: int, window: Window
+) -> Piece:
+    """A virtual piece with the boundary equilibrium added at which it ends."""
+    outside = part.u[end]
+    _, _, h0, _ = field.at(part.region, outside)
+    _, _, h1, _ = field.at(part.region, inside)
+    for interface in np.flatnonzero(h0 * h1 < 0):
+        share = h0[interface] / (h0[interface] - h1[interface])
+        guess = outside + share * (inside - outside)
+        corner = on_interface(field, part.region, int(interface), guess, window)
+        if corner.converged:
+            place = 0 if end == 0 else len(part.u)
+            u = np.insert(part.u, place, corner.u, axis=0)
+            tangents = np.insert(part.tangents, place, part.tangents[end], axis=0)
+            return Piece(part.region, u, tangents)
+    return part
 
 
 def _passes(

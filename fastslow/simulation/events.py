@@ -6,7 +6,7 @@ import numpy as np
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
-from fastslow.simulation.modes import EPSILON, interface_noise, scaled
+from fastslow.simulation.modes import BEGINNING, EPSILON, interface_noise, scaled
 from fastslow.simulation.polynomials import (
     ONE,
     ZERO,
@@ -65,12 +65,17 @@ def find_event(
         row = (first_h + j) * (order + 1)
         if W[row] * sign > 0.0 and not on[j] and kept_away(W, row, row + order, h):
             continue
-        total = scaled(W, first_h + j, order, h, b)
         start = ZERO
         if on[j]:
+            scaled(W, first_h + j, order, BEGINNING * h, b)
             start = first_strong(b, ONE, order, noise[j])
+        total = scaled(W, first_h + j, order, h, b)
+        if on[j]:
             if start > order:
                 rests[j] = True
+                if total > noise[j] and best > BEGINNING:
+                    # only the beginning is known to rest: look again after it
+                    best, interface, touched = BEGINNING, j, False
                 continue
         elif b[0] * sign <= 0.0:
             return 0.0, j, False, 1.0, 0.0

@@ -10,6 +10,10 @@ from fastslow.simulation.polynomials import ONE, ZERO, first_nonzero, first_stro
 
 EPSILON = float(np.finfo(float).eps)
 
+#: The part of a step over which the beginning of a motion is judged: over a whole one that
+#: stability limits, the last terms of the series are much larger than the motion itself.
+BEGINNING = 1.0 / 16.0
+
 #: How well a mode agrees with an interface that it starts on.
 AGREES, LEANS, RESTS, LEANS_AWAY, DISAGREES = 3, 2, 1, 0, -1
 
@@ -168,10 +172,10 @@ def choose_mode(
                 if not on[j]:
                     continue
                 if signs[mode, j] != 0:
-                    scaled(W, first_h + j, order, shared, b)
+                    scaled(W, first_h + j, order, BEGINNING * shared, b)
                     score = min(score, agreement(b, order, noise[j], signs[mode, j]))
                 else:
-                    score = min(score, slides(W, drift, order, shared, b))
+                    score = min(score, slides(W, drift, order, BEGINNING * shared, b))
             if score > best_score:
                 best, best_score, equals = mode, score, 1
             elif score == best_score and best != NO_MODE:

@@ -100,6 +100,13 @@ def test_virtual_folds(folded):
     assert sorted(p["x"] for p in unreal) == pytest.approx([-VIRTUAL_X, VIRTUAL_X], abs=1e-12)
 
 
+def test_virtual_branches_end_on_the_interface_exactly(folded):
+    ends = [p for b in folded.branches if not b.admissible for p in b.special if p.code == "EP"]
+    on_interface = [p for p in ends if "is admissible beyond" in p.note]
+    assert sorted(p["x"] for p in on_interface) == pytest.approx([-0.25, 0.25], abs=1e-15)
+    assert [p["w"] for p in on_interface] == pytest.approx([0, 0], abs=1e-15)
+
+
 def test_at_agrees_with_companion_roots(folded):
     """NumPy's roots of the closed-form cubic, kept where they are admissible."""
     for w in np.linspace(-0.29, 0.29, 24):
