@@ -78,7 +78,28 @@ def positive(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol] = ())
         main = sp.Or(both, none)
     else:
         main = sp.Gt(sp.Mul(flip, *open_parts), 0)
-    return sp.And(main, *avoided)
+    return plain(sp.And(main, *avoided))
+
+
+def plain(condition: Boolean) -> Boolean:
+    """A condition that only compares one symbol with numbers, as its intervals.
+
+    Examples
+    --------
+    >>> from fastslow.model.structure import real
+    >>> w = real("w")
+    >>> plain(((w > -1) & (w > 1)) | ((w < -1) & (w < 1)))
+    (w > 1) | (w < -1)
+    """
+    if not isinstance(condition, (sp.And, sp.Or)) or len(condition.free_symbols) != 1:
+        return condition
+    (symbol,) = condition.free_symbols
+    for relation in condition.atoms(sp.core.relational.Relational):
+        if not (relation.lhs == symbol and relation.rhs.is_Rational):
+            return condition
+    intervals: Boolean = condition.as_set().as_relational(symbol)
+    turned = [r for r in intervals.atoms(sp.core.relational.Relational) if r.lhs.is_number]
+    return intervals.xreplace({r: r.reversed for r in turned})
 
 
 def _one(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean:

@@ -260,7 +260,9 @@ def _form(family: Family, root: Root | None, inner: Stability, setting: Setting)
         curve_at = {s: e for s, e in curve.items() if e is not None}
         equations = () if curve_at else family.equations
         unknowns = family.elimination.unknowns
-        check = checked(setting.rates.values(), {**values, **curve_at}, signs, equations, unknowns)
+        # a state may be written with the slow parameter, which has its own value on the curve
+        place = {**{n: e.xreplace(curve_at) for n, e in values.items()}, **curve_at}
+        check = checked(setting.rates.values(), place, signs, equations, unknowns)
     kind = "explicit" if explicit else "curve" if family.curve is not None else "implicit"
     return EquilibriumForm(
         setting.region,

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
+import fastslow as fs
 from fastslow.model.structure import real
 from tests.symbolic.symbolic_models import law
 
@@ -209,3 +210,28 @@ def test_four_states():
         for c in form.stability.routh_hurwitz
     ]
     assert (min(tests) > 0) == (np.linalg.eigvals(matrix).real.max() < 0)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "cusp",
+        "fitzhugh_nagumo",
+        "hindmarsh_rose",
+        "van_der_pol",
+        "van_der_pol_relaxation",
+        "bilinear_oscillator",
+        "gear_pair",
+        "harmonic_gear",
+        "stick_slip",
+    ],
+)
+def test_every_form_of_a_ready_made_system_is_verified_exactly(name):
+    model = getattr(fs.systems, name)()
+    assert fs.derive(model.frozen()).check == "exact"
+
+
+def test_stability_between_two_hopf_points_reads_as_intervals():
+    w = real("w")
+    (form,) = fs.derive(fs.systems.van_der_pol().frozen())["S1"].equilibria
+    assert form.stability.conditions == (sp.Or(w > 1, w < -1),)
