@@ -235,3 +235,10 @@ def test_stability_between_two_hopf_points_reads_as_intervals():
     w = real("w")
     (form,) = fs.derive(fs.systems.van_der_pol().frozen())["S1"].equilibria
     assert form.stability.conditions == (sp.Or(w > 1, w < -1),)
+
+
+def test_node_or_focus_of_the_gear():
+    x, a, d = real("x"), real("A"), real("D")
+    law = fs.derive(fs.systems.harmonic_gear().frozen())
+    test = law["S1"].stability.focus_test
+    assert sp.expand(test - (4 * (3 * x**2 - 2 * d * x + a) - 1)) == 0
