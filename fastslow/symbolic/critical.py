@@ -109,6 +109,8 @@ def folds(
     points = []
     for located in found:
         point = critical_point("LP", family, located, stability.determinant, setting)
+        if not _defined(point):
+            continue
         if any(_passes(other, point, setting) for other in others):
             point = replace(point, code="BP")
         points.append(point)
@@ -142,7 +144,12 @@ def _meetings(
         for f in found
         if not f.equations
     ]
-    return [p for p in points if any(_passes(o, p, setting) for o in others)]
+    return [p for p in points if _defined(p) and any(_passes(o, p, setting) for o in others)]
+
+
+def _defined(point: CriticalPoint) -> bool:
+    """Whether a point was not found by dividing by zero at the parameter values located."""
+    return not any(undefined(e) for e in (*point.state.values(), *point.parameters.values()))
 
 
 def _passes(other: Family, point: CriticalPoint, setting: Setting) -> bool:
@@ -172,7 +179,7 @@ def cusps(family: Family, setting: Setting) -> list[CriticalPoint]:
         for further in parameters_where(at, known, under, setting.signs, others):
             if not further.equations:
                 points.append(critical_point("CP", family, further, first, setting))
-    return points
+    return [p for p in points if _defined(p)]
 
 
 def hopf_points(family: Family, stability: Stability, setting: Setting) -> list[CriticalPoint]:
@@ -193,7 +200,7 @@ def hopf_points(family: Family, stability: Stability, setting: Setting) -> list[
         return []
     found = locate(family, test, setting.signs, setting.candidates)
     points = [critical_point("HB", family, f, test, setting, stability) for f in found]
-    return [p for p in points if p.exists != sp.false]
+    return [p for p in points if p.exists != sp.false and _defined(p)]
 
 
 def frequency_squared(stability: Stability) -> sp.Expr | None:

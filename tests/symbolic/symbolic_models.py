@@ -137,6 +137,16 @@ def food_chain() -> Model:
     )
 
 
+def two_responses() -> Model:
+    """A food chain with a Holling type II response at both links (Hastings and Powell 1991)."""
+    x, y, z, a1, b1, a2, b2, d1, d2 = sp.symbols("x y z a1 b1 a2 b2 d1 d2")
+    first, second = a1 * x * y / (1 + b1 * x), a2 * y * z / (1 + b2 * y)
+    return Model(
+        {x: x * (1 - x) - first, y: first - second - d1 * y, z: second - d2 * z},
+        parameters={a1: 5, b1: 3, a2: 0.1, b2: 2, d1: 0.4, d2: 0.01},
+    )
+
+
 def quadratic() -> Model:
     """Three states with all quadratic terms."""
     x, y, z, w = sp.symbols("x y z w")

@@ -13,12 +13,28 @@ x, y, a = map(real, ("x", "y", "a"))
 
 
 @pytest.mark.parametrize(
-    "name", ["dense_linear", "food_chain", "quadratic", "hodgkin_huxley", "coupled_oscillators"]
+    "name",
+    [
+        "dense_linear",
+        "food_chain",
+        "two_responses",
+        "quadratic",
+        "hodgkin_huxley",
+        "coupled_oscillators",
+    ],
 )
 def test_every_form_is_verified_and_says_how(name):
     derivation = law(name)
     assert derivation.verified
     assert derivation.check in ("exact", "50 digits")
+
+
+def test_a_special_point_found_by_dividing_by_zero_is_left_out():
+    # at a2 = b2 d2 the coexisting equilibrium is at infinity
+    region = law("two_responses")["S1"]
+    for point in (*region.folds, *region.branch_points, *region.hopf, *region.cusps):
+        for value in (*point.state.values(), *point.parameters.values()):
+            assert not value.has(sp.zoo, sp.nan, sp.oo)
 
 
 @pytest.mark.parametrize("name", ["quadratic", "hodgkin_huxley"])
