@@ -78,8 +78,8 @@ def overlay(
     """Draw a trajectory over the branches of equilibria that it passes.
 
     Jumps at a fold, passages of a boundary equilibrium and other changes of
-    the followed sheet have markers of their own, where the trajectory came
-    nearer to the new sheet; dots mark the crossings of interfaces.
+    the followed sheet have markers of their own, where two thirds of the way
+    to the new sheet are done; dots mark the crossings of interfaces.
 
     Parameters
     ----------

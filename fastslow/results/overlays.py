@@ -42,7 +42,7 @@ class Transition:
     Parameters
     ----------
     time : float
-        When the trajectory came nearer to the new sheet than to the end of the old one.
+        When two thirds of the way from the old sheet to the new one were done.
     value : float
         The slow quantity at that time.
     state : ndarray, shape (n,)

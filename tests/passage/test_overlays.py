@@ -43,8 +43,18 @@ def test_the_change_is_where_two_thirds_of_the_way_are_done(lay, gear):
         assert (0.25 - x) / (0.25 - landing) == pytest.approx(2 / 3, abs=1e-5)
 
 
-def test_distance_is_small_while_a_sheet_is_followed(lay):
-    assert np.median(lay.distance) < 1e-2
+def test_distance_is_that_to_the_closed_form(lay, gear):
+    """On S1, x solves (x² + A)(x − D) = w; rows in between are interpolated to six digits."""
+    a = gear.parameters["A"]
+    extent = np.ptp(lay.state, axis=0)
+    on = [k for k in range(0, len(lay.time), 40) if lay.sheets[lay.followed[k]].label == "S1"]
+    on = [k for k in on if 0 < lay.slow[k] < 6]
+    assert len(on) > 20
+    for k in on:
+        roots = np.roots([1, -0.25, a, -0.25 * a - lay.slow[k]])
+        (x,) = roots[np.abs(roots.imag) < 1e-9].real
+        expected = np.hypot(*((lay.state[k] - [x, 0]) / extent))
+        assert lay.distance[k] == pytest.approx(expected, abs=1e-6)
     assert lay.distance.shape == lay.time.shape == lay.followed.shape
 
 
