@@ -221,6 +221,19 @@ class Model:
         return common_period(laws, TIME, self.values)
 
     @property
+    def vanished(self) -> tuple[str, ...]:
+        """Names of regions seen at other parameter values that are empty at these.
+
+        Examples
+        --------
+        >>> x, D = sp.symbols("x D")
+        >>> model = Model({x: -sp.Max(x - D, -x - D, 0)}, parameters={D: 1})
+        >>> model.vanished, model.with_parameters(D=0).vanished
+        ((), ('S2',))
+        """
+        return tuple(n for n in sorted(set(self.structure.names.values())) if n not in self.regions)
+
+    @property
     def values(self) -> dict[sp.Symbol, float]:
         """Parameter values by (real) symbol, for substitution."""
         return {real(name): value for name, value in self.parameters.items()}
@@ -266,6 +279,8 @@ class Model:
         for region in self.regions.values():
             rates = ", ".join(f"{state}' = {rate}" for state, rate in region.rates.items())
             lines.append(f"  {region}:  {rates}" if len(self.regions) > 1 else f"  {rates}")
+        if self.vanished:
+            lines.append(f"  empty at these parameter values: {', '.join(self.vanished)}")
         lines += [f"  {name} = {law}" for name, law in self.forcing.items()]
         if self.parameters:
             lines.append("  " + ", ".join(f"{k} = {v:g}" for k, v in self.parameters.items()))

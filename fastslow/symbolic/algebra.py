@@ -6,6 +6,7 @@ budget is only expanded, and what is past expansion is left as it is.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 
@@ -28,6 +29,9 @@ PARTS = 600
 
 #: Most terms that an expansion may be expected to give.
 EXPANDED = 800
+
+#: Factored and shortened expressions that are kept for the next question about them.
+MEMORY = 2048
 
 
 def spread(expression: sp.Expr) -> sp.Expr:
@@ -54,6 +58,20 @@ def longer(expression: sp.Basic, parts: int) -> bool:
     """
     traversal = sp.preorder_traversal(expression)
     return any(k >= parts for k, _ in enumerate(traversal))
+
+
+def compressed(expression: sp.Expr) -> bool:
+    """Whether products or powers of sums stand in a sum.
+
+    Examples
+    --------
+    >>> x, y = sp.symbols("x y")
+    >>> compressed(x * (x + y) + 1), compressed(x**2 + x * y + 1 / (x + y))
+    (True, False)
+    """
+    pieces = [p for term in sp.Add.make_args(expression) for p in sp.Mul.make_args(term)]
+    bases = [p.base if p.is_Pow and p.exp.is_positive else p for p in pieces]
+    return any(b.is_Add and b != expression for b in bases)
 
 
 def growth(expression: sp.Expr) -> float:
@@ -153,17 +171,18 @@ def numerator(expression: sp.Expr) -> sp.Expr:
     return spread(sp.together(expanded).as_numer_denom()[0])
 
 
-def factors(expression: sp.Expr) -> tuple[sp.Expr, list[tuple[sp.Expr, int]]]:
+@functools.lru_cache(maxsize=MEMORY)
+def factors(expression: sp.Expr) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ...]]:
     """Constant and irreducible factors with powers; past the budget, the expression itself.
 
     Examples
     --------
     >>> x = sp.Symbol("x")
     >>> factors(2 * x**2 - 2)
-    (2, [(x - 1, 1), (x + 1, 1)])
+    (2, ((x - 1, 1), (x + 1, 1)))
     """
     if expression.is_number:
-        return expression, []
+        return expression, ()
     if not light(expression):
         pieces: list[tuple[sp.Expr, int]] = []
         constant = sp.S.One
@@ -175,12 +194,12 @@ def factors(expression: sp.Expr) -> tuple[sp.Expr, list[tuple[sp.Expr, int]]]:
                 pieces.append((base, int(power)))
             else:
                 pieces.append((part, 1))
-        return constant, pieces
+        return constant, tuple(pieces)
     try:
         constant, pieces = sp.factor_list(expression)
     except sp.PolynomialError:
-        return sp.S.One, [(expression, 1)]
-    return constant, list(pieces)
+        return sp.S.One, ((expression, 1),)
+    return constant, tuple(pieces)
 
 
 def undefined(expression: sp.Expr) -> bool:
@@ -188,6 +207,7 @@ def undefined(expression: sp.Expr) -> bool:
     return bool(expression.has(sp.nan, sp.zoo, sp.oo, -sp.oo))
 
 
+@functools.lru_cache(maxsize=MEMORY)
 def shortest(expression: sp.Expr) -> sp.Expr:
     """Factored or expanded, whichever takes fewer operations; as it is when past the budget.
 

@@ -10,7 +10,7 @@ import sympy as sp
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.structure import real
 from fastslow.results.named import Named
-from fastslow.symbolic.algebra import growth, light, numerator, spread, whole
+from fastslow.symbolic.algebra import generators, growth, light, longer, numerator, spread, whole
 
 #: Orders of elimination that are compared before the best so far is taken.
 ORDERS = 40
@@ -20,6 +20,9 @@ TERMS = 400
 
 #: A substitution that may give more terms than this is not made.
 LONGEST = 120
+
+#: Parts of a longer equation up to which it is kept unexpanded where it is no polynomial.
+PARTS = 400
 
 Nonzero = Callable[[sp.Expr], bool]
 
@@ -122,7 +125,7 @@ def eliminate(
     best = _best(start, known)
     solved: dict[sp.Symbol, sp.Expr] = {}
     for symbol, value in reversed(best.solved):
-        solved[symbol] = _flat(value.xreplace(solved))
+        solved[symbol] = _compact(value.xreplace(solved))
     return Elimination(
         tuple(e for e in best.equations if e != 0),
         tuple(s for s in symbols if s not in solved),
@@ -212,11 +215,10 @@ def _further(step: _Step, nonzero: Nonzero) -> list[_Step]:
             slope = equation.diff(symbol)
             if slope == 0 or symbol in slope.free_symbols or not nonzero(slope):
                 continue
-            value = _flat(-equation.subs(symbol, 0) / slope)
-            others = tuple(
-                _tidy(e.subs(symbol, value)) for k, e in enumerate(step.equations) if k != row
-            )
-            if any(growth(e) > LONGEST for e in others):
+            value = _compact(-equation.subs(symbol, 0) / slope)
+            rest = [e for k, e in enumerate(step.equations) if k != row]
+            others = tuple(_put(e, symbol, value, step.left) for e in rest)
+            if None in others:
                 continue
             found.append(
                 _Step(
@@ -227,6 +229,28 @@ def _further(step: _Step, nonzero: Nonzero) -> list[_Step]:
                 )
             )
     return found
+
+
+def _put(
+    equation: sp.Expr, symbol: sp.Symbol, value: sp.Expr, unknowns: Sequence[sp.Symbol]
+) -> sp.Expr | None:
+    """Substitute and expand; past the budget as it stands if that is no polynomial, else None."""
+    if symbol not in equation.free_symbols:
+        return equation
+    inside = equation.subs(symbol, value)
+    expanded = _tidy(inside)
+    if growth(expanded) <= LONGEST:
+        return expanded
+    bent = not value.is_polynomial(*[u for u in unknowns if u != symbol])
+    return inside if bent and not longer(inside, PARTS) else None
+
+
+def _compact(expression: sp.Expr) -> sp.Expr:
+    """Flat, or with common factors taken out where transcendental functions make that shorter."""
+    flat = _flat(expression)
+    if not generators(expression):
+        return flat
+    return min(flat, sp.factor_terms(expression), key=sp.count_ops)
 
 
 def _flat(expression: sp.Expr) -> sp.Expr:

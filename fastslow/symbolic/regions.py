@@ -169,8 +169,16 @@ def derive_region(setting: Setting, boundary: tuple[BoundaryForm, ...]) -> Regio
         coded("HB"),
         no_hopf,
         tuple(b for b in boundary if setting.region in b.regions),
-        tuple(dict.fromkeys(f.note for f in found if f.note)),
+        _notes(found, points, whole),
     )
+
+
+def _notes(found: list[Family], points: list[CriticalPoint], whole: Stability) -> tuple[str, ...]:
+    """What stayed implicit, each once."""
+    names = {"LP": "fold", "BP": "branch point", "CP": "cusp", "HB": "Hopf"}
+    kept = [f.note for f in found if f.note]
+    sets = [f"the {names[p.code]} set is given by its equations" for p in points if p.equations]
+    return tuple(dict.fromkeys([*kept, *sets, *whole.notes]))
 
 
 def region_conditions(setting: Setting) -> tuple[Boolean, ...]:

@@ -97,12 +97,35 @@ class Signs:
         return sign
 
     def _by_terms(self, expression: sp.Expr) -> int | None:
-        """Sign of a sum whose terms all have one sign, as it stands or expanded."""
+        """Sign of a sum whose terms all have one sign, as it stands, expanded, or by rates."""
         found = _definite(term_bound(expression, self.known))
         if found is not None or not expression.is_Add or longer(expression, PARTS):
             return found
         expanded = spread(expression)
-        return None if expanded == expression else _definite(term_bound(expanded, self.known))
+        if expanded != expression:
+            found = _definite(term_bound(expanded, self.known))
+        return self._by_rates(expanded) if found is None else found
+
+    def _by_rates(self, expanded: sp.Expr) -> int | None:
+        """Sign of a sum in which u/(1 − exp(u)), negative for every real u, is spread out.
+
+        The opening rate of a gate (Hodgkin and Huxley 1952, eq. 12) is such a quotient.
+        """
+        grouped: dict[sp.Expr, sp.Expr] = {}
+        alone: list[sp.Expr] = []
+        for term in sp.Add.make_args(expanded):
+            rest, kind = term.as_independent(sp.exp, as_Add=False)
+            constant, exponential = (1 / kind).as_independent(sp.exp, as_Add=True)
+            over = exponential / -constant if constant.is_Rational and constant != 0 else None
+            if isinstance(over, sp.exp):
+                grouped[over] = grouped.get(over, sp.S.Zero) + rest / constant
+            else:
+                alone.append(term)
+        if not grouped:
+            return None
+        sides = {self.sign(term) for term in alone}
+        sides |= {self.sign(-sp.cancel(e / over.args[0])) for over, e in grouped.items()}
+        return sides.pop() if len(sides) == 1 else None
 
     def _part_sign(self, part: sp.Expr) -> int | None:
         found = self._by_terms(part)

@@ -12,6 +12,7 @@ from sympy.logic.boolalg import Boolean
 from fastslow.model.structure import real
 from fastslow.symbolic.algebra import (
     characteristic_coefficients,
+    compressed,
     determinant,
     growth,
     spread,
@@ -80,6 +81,15 @@ class Stability:
         if 0 in self.signs and None not in self.signs:
             return "neutral"
         return "depends"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Which of the Routh-Hurwitz expressions are not expanded, past the budget."""
+        return tuple(
+            f"Routh-Hurwitz expression {k} is past the budget of expansion; given as products"
+            for k, e in enumerate(self.routh_hurwitz, 1)
+            if compressed(e)
+        )
 
     @property
     def hopf_test(self) -> sp.Expr | None:

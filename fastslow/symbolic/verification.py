@@ -157,7 +157,10 @@ def _at_points(
 
 
 def _left_over(expression: sp.Expr, point: Place) -> bool | None:
-    """Whether the terms of a sum cancel at a point; None where they have no value."""
+    """Whether the terms of a sum, or of a factor, cancel at a point; None where undefined."""
+    if expression.is_Mul:
+        each = [_left_over(factor, point) for factor in expression.args]
+        return None if None in each else any(each)
     terms = [t.xreplace(dict(point)).evalf(DIGITS) for t in sp.Add.make_args(expression)]
     if not all(t.is_number and t.is_finite for t in terms):
         return None

@@ -1,11 +1,13 @@
 """Systems whose closed forms grow long: what is past the budget is implicit, and verified."""
 
+import mpmath
 import numpy as np
 import pytest
 import sympy as sp
 
 from fastslow.model.structure import real
 from fastslow.symbolic.linear import NOTE, cramer
+from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.verification import checked, weakest
 from tests.symbolic.symbolic_models import dense_linear, food_chain, law
 
@@ -37,11 +39,46 @@ def test_a_special_point_found_by_dividing_by_zero_is_left_out():
             assert not value.has(sp.zoo, sp.nan, sp.oo)
 
 
-@pytest.mark.parametrize("name", ["quadratic", "hodgkin_huxley"])
-def test_implicit_forms_say_so(name):
-    region = law(name)["S1"]
+def test_implicit_forms_say_so():
+    region = law("quadratic")["S1"]
     assert [e.kind for e in region.equilibria] == ["implicit"]
     assert any("equations are left" in note for note in region.notes)
+
+
+def test_conditions_past_the_budget_say_so():
+    region = law("hodgkin_huxley")["S1"]
+    assert "the Hopf set is given by its equations" in region.notes
+    assert sum(note.startswith("Routh-Hurwitz expression") for note in region.notes) == 3
+    assert not any("Routh" in note for note in law("lorenz")["S1"].notes)
+
+
+def test_gates_are_divided_by_their_rates():
+    # steady gates alpha/(alpha + beta) and the steady current, written out by hand in mpmath
+    (form,) = law("hodgkin_huxley")["S1"].equilibria
+    assert form.kind == "curve"
+    values = {real("g_Na"): 120, real("g_K"): 36, real("g_L"): sp.Rational(3, 10)}
+    for volts in (-65, -52, 7):
+        v, one = mpmath.mpf(volts), mpmath.mpf(1)
+        up_m = (v + 40) / 10 / (1 - mpmath.exp(-(v + 40) / 10))
+        up_n = (v + 55) / 100 / (1 - mpmath.exp(-(v + 55) / 10))
+        up_h, down_h = 0.07 * mpmath.exp(-(v + 65) / 20), one / (1 + mpmath.exp(-(v + 35) / 10))
+        m = up_m / (up_m + 4 * mpmath.exp(-(v + 65) / 18))
+        n = up_n / (up_n + mpmath.exp(-(v + 65) / 80) / 8)
+        h = up_h / (up_h + down_h)
+        ionic = 120 * m**3 * h * (v - 50) + 36 * n**4 * (v + 77) + mpmath.mpf(3) / 10 * (v + 54)
+        place = {**values, real("v"): volts}
+        assert float(form.parameter["I"].subs(place)) == pytest.approx(float(ionic), rel=1e-13)
+        mine = [float(form.state[s].subs(place)) for s in "mhn"]
+        assert mine == pytest.approx([float(m), float(h), float(n)], rel=1e-13)
+
+
+def test_sign_of_a_gate_rate():
+    signs, rate = Signs({a: 1}), (x + 40) / 10 / (1 - sp.exp(-(x + 40) / 10))
+    assert signs.sign(a * rate + sp.exp(-x)) == 1
+    assert signs.sign(a * rate - sp.exp(-x)) is None
+    assert signs.sign(a * x / (1 - sp.exp(x)) - a) == -1
+    # the exponent belongs to another zero than the factor in front
+    assert signs.sign((x + 40) / (1 - sp.exp(-(x + 39)))) is None
 
 
 def test_dense_linear_system_against_numpy():
@@ -77,6 +114,8 @@ def test_verification_says_how():
     assert checked([x**2 - a], {x: sp.sqrt(a)}) == "exact"
     assert checked([sp.sin(x) ** 2 + sp.cos(x) ** 2 - 1], {}) == "50 digits"
     assert checked([x**2 - a], {x: a}) == ""
+    # the terms cancel inside a factor
+    assert checked([a * (sp.sin(x) ** 2 + sp.cos(x) ** 2 - 1)], {}) == "50 digits"
     # on a circle, where nothing is solved for
     circle = x**2 + y**2 - a
     assert checked([sp.exp(circle) - 1], {}, None, [circle], [x]) == "50 digits"
