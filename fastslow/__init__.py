@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fastslow import plot, systems
     from fastslow.continuation.settings import Continuation
+    from fastslow.diagrams.point_curves import continue_points
     from fastslow.diagrams.solving import equilibria
     from fastslow.diagrams.tracing import continue_equilibria
     from fastslow.errors import (
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from fastslow.results.branches import Branch
     from fastslow.results.diagrams import Diagram
     from fastslow.results.overlays import Overlay
+    from fastslow.results.point_branches import PointBranch
     from fastslow.results.points import Equilibrium, SpecialPoint
     from fastslow.results.trajectories import Trajectory
     from fastslow.simulation.trajectories import simulate
@@ -46,10 +48,12 @@ _HOME = {
     "Model": "model.model",
     "ModelError": "errors",
     "Overlay": "results.overlays",
+    "PointBranch": "results.point_branches",
     "SpecialPoint": "results.points",
     "Trajectory": "results.trajectories",
     "UnknownNameError": "errors",
     "continue_equilibria": "diagrams.tracing",
+    "continue_points": "diagrams.point_curves",
     "derive": "symbolic.derivation",
     "disagreements": "symbolic.scaling",
     "equilibria": "diagrams.solving",
@@ -73,11 +77,13 @@ __all__ = [
     "Model",
     "ModelError",
     "Overlay",
+    "PointBranch",
     "SpecialPoint",
     "Trajectory",
     "UnknownNameError",
     "__version__",
     "continue_equilibria",
+    "continue_points",
     "derive",
     "disagreements",
     "equilibria",

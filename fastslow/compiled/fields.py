@@ -17,13 +17,16 @@ from fastslow.errors import ModelError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 
+#: Rates and switching functions of one smooth motion.
+Equations = tuple[Sequence[sp.Expr], Sequence[sp.Expr]]
+
 
 @dataclass(frozen=True)
 class CompiledField:
     """Address of a generated function and how its arrays are laid out.
 
-    The function fills, for u = (states, parameter) of length n + 1: F (n), the
-    Jacobian (n, n + 1) row by row, h (m) and the gradients of h (m, n + 1).
+    The function fills, for u = (states, varying parameters) of length n + k: F (n),
+    the Jacobian (n, n + k) row by row, h (m) and the gradients of h (m, n + k).
 
     Parameters
     ----------
@@ -31,44 +34,51 @@ class CompiledField:
         Of ``void(int64 region, double* u, double* parameters, double* out)``.
     parameters : tuple of str
         Order of the parameter array.
-    n, m : int
-        Numbers of states and interfaces.
+    n, m, k : int
+        Numbers of states, interfaces and varying parameters.
     """
 
     address: int
     parameters: tuple[str, ...]
     n: int
     m: int
+    k: int = 1
 
     @property
     def size(self) -> int:
         """Length of the output array."""
-        return (self.n + self.m) * (self.n + 2)
+        return (self.n + self.m) * (self.n + self.k + 1)
 
 
-def compile_field(model: Model, parameter: str) -> CompiledField:
-    """Compile the frozen rates of every region, with derivatives by the states and a parameter.
+def compile_field(
+    model: Model, *varying: str, modes: Sequence[Equations] | None = None
+) -> CompiledField:
+    """Compile the frozen rates of every region, with derivatives by states and parameters.
 
     Parameters
     ----------
     model : Model
         Without forcing: a frozen model.
-    parameter : str
-        The continuation parameter.
+    *varying : str
+        The continuation parameters.
+    modes : sequence of (rates, switching functions), optional
+        What to compile instead of the regions' rates and the interfaces.
 
     Raises
     ------
     ModelError
         If the rates depend on time.
     """
-    names = (*model.states, parameter)
-    others = tuple(n for n in (*model.parameters, *model.free) if n != parameter)
+    names = (*model.states, *varying)
+    others = tuple(dict.fromkeys(n for n in (*model.parameters, *model.free) if n not in varying))
     rename = {real(n): sp.Symbol(f"u{k}") for k, n in enumerate(names)}
     rename |= {real(n): sp.Symbol(f"p{k}") for k, n in enumerate(others)}
     bodies = []
-    for region in model.regions.values():
-        rows = [region.rates[n] for n in model.states]
-        rows += [i.function for i in model.interfaces.values()]
+    if modes is None:
+        functions = [i.function for i in model.interfaces.values()]
+        modes = [([r.rates[n] for n in model.states], functions) for r in model.regions.values()]
+    for rates, functions in modes:
+        rows = [*rates, *functions]
         unknown = set().union(*(r.free_symbols for r in rows)) - set(rename)
         if unknown:
             name = min(s.name for s in unknown)
@@ -78,12 +88,13 @@ def compile_field(model: Model, parameter: str) -> CompiledField:
             )
         bodies.append(_body(rows, len(model.states), rename))
     module = load_generated(_source(bodies, len(names), len(others)), "field")
-    return CompiledField(module.field.address, others, len(model.states), len(model.interfaces))
+    n, m = len(model.states), max((len(f) for _, f in modes), default=0)
+    return CompiledField(module.field.address, others, n, m, len(varying))
 
 
 def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -> list[str]:
     """Assignments that fill the output array for one region."""
-    unknowns = list(rename)[: n + 1]
+    unknowns = [s for s, new in rename.items() if new.name.startswith("u")]
     values = [r.xreplace(rename) for r in rows]
     slopes = [[r.diff(u).xreplace(rename) for u in unknowns] for r in rows]
     first, second = (list(chain.from_iterable(rows)) for rows in (slopes[:n], slopes[n:]))
@@ -118,8 +129,13 @@ def _source(bodies: Sequence[list[str]], unknowns: int, parameters: int) -> str:
         *(f"    u{k} = u[{k}]" for k in range(unknowns)),
         *(f"    p{k} = p[{k}]" for k in range(parameters)),
     ]
+    # sliding and escaping motion have the same equations
+    alike: dict[tuple[str, ...], list[int]] = {}
     for number, body in enumerate(bodies):
-        lines.append(f"    {'if' if number == 0 else 'elif'} region == {number}:")
+        alike.setdefault(tuple(body), []).append(number)
+    for body, numbers in alike.items():
+        test = " or ".join(f"region == {number}" for number in numbers)
+        lines.append(f"    {'if' if numbers[0] == 0 else 'elif'} {test}:")
         lines += [f"        {line}" for line in body]
     return "\n".join(lines) + "\n"
 

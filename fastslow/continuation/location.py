@@ -50,22 +50,22 @@ def newton(
     scale: Array,
     *,
     iterations: int = 30,
-) -> tuple[Array, float, bool]:
+) -> tuple[Array, float, bool, float]:
     """Newton's method with a differenced Jacobian until the correction is at rounding.
 
     Returns
     -------
-    solution, residual, converged
+    solution, residual, converged, size of the last correction
     """
     z = start.copy()
     value = equations(z)
     size, least = np.inf, np.inf
     for _ in range(iterations):
         if not np.all(np.isfinite(value)):
-            return z, float("inf"), False
+            return z, float("inf"), False, float("inf")
         slopes = _differenced(equations, z, scale)
         if not np.all(np.isfinite(slopes)):
-            return z, float("inf"), False
+            return z, float("inf"), False, float("inf")
         correction = _solved(slopes * scale, -value)
         z = z + correction * scale
         value = equations(z)
@@ -76,7 +76,7 @@ def newton(
     z = without_dust(z, scale)
     value = equations(z)
     residual = float(np.abs(value).max()) if np.all(np.isfinite(value)) else float("inf")
-    return z, residual, bool(size < 1e-8 and _balanced(value, slopes, z, scale))
+    return z, residual, bool(size < 1e-8 and _balanced(value, slopes, z, scale)), size
 
 
 def _balanced(value: Array, slopes: Array, u: Array, scale: Array) -> bool:
@@ -159,10 +159,10 @@ def fold(curve: Curve, start: Array, scale: Array) -> Located:
         q = z[n + 1 :]
         return np.concatenate([value, slopes[:, :n] @ (scale[:n] * q), [guide @ q - 1.0]])
 
-    z, residual, converged = newton(
+    z, residual, converged, size = newton(
         equations, np.append(start, guide), np.append(scale, np.ones(n))
     )
-    return Located(z[: n + 1], residual, converged, scale[:n] * z[n + 1 :])
+    return Located(z[: n + 1], residual, converged, scale[:n] * z[n + 1 :], size)
 
 
 def turning_pair(curve: Curve, start: Array, scale: Array, squared: float) -> Located:
@@ -186,12 +186,12 @@ def turning_pair(curve: Curve, start: Array, scale: Array, squared: float) -> Lo
         double = matrix @ (matrix @ q) + kappa * q
         return np.concatenate([value, double, [guide @ q - 1.0, across @ q]])
 
-    z, residual, converged = newton(
+    z, residual, converged, size = newton(
         equations,
         np.concatenate([start, guide, [squared]]),
         np.concatenate([scale, np.ones(n), [max(1.0, abs(squared))]]),
     )
-    return Located(z[: n + 1], residual, converged, z[-1:])
+    return Located(z[: n + 1], residual, converged, z[-1:], size)
 
 
 def branch_point(curve: Curve, start: Array, scale: Array) -> Located:
@@ -205,13 +205,43 @@ def branch_point(curve: Curve, start: Array, scale: Array) -> Located:
         psi, beta = z[n + 1 : 2 * n + 1], z[-1]
         return np.concatenate([value + beta * psi, scale * (slopes.T @ psi), [guide @ psi - 1.0]])
 
-    z, residual, converged = newton(
+    z, residual, converged, size = newton(
         equations,
         np.concatenate([start, guide, [0.0]]),
         np.concatenate([scale, np.ones(n), [1.0]]),
     )
     converged = converged and abs(z[-1]) < 1e-9
-    return Located(z[: n + 1], residual, converged, z[-1:])
+    return Located(z[: n + 1], residual, converged, z[-1:], size)
+
+
+def crossing_tangents(curve: Curve, u: Array, scale: Array) -> Array | None:
+    """Tangents of the two curves that cross at a branch point, shape (2, n + 1).
+
+    Solutions of ψᵀB(φ, φ) = 0 in the null plane of [F_x F_p] (Kuznetsov 2004,
+    section 10.2.3), of length one in units of the scale; None where the two do
+    not cross with different tangents.
+    """
+    n = len(u) - 1
+    matrix = curve(u)[1] * scale
+    left, _, right = np.linalg.svd(matrix)
+    psi, plane = left[:, -1], right[-2:]
+    step = 1e-4
+
+    def bent(along: Array) -> Array:
+        ahead, back = (curve(u + k * step * scale * along)[1] * scale for k in (1, -1))
+        return np.asarray(psi @ (ahead - back) / (2.0 * step))
+
+    first, second = bent(plane[0]), bent(plane[1])
+    a, b, c = first @ plane[0], first @ plane[1], second @ plane[1]
+    size = max(abs(a), abs(b), abs(c))
+    inside = b * b - a * c
+    if n < 1 or size == 0 or inside <= 1e-6 * size * size:
+        return None
+    # roots of a α² + 2 b αβ + c β² without cancellation
+    q = -(b + np.copysign(np.sqrt(inside), b))
+    pairs = np.array([[q, a], [c, q]])
+    tangents = pairs @ plane
+    return np.asarray(scale * tangents / np.linalg.norm(tangents, axis=1)[:, None])
 
 
 def fold_coefficient(curve: Curve, u: Array, null: Array) -> float:

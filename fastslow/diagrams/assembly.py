@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.continuation.location import crossing_tangents
 from fastslow.diagrams.detection import Detected, special_points
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.walking import Piece, Walk, Window
 from fastslow.results.branches import Branch
 from fastslow.results.outcome import Outcome
-from fastslow.results.points import ClarkePath, SpecialPoint
+from fastslow.results.points import ClarkePath, SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
 
@@ -104,7 +105,7 @@ def branch_of(
         tangents,
         eigenvalues,
         region,
-        tuple(special),
+        SpecialPoints(special),
         tuple(at_row),
         curve.outcomes,
         curve.closed,
@@ -121,6 +122,7 @@ def _special(
         "regions": (field.regions[region],),
         "residual": float(np.abs(rates).max()),
         "converged": True,
+        "source": field.model,
         **more,
     }
     return SpecialPoint(
@@ -152,7 +154,23 @@ def _point(field: FrozenField, piece: Piece, detected: Detected, window: Window)
         converged=located.converged,
         coefficient=detected.coefficient,
         frequency=detected.frequency,
+        lyapunov=detected.lyapunov,
+        accuracy=located.correction,
+        switch=_switch(field, piece, detected, window),
     )
+
+
+def _switch(field: FrozenField, piece: Piece, detected: Detected, window: Window) -> Array | None:
+    """At a branch point the tangent of the branch that crosses this one."""
+    if detected.code != "BP":
+        return None
+    both = crossing_tangents(
+        lambda u: field.curve(piece.region, u), detected.located.u, window.scale
+    )
+    if both is None:
+        return None
+    here = piece.tangents[detected.row]
+    return np.asarray(both[np.argmin(np.abs(both @ (here * window.weight)))])
 
 
 def _corner(field: FrozenField, curve: Curve, number: int) -> SpecialPoint:

@@ -17,6 +17,7 @@ from fastslow.continuation.location import (
     with_condition,
 )
 from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.normal_forms import first_lyapunov, forms_at
 from fastslow.diagrams.walking import Piece, Window
 
 Array = NDArray[np.float64]
@@ -31,6 +32,7 @@ class Detected:
     located: Located
     coefficient: float | None = None
     frequency: float | None = None
+    lyapunov: float | None = None
 
 
 @np.errstate(all="ignore")
@@ -118,7 +120,13 @@ def _turning_pairs(field: FrozenField, piece: Piece, window: Window) -> Iterator
         located = turning_pair(lambda u: field.curve(piece.region, u), guess, window.scale, squared)
         kappa = float(located.extra[0])
         if kappa > 0:
-            yield Detected(before, "HB", located, frequency=float(np.sqrt(kappa)))
+            frequency = float(np.sqrt(kappa))
+            lyapunov = first_lyapunov(
+                forms_at(field, piece.region, located.u),
+                field.curve(piece.region, located.u)[1][:, :n],
+                frequency,
+            )
+            yield Detected(before, "HB", located, frequency=frequency, lyapunov=lyapunov)
         else:
             yield Detected(before, "NSD", located)
 

@@ -26,23 +26,31 @@ class FrozenField:
         With a value for every parameter but the one that varies.
     parameter : str
         The one that varies.
+    second : str, optional
+        One more that varies, along curves in a parameter plane.
     """
 
     model: Model
     parameter: str
+    second: str | None = None
 
     def __post_init__(self) -> None:
         names = (*self.model.free, *self.model.parameters)
-        missing = [n for n in names if n not in (*self.model.parameters, self.parameter)]
+        missing = [n for n in names if n not in (*self.model.parameters, *self.varying)]
         if missing:
             raise ModelError(
                 f"the frozen slow quantity '{missing[0]}' has no value; give one, "
                 f"as in with_parameters({missing[0]}=…)"
             )
 
+    @property
+    def varying(self) -> tuple[str, ...]:
+        """The parameters that vary, k of them."""
+        return (self.parameter,) if self.second is None else (self.parameter, self.second)
+
     @cached_property
     def compiled(self) -> CompiledField:
-        return compile_field(self.model, self.parameter)
+        return compile_field(self.model, *self.varying)
 
     @cached_property
     def values(self) -> Array:
@@ -68,19 +76,19 @@ class FrozenField:
         return len(self.model.states)
 
     def at(self, region: int, points: ArrayLike) -> tuple[Array, Array, Array, Array]:
-        """F (…, n), [F_x F_p] (…, n, n + 1), h (…, m) and ∇h (…, m, n + 1) at points u."""
+        """F (…, n), [F_x F_p] (…, n, n + k), h (…, m) and ∇h (…, m, n + k) at points u."""
         u = np.asarray(points, dtype=float)
         rows = np.atleast_2d(u)
         modes = np.full(len(rows), region, dtype=np.int64)
         out = loop("evaluate")(self.compiled.address, modes, rows, self.values, self.compiled.size)
-        n, m = self.n, self.compiled.m
-        parts = np.split(out, np.cumsum([n, n * (n + 1), m]), axis=1)
+        n, m, columns = self.n, self.compiled.m, self.n + self.compiled.k
+        parts = np.split(out, np.cumsum([n, n * columns, m]), axis=1)
         lead = u.shape[:-1]
         return (
             parts[0].reshape(*lead, n),
-            parts[1].reshape(*lead, n, n + 1),
+            parts[1].reshape(*lead, n, columns),
             parts[2].reshape(*lead, m),
-            parts[3].reshape(*lead, m, n + 1),
+            parts[3].reshape(*lead, m, columns),
         )
 
     def curve(self, region: int, u: Array) -> tuple[Array, Array]:

@@ -24,7 +24,7 @@ from fastslow.model.structure import real
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import Corrector, Diagram
 from fastslow.results.outcome import Outcome
-from fastslow.results.points import Equilibrium, SpecialPoint
+from fastslow.results.points import Equilibrium, SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
 
@@ -286,7 +286,7 @@ def _labelled(branches: list[Branch]) -> tuple[Branch, ...]:
             points.append(replace(point, label=label))
             if point.code == "BP":
                 shared.append(points[-1])
-        done.append(replace(branch, special=tuple(points)))
+        done.append(replace(branch, special=SpecialPoints(points)))
     return tuple(done)
 
 

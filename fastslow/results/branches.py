@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.errors import unknown_name
 from fastslow.results.outcome import Outcome
-from fastslow.results.points import SpecialPoint, stability_of
+from fastslow.results.points import SpecialPoints, stability_of
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,8 @@ class Branch:
         Of the Jacobian in the row's region.
     region : ndarray of str, shape (N,)
         The region whose rates vanish.
-    special : tuple of SpecialPoint
-        In order along the branch.
+    special : SpecialPoints
+        In order along the branch; ``branch.special("LP")`` gives those of one code.
     special_rows : tuple of int
         The row of each special point (of a boundary equilibrium, the first of its two).
     outcomes : tuple of Outcome
@@ -73,7 +73,7 @@ class Branch:
     tangent: NDArray[np.float64]
     eigenvalues: NDArray[np.complex128]
     region: NDArray[np.str_]
-    special: tuple[SpecialPoint, ...]
+    special: SpecialPoints
     special_rows: tuple[int, ...]
     outcomes: tuple[Outcome, Outcome]
     closed: bool = False

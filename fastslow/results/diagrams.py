@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.branches import Branch
-from fastslow.results.points import CODE_NAMES, Equilibrium, SpecialPoint
+from fastslow.results.points import Equilibrium, SpecialPoints
 
 #: Solves for the equilibrium of a region near a state: (region, state, value) -> Equilibrium.
 Corrector = Callable[[str, NDArray[np.float64], float], Equilibrium | None]
@@ -59,22 +59,16 @@ class Diagram:
         return {**self.__dict__, "corrector": None}
 
     @property
-    def special_points(self) -> tuple[SpecialPoint, ...]:
-        """Every special point, branch by branch, in order along each."""
-        return tuple(point for branch in self.branches for point in branch.special)
-
-    def special(self, code: str) -> tuple[SpecialPoint, ...]:
-        """The special points of one code."""
-        if code not in CODE_NAMES:
-            raise unknown_name("special point code", code, CODE_NAMES)
-        return tuple(point for point in self.special_points if point.code == code)
+    def special(self) -> SpecialPoints:
+        """Every special point, branch by branch; ``diagram.special("BE")`` those of one code."""
+        return SpecialPoints(point for branch in self.branches for point in branch.special)
 
     @property
-    def folds(self) -> tuple[SpecialPoint, ...]:
+    def folds(self) -> SpecialPoints:
         return self.special("LP")
 
     @property
-    def boundary_equilibria(self) -> tuple[SpecialPoint, ...]:
+    def boundary_equilibria(self) -> SpecialPoints:
         return self.special("BE")
 
     def at(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +22,17 @@ CODE_NAMES = {
     "BP": "branch point",
     "NSD": "neutral saddle",
     "BE": "boundary equilibrium",
+    "CP": "cusp",
+    "BT": "Bogdanov-Takens",
+    "GH": "generalized Hopf",
+    "ZH": "zero-Hopf",
+    "HH": "double Hopf",
+    "BF": "fold on an interface",
+    "BH": "Hopf on an interface",
 }
+
+#: A first Lyapunov coefficient below this decides nothing.
+FLAT = 1e-10
 
 
 def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
@@ -220,7 +231,8 @@ class SpecialPoint(_Point):
     Parameters
     ----------
     code : str
-        LP, HB, BP, NSD, BE, UZ or EP.
+        LP, HB, BP, NSD, BE, UZ or EP; on a curve of such points CP, BT, GH, ZH,
+        HH, BF or BH.
     label : str
         The code with its number along the diagram, such as ``"BE2"``.
     states, state, parameters
@@ -230,7 +242,8 @@ class SpecialPoint(_Point):
     eigenvalues : ndarray of complex, shape (n,)
         Of the Jacobian in ``regions[0]``.
     tangent : ndarray, shape (n + 1,)
-        Unit tangent of the branch, (states, parameter), in the direction of tracing.
+        Unit tangent of the branch, (states, parameter), in the direction of tracing;
+        on a curve of points (states, two parameters), shape (n + 2,).
     residual : float
         Largest component of the defining equations that is left.
     converged : bool
@@ -242,11 +255,26 @@ class SpecialPoint(_Point):
     clarke : ClarkePath, optional
         For boundary equilibria of a continuous field.
     coefficient : float, optional
-        Quadratic normal-form coefficient of a fold, a in y' = β + a y².
+        Normal-form coefficient: of a fold a in y' = β + a y² (Kuznetsov 2004, eq.
+        5.26), of a cusp c in y' = β₁ + β₂ y + c y³ (eq. 8.131), both for a null
+        vector of length one.
     frequency : float, optional
-        Angular frequency at a Hopf point.
+        Angular frequency at a Hopf point; at a double Hopf point of the pair that
+        the curve does not follow.
+    lyapunov : float, optional
+        First Lyapunov coefficient l₁ of a Hopf point (Kuznetsov 2004, eq. 5.34),
+        for an eigenvector of length one.
+    switch : ndarray, shape (n + 1,), optional
+        At a branch point the unit tangent of the other branch.
+    accuracy : float, optional
+        Newton's last correction in units of the branch's scales: how well the
+        point is known.
+    admissible : bool
+        Whether it lies in its region; otherwise it is virtual.
     note : str
         What else a reader should know, e.g. why an end point is one.
+    source : object, optional
+        The frozen model, for `continue_points`; not kept in a file.
     """
 
     code: str
@@ -264,16 +292,53 @@ class SpecialPoint(_Point):
     clarke: ClarkePath | None = field(default=None, repr=False)
     coefficient: float | None = None
     frequency: float | None = None
+    lyapunov: float | None = None
+    switch: NDArray[np.float64] | None = field(default=None, repr=False)
+    accuracy: float | None = None
+    admissible: bool = True
     note: str = ""
+    source: Any = field(default=None, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "source": None}
+
+    @property
+    def criticality(self) -> str | None:
+        """Of a Hopf point: ``"supercritical"`` (l₁ < 0), ``"subcritical"`` or ``"degenerate"``."""
+        if self.code != "HB" or self.lyapunov is None:
+            return None
+        if abs(self.lyapunov) <= FLAT:
+            return "degenerate"
+        return "supercritical" if self.lyapunov < 0 else "subcritical"
 
     @property
     def description(self) -> str:
         """What it is and where, in words."""
         kind = CODE_NAMES.get(self.code, self.code)
-        if self.subtype:
-            kind += f", {self.subtype}"
+        if self.subtype or self.criticality:
+            kind += f", {self.subtype or self.criticality}"
+        if self.clarke is not None and self.clarke.q_hopf is not None:
+            kind += " with Clarke-Hopf"
+        if not self.admissible:
+            kind = f"virtual {kind}"
         on = f" on {self.interface}" if self.interface else ""
         return f"{kind}{on}; {self._values()}"
 
     def __repr__(self) -> str:
         return f"SpecialPoint({self.label}: {self.description})"
+
+
+class SpecialPoints(tuple[SpecialPoint, ...]):
+    """Special points in order along a branch or diagram; called with a code, those of that code.
+
+    Examples
+    --------
+    >>> SpecialPoints()("LP")
+    ()
+    """
+
+    def __call__(self, code: str) -> SpecialPoints:
+        """Those of one code; UnknownNameError for a code that there is not."""
+        if code not in CODE_NAMES:
+            raise unknown_name("special point code", code, CODE_NAMES)
+        return SpecialPoints(point for point in self if point.code == code)

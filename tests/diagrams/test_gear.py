@@ -158,13 +158,13 @@ def test_symmetry(a, d):
     assume(abs(fold_w - 1.5) > 1e-3)
     model = fs.systems.harmonic_gear(A=a, D=d).frozen()
     diagram = fs.continue_equilibria(model, "w", (-1.5, 1.5))
-    codes = [p.code for p in diagram.special_points]
+    codes = [p.code for p in diagram.special]
     assert codes.count("BE") == 2
     assert codes.count("LP") == (2 if a < -(d**2) and fold_w < 1.5 else 0)
-    for point in diagram.special_points:
+    for point in diagram.special:
         mirrored = [
             max(abs(p["w"] + point["w"]), abs(p["x"] + point["x"]))
-            for p in diagram.special_points
+            for p in diagram.special
             if p.code == point.code
         ]
         assert min(mirrored) < 1e-11

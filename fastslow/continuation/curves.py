@@ -1,0 +1,233 @@
+"""A curve G(z) = 0 traced by pseudo-arclength where derivatives of G are differenced.
+
+For curves of special points, whose equations hold derivatives already: short
+tables, few steps, so that plain NumPy serves. The first entries of z are the
+point (states, two parameters); the others, null vectors and the like, follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation.location import newton
+from fastslow.continuation.settings import Continuation
+
+Array = NDArray[np.float64]
+
+#: How a trace ends.
+FULL, RANGE, SMALL_STEP, WINDOW, CLOSED, STOPPED = (
+    "full",
+    "range",
+    "small step",
+    "window",
+    "closed",
+    "stopped",
+)
+
+
+class System(Protocol):
+    """Equations G(z) = 0, N in number for N + 1 unknowns, that hold vectors of free length.
+
+    A guide is a point z of the curve, by which the vectors in another are
+    normalised.
+    """
+
+    def residual(self, z: Array, guide: Array) -> Array:
+        """G at points z of shape (…, N + 1), shape (…, N)."""
+
+    def renewed(self, z: Array) -> Array:
+        """The same point with vectors of length one, good as a guide."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Where a curve is traced, and in which units.
+
+    Parameters
+    ----------
+    size : int
+        Leading entries of z in which arclength is measured.
+    scale : ndarray, shape (N + 1,)
+        Unit of every entry.
+    lower, upper : ndarray, shape (2,)
+        Range of the last two of the leading entries.
+    """
+
+    size: int
+    scale: Array
+    lower: Array
+    upper: Array
+
+    @property
+    def weight(self) -> Array:
+        weight = np.zeros(len(self.scale))
+        weight[: self.size] = self.scale[: self.size] ** -2.0
+        return weight
+
+    def outside(self, z: Array) -> bool:
+        plane = z[self.size - 2 : self.size]
+        return bool(np.any(plane < self.lower) or np.any(plane > self.upper))
+
+
+def slopes(system: System, z: Array, guide: Array, scale: Array) -> Array:
+    """Derivative of G by central differences, shape (N, N + 1), in one evaluation."""
+    steps = np.diag(6e-6 * np.maximum(np.abs(z), scale))
+    both = np.concatenate([z + steps, z - steps])
+    values = system.residual(both, guide)
+    count = len(z)
+    return np.asarray((values[:count] - values[count:]).T / (2.0 * np.diag(steps)))
+
+
+def tangent(system: System, z: Array, frame: Frame) -> Array:
+    """Null vector of the derivative, of length one in the frame."""
+    matrix = slopes(system, z, z, frame.scale) * frame.scale
+    rows = np.abs(matrix).max(axis=1, keepdims=True)
+    _, _, right = np.linalg.svd(matrix / np.where(rows > 0, rows, 1.0))
+    along = right[-1] * frame.scale
+    length = np.sqrt((along**2) @ frame.weight)
+    return np.asarray(along / length) if length > 0 else along
+
+
+@np.errstate(all="ignore")
+def corrected(
+    system: System, guess: Array, direction: Array, frame: Frame, settings: Continuation
+) -> tuple[Array, int] | None:
+    """The point of the curve in the plane through a guess, and the Newton steps it took."""
+    z, normal = guess.copy(), direction * frame.weight
+    guide = system.renewed(guess)
+    for used in range(1, settings.iterations + 1):
+        matrix = np.vstack([slopes(system, z, guide, frame.scale), normal]) * frame.scale
+        right = np.append(-system.residual(z, guide), (guess - z) @ normal)
+        rows = np.abs(matrix).max(axis=1)
+        if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(right)) and rows.all()):
+            return None
+        try:
+            step = np.linalg.solve(matrix / rows[:, None], right / rows)
+        except np.linalg.LinAlgError:
+            return None
+        z = z + step * frame.scale
+        if np.abs(step).max() <= settings.tolerance:
+            # one more, whose matrix is the same to rounding
+            right = np.append(-system.residual(z, guide), (guess - z) @ normal)
+            z = z + np.linalg.solve(matrix / rows[:, None], right / rows) * frame.scale
+            return system.renewed(z), used
+    return None
+
+
+def landed(system: System, guess: Array, frame: Frame) -> Array | None:
+    """The point of the curve nearest to a guess, None where Newton's method fails."""
+    guide = system.renewed(guess)
+    z, _, converged, _ = newton(lambda z: system.residual(z, guide), guess, frame.scale)
+    return system.renewed(z) if converged else None
+
+
+def follow(
+    system: System,
+    start: Array,
+    direction: Array,
+    frame: Frame,
+    settings: Continuation,
+    stop: Callable[[Array], bool] = lambda _: False,
+) -> tuple[Array, Array, str]:
+    """Follow a curve from one of its points until something ends it.
+
+    Parameters
+    ----------
+    system : System
+    start, direction : ndarray, shape (N + 1,)
+    frame : Frame
+    settings : Continuation
+    stop : callable
+        Whether the curve ends after a point.
+
+    Returns
+    -------
+    z, tangents : ndarray, shape (M, N + 1)
+        With ``RANGE`` the last row is exactly on the edge of the range.
+    status : str
+    """
+    rows, tangents = [start], [direction]
+    step = settings.step
+    while len(rows) < settings.points:
+        last, along = rows[-1], tangents[-1]
+        if step < settings.smallest_step:
+            return np.array(rows), np.array(tangents), SMALL_STEP
+        found = corrected(system, last + step * along, along, frame, settings)
+        turned, cosine = along, -1.0
+        if found is not None:
+            turned = tangent(system, found[0], frame)
+            cosine = float((turned * frame.weight) @ along)
+            turned = turned if cosine >= 0 else -turned
+        if found is None or abs(cosine) < np.cos(settings.largest_turn):
+            step *= 0.5
+            continue
+        z, used = found
+        if frame.outside(z):
+            edge = _on_edge(system, last, z, frame)
+            if edge is not None:
+                rows.append(edge)
+                tangents.append(turned)
+            return np.array(rows), np.array(tangents), RANGE
+        rows.append(z)
+        tangents.append(turned)
+        states = frame.size - 2
+        if np.any(np.abs(z[:states]) > settings.reach * frame.scale[:states]):
+            return np.array(rows), np.array(tangents), WINDOW
+        if len(rows) > 4 and _returns(start, direction, last, along, turned, step, frame):
+            rows[-1], tangents[-1] = start, direction
+            return np.array(rows), np.array(tangents), CLOSED
+        if stop(z):
+            return np.array(rows), np.array(tangents), STOPPED
+        if used <= 3 and cosine > np.cos(0.5 * settings.largest_turn):
+            step = min(1.5 * step, settings.largest_step)
+        elif used >= 6:
+            step *= 0.7
+    return np.array(rows), np.array(tangents), FULL
+
+
+def _on_edge(system: System, inside: Array, outside: Array, frame: Frame) -> Array | None:
+    """Where the curve meets the edge of the range between two points."""
+    best: tuple[float, Array] | None = None
+    for k in range(2):
+        entry = frame.size - 2 + k
+        for bound in (frame.lower[k], frame.upper[k]):
+            before, after = inside[entry] - bound, outside[entry] - bound
+            if before == after or before * after > 0 or before == 0:
+                continue
+            share = before / (before - after)
+            guess = inside + share * (outside - inside)
+            guide = system.renewed(guess)
+
+            def equations(
+                z: Array, guide: Array = guide, entry: int = entry, bound: float = bound
+            ) -> Array:
+                return np.append(system.residual(z, guide), z[entry] - bound)
+
+            z, _, converged, _ = newton(equations, guess, frame.scale)
+            if converged and (best is None or share < best[0]):
+                z[entry] = bound
+                best = share, system.renewed(z)
+    return None if best is None else best[1]
+
+
+def _returns(
+    start: Array,
+    direction: Array,
+    last: Array,
+    along: Array,
+    turned: Array,
+    step: float,
+    frame: Frame,
+) -> bool:
+    """Whether the last step passed the start again, in its direction."""
+    gap = start - last
+    ahead = float((gap * frame.weight) @ along)
+    off = gap - ahead * along
+    apart = float(np.sqrt((off**2) @ frame.weight))
+    same = float((direction * frame.weight) @ turned)
+    return 0.0 < ahead <= step and apart < 0.2 * step and same > 0.9

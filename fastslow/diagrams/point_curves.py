@@ -1,0 +1,394 @@
+"""Curves of special points in the plane of two parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation import curves
+from fastslow.continuation.curves import Frame
+from fastslow.continuation.settings import Continuation
+from fastslow.diagrams.codimension_two import Found, along, coefficients, criteria, search
+from fastslow.diagrams.defining import Crossing, Defining, Fold, OnInterface, Pair
+from fastslow.diagrams.fields import FrozenField
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.model import Model
+from fastslow.results.outcome import Outcome
+from fastslow.results.point_branches import PointBranch
+from fastslow.results.points import SpecialPoint, SpecialPoints
+
+Array = NDArray[np.float64]
+
+#: Curves that start from a point of each kind, the usual one first.
+CURVES = {
+    "LP": ("LP",),
+    "HB": ("HB",),
+    "NSD": ("HB",),
+    "BP": ("BP",),
+    "BE": ("BE",),
+    "CP": ("LP",),
+    "BT": ("HB", "LP"),
+    "GH": ("HB",),
+    "ZH": ("HB", "LP"),
+    "HH": ("HB",),
+    "BF": ("BE", "LP"),
+    "BH": ("BE", "HB"),
+}
+
+
+def continue_points(
+    point: SpecialPoint,
+    parameters: Sequence[Any],
+    over: Mapping[Any, tuple[float, float]],
+    *,
+    code: str | None = None,
+    settings: Continuation | None = None,
+    virtual: bool = True,
+) -> PointBranch:
+    """Trace a curve of special points in the plane of two parameters.
+
+    Folds, Hopf points, branch points (in models with a symmetry) and boundary
+    equilibria are followed as extended systems (Kuznetsov 2004, chapter 10);
+    codimension-two points on the way are solved for: CP, BT, GH, ZH, HH, BF
+    (the fold meets an interface) and BH (the Hopf point does).
+
+    Parameters
+    ----------
+    point : SpecialPoint
+        Of a diagram or of another such curve.
+    parameters : sequence of two str or Symbol
+    over : mapping
+        The range of both, in their own units.
+    code : str, optional
+        Which curve to trace from a codimension-two point: ``"LP"`` or ``"HB"``
+        from BT and ZH, ``"BE"`` or ``"LP"`` from BF, ``"BE"`` or ``"HB"`` from BH.
+    settings : Continuation, optional
+        Lengths in units of the ranges.
+    virtual : bool
+        Whether the curve goes on beyond an interface as one of virtual points;
+        the rows say which they are.
+
+    Returns
+    -------
+    PointBranch
+
+    Raises
+    ------
+    ArgumentError
+        If the point has no model (it was read from a file), starts no curve, lies
+        outside the ranges, or a range is empty.
+    UnknownNameError
+        For a name that is no parameter.
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> from fastslow.diagrams.tracing import continue_equilibria
+    >>> x, p, q = sp.symbols("x p q")
+    >>> model = Model({x: p + q * x - x**3}, parameters={p: 0, q: 1})
+    >>> fold = continue_equilibria(model, "p", (-1, 1)).folds[0]
+    >>> curve = continue_points(fold, ("p", "q"), over={"p": (-1, 1), "q": (-1, 2)})
+    >>> [abs(round(c["q"], 12)) for c in curve.special("CP")]
+    [0.0]
+    """
+    first, second = _names(parameters)
+    lower, upper = _ranges((first, second), over)
+    code = _curve_code(point, code)
+    model = _model(point, (first, second))
+    field = FrozenField(model, first, second)
+    settings = settings or Continuation()
+    region = field.regions.index(point.regions[0])
+    u = np.append(point.state, [point.parameters[n] for n in (first, second)])
+    if np.any(u[-2:] < lower) or np.any(u[-2:] > upper):
+        raise ArgumentError(
+            f"the point {point.label} at {first} = {u[-2]:g}, {second} = {u[-1]:g} lies outside "
+            f"over={dict(over)}"
+        )
+    system, start = _system(field, region, code, point, u, upper - lower)
+    frame = _frame(system, start, lower, upper)
+    landing = curves.landed(system, start, frame)
+    if landing is None:
+        raise ArgumentError(
+            f"the point {point.label} does not lie on a curve of {code} points of region "
+            f"{field.regions[region]}: Newton's method did not converge from it"
+        )
+    return _traced(system, landing, frame, settings, point, (first, second), virtual)
+
+
+def _names(parameters: Sequence[Any]) -> tuple[str, str]:
+    names = [str(p) for p in parameters] if not isinstance(parameters, str) else [parameters]
+    if len(names) != 2 or names[0] == names[1]:
+        raise ArgumentError(f"parameters={parameters!r}: expected two different parameters")
+    return names[0], names[1]
+
+
+def _ranges(names: tuple[str, str], over: Mapping[Any, tuple[float, float]]) -> tuple[Array, Array]:
+    if not isinstance(over, Mapping):
+        raise ArgumentError(f"over={over!r}: expected {{'{names[0]}': (low, high), …}}")
+    given = {str(k): v for k, v in over.items()}
+    for name in given:
+        if name not in names:
+            raise unknown_name("parameter in over", name, names)
+    bounds = []
+    for name in names:
+        if name not in given:
+            raise ArgumentError(f"over has no range for '{name}'")
+        try:
+            low, high = (float(v) for v in given[name])
+        except (TypeError, ValueError):
+            raise ArgumentError(
+                f"over['{name}']={given[name]!r}: expected two numbers, its range"
+            ) from None
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise ArgumentError(
+                f"over['{name}']=({low:g}, {high:g}): expected an increasing, finite range"
+            )
+        bounds.append((low, high))
+    table = np.array(bounds)
+    return table[:, 0], table[:, 1]
+
+
+def _curve_code(point: SpecialPoint, code: str | None) -> str:
+    possible = CURVES.get(point.code)
+    if possible is None:
+        raise ArgumentError(
+            f"a point {point.code} starts no curve in a parameter plane; expected one of "
+            f"{', '.join(CURVES)}"
+        )
+    if code is None:
+        return possible[0]
+    if code not in possible:
+        raise unknown_name(f"curve from {point.code}", code, possible)
+    return code
+
+
+def _model(point: SpecialPoint, names: tuple[str, str]) -> Model:
+    if point.source is None:
+        raise ArgumentError(
+            f"the point {point.label} carries no model (it was read from a file or another "
+            "process); trace its diagram again and take the point from there"
+        )
+    model: Model = point.source
+    known = (*model.parameters, *model.free)
+    for name in names:
+        if name not in known:
+            raise unknown_name("parameter", name, known)
+    whole = model.with_parameters({n: point.parameters[n] for n in known if n in point.parameters})
+    return whole.freed(names[0]).freed(names[1])
+
+
+def _system(
+    field: FrozenField, region: int, code: str, point: SpecialPoint, u: Array, spans: Array
+) -> tuple[Defining, Array]:
+    """The defining system with its first z, the states in units of how far they move."""
+    _, slopes, _, _ = field.at(region, u)
+    slope = np.linalg.lstsq(slopes[:, : field.n], -slopes[:, field.n :] * spans, rcond=1e-6)[0]
+    unit = np.maximum(np.abs(u[: field.n]), np.abs(slope).max(axis=1))
+    unit = np.where(unit > 1e-12 * max(float(unit.max()), 1e-300), unit, 1.0)
+    if code == "LP":
+        fold = Fold(field, region, unit)
+        return fold, fold.start(u)
+    if code == "HB":
+        pair = Pair(field, region, unit)
+        squared = point.frequency**2 if point.frequency is not None else None
+        return pair, pair.start(u, 0.0 if point.code == "BT" else squared)
+    if code == "BP":
+        crossing = Crossing(field, region, unit)
+        return crossing, crossing.start(u)
+    if point.interface not in field.interfaces:
+        raise ArgumentError(f"the point {point.label} lies on no interface of the model")
+    edge = OnInterface(field, region, unit, field.interfaces.index(point.interface))
+    return edge, edge.start(u)
+
+
+def _frame(system: Defining, start: Array, lower: Array, upper: Array) -> Frame:
+    extras = np.maximum(1.0, np.abs(start[system.width :]))
+    scale = np.concatenate([system.unit, upper - lower, extras])
+    return Frame(system.width, scale, lower, upper)
+
+
+def _traced(
+    system: Defining,
+    start: Array,
+    frame: Frame,
+    settings: Continuation,
+    point: SpecialPoint,
+    names: tuple[str, str],
+    virtual: bool,
+) -> PointBranch:
+    field, region = system.field, system.region
+    inside = _inside(system, start)
+
+    def stop(z: Array) -> bool:
+        if isinstance(system, Crossing) and abs(z[-1]) > 1e-7:
+            return True
+        if isinstance(system, OnInterface):
+            return not _inside(system, z)
+        return not virtual and inside and not _inside(system, z)
+
+    direction = curves.tangent(system, start, frame)
+    rows, tangents, last = curves.follow(system, start, direction, frame, settings, stop)
+    first = last
+    if last != curves.CLOSED:
+        back, turned, first = curves.follow(system, start, -direction, frame, settings, stop)
+        rows = np.concatenate([back[:0:-1], rows])
+        tangents = np.concatenate([-turned[:0:-1], tangents])
+    watched = criteria(system, _meeting(system))
+    coefficient = along(system, rows)
+    found = sorted(
+        search(system, rows, watched, frame, {"GH": coefficient} if system.code == "HB" else {}),
+        key=lambda f: (f.row, float((f.z - rows[f.row]) * frame.weight @ tangents[f.row])),
+    )
+    found = _told_apart(found, frame)
+    places = [f.row + 1 for f in found]
+    if found:
+        rows = np.insert(rows, places, [f.z for f in found], axis=0)
+        tangents = np.insert(tangents, places, [tangents[f.row] for f in found], axis=0)
+        coefficient = np.insert(coefficient, places, along(system, np.array([f.z for f in found])))
+    w, n = system.width, field.n
+    admissible = np.array([_inside(system, z) for z in rows])
+    codes = np.full(len(rows), system.code, dtype="<U3")
+    if isinstance(system, Pair):
+        codes[rows[:, w] < 0] = "NSD"
+    counts: dict[str, int] = {}
+    special = [
+        _special(system, f, point, names, tangents[place + k], counts)
+        for k, (f, place) in enumerate(zip(found, places, strict=True))
+    ]
+    return PointBranch(
+        field.model.states,
+        names,
+        system.code,
+        codes,
+        rows[:, :n].copy(),
+        rows[:, n:w].copy(),
+        tangents[:, :w].copy(),
+        field.eigenvalues(region, rows[:, :w]),
+        field.regions[region],
+        admissible,
+        coefficient,
+        SpecialPoints(special),
+        tuple(place + k for k, place in enumerate(places)),
+        (_outcome(first, system, rows[0], names), _outcome(last, system, rows[-1], names)),
+        last == curves.CLOSED,
+    )
+
+
+def _inside(system: Defining, z: Array) -> bool:
+    """Whether a point lies in the closure of its region; on its own interface it does."""
+    return system.inside(z, system.interface if isinstance(system, OnInterface) else None)
+
+
+def _meeting(system: Defining) -> list[int]:
+    """Regions whose Jacobians matter on a curve: both sides of a continuous interface."""
+    if not isinstance(system, OnInterface):
+        return []
+    field, name = system.field, system.field.interfaces[system.interface]
+    beyond = field.neighbour(system.region, system.interface)
+    if beyond is None or not field.model.continuous[name]:
+        return [system.region]
+    return [system.region, beyond]
+
+
+def _told_apart(found: list[Found], frame: Frame) -> list[Found]:
+    """Leave out a point that another criterion has found already, such as ZH at BT."""
+    kept: list[Found] = []
+    for point in found:
+        width = frame.size
+        near = any(
+            np.abs((point.z - k.z) / frame.scale)[:width].max() < 1e-6
+            and {point.criterion.code, k.criterion.code} != {"BF", "BH"}
+            and (k.criterion.code == point.criterion.code or "BT" in (k.criterion.code,))
+            and k.criterion.region == point.criterion.region
+            for k in kept
+        )
+        if not near:
+            kept.append(point)
+    return kept
+
+
+def _special(
+    system: Defining,
+    found: Found,
+    point: SpecialPoint,
+    names: tuple[str, str],
+    tangent: Array,
+    counts: dict[str, int],
+) -> SpecialPoint:
+    field, w, code = system.field, system.width, found.criterion.code
+    u = found.z[:w]
+    counts[code] = counts.get(code, 0) + 1
+    interface = found.criterion.interface
+    region = found.criterion.region
+    regions: tuple[str, ...] = (field.regions[region],)
+    if interface is not None:
+        other = field.neighbour(region, interface)
+        if other is not None:
+            regions = (*regions, field.regions[other])
+    data: dict[str, Any] = coefficients(system, found)
+    return SpecialPoint(
+        code=code,
+        label=f"{code}{counts[code]}",
+        states=field.model.states,
+        state=u[: field.n].copy(),
+        parameters={
+            **point.parameters,
+            **dict(zip(names, map(float, u[field.n :]), strict=True)),
+        },
+        regions=regions,
+        eigenvalues=field.eigenvalues(region, u),
+        tangent=tangent[:w].copy(),
+        residual=found.residual,
+        converged=found.converged,
+        interface=None if interface is None else field.interfaces[interface],
+        accuracy=found.correction,
+        admissible=_inside(system, found.z),
+        source=point.source,
+        **data,
+    )
+
+
+def _outcome(status: str, system: Defining, z: Array, names: tuple[str, str]) -> Outcome:
+    plane = z[system.width - 2 : system.width]
+    where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, plane, strict=True))
+    if status == curves.RANGE:
+        return Outcome("end of range", f"reached the end of the range at {where}.", True)
+    if status == curves.CLOSED:
+        return Outcome("closed loop", "the curve returned to its start: a closed loop.", True)
+    if status == curves.STOPPED and isinstance(system, Crossing):
+        return Outcome(
+            "no branch point",
+            f"branch points do not persist beyond {where}: the model has no symmetry that keeps "
+            "them, so they are isolated in this plane.",
+            False,
+        )
+    if status == curves.STOPPED:
+        return Outcome(
+            "left the region", f"the points leave region {_region(system)} at {where}.", True
+        )
+    if status == curves.WINDOW:
+        return Outcome(
+            "left the window",
+            f"a state grew without bound near {where}; raise Continuation(reach=…).",
+            False,
+        )
+    if status == curves.FULL:
+        return Outcome(
+            "too many points",
+            f"the curve goes on at {where}; raise Continuation(points=…) or largest_step.",
+            False,
+        )
+    return Outcome(
+        "step too small",
+        f"no next point was found from {where}: the curve is singular there, or the rates are not "
+        "defined beyond.",
+        False,
+    )
+
+
+def _region(system: Defining) -> str:
+    return system.field.regions[system.region]
