@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from fastslow.continuation.settings import Continuation
     from fastslow.diagrams.point_curves import continue_points
     from fastslow.diagrams.solving import equilibria
+    from fastslow.diagrams.tangency_points import tangencies
     from fastslow.diagrams.tracing import continue_equilibria
     from fastslow.errors import (
         ArgumentError,
@@ -64,6 +65,7 @@ _HOME = {
     "reduce_to": "symbolic.reduction",
     "simulate": "simulation.trajectories",
     "systems": "",
+    "tangencies": "diagrams.tangency_points",
 }
 
 __all__ = [
@@ -94,6 +96,7 @@ __all__ = [
     "reduce_to",
     "simulate",
     "systems",
+    "tangencies",
 ]
 
 

@@ -75,8 +75,8 @@ def compile_field(
     rename |= {real(n): sp.Symbol(f"p{k}") for k, n in enumerate(others)}
     bodies = []
     if modes is None:
-        functions = [i.function for i in model.interfaces.values()]
-        modes = [([r.rates[n] for n in model.states], functions) for r in model.regions.values()]
+        heights = [i.function for i in model.interfaces.values()]
+        modes = [([r.rates[n] for n in model.states], heights) for r in model.regions.values()]
     for rates, functions in modes:
         rows = [*rates, *functions]
         unknown = set().union(*(r.free_symbols for r in rows)) - set(rename)
@@ -100,7 +100,7 @@ def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -
     first, second = (list(chain.from_iterable(rows)) for rows in (slopes[:n], slopes[n:]))
     ordered = [*values[:n], *first, *values[n:], *second]
     shared, results = sp.cse(ordered, symbols=sp.numbered_symbols("s"))
-    printer = PythonCodePrinter({"fully_qualified_modules": True})
+    printer = _Printer({"fully_qualified_modules": True})
     try:
         lines = [f"{symbol} = {printer.doprint(value)}" for symbol, value in shared]
         lines += [f"out[{k}] = {_float(printer.doprint(v))}" for k, v in enumerate(results)]
@@ -112,6 +112,25 @@ def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -
             "cannot be compiled; expected elementary functions"
         ) from None
     return lines
+
+
+class _Printer(PythonCodePrinter):
+    """Python code in which a pole gives infinity, as every other division does."""
+
+    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
+        if expr.exp.is_Integer and expr.exp < -1:
+            # numba raises for 0.0**(-2)
+            return f"(1.0/{self._print(expr.base**-expr.exp)})"
+        return super()._print_Pow(expr, rational=rational)
+
+    def _print_Rational(self, expr: sp.Rational) -> str:
+        if max(abs(expr.p), expr.q) >= 2**53:
+            # numba knows no longer integers
+            return f"({float(expr)!r})"
+        return super()._print_Rational(expr)
+
+    def _print_Integer(self, expr: sp.Integer) -> str:
+        return self._print_Rational(expr) if abs(expr) >= 2**53 else str(expr.p)
 
 
 def _float(code: str) -> str:
@@ -133,10 +152,10 @@ def _source(bodies: Sequence[list[str]], unknowns: int, parameters: int) -> str:
     alike: dict[tuple[str, ...], list[int]] = {}
     for number, body in enumerate(bodies):
         alike.setdefault(tuple(body), []).append(number)
-    for body, numbers in alike.items():
+    for lines_of, numbers in alike.items():
         test = " or ".join(f"region == {number}" for number in numbers)
         lines.append(f"    {'if' if numbers[0] == 0 else 'elif'} {test}:")
-        lines += [f"        {line}" for line in body]
+        lines += [f"        {line}" for line in lines_of]
     return "\n".join(lines) + "\n"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fastslow.continuation.location import crossing_tangents
 from fastslow.diagrams.detection import Detected, special_points
 from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.two_folds import two_fold_residual
 from fastslow.diagrams.walking import Piece, Walk, Window
 from fastslow.results.branches import Branch
 from fastslow.results.outcome import Outcome
@@ -20,6 +21,9 @@ Array = NDArray[np.float64]
 
 #: A determinant below this times the product of its row norms counts as zero.
 SINGULAR = 1e-10
+
+#: Kind of a boundary equilibrium by the product of the signs of both determinants.
+KINDS = {1: "persistence", 0: "degenerate", -1: "non-smooth fold"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,16 +178,23 @@ def _switch(field: FrozenField, piece: Piece, detected: Detected, window: Window
 
 
 def _corner(field: FrozenField, curve: Curve, number: int) -> SpecialPoint:
-    """The boundary equilibrium between two pieces of a continuous field."""
-    before, after = curve.pieces[number], curve.pieces[number + 1]
-    u = before.u[-1]
-    jacobians = np.array([field.curve(p.region, u)[1][:, : field.n] for p in (before, after)])
-    first, second = (_determinant_sign(j) for j in jacobians)
-    kinds = {1: "persistence", 0: "degenerate", -1: "non-smooth fold"}
+    """The boundary equilibrium between two pieces."""
+    # a closed branch may have its start on an interface
+    before, after = curve.pieces[number], curve.pieces[(number + 1) % len(curve.pieces)]
+    u, interface = before.u[-1], curve.joins[number]
     names = (field.regions[before.region], field.regions[after.region])
-    _, _, h, _ = field.at(before.region, u)
-    rates, _ = field.curve(before.region, u)
-    interface = curve.joins[number]
+    sliding = [field.modes[p.region].sides is not None for p in (before, after)]
+    clarke = None
+    if sliding[0] != sliding[1]:
+        active = after.region if sliding[0] else before.region
+        subtype = _filippov(field, active, interface, u)
+    else:
+        active = before.region
+        jacobians = np.array([field.curve(p.region, u)[1][:, : field.n] for p in (before, after)])
+        first, second = (_determinant_sign(j) for j in jacobians)
+        subtype = KINDS[first * second]
+        clarke = None if sliding[0] else ClarkePath(names, jacobians)
+    rates, _, h, _ = field.at(active, u)
     return _special(
         field,
         "BE",
@@ -193,8 +204,8 @@ def _corner(field: FrozenField, curve: Curve, number: int) -> SpecialPoint:
         regions=names,
         residual=float(max(np.abs(rates).max(), abs(h[interface]))),
         interface=field.interfaces[interface],
-        subtype=kinds[first * second],
-        clarke=ClarkePath(names, jacobians),
+        subtype=subtype,
+        clarke=clarke,
     )
 
 
@@ -205,13 +216,16 @@ def _determinant_sign(matrix: Array) -> int:
     return 0 if abs(value) <= SINGULAR * size else int(np.sign(value))
 
 
-def _filippov(field: FrozenField, region: int, interface: int, u: Array) -> str:
+def _filippov(field: FrozenField, region: int, interface: int, u: Array) -> str | None:
     """Persistence or non-smooth fold of a boundary equilibrium where the rates jump.
 
     With N the Jacobian of the region whose equilibrium it is, E the jump of
     the rates and C the gradient of h towards that region: C·N⁻¹E < 0 is
     persistence, > 0 a non-smooth fold (di Bernardo et al. 2008, chapter 5).
+    None for a sliding motion, whose branch ends there.
     """
+    if field.modes[region].sides is not None:
+        return None
     beyond = field.neighbour(region, interface)
     if beyond is None:
         return "degenerate"
@@ -221,8 +235,11 @@ def _filippov(field: FrozenField, region: int, interface: int, u: Array) -> str:
     if _determinant_sign(matrix) == 0:
         return "degenerate"
     toward = field.signs[region, interface] * gradients[interface, : field.n]
-    value = float(toward @ np.linalg.solve(matrix, other - active))
-    return "persistence" if value < 0 else "non-smooth fold" if value > 0 else "degenerate"
+    moved = np.linalg.solve(matrix, other - active)
+    value = float(toward @ moved)
+    if abs(value) <= SINGULAR * float(np.abs(toward) @ np.abs(moved)):
+        return "degenerate"
+    return "persistence" if value < 0 else "non-smooth fold"
 
 
 def _with_ends(
@@ -234,7 +251,10 @@ def _with_ends(
         u, tangent, interface = piece.u[side], piece.tangents[side], curve.ends[side]
         note = curve.outcomes[side].message
         if interface is None:
-            ends.append([_special(field, "EP", piece.region, u, tangent, note=note)])
+            point = _special(field, "EP", piece.region, u, tangent, note=note)
+            if curve.outcomes[side].code == "two-fold":
+                point = replace(point, residual=two_fold_residual(field, piece.region, u))
+            ends.append([point])
             continue
         beyond = field.neighbour(piece.region, interface)
         names: tuple[str, ...] = (field.regions[piece.region],)

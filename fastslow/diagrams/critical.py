@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
-from fastslow.diagrams.solving import RegionEquations, real_roots
+from fastslow.diagrams.equations import RegionEquations, real_roots
 from fastslow.model.structure import real
 
 #: Degree in the unknown up to which discriminants and resultants are formed.
@@ -17,7 +17,8 @@ def critical_values(equations: RegionEquations, lower: float, upper: float) -> l
 
     These are the real roots in the parameter of the discriminant and leading
     coefficient of the eliminated polynomial and of its resultant with every
-    interface function. A start in every interval between them is therefore a
+    interface function (for sliding also with both drifts, which vanish at
+    boundary equilibria and two-folds). A start in every interval between them is therefore a
     start on every branch.
 
     Parameters
@@ -51,6 +52,8 @@ def _conditions(equations: RegionEquations) -> list[sp.Expr] | None:
     """Polynomials in the parameter whose roots are the critical values."""
     left = equations.elimination
     p = real(equations.field.parameter)
+    if equations.impossible:
+        return []
     if left.divisors or len(left.unknowns) > 1:
         return None
     alone = [e for e in left.remaining if not e.has(*left.unknowns)] if left.unknowns else []
@@ -76,13 +79,13 @@ def _conditions(equations: RegionEquations) -> list[sp.Expr] | None:
 
 
 def _edges(equations: RegionEquations) -> list[sp.Expr] | None:
-    """Interface functions along the equilibria, None unless polynomial in unknown and parameter."""
+    """What bounds the region, along its equilibria; None unless polynomial in both."""
     left = equations.elimination
     p = real(equations.field.parameter)
     solved = {real(n): e for n, e in left.solved.items()}
     edges = []
-    for interface in equations.field.model.interfaces.values():
-        h = interface.function.subs(equations.numbers).subs(solved)
+    for bound in equations.bounds:
+        h = bound.subs(solved)
         if not h.is_polynomial(p, *left.unknowns):
             return None
         edges.append(sp.expand(h))

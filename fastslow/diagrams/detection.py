@@ -105,10 +105,10 @@ def _branch_points(field: FrozenField, piece: Piece, window: Window) -> Iterator
 
 def _turning_pairs(field: FrozenField, piece: Piece, window: Window) -> Iterator[Detected]:
     n = field.n
-    if n < 2:
+    eigenvalues = field.finite_eigenvalues(piece.region, piece.u)
+    first, second = np.triu_indices(eigenvalues.shape[1], 1)
+    if not first.size:
         return
-    eigenvalues = field.eigenvalues(piece.region, piece.u)
-    first, second = np.triu_indices(n, 1)
     sums = eigenvalues[:, first] + eigenvalues[:, second]
     size = np.maximum(np.abs(eigenvalues).max(axis=1, keepdims=True), np.finfo(float).tiny)
     test = np.prod(sums / size, axis=1).real

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.compiled.fields import CompiledField, compile_field, parameter_array
 from fastslow.continuation.loops import loop
+from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
 
@@ -18,7 +20,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class FrozenField:
-    """The frozen rates of every region over (states, one parameter).
+    """The frozen rates of every region over (states, varying parameters).
+
+    In a Filippov model the sliding motions along its discontinuities follow the
+    regions; "region" and its number then stand for either (see `Mode`).
 
     Parameters
     ----------
@@ -50,7 +55,8 @@ class FrozenField:
 
     @cached_property
     def compiled(self) -> CompiledField:
-        return compile_field(self.model, *self.varying)
+        modes = [(mode.rates, mode.rows) for mode in self.modes]
+        return compile_field(self.model, *self.varying, modes=modes)
 
     @cached_property
     def values(self) -> Array:
@@ -58,8 +64,13 @@ class FrozenField:
         return parameter_array(self.model, self.compiled)
 
     @cached_property
+    def modes(self) -> tuple[Mode, ...]:
+        return modes_of(self.model)
+
+    @cached_property
     def regions(self) -> tuple[str, ...]:
-        return tuple(self.model.regions)
+        """Names of all regions, then of the sliding motions."""
+        return tuple(mode.name for mode in self.modes)
 
     @cached_property
     def interfaces(self) -> tuple[str, ...]:
@@ -67,13 +78,20 @@ class FrozenField:
 
     @cached_property
     def signs(self) -> NDArray[np.float64]:
-        """Sign of every interface function in every region, shape (regions, m)."""
-        rows = [[r.signs[i] for i in self.interfaces] for r in self.model.regions.values()]
-        return np.array(rows, dtype=float).reshape(len(rows), len(self.interfaces))
+        """Sign of every switching function in every region, shape (regions, m).
+
+        The interfaces come first; a sliding motion is bounded by two more, its drifts.
+        """
+        rows = [mode.signs for mode in self.modes]
+        return np.array(rows, dtype=float).reshape(len(rows), len(rows[0]))
 
     @property
     def n(self) -> int:
         return len(self.model.states)
+
+    def rates(self, region: int) -> list[sp.Expr]:
+        """The rates of a region in SymPy, in the order of the states."""
+        return list(self.modes[region].rates)
 
     def at(self, region: int, points: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """F (…, n), [F_x F_p] (…, n, n + k), h (…, m) and ∇h (…, m, n + k) at points u."""
@@ -97,9 +115,55 @@ class FrozenField:
         return value, slopes
 
     def eigenvalues(self, region: int, points: ArrayLike) -> NDArray[np.complex128]:
-        """Eigenvalues of the state Jacobian at points u, shape (…, n)."""
-        _, slopes, _, _ = self.at(region, points)
-        return np.linalg.eigvals(slopes[..., : self.n]).astype(complex)
+        """Eigenvalues of the state Jacobian at points u, shape (…, n).
+
+        Of a sliding motion those along the interface, and as the last one −∞
+        (+∞ where it escapes): the interface is reached (left) in finite time.
+        """
+        finite = self.finite_eigenvalues(region, points)
+        sides = self.modes[region].sides
+        if sides is None:
+            return finite
+        across = np.full((*finite.shape[:-1], 1), np.inf if sides.escaping else -np.inf)
+        return np.concatenate([finite, across.astype(complex)], axis=-1)
+
+    def finite_eigenvalues(self, region: int, points: ArrayLike) -> NDArray[np.complex128]:
+        """As `eigenvalues` without the infinite one, shape (…, n) or (…, n − 1)."""
+        _, slopes, _, gradients = self.at(region, points)
+        jacobian, sides = slopes[..., : self.n], self.modes[region].sides
+        # at a two-fold the sliding field is 0/0
+        finite = np.asarray(np.isfinite(jacobian).all(axis=(-1, -2)))[..., None]
+        jacobian = np.where(finite[..., None], jacobian, 0.0)
+        if sides is not None:
+            normal = gradients[..., sides.interface, : self.n, None]
+            # the columns of Q after the first span the interface's tangent space
+            along = np.linalg.qr(normal, mode="complete")[0][..., 1:]
+            jacobian = np.swapaxes(along, -1, -2) @ jacobian @ along
+        return np.where(finite, np.linalg.eigvals(jacobian).astype(complex), np.nan)
+
+    def slides_into(self, region: int, beyond: int, point: Array) -> int | None:
+        """The sliding or escaping motion that an equilibrium of a region on an interface enters.
+
+        None where both fields are tangent to it (a two-fold), or nothing slides.
+        """
+        for number, mode in enumerate(self.modes):
+            if mode.sides is None or {mode.sides.above, mode.sides.below} != {region, beyond}:
+                continue
+            _, _, h, slopes = self.at(number, point)
+            size = np.abs(slopes) @ np.maximum(np.abs(point), 1.0)
+            # the drift of the region itself vanishes: the other one decides
+            other = -1 if mode.sides.above == region else -2
+            if self.signs[number, other] * h[other] > 1e-9 * max(size[other], 1e-300):
+                return number
+        return None
+
+    def virtual(self, region: int, u: Array) -> bool:
+        """Whether a zero of a region's rates lies outside it; of sliding, outside escaping too."""
+        sides = self.modes[region].sides
+        twins = [region]
+        if sides is not None:
+            twins.append(region - 1 if sides.escaping else region + 1)
+        return not any(self.admissible(k, u) for k in twins)
 
     def admissible(self, region: int, u: Array, tolerance: float = 1e-9) -> bool:
         """Whether a point lies in the closure of a region."""
@@ -109,6 +173,8 @@ class FrozenField:
 
     def neighbour(self, region: int, interface: int) -> int | None:
         """The region across an interface, None if there is none."""
+        if self.signs[region, interface] == 0:
+            return None
         across = self.signs[region].copy()
         across[interface] *= -1
         found = np.flatnonzero((self.signs == across).all(axis=1))
@@ -117,6 +183,8 @@ class FrozenField:
     def tangent(self, region: int, u: Array, weight: Array) -> tuple[Array, bool]:
         """Null vector of [F_x F_p], unit in the weighted norm, and whether it is the only one."""
         _, slopes, _, _ = self.at(region, u)
+        if not np.isfinite(slopes).all():
+            return np.zeros(len(u)), False
         scale = 1.0 / np.sqrt(weight)
         _, singular, right = np.linalg.svd(slopes * scale)
         rows = np.abs(slopes * scale).max(initial=0.0)

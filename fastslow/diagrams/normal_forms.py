@@ -1,7 +1,6 @@
-"""Normal-form coefficients of special points, from derivatives of any order at many digits.
+"""Normal-form coefficients of special points, from second and third derivatives of the rates.
 
-The multilinear forms B and C of the rates are differenced with a hundred
-digits, so that what is left of the truncation is far below double precision.
+SymPy derives them once for each set of rates; entries that vanish are left out.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-import mpmath
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
@@ -23,83 +21,92 @@ from fastslow.model.structure import real
 Array = NDArray[np.float64]
 Vector = NDArray[Any]  # real or complex
 
-#: Digits of the evaluation, and the step that leaves forty of them after three differences.
-DIGITS = 100
-STEP = "1e-20"
-
 
 @dataclass(frozen=True, eq=False)
 class Multilinear:
-    """Derivatives of smooth rates at a point, applied to vectors.
+    """Second and third derivatives of rates at one point, as multilinear forms.
 
     Parameters
     ----------
-    rates : callable
-        n mpmath numbers to the n rates.
-    state : ndarray, shape (n,)
+    second : ndarray, shape (n, n, n)
+        ∂²F_i/∂x_j∂x_k.
+    third : ndarray, shape (n, n, n, n)
     """
 
-    rates: Callable[..., Any]
-    state: Array
+    second: Array
+    third: Array
 
     def form(self, *vectors: Vector) -> Vector:
-        """Apply the derivative of order k to k vectors: B(q, r), C(q, r, s), shape (n,)."""
-        order = len(vectors)
-        with mpmath.workdps(DIGITS):
-            step = mpmath.mpf(STEP)
-            base = [mpmath.mpf(float(x)) for x in self.state]
-            moves = [[step * mpmath.mpc(complex(c)) for c in v] for v in vectors]
-            total = [mpmath.mpc(0)] * len(base)
-            # an even form is the same for the opposite signs, an odd one the opposite
-            for signs in itertools.product((1, -1), repeat=order):
-                place = [
-                    x + sum(s * m[i] for s, m in zip(signs, moves, strict=True))
-                    for i, x in enumerate(base)
-                ]
-                weight = int(np.prod(signs))
-                total = [t + weight * r for t, r in zip(total, self.rates(*place), strict=True)]
-            return np.array([complex(t / (2 * step) ** order) for t in total])
+        """B(q, r) or C(q, r, s), shape (n,)."""
+        result: Vector = self.second if len(vectors) == 2 else self.third
+        for vector in reversed(vectors):
+            result = result @ vector
+        return result
 
 
-def multilinear(rates: list[sp.Expr], values: dict[str, float], names: list[str]) -> Any:
-    """Give a function of mpmath numbers for rates at parameter values.
-
-    Parameters
-    ----------
-    rates : list of sympy.Expr
-        In real symbols.
-    values : dict
-        Parameter to value, kept exactly.
-    names : list of str
-        States, in the order of the rates.
-
-    Examples
-    --------
-    >>> x = real("x")
-    >>> at = Multilinear(multilinear([x**3], {}, ["x"]), np.array([2.0]))
-    >>> one = np.ones(1, dtype=complex)
-    >>> at.form(one, one).real.tolist(), at.form(one, one, one).real.tolist()
-    ([12.0], [6.0])
-    """
-    numbers = {real(n): sp.Rational(v) for n, v in values.items()}
-    exact = [sp.nsimplify(r, rational=True).subs(numbers) for r in rates]
-    return sp.lambdify([real(n) for n in names], exact, "mpmath")
+Entries = list[tuple[int, ...]]
 
 
 @lru_cache(maxsize=64)
-def _compiled(field: FrozenField, region: int) -> Any:
-    names = field.model.states
-    rates = field.model.regions[field.regions[region]].rates
-    values = {n: v for n, v in field.model.parameters.items() if n not in field.varying}
-    moving = [*names, *field.varying]
-    return multilinear([rates[n] for n in names], values, moving)
+def derivatives(
+    rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...], others: tuple[sp.Symbol, ...]
+) -> tuple[Entries, Callable[..., Any]]:
+    """Derive all second and third derivatives that do not vanish.
+
+    Parameters
+    ----------
+    rates : tuple of sympy.Expr
+    states : tuple of Symbol
+    others : tuple of Symbol
+        Every other symbol of the rates.
+
+    Returns
+    -------
+    entries : list of tuple
+        (i, j, k) or (i, j, k, l) with j ≤ k ≤ l.
+    values : callable
+        Numbers for states and others to the list of values.
+
+    Examples
+    --------
+    >>> x, y = real("x"), real("y")
+    >>> entries, values = derivatives((x**2 * y, y), (x, y), ())
+    >>> entries, values(3.0, 5.0)
+    ([(0, 0, 0), (0, 0, 1), (0, 0, 0, 1)], [10.0, 6.0, 2])
+    """
+    table: dict[tuple[int, ...], sp.Expr] = {}
+    for i, rate in enumerate(rates):
+        level: dict[tuple[int, ...], sp.Expr] = {(i,): rate}
+        for _ in range(3):
+            deeper = {}
+            for index, expression in level.items():
+                first = index[-1] if len(index) > 1 else 0
+                for j in range(first, len(states)):
+                    if states[j] in expression.free_symbols:
+                        slope = expression.diff(states[j])
+                        if slope != 0:
+                            deeper[(*index, j)] = slope
+            level = deeper
+            table |= {k: e for k, e in level.items() if len(k) > 2}
+    entries = sorted(table, key=lambda k: (len(k), k))
+    return entries, sp.lambdify((*states, *others), [table[k] for k in entries], "numpy", cse=True)
 
 
 def forms_at(field: FrozenField, region: int, u: Array) -> Multilinear:
     """Give the derivatives of a region's rates by the states at u = (states, parameters)."""
-    function, n = _compiled(field, region), field.n
-    fixed = [float(v) for v in u[n:]]
-    return Multilinear(lambda *x: function(*x, *fixed), u[:n])
+    model, n = field.model, field.n
+    rates = field.rates(region)
+    names = [*field.varying, *(p for p in model.parameters if p not in field.varying)]
+    entries, values = derivatives(
+        tuple(rates), tuple(map(real, model.states)), tuple(map(real, names))
+    )
+    fixed = [model.parameters[p] for p in names[len(field.varying) :]]
+    second, third = np.zeros((n,) * 3), np.zeros((n,) * 4)
+    for index, value in zip(entries, values(*u, *fixed), strict=True):
+        target = second if len(index) == 3 else third
+        for places in set(itertools.permutations(index[1:])):
+            target[(index[0], *places)] = value
+    return Multilinear(second, third)
 
 
 def fold_form(forms: Multilinear, jacobian: Array) -> float:
@@ -145,11 +152,11 @@ def first_lyapunov(forms: Multilinear, jacobian: Array, frequency: float) -> flo
 
     Examples
     --------
-    >>> x, y = real("x"), real("y")
-    >>> rates = [-y - x * (x**2 + y**2), x - y * (x**2 + y**2)]
-    >>> forms = Multilinear(multilinear(rates, {}, ["x", "y"]), np.zeros(2))
+    >>> third = np.zeros((2, 2, 2, 2))  # of x' = −y − x³, y' = x
+    >>> third[0, 0, 0, 0] = -6.0
+    >>> forms = Multilinear(np.zeros((2, 2, 2)), third)
     >>> round(first_lyapunov(forms, np.array([[0.0, -1.0], [1.0, 0.0]]), 1.0), 14)
-    -2.0
+    -0.75
     """
     n = len(jacobian)
     q = _eigenvector(jacobian, 1j * frequency)

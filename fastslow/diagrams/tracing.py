@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.assembly import Curve, branch_of, joined, rising
 from fastslow.diagrams.critical import critical_values
+from fastslow.diagrams.equations import region_equations
 from fastslow.diagrams.fields import FrozenField
-from fastslow.diagrams.solving import point_at, region_equations, solve_at
+from fastslow.diagrams.solving import point_at, solve_at
 from fastslow.diagrams.walking import Piece, Window, beside, on_interface, walk
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.model import Model
@@ -47,6 +48,8 @@ def continue_equilibria(
     Pseudo-arclength continuation (Keller 1977) inside each region; at an
     interface the boundary equilibrium is solved for exactly and the branch
     goes on in the region beyond, turning back in the parameter where it must.
+    Where the rates jump it goes on as a pseudo-equilibrium of the sliding field,
+    and ends at a two-fold.
 
     Parameters
     ----------
@@ -147,7 +150,8 @@ class _Starts:
         # the golden ratio keeps the values clear of each other and of round numbers
         parts = [(0.5 + k * 0.6180339887498949) % 1.0 for k in range(inside)]
         spread = [lower + p * (upper - lower) for p in parts]
-        between = [critical_values(e, lower, upper) for e in region_equations(field)]
+        equations = dict.fromkeys(region_equations(field))
+        between = [critical_values(e, lower, upper) for e in equations]
         self.complete = all(b is not None for b in between)
         levels = sorted({lower, upper, *(v for b in between for v in b or ())})
         middles = [0.5 * (a + b) for a, b in pairwise(levels)]
@@ -210,7 +214,7 @@ def _branches(
         return [branch_of(field, curve, window, marks, True)]
     found = []
     (piece,) = curve.pieces
-    inside = np.array([field.admissible(piece.region, u) for u in piece.u])
+    inside = np.array([not field.virtual(piece.region, u) for u in piece.u])
     edges = np.flatnonzero(np.diff(inside)) + 1
     for rows in np.split(np.arange(len(inside)), edges):
         if inside[rows[0]] or len(rows) < 2:
@@ -235,7 +239,8 @@ def _led_to_interface(
     outside = part.u[end]
     _, _, h0, _ = field.at(part.region, outside)
     _, _, h1, _ = field.at(part.region, inside)
-    for interface in np.flatnonzero(h0 * h1 < 0):
+    bounding = field.signs[part.region] != 0
+    for interface in np.flatnonzero((h0 * h1 < 0) & bounding):
         share = h0[interface] / (h0[interface] - h1[interface])
         guess = outside + share * (inside - outside)
         corner = on_interface(field, part.region, int(interface), guess, window)

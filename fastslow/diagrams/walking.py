@@ -11,6 +11,7 @@ from fastslow.continuation import loops
 from fastslow.continuation.location import Located, with_condition
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.two_folds import cut_at_two_fold, two_fold_ahead
 from fastslow.results.outcome import Outcome
 
 Array = NDArray[np.float64]
@@ -89,10 +90,10 @@ def walk(
     """
     pieces: list[Piece] = []
     joins: list[int] = []
-    first = (start, tangent, region)
+    first = Piece(region, start[None], tangent[None])
     step = settings.step
     while len(pieces) < PIECES:
-        signs = field.signs[region] if bounded else np.zeros(len(field.interfaces))
+        signs = field.signs[region] if bounded else np.zeros(field.compiled.m)
         u, tangents, status, step = loops.loop("trace")(
             field.compiled.address, region, field.values, start, tangent, signs,
             window.weight, window.lower, window.upper, settings.reach * window.scale[:-1],
@@ -100,7 +101,16 @@ def walk(
             settings.largest_step, settings.largest_turn, settings.tolerance,
             settings.iterations, settings.points, not joins,
         )  # fmt: skip
+        back = _returned(region, u, tangents, first, window) if joins else None
+        if back is not None:
+            pieces.append(back)
+            return Walk(tuple(pieces), tuple(joins), _closed(), closed=True)
         met = None
+        if status in (loops.INTERFACE, loops.SMALL_STEP):
+            end = two_fold_ahead(field, region, u, window.scale)
+            if end is not None and window.lower <= end[-1] <= window.upper:
+                pieces.append(Piece(region, *cut_at_two_fold(u, tangents, end, window.scale)))
+                return Walk(tuple(pieces), tuple(joins), _two_fold(field, region, end))
         if status == loops.INTERFACE:
             met = _first_interface(field, region, u, tangents, window)
             if met is None:
@@ -116,29 +126,52 @@ def walk(
             pieces.append(Piece(region, u, tangents))
             closed = status == loops.CLOSED
             if closed:
-                u[-1], tangents[-1] = first[0], first[1]
+                u[-1], tangents[-1] = first.u[0], first.tangents[0]
             outcome = _outcome(status, field, u[-1], window, settings)
             return Walk(tuple(pieces), tuple(joins), outcome, closed=closed)
-        interface, corner = met
+        row, corner = met
+        interface = _interface_of(field, region, row)
         end = _oriented(field.tangent(region, corner, window.weight)[0], tangents[-1], window)
         u[-1], tangents[-1] = corner, end
         pieces.append(Piece(region, u, tangents))
-        beyond, outcome = _enter(field, region, interface, corner, window)
+        beyond, outcome = _enter(field, region, row, corner, window)
         if beyond is None:
-            return Walk(tuple(pieces), tuple(joins), outcome, last=interface)
+            # at a two-fold the branch of pseudo-equilibria itself ends, at no boundary
+            inner = outcome.code == "two-fold" and field.modes[region].sides is not None
+            last = None if inner else interface
+            return Walk(tuple(pieces), tuple(joins), outcome, last=last)
         joins.append(interface)
         region, tangent = beyond
         start = corner
-        home = region == first[2] and np.abs((start - first[0]) / window.scale).max() < 1e-9
+        apart = np.abs((start - first.u[0]) / window.scale).max()
+        home = region == first.region and apart < 1e-9
         if home:
             return Walk(tuple(pieces), tuple(joins), _closed(), closed=True)
     return Walk(tuple(pieces), tuple(joins), _full(field, start, settings))
 
 
+def _returned(region: int, u: Array, tangents: Array, first: Piece, window: Window) -> Piece | None:
+    """The rows before a curve that left the first region passes its start again."""
+    if region != first.region:
+        return None
+    start, direction = first.u[0], first.tangents[0]
+    chords = np.linalg.norm(np.diff(u, axis=0) / window.scale, axis=1)
+    gaps = (start - u[:-1]) / window.scale
+    along = tangents[:-1] / window.scale
+    ahead = (gaps * along).sum(axis=1)
+    aside = np.linalg.norm(gaps - ahead[:, None] * along, axis=1)
+    alike = along @ (direction / window.scale) > 0.9
+    passed = np.flatnonzero((ahead > 0) & (ahead <= chords) & (aside < 0.2 * chords) & alike)
+    if not passed.size:
+        return None
+    stop = int(passed[0]) + 1
+    return Piece(region, np.vstack([u[:stop], start]), np.vstack([tangents[:stop], direction]))
+
+
 def _first_interface(
     field: FrozenField, region: int, u: Array, tangents: Array, window: Window
 ) -> tuple[int, Array] | None:
-    """The interface met first on the last step, with the boundary equilibrium on it."""
+    """The switching function met first on the last step, with the point where it vanishes."""
     before, after = u[-2], u[-1]
     signs = field.signs[region]
     _, _, h0, _ = field.at(region, before)
@@ -178,14 +211,37 @@ def beside(
     )
 
 
+def _interface_of(field: FrozenField, region: int, row: int) -> int:
+    """The interface that a switching function is about: of a drift, the one slid along."""
+    sides = field.modes[region].sides
+    return row if sides is None or row < len(field.interfaces) else sides.interface
+
+
 def _enter(
+    field: FrozenField, region: int, row: int, corner: Array, window: Window
+) -> tuple[tuple[int, Array] | None, Outcome]:
+    """The region (or sliding motion) beyond a switching function, and the tangent into it."""
+    sides = field.modes[region].sides
+    if sides is None or row < len(field.interfaces):
+        return _cross(field, region, row, corner, window)
+    _, _, h, slopes = field.at(region, corner)
+    size = np.abs(slopes) @ np.maximum(np.abs(corner), 1.0)
+    if np.all(np.abs(h[-2:]) <= 1e-9 * size[-2:]):
+        return None, _two_fold(field, region, corner)
+    # the first drift belongs to the region above, whose equilibrium this is
+    beyond = sides.above if row == len(h) - 2 else sides.below
+    return _led_into(field, beyond, sides.interface, sides.interface, corner, window)
+
+
+def _cross(
     field: FrozenField, region: int, interface: int, corner: Array, window: Window
 ) -> tuple[tuple[int, Array] | None, Outcome]:
-    """The region beyond an interface and the tangent that leads into it."""
+    """The same beyond an interface; where the rates jump there, sliding along it."""
     name, where = field.interfaces[interface], _where(field, corner)
     _, _, h, gradients = field.at(region, corner)
     size = np.abs(gradients * window.scale).max(axis=1)
-    meeting = [field.interfaces[k] for k in np.flatnonzero(np.abs(h) <= 1e-9 * size)]
+    near = (np.abs(h) <= 1e-9 * size) & (field.signs[region] != 0)
+    meeting = [field.interfaces[k] for k in np.flatnonzero(near[: len(field.interfaces)])]
     if len(meeting) > 1:
         return None, Outcome(
             "interfaces meet",
@@ -200,20 +256,43 @@ def _enter(
         )
     rates, slopes = field.curve(beyond, corner)
     bound = 1e-8 * np.maximum(1.0, np.abs(slopes) @ np.maximum(1.0, np.abs(corner)))
-    if np.any(np.abs(rates) > bound):
+    if np.all(np.abs(rates) <= bound):
+        return _led_into(field, beyond, interface, interface, corner, window)
+    if field.modes[region].sides is not None:
         return None, Outcome(
             "discontinuous interface",
-            f"the rates jump across {name} = 0 at {where}; beyond it there is no equilibrium of "
-            f"region {field.regions[beyond]} (the field is of Filippov type there).",
+            f"the sliding field jumps across {name} = 0 at {where}, where two discontinuities "
+            "meet; the motion along both at once is not unique.",
+            False,
+        )
+    along = field.slides_into(region, beyond, corner)
+    if along is None:
+        return None, Outcome(
+            "two-fold",
+            f"both fields are tangent to {name} = 0 at the boundary equilibrium {where}; there is "
+            "no sliding motion beside it.",
             True,
         )
+    # the drift of this region's field, which vanishes here, is the bound to leave
+    sides = field.modes[along].sides
+    drift = -2 if sides is not None and sides.above == region else -1
+    return _led_into(field, along, len(h) + drift, interface, corner, window)
+
+
+def _led_into(
+    field: FrozenField, beyond: int, row: int, interface: int, corner: Array, window: Window
+) -> tuple[tuple[int, Array] | None, Outcome]:
+    """A region and the tangent along which one of the functions that bound it grows."""
     tangent, single = field.tangent(beyond, corner, window.weight)
-    ahead = field.signs[beyond, interface] * float(gradients[interface] @ tangent)
-    if not single or abs(ahead) < 1e-9 * size[interface]:
+    _, _, _, gradients = field.at(beyond, corner)
+    size = float(np.abs(gradients[row] * window.scale).max())
+    ahead = field.signs[beyond, row] * float(gradients[row] @ tangent)
+    if not single or abs(ahead) < 1e-9 * size:
         return None, Outcome(
             "singular at interface",
             f"the equilibria of region {field.regions[beyond]} are singular or tangent to "
-            f"{name} = 0 at {where}; a small change of another parameter makes them regular.",
+            f"{field.interfaces[interface]} = 0 at {_where(field, corner)}; a small change of "
+            "another parameter makes them regular.",
             False,
         )
     return (beyond, tangent if ahead > 0 else -tangent), _closed()
@@ -252,6 +331,17 @@ def _oriented(tangent: Array, along: Array, window: Window) -> Array:
 def _where(field: FrozenField, u: Array) -> str:
     names = (*field.model.states, field.parameter)
     return "(" + ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, u, strict=True)) + ")"
+
+
+def _two_fold(field: FrozenField, region: int, u: Array) -> Outcome:
+    sides = field.modes[region].sides
+    name = field.interfaces[sides.interface] if sides is not None else ""
+    return Outcome(
+        "two-fold",
+        f"both fields are tangent to {name} = 0 at {_where(field, u)}; at this two-fold the "
+        f"pseudo-equilibria of {field.regions[region]} end.",
+        True,
+    )
 
 
 def _closed() -> Outcome:

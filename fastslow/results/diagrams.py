@@ -157,7 +157,10 @@ class Diagram:
                 return solved
         low, high = branch.parameter[row], branch.parameter[row + 1]
         part = (where - low) / (high - low)
-        eigenvalues = (1 - part) * branch.eigenvalues[row] + part * branch.eigenvalues[row + 1]
+        pair = branch.eigenvalues[row : row + 2]
+        # apart, because a complex number times an infinite one (of sliding) is not a number
+        real, imaginary = (np.array([1 - part, part]) @ p for p in (pair.real, pair.imag))
+        eigenvalues = real + 1j * imaginary
         return Equilibrium(
             self.states,
             state,

@@ -39,15 +39,19 @@ def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
     """Stable, unstable or neutral, for eigenvalues of shape (..., n).
 
     Neutral means that no real part is positive and at least one vanishes to
-    rounding: linear theory does not decide.
+    rounding: linear theory does not decide. An infinite eigenvalue (across the
+    interface at a pseudo-equilibrium) counts by its sign.
 
     Examples
     --------
     >>> stability_of(np.array([[-1.0, -2.0], [0.0, -1.0], [1.0, -1.0]])).tolist()
     ['stable', 'neutral', 'unstable']
+    >>> stability_of(np.array([[-1.0, -np.inf], [-1.0, np.inf]])).tolist()
+    ['stable', 'unstable']
     """
     values = np.asarray(eigenvalues)
-    scale = np.maximum(1.0, np.abs(values).max(axis=-1))
+    size = np.where(np.isinf(values.real), 0.0, np.abs(values))
+    scale = np.maximum(1.0, size.max(axis=-1))
     largest = values.real.max(axis=-1)
     small = NEUTRAL * scale
     return np.where(largest < -small, "stable", np.where(largest > small, "unstable", "neutral"))
@@ -57,22 +61,27 @@ def type_of(eigenvalues: ArrayLike) -> str:
     """Node, focus, saddle, saddle-focus, or non-hyperbolic, of one equilibrium.
 
     For n > 2 the name node or focus follows the leading eigenvalue, the one
-    nearest the imaginary axis.
+    nearest the imaginary axis. With an infinite eigenvalue, which counts by its
+    sign, they are pseudo-nodes and so on (Kuznetsov, Rinaldi and Gragnani 2003).
 
     Examples
     --------
     >>> type_of([-1, -2]), type_of([-1 + 2j, -1 - 2j]), type_of([1, -1])
     ('node', 'focus', 'saddle')
+    >>> type_of([-1, -np.inf]), type_of([1, -np.inf]), type_of([-np.inf])
+    ('pseudo-node', 'pseudo-saddle', 'pseudo-node')
     """
     values = np.asarray(eigenvalues, dtype=complex)
-    scale = max(1.0, float(np.abs(values).max()))
-    if np.any(np.abs(values.real) <= NEUTRAL * scale):
+    infinite = np.isinf(values.real)
+    scale = max(1.0, float(np.abs(values[~infinite]).max(initial=0.0)))
+    if np.isnan(scale) or np.any(np.abs(values.real) <= NEUTRAL * scale):
         return "non-hyperbolic"
+    pseudo = "pseudo-" if infinite.any() else ""
     turning = np.abs(values.imag) > 1e-8 * scale
     if np.any(values.real > 0) and np.any(values.real < 0):
-        return "saddle-focus" if turning.any() else "saddle"
+        return f"{pseudo}saddle-focus" if turning.any() else f"{pseudo}saddle"
     leading = int(np.argmin(np.abs(values.real)))
-    return "focus" if turning[leading] else "node"
+    return f"{pseudo}focus" if turning[leading] else f"{pseudo}node"
 
 
 class _Point:
@@ -107,11 +116,14 @@ class Equilibrium(_Point):
     parameters : mapping
         Every parameter value at which it was found.
     region : str
-        The region whose rates vanish here.
+        The region whose rates vanish here; ``"S1|S2"`` where the sliding field
+        between two does (a pseudo-equilibrium), ``"S1|S2 (escaping)"`` where both
+        fields point away from the interface.
     admissible : bool
         Whether the point lies in the closure of that region; otherwise it is virtual.
     eigenvalues : ndarray of complex, shape (n,)
-        Of the region's Jacobian.
+        Of the region's Jacobian. Of a pseudo-equilibrium those of the sliding field
+        along the interface, and last −∞ (+∞ where the fields point away).
     residual : float
         Largest rate left over at the point.
     continuum : bool
@@ -140,8 +152,13 @@ class Equilibrium(_Point):
         return self.stability == "stable"
 
     @property
+    def pseudo(self) -> bool:
+        """Whether it is a pseudo-equilibrium, of a sliding field."""
+        return bool(np.isinf(self.eigenvalues.real).any())
+
+    @property
     def type(self) -> str:
-        """Node, focus, saddle, saddle-focus or non-hyperbolic."""
+        """Node, focus, saddle, saddle-focus (pseudo-node, …) or non-hyperbolic."""
         return type_of(self.eigenvalues)
 
     def __repr__(self) -> str:

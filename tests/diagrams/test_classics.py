@@ -149,14 +149,17 @@ def test_persistence_and_planar_clarke_hopf():
 
 
 @pytest.mark.parametrize(("sign", "kind"), [(1, "persistence"), (-1, "non-smooth fold")])
-def test_filippov_boundary_equilibria_end_the_branch(sign, kind):
+def test_filippov_branches_go_on_as_pseudo_equilibria(sign, kind):
     """x' = p − x ∓ sgn x: at p = ±1 the equilibrium meets the sliding segment."""
     model = fs.Model({x: p - x - sign * sp.sign(x)}, parameters={p: 0})
     assert not model.continuous["x"]
     diagram = fs.continue_equilibria(model, "p", (-2, 2))
     assert {b.subtype for b in diagram.boundary_equilibria} == {kind}
     assert sorted(b["p"] for b in diagram.boundary_equilibria) == pytest.approx([-1, 1], abs=1e-14)
-    assert any("Filippov" in b.note for b in diagram.boundary_equilibria)
+    (branch,) = diagram.branches
+    mode = "S1|S2" if sign > 0 else "S1|S2 (escaping)"
+    assert list(dict.fromkeys(branch.region.tolist())) == ["S2", mode, "S1"]
+    assert np.abs(branch["x"][branch.region == mode]).max() == 0
 
 
 def test_slowly_forced_van_der_pol():

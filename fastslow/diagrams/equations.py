@@ -1,0 +1,313 @@
+"""Equilibrium equations of regions and of sliding motions, and their roots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.continuation.location import with_condition
+from fastslow.continuation.loops import loop
+from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.modes import Sides
+from fastslow.model.structure import real
+from fastslow.symbolic.elimination import Elimination, eliminate
+
+Array = NDArray[np.float64]
+
+#: Starting states tried by Newton's method where a region has no univariate polynomial.
+STARTS = 200
+
+#: Stands for the weight of the field below in a sliding field.
+SHARE = "(alpha)"
+
+#: Degree up to which the roots of a univariate polynomial are trusted to be complete.
+DEGREE = 60
+
+
+@dataclass(frozen=True, eq=False)
+class RegionEquations:
+    """The equilibrium equations of one region, eliminated, at fixed other parameters.
+
+    Parameters
+    ----------
+    field : FrozenField
+    region : int
+        Number of the region.
+    """
+
+    field: FrozenField
+    region: int
+
+    @cached_property
+    def numbers(self) -> dict[sp.Symbol, sp.Rational]:
+        """Exact value of every parameter but the one that varies."""
+        values = self.field.model.parameters
+        return {real(n): sp.Rational(v) for n, v in values.items() if n != self.field.parameter}
+
+    @cached_property
+    def elimination(self) -> Elimination:
+        """Of the rates with every other parameter a number, so that its sign is known."""
+        states = self.field.model.states
+        rates = [rate.subs(self.numbers) for rate in self.field.modes[self.region].rates]
+        return eliminate(dict(zip(states, rates, strict=True)), states)
+
+    @property
+    def bounds(self) -> list[sp.Expr]:
+        """Functions one of which vanishes where an equilibrium leaves the region."""
+        return [i.function.subs(self.numbers) for i in self.field.model.interfaces.values()]
+
+    @cached_property
+    def polynomial(self) -> sp.Poly | None:
+        """The one remaining equation as a polynomial in its unknown, if it is one."""
+        left = self.elimination
+        if not (left.is_univariate and left.is_polynomial):
+            return None
+        polynomial = sp.Poly(left.remaining[0], left.unknowns[0])
+        return polynomial if polynomial.degree() <= DEGREE else None
+
+    @cached_property
+    def _coefficients(self) -> Any:
+        assert self.polynomial is not None
+        p = real(self.field.parameter)
+        return sp.lambdify(p, [sp.N(c, 17) for c in self.polynomial.all_coeffs()], "math")
+
+    @cached_property
+    def _formula(self) -> Any:
+        left = self.elimination
+        p = real(self.field.parameter)
+        states = left.state({}, self.field.model.states)
+        return sp.lambdify((p, *left.unknowns), [sp.N(s, 17) for s in states], "math")
+
+    def _whole(self, value: float, *unknowns: float) -> list[Array]:
+        """The full state at values of the unknowns; none outside the domain of the formulas."""
+        try:
+            return [np.array(self._formula(value, *unknowns), dtype=float)]
+        except (ArithmeticError, ValueError, TypeError):
+            return []
+
+    @property
+    def complete(self) -> bool:
+        """Whether `states` is sure to find every equilibrium."""
+        left = self.elimination
+        known = self.polynomial is not None or self._conditions is not None
+        return not left.unknowns or known or self.impossible
+
+    @property
+    def impossible(self) -> bool:
+        """Whether an equation without states can never hold, as where a rate is a constant."""
+        return any(e.is_number and e.is_nonzero for e in self.elimination.remaining)
+
+    @cached_property
+    def _conditions(self) -> list[sp.Expr] | None:
+        """Equations without unknowns, where nothing else is left: a continuum or nothing."""
+        left = self.elimination
+        if left.unknowns and all(not e.has(*left.unknowns) for e in left.remaining):
+            return list(left.remaining)
+        return None
+
+    def states(self, value: float) -> list[Array]:
+        """Isolated equilibria of the region's rates at a parameter value, admissible or not."""
+        left = self.elimination
+        if not left.unknowns:
+            return self._holding(value, self._whole(value))
+        if self._conditions is not None or self.impossible:
+            return []
+        if self.polynomial is None:
+            return self._searched(value)
+        try:
+            coefficients = np.array(self._coefficients(value), dtype=float)
+        except (ArithmeticError, ValueError, TypeError):
+            return []
+        found = [s for root in real_roots(coefficients) for s in self._whole(value, root)]
+        return self._polished(value, found)
+
+    def continuum(self, value: float) -> bool:
+        """Whether the region's equilibria at this value form a continuum."""
+        if self._conditions is None or self.impossible:
+            return False
+        p = real(self.field.parameter)
+        return all(abs(float(e.subs(p, value))) < 1e-14 for e in self._conditions)
+
+    def edges(self, value: float) -> list[Array]:
+        """Where a one-parameter continuum of equilibria meets an interface, or its middle."""
+        unknowns = self.elimination.unknowns
+        if len(unknowns) != 1:
+            return self._whole(value, *([0.0] * len(unknowns)))
+        ends = []
+        p = real(self.field.parameter)
+        solved = {real(n): e.subs(self.numbers) for n, e in self.elimination.solved.items()}
+        for bound in self.bounds:
+            line = sp.together(bound.subs(solved).subs(p, value)).as_numer_denom()[0]
+            if line.is_polynomial(*unknowns) and line.has(*unknowns):
+                coefficients = np.array(sp.Poly(line, *unknowns).all_coeffs(), dtype=float)
+                ends += [s for root in real_roots(coefficients) for s in self._whole(value, root)]
+        return ends or self._whole(value, 0.0)
+
+    def _holding(self, value: float, states: list[Array]) -> list[Array]:
+        """Those states at which equations without unknowns hold too."""
+        p = real(self.field.parameter)
+        rest = [float(e.subs(p, value)) for e in self.elimination.remaining]
+        return self._polished(value, states) if all(abs(r) < 1e-14 for r in rest) else []
+
+    def _polished(self, value: float, states: Sequence[Array]) -> list[Array]:
+        """Newton's last digits at fixed parameter; what does not converge was no root."""
+        kept: list[Array] = []
+        for state in states:
+            solved = self.corrected(state, value)
+            if solved is not None and not any(same(solved, other) for other in kept):
+                kept.append(solved)
+        return kept
+
+    def corrected(self, state: Array, value: float) -> Array | None:
+        """The equilibrium near a state at a parameter value, None without convergence."""
+        target = np.append(np.zeros(len(state)), 1.0)
+        scale = np.append(np.maximum(1.0, np.abs(state)), max(1.0, abs(value)))
+        found = with_condition(
+            lambda u: self.field.curve(self.region, u),
+            lambda u: (u[-1] - value, target),
+            np.append(state, value),
+            scale,
+        )
+        # at a double root Newton's last corrections stay near the root of the rounding
+        if not (np.isfinite(found.residual) and found.correction < 1e-6):
+            return None
+        rates, slopes = self.field.curve(self.region, found.u)
+        terms = np.abs(slopes[:, :-1]) @ np.maximum(1.0, np.abs(found.u[:-1]))
+        small = np.abs(rates) <= 1e-9 * np.maximum(1.0, terms)
+        moved = np.abs(found.u[:-1] - state) / scale[:-1]
+        there = abs(found.u[-1] - value) <= 1e-12 * scale[-1]
+        return found.u[:-1] if there and small.all() and moved.max() < 1e6 else None
+
+    def _searched(self, value: float) -> list[Array]:
+        """Newton's method from many states, a fixed sequence spread over several scales."""
+        field, n = self.field, self.field.n
+        generator = np.random.default_rng(20231)
+        spread = 10.0 ** generator.uniform(-2, 1.5, (STARTS, 1))
+        starts = np.vstack([np.zeros(n), generator.standard_normal((STARTS, n)) * spread])
+        states, converged = loop("newton_from")(
+            field.compiled.address, self.region, field.values, starts, value,
+            field.compiled.size, 100,
+        )  # fmt: skip
+        distinct: list[Array] = []
+        for state in states[converged]:
+            near = (np.abs(state - o).max() / max(1.0, np.abs(o).max()) for o in distinct)
+            if min(near, default=1.0) > 1e-5:
+                distinct.append(state)
+        return sorted(self._polished(value, distinct), key=lambda s: tuple(s))
+
+
+@dataclass(frozen=True, eq=False)
+class SlidingEquations(RegionEquations):
+    """The equations of pseudo-equilibria, those of the sliding field on its interface.
+
+    Without division they are (1 − α) f₁ + α f₂ = 0 and h = 0 with one more unknown
+    α, or, where that leaves more than one polynomial, b f₁ − a f₂ = 0 and h = 0, of
+    which one equation depends on the others (a, b are the drifts of h).
+    """
+
+    @cached_property
+    def elimination(self) -> Elimination:
+        whole = self._with_share
+        if len(whole.unknowns) <= 1 and whole.is_polynomial:
+            return whole
+        crossed = self._without_share
+        return crossed if crossed is not None and crossed.is_univariate else whole
+
+    @property
+    def _sides(self) -> Sides:
+        sides = self.field.modes[self.region].sides
+        assert sides is not None
+        return sides
+
+    @property
+    def _height(self) -> sp.Expr:
+        """The function h of the interface that is slid along."""
+        return self.field.modes[self.region].rows[self._sides.interface].subs(self.numbers)
+
+    @property
+    def _fields(self) -> list[tuple[sp.Expr, sp.Expr]]:
+        """The rates on both sides, state by state."""
+        modes, sides = self.field.modes, self._sides
+        both = zip(modes[sides.above].rates, modes[sides.below].rates, strict=True)
+        return [(f.subs(self.numbers), g.subs(self.numbers)) for f, g in both]
+
+    @cached_property
+    def _with_share(self) -> Elimination:
+        states, alpha = self.field.model.states, real(SHARE)
+        rates = [f + alpha * (g - f) for f, g in self._fields]
+        equations = {**dict(zip(states, rates, strict=True)), SHARE: self._height}
+        return eliminate(equations, (*states, SHARE))
+
+    @cached_property
+    def _without_share(self) -> Elimination | None:
+        states, h = self.field.model.states, self._height
+        a, b = (drift.subs(self.numbers) for drift in self._sides.drifts)
+        crossed = [b * f - a * g for f, g in self._fields]
+        for k, name in enumerate(states):
+            # sum of ∂h/∂x times these vanishes: one with ∂h/∂x ≠ 0 may be left out
+            if h.diff(real(name)).is_nonzero:
+                crossed[k] = h
+                return eliminate(dict(zip(states, crossed, strict=True)), states)
+        return None
+
+    @property
+    def bounds(self) -> list[sp.Expr]:
+        functions = super().bounds
+        del functions[self._sides.interface]
+        return [*functions, *(drift.subs(self.numbers) for drift in self._sides.drifts)]
+
+    def corrected(self, state: Array, value: float) -> Array | None:
+        """As for a region; None at a two-fold, where the sliding field is 0/0."""
+        solved = super().corrected(state, value)
+        if solved is None:
+            return None
+        u = np.append(solved, value)
+        _, _, h, slopes = self.field.at(self.region, u)
+        size = np.abs(slopes) @ np.maximum(np.abs(u), 1.0)
+        return None if np.all(np.abs(h[-2:]) <= 1e-9 * size[-2:]) else solved
+
+
+def real_roots(coefficients: Array) -> list[float]:
+    """Real roots of a polynomial, highest coefficient first, double ones once or twice.
+
+    A root counts as real when its imaginary part is within the error that
+    rounding makes at a double root; Newton decides afterwards.
+
+    Examples
+    --------
+    >>> [round(r, 12) for r in real_roots(np.array([1.0, 0.0, -4.0]))]
+    [-2.0, 2.0]
+    """
+    size = np.abs(coefficients).max(initial=0.0)
+    if size == 0:
+        return []
+    start = int(np.argmax(np.abs(coefficients) > 1e-15 * size))
+    roots = np.roots(coefficients[start:])
+    scale = np.maximum(1.0, np.abs(roots))
+    return sorted(float(r) for r in roots.real[np.abs(roots.imag) < 1e-6 * scale])
+
+
+def same(one: Array, other: Array) -> bool:
+    """Whether two states are equal, but for what a double root may be off."""
+    return bool(np.all(np.abs(one - other) <= 1e-8 * np.maximum(1.0, np.abs(one))))
+
+
+@lru_cache(maxsize=64)
+def region_equations(field: FrozenField) -> tuple[RegionEquations, ...]:
+    """The eliminated equations of every region, kept while the field is in use."""
+    found: list[RegionEquations] = []
+    for number, mode in enumerate(field.modes):
+        if mode.sides is None:
+            found.append(RegionEquations(field, number))
+        elif mode.sides.escaping:
+            # the same equations as for sliding, which stands before
+            found.append(found[-1])
+        else:
+            found.append(SlidingEquations(field, number))
+    return tuple(found)
