@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import chain
 
 import numpy as np
@@ -73,12 +74,27 @@ def compile_field(
     others = tuple(dict.fromkeys(n for n in (*model.parameters, *model.free) if n not in varying))
     rename = {real(n): sp.Symbol(f"u{k}") for k, n in enumerate(names)}
     rename |= {real(n): sp.Symbol(f"p{k}") for k, n in enumerate(others)}
-    bodies = []
     if modes is None:
         heights = [i.function for i in model.interfaces.values()]
         modes = [([r.rates[n] for n in model.states], heights) for r in model.regions.values()]
-    for rates, functions in modes:
-        rows = [*rates, *functions]
+    rows_of = tuple((*rates, *functions) for rates, functions in modes)
+    address = _address(rows_of, len(model.states), tuple(rename.items()), len(names), len(others))
+    n, m = len(model.states), max((len(f) for _, f in modes), default=0)
+    return CompiledField(address, others, n, m, len(varying))
+
+
+@lru_cache(maxsize=256)
+def _address(
+    rows_of: tuple[tuple[sp.Expr, ...], ...],
+    n: int,
+    renaming: tuple[tuple[sp.Symbol, sp.Symbol], ...],
+    unknowns: int,
+    parameters: int,
+) -> int:
+    """Address of the generated function of these rows."""
+    rename = dict(renaming)
+    bodies = []
+    for rows in rows_of:
         unknown = set().union(*(r.free_symbols for r in rows)) - set(rename)
         if unknown:
             name = min(s.name for s in unknown)
@@ -86,10 +102,9 @@ def compile_field(
                 f"the rates depend on '{name}', which has no frozen value; "
                 "call frozen() on the model first"
             )
-        bodies.append(_body(rows, len(model.states), rename))
-    module = load_generated(_source(bodies, len(names), len(others)), "field")
-    n, m = len(model.states), max((len(f) for _, f in modes), default=0)
-    return CompiledField(module.field.address, others, n, m, len(varying))
+        bodies.append(_body(rows, n, rename))
+    module = load_generated(_source(bodies, unknowns, parameters), "field")
+    return int(module.field.address)
 
 
 def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -> list[str]:

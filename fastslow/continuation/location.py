@@ -1,9 +1,9 @@
 """Special points of a curve F(u) = 0, u = (states, parameter), solved as extended systems.
 
 Each is a regular square system at a generic point (Kuznetsov 2004, chapter 10).
-The Jacobian of F is analytic; the derivative of the extended equations that
-needs second derivatives is differenced, which costs Newton its last bit of
-speed but nothing of the solution's accuracy.
+The Jacobian of F is analytic; what the extended equations need of second
+derivatives is differenced along a direction or two, which costs Newton its last
+bit of speed but nothing of the solution's accuracy.
 """
 
 from __future__ import annotations
@@ -48,10 +48,18 @@ def newton(
     equations: Callable[[Array], Array],
     start: Array,
     scale: Array,
+    slopes: Callable[[Array], Array] | None = None,
     *,
     iterations: int = 30,
 ) -> tuple[Array, float, bool, float]:
-    """Newton's method with a differenced Jacobian until the correction is at rounding.
+    """Newton's method until the correction is at rounding.
+
+    Parameters
+    ----------
+    equations : callable
+    start, scale : ndarray
+    slopes : callable, optional
+        Derivative of the equations; differenced where it is not given.
 
     Returns
     -------
@@ -63,10 +71,10 @@ def newton(
     for _ in range(iterations):
         if not np.all(np.isfinite(value)):
             return z, float("inf"), False, float("inf")
-        slopes = _differenced(equations, z, scale)
-        if not np.all(np.isfinite(slopes)):
+        matrix = _differenced(equations, z, scale) if slopes is None else slopes(z)
+        if not np.all(np.isfinite(matrix)):
             return z, float("inf"), False, float("inf")
-        correction = _solved(slopes * scale, -value)
+        correction = _solved(matrix * scale, -value)
         z = z + correction * scale
         value = equations(z)
         size = float(np.abs(correction).max())
@@ -76,7 +84,7 @@ def newton(
     z = without_dust(z, scale)
     value = equations(z)
     residual = float(np.abs(value).max()) if np.all(np.isfinite(value)) else float("inf")
-    return z, residual, bool(size < 1e-8 and _balanced(value, slopes, z, scale)), size
+    return z, residual, bool(size < 1e-8 and _balanced(value, matrix, z, scale)), size
 
 
 def _balanced(value: Array, slopes: Array, u: Array, scale: Array) -> bool:
@@ -148,21 +156,42 @@ def with_condition(
     return Located(u, float(np.abs(right).max()), converged, np.empty(0), size)
 
 
+def _bending(curve: Curve, u: Array, along: Array, scale: Array) -> Array:
+    """Derivative of F_x v by u, shape (n, n + 1), for a direction v of the states."""
+    n = len(along)
+    length = float(np.abs(along / scale[:n]).max())
+    if length == 0.0:
+        return np.zeros((n, n + 1))
+    step = 6e-6 / length
+    move = np.append(along, 0.0) * step
+    return np.asarray((curve(u + move)[1] - curve(u - move)[1]) / (2.0 * step))
+
+
 def fold(curve: Curve, start: Array, scale: Array) -> Located:
     """F = 0, F_x q = 0, |q| = 1; ``extra`` is the null vector q."""
     n = len(start) - 1
-    _, _, right = np.linalg.svd(curve(start)[1][:, :n] * scale[:n])
+    units = scale[:n]
+    _, _, right = np.linalg.svd(curve(start)[1][:, :n] * units)
     guide = right[-1]
 
     def equations(z: Array) -> Array:
         value, slopes = curve(z[: n + 1])
         q = z[n + 1 :]
-        return np.concatenate([value, slopes[:, :n] @ (scale[:n] * q), [guide @ q - 1.0]])
+        return np.concatenate([value, slopes[:, :n] @ (units * q), [guide @ q - 1.0]])
+
+    def derivative(z: Array) -> Array:
+        u, q = z[: n + 1], z[n + 1 :]
+        matrix = np.zeros((2 * n + 1, 2 * n + 1))
+        _, matrix[:n, : n + 1] = curve(u)
+        matrix[n : 2 * n, : n + 1] = _bending(curve, u, units * q, scale)
+        matrix[n : 2 * n, n + 1 :] = matrix[:n, :n] * units
+        matrix[2 * n, n + 1 :] = guide
+        return matrix
 
     z, residual, converged, size = newton(
-        equations, np.append(start, guide), np.append(scale, np.ones(n))
+        equations, np.append(start, guide), np.append(scale, np.ones(n)), derivative
     )
-    return Located(z[: n + 1], residual, converged, scale[:n] * z[n + 1 :], size)
+    return Located(z[: n + 1], residual, converged, units * z[n + 1 :], size)
 
 
 def turning_pair(curve: Curve, start: Array, scale: Array, squared: float) -> Located:
@@ -171,10 +200,11 @@ def turning_pair(curve: Curve, start: Array, scale: Array, squared: float) -> Lo
     κ = ω² > 0 is a Hopf point, κ < 0 a neutral saddle; ``extra`` is (κ,).
     """
     n = len(start) - 1
+    units = scale[:n]
 
     def jacobian(u: Array) -> tuple[Array, Array]:
         value, slopes = curve(u)
-        return value, slopes[:, :n] * scale[:n] / scale[:n, None]
+        return value, slopes[:, :n] * units / units[:, None]
 
     _, matrix = jacobian(start)
     _, _, right = np.linalg.svd(matrix @ matrix + squared * np.eye(n))
@@ -186,10 +216,25 @@ def turning_pair(curve: Curve, start: Array, scale: Array, squared: float) -> Lo
         double = matrix @ (matrix @ q) + kappa * q
         return np.concatenate([value, double, [guide @ q - 1.0, across @ q]])
 
+    def derivative(z: Array) -> Array:
+        u, q, kappa = z[: n + 1], z[n + 1 : 2 * n + 1], z[-1]
+        result = np.zeros((2 * n + 2, 2 * n + 2))
+        _, result[:n, : n + 1] = curve(u)
+        inner = result[:n, :n] * units / units[:, None]
+        first = _bending(curve, u, units * q, scale) / units[:, None]
+        second = _bending(curve, u, units * (inner @ q), scale) / units[:, None]
+        result[n : 2 * n, : n + 1] = inner @ first + second
+        result[n : 2 * n, n + 1 : 2 * n + 1] = inner @ inner + kappa * np.eye(n)
+        result[n : 2 * n, -1] = q
+        result[2 * n, n + 1 : 2 * n + 1] = guide
+        result[2 * n + 1, n + 1 : 2 * n + 1] = across
+        return result
+
     z, residual, converged, size = newton(
         equations,
         np.concatenate([start, guide, [squared]]),
         np.concatenate([scale, np.ones(n), [max(1.0, abs(squared))]]),
+        derivative,
     )
     return Located(z[: n + 1], residual, converged, z[-1:], size)
 
@@ -242,25 +287,3 @@ def crossing_tangents(curve: Curve, u: Array, scale: Array) -> Array | None:
     pairs = np.array([[q, a], [c, q]])
     tangents = pairs @ plane
     return np.asarray(scale * tangents / np.linalg.norm(tangents, axis=1)[:, None])
-
-
-def fold_coefficient(curve: Curve, u: Array, null: Array) -> float:
-    """Quadratic coefficient a = ½⟨p, B(q, q)⟩, with |q| = 1 and ⟨p, q⟩ = 1.
-
-    Kuznetsov (2004), equation 5.26. Its sign depends on the direction of q,
-    which is taken with its largest component positive. The second derivative
-    along q is differenced from the analytic Jacobian, to about 11 digits.
-    """
-    n = len(u) - 1
-    q = null / np.linalg.norm(null)
-    q = q if q[np.argmax(np.abs(q))] > 0 else -q
-    left, _, _ = np.linalg.svd(curve(u)[1][:, :n])
-    p = left[:, -1]
-    step = np.append(q, 0.0) * 1e-3 * max(1.0, float(np.abs(u[:n]).max()))
-    length = np.linalg.norm(step)
-
-    def slope(k: float) -> Array:
-        return np.asarray(curve(u + k * step)[1][:, :n] @ q)
-
-    second = (8.0 * (slope(1) - slope(-1)) - (slope(2) - slope(-2))) / (12.0 * length)
-    return float(0.5 * (p @ second) / (p @ q))

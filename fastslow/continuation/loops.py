@@ -1,4 +1,4 @@
-"""The compiled loops of `fastslow.continuation.engine`, loaded when first used."""
+"""The compiled loops of this package, loaded when first used."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from fastslow.compiled.generic import load_loop
 
 _ENGINE = "fastslow.continuation.engine"
+_EVALUATION = "fastslow.continuation.evaluation"
 _SOURCES = ("fastslow.compiled.pointers",)
 _ARGUMENTS = {
     "trace": (
@@ -16,6 +17,11 @@ _ARGUMENTS = {
         "largest turn tolerance iterations points closing"
     ),
     "evaluate": "address modes points parameters width",
+    "refine": "address mode parameters start scale row normal point width m iterations",
+    "survey": "address mode parameters points tangents scale width",
+    "pairs": "jacobians",
+    "passing": "points scale u within",
+    "value_at": "address mode point parameters width",
     "newton_from": "address mode parameters starts value width iterations",
 }
 
@@ -25,5 +31,8 @@ FULL, RANGE, INTERFACE, SMALL_STEP, WINDOW, CLOSED = range(6)
 
 @cache
 def loop(name: str) -> Callable[..., Any]:
-    """One of the engine's loops, compiled: ``trace``, ``evaluate`` or ``newton_from``."""
-    return load_loop(_ENGINE, name, tuple(_ARGUMENTS[name].split()), _SOURCES)
+    """One of the loops by its name, compiled."""
+    arguments = tuple(_ARGUMENTS[name].split())
+    if name == "trace":
+        return load_loop(_ENGINE, name, arguments, _SOURCES)
+    return load_loop(_EVALUATION, name, arguments, (_ENGINE, *_SOURCES))

@@ -32,6 +32,8 @@ class Continuation:
         States beyond this multiple of their scale end the branch ("left the window").
     starts : int
         Values of the parameter, beside both ends, at which branches are looked for.
+    branches : int
+        Branches that one diagram may have; beyond it the search ends and says so.
 
     Raises
     ------
@@ -48,6 +50,7 @@ class Continuation:
     points: int = 20_000
     reach: float = 1e6
     starts: int = 7
+    branches: int = 100
 
     def __post_init__(self) -> None:
         for entry in fields(self):

@@ -78,27 +78,30 @@ def branch_of(
     """The table of a curve, with its special points solved for and put among its rows."""
     special: list[SpecialPoint] = []
     at_row: list[int] = []
-    tables: list[tuple[Array, Array, int]] = []
+    tables: list[tuple[Array, Array, NDArray[np.complex128], int]] = []
     rows = 0
     for number, piece in enumerate(curve.pieces):
         u, tangents = piece.u, piece.tangents
-        found = special_points(field, piece, window, marks)
+        found, finite = special_points(field, piece, window, marks)
+        eigenvalues = field.with_infinite(piece.region, finite)
         if found:
             points = [_point(field, piece, d, window) for d in found]
             places = [d.row + 1 for d in found]
             u = np.insert(u, places, [d.located.u for d in found], axis=0)
             tangents = np.insert(tangents, places, [p.tangent for p in points], axis=0)
+            eigenvalues = np.insert(eigenvalues, places, [p.eigenvalues for p in points], axis=0)
             special += points
             at_row += [rows + place + k for k, place in enumerate(places)]
-        tables.append((u, tangents, piece.region))
+        tables.append((u, tangents, eigenvalues, piece.region))
         rows += len(u)
         if number < len(curve.joins):
             special.append(_corner(field, curve, number))
             at_row.append(rows - 1)
     u = np.concatenate([t[0] for t in tables])
     tangents = np.concatenate([t[1] for t in tables])
-    eigenvalues = np.concatenate([field.eigenvalues(t[2], t[0]) for t in tables])
-    region = np.concatenate([np.full(len(t[0]), field.regions[t[2]]) for t in tables])
+    eigenvalues = np.concatenate([t[2] for t in tables])
+    names = np.array(field.regions)[[t[3] for t in tables]]
+    region = np.repeat(names, [len(t[0]) for t in tables])
     if not curve.closed:
         special, at_row = _with_ends(field, curve, special, at_row, rows)
     return Branch(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +13,11 @@ from fastslow.continuation.location import (
     Located,
     branch_point,
     fold,
-    fold_coefficient,
     turning_pair,
     with_condition,
 )
 from fastslow.diagrams.fields import FrozenField
-from fastslow.diagrams.normal_forms import first_lyapunov, forms_at
+from fastslow.diagrams.normal_forms import first_lyapunov, fold_form, forms_at
 from fastslow.diagrams.walking import Piece, Window
 
 Array = NDArray[np.float64]
@@ -38,12 +38,13 @@ class Detected:
 @np.errstate(all="ignore")
 def special_points(
     field: FrozenField, piece: Piece, window: Window, marks: Sequence[float]
-) -> list[Detected]:
-    """All special points of a piece, in order along it."""
+) -> tuple[list[Detected], NDArray[np.complex128]]:
+    """All special points of a piece, in order along it, and the finite eigenvalues of its rows."""
+    branching, eigenvalues = field.survey(piece.region, piece.u, piece.tangents, window.scale)
     found = [
         *_folds(field, piece, window),
-        *_branch_points(field, piece, window),
-        *_turning_pairs(field, piece, window),
+        *_branch_points(field, piece, window, branching),
+        *_turning_pairs(field, piece, window, eigenvalues),
         *_marks(field, piece, window, marks),
     ]
     found = [d for d in found if _between(d.located.u, piece, d.row, window)]
@@ -55,11 +56,14 @@ def special_points(
         if d.code != "LP"
         or all(np.abs((d.located.u - c) / window.scale).max() > 1e-4 for c in crossings)
     ]
-    return sorted(found, key=lambda d: (d.row, _ahead(d.located.u, piece, d.row, window)))
+    found = sorted(found, key=lambda d: (d.row, _ahead(d.located.u, piece, d.row, window)))
+    return found, eigenvalues
 
 
 def _changes(test: Array) -> Iterator[tuple[int, int]]:
     """Pairs of rows, next to each other but for zeros, between which a test changes sign."""
+    if not (np.any(test < 0) and np.any(test > 0)):
+        return
     rows = np.flatnonzero(test != 0)
     signs = np.sign(test[rows])
     for k in np.flatnonzero(signs[:-1] * signs[1:] < 0):
@@ -83,17 +87,14 @@ def _folds(field: FrozenField, piece: Piece, window: Window) -> Iterator[Detecte
         if after - before > 2:
             continue
         located = fold(curve, _meeting(test, piece, before, after), window.scale)
-        coefficient = fold_coefficient(curve, located.u, located.extra)
+        jacobian = field.curve(piece.region, located.u)[1][:, : field.n]
+        coefficient = fold_form(forms_at(field, piece.region, located.u), jacobian)
         yield Detected(before, "LP", located, coefficient=coefficient)
 
 
-def _branch_points(field: FrozenField, piece: Piece, window: Window) -> Iterator[Detected]:
-    _, slopes, _, _ = field.at(piece.region, piece.u)
-    rows = np.concatenate(
-        [slopes * window.scale, (piece.tangents / window.scale)[:, None, :]], axis=1
-    )
-    size = np.linalg.norm(rows, axis=2).prod(axis=1)
-    test = np.linalg.det(rows) / np.where(size > 0, size, 1.0)
+def _branch_points(
+    field: FrozenField, piece: Piece, window: Window, test: Array
+) -> Iterator[Detected]:
     for before, after in _changes(np.where(np.abs(test) < 1e-14, 0.0, test)):
         if after - before > 2:
             continue
@@ -103,12 +104,20 @@ def _branch_points(field: FrozenField, piece: Piece, window: Window) -> Iterator
             yield Detected(before, "BP", located)
 
 
-def _turning_pairs(field: FrozenField, piece: Piece, window: Window) -> Iterator[Detected]:
+@cache
+def _pairs(n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Numbers of the two members of every pair of n."""
+    first, second = np.triu_indices(n, 1)
+    return first, second
+
+
+def _turning_pairs(
+    field: FrozenField, piece: Piece, window: Window, eigenvalues: NDArray[np.complex128]
+) -> Iterator[Detected]:
     n = field.n
-    eigenvalues = field.finite_eigenvalues(piece.region, piece.u)
-    first, second = np.triu_indices(eigenvalues.shape[1], 1)
-    if not first.size:
+    if eigenvalues.shape[1] < 2:
         return
+    first, second = _pairs(eigenvalues.shape[1])
     sums = eigenvalues[:, first] + eigenvalues[:, second]
     size = np.maximum(np.abs(eigenvalues).max(axis=1, keepdims=True), np.finfo(float).tiny)
     test = np.prod(sums / size, axis=1).real

@@ -11,7 +11,6 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.continuation.location import with_condition
 from fastslow.continuation.loops import loop
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.modes import Sides
@@ -168,12 +167,8 @@ class RegionEquations:
         """The equilibrium near a state at a parameter value, None without convergence."""
         target = np.append(np.zeros(len(state)), 1.0)
         scale = np.append(np.maximum(1.0, np.abs(state)), max(1.0, abs(value)))
-        found = with_condition(
-            lambda u: self.field.curve(self.region, u),
-            lambda u: (u[-1] - value, target),
-            np.append(state, value),
-            scale,
-        )
+        u = np.append(state, value)
+        found = self.field.refined(self.region, u, scale, normal=target, point=value * target)
         # at a double root Newton's last corrections stay near the root of the rounding
         if not (np.isfinite(found.residual) and found.correction < 1e-6):
             return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,12 +11,15 @@ import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.compiled.fields import CompiledField, compile_field, parameter_array
+from fastslow.continuation.location import Located, with_condition
 from fastslow.continuation.loops import loop
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
 
 Array = NDArray[np.float64]
+
+_NONE = np.empty(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +89,16 @@ class FrozenField:
         rows = [mode.signs for mode in self.modes]
         return np.array(rows, dtype=float).reshape(len(rows), len(rows[0]))
 
-    @property
+    @cached_property
     def n(self) -> int:
         return len(self.model.states)
+
+    @cached_property
+    def _layout(self) -> tuple[int, int, int, int, int, Callable[..., Array]]:
+        """How `at` cuts up the output of the compiled function, and its evaluation at a point."""
+        n, m, columns = self.n, self.compiled.m, self.n + self.compiled.k
+        first = n + n * columns
+        return n, m, columns, first, first + m, loop("value_at")
 
     def rates(self, region: int) -> list[sp.Expr]:
         """The rates of a region in SymPy, in the order of the states."""
@@ -96,17 +107,24 @@ class FrozenField:
     def at(self, region: int, points: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """F (…, n), [F_x F_p] (…, n, n + k), h (…, m) and ∇h (…, m, n + k) at points u."""
         u = np.asarray(points, dtype=float)
+        n, m, columns, first, second, one = self._layout
+        if u.ndim == 1:
+            out = one(self.compiled.address, region, u, self.values, second + m * columns)
+            return (
+                out[:n],
+                out[n:first].reshape(n, columns),
+                out[first:second],
+                out[second:].reshape(m, columns),
+            )
         rows = np.atleast_2d(u)
         modes = np.full(len(rows), region, dtype=np.int64)
         out = loop("evaluate")(self.compiled.address, modes, rows, self.values, self.compiled.size)
-        n, m, columns = self.n, self.compiled.m, self.n + self.compiled.k
-        parts = np.split(out, np.cumsum([n, n * columns, m]), axis=1)
         lead = u.shape[:-1]
         return (
-            parts[0].reshape(*lead, n),
-            parts[1].reshape(*lead, n, columns),
-            parts[2].reshape(*lead, m),
-            parts[3].reshape(*lead, m, columns),
+            out[:, :n].reshape(*lead, n),
+            out[:, n:first].reshape(*lead, n, columns),
+            out[:, first:second].reshape(*lead, m),
+            out[:, second:].reshape(*lead, m, columns),
         )
 
     def curve(self, region: int, u: Array) -> tuple[Array, Array]:
@@ -120,26 +138,79 @@ class FrozenField:
         Of a sliding motion those along the interface, and as the last one −∞
         (+∞ where it escapes): the interface is reached (left) in finite time.
         """
-        finite = self.finite_eigenvalues(region, points)
+        return self.with_infinite(region, self.finite_eigenvalues(region, points))
+
+    def finite_eigenvalues(self, region: int, points: ArrayLike) -> NDArray[np.complex128]:
+        """As `eigenvalues` without the infinite one, shape (…, n) or (…, n − 1)."""
+        _, slopes, _, gradients = self.at(region, points)
+        jacobian, sides = slopes[..., : self.n], self.modes[region].sides
+        if sides is not None:
+            normal = gradients[..., sides.interface, : self.n, None]
+            # the columns of Q after the first span the interface's tangent space
+            along = np.linalg.qr(normal, mode="complete")[0][..., 1:]
+            jacobian = np.swapaxes(along, -1, -2) @ jacobian @ along
+        return self.spectrum(jacobian)
+
+    def survey(
+        self, region: int, points: Array, tangents: Array, scale: Array
+    ) -> tuple[Array, NDArray[np.complex128]]:
+        """Normalized determinants of [F_x F_p; tangent], and finite eigenvalues, at rows."""
+        branching, jacobians = loop("survey")(
+            self.compiled.address, region, self.values, np.ascontiguousarray(points),
+            np.ascontiguousarray(tangents), scale, self.compiled.size,
+        )  # fmt: skip
+        if self.modes[region].sides is not None:
+            return branching, self.finite_eigenvalues(region, points)
+        return branching, self.spectrum(jacobians)
+
+    def with_infinite(self, region: int, finite: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Eigenvalues with the infinite one of a sliding motion."""
         sides = self.modes[region].sides
         if sides is None:
             return finite
         across = np.full((*finite.shape[:-1], 1), np.inf if sides.escaping else -np.inf)
         return np.concatenate([finite, across.astype(complex)], axis=-1)
 
-    def finite_eigenvalues(self, region: int, points: ArrayLike) -> NDArray[np.complex128]:
-        """As `eigenvalues` without the infinite one, shape (…, n) or (…, n − 1)."""
-        _, slopes, _, gradients = self.at(region, points)
-        jacobian, sides = slopes[..., : self.n], self.modes[region].sides
-        # at a two-fold the sliding field is 0/0
+    @staticmethod
+    def spectrum(jacobian: Array) -> NDArray[np.complex128]:
+        """Eigenvalues of matrices; NaN where one is not finite, as at a two-fold (0/0)."""
+        if jacobian.shape[-1] == 2:
+            flat = np.ascontiguousarray(jacobian).reshape(-1, 2, 2)
+            return np.asarray(loop("pairs")(flat)).reshape(jacobian.shape[:-1])
         finite = np.asarray(np.isfinite(jacobian).all(axis=(-1, -2)))[..., None]
+        if jacobian.shape[-1] == 1:
+            return np.where(finite, jacobian[..., 0].astype(complex), np.nan)
         jacobian = np.where(finite[..., None], jacobian, 0.0)
-        if sides is not None:
-            normal = gradients[..., sides.interface, : self.n, None]
-            # the columns of Q after the first span the interface's tangent space
-            along = np.linalg.qr(normal, mode="complete")[0][..., 1:]
-            jacobian = np.swapaxes(along, -1, -2) @ jacobian @ along
         return np.where(finite, np.linalg.eigvals(jacobian).astype(complex), np.nan)
+
+    def refined(
+        self,
+        region: int,
+        start: Array,
+        scale: Array,
+        *,
+        row: int = -1,
+        normal: Array | None = None,
+        point: Array | None = None,
+    ) -> Located:
+        """Where the curve F = 0 meets h[row] = 0, or the plane through a point with a normal."""
+        normal = start if normal is None else normal
+        point = start if point is None else point
+        u, residual, size, converged = loop("refine")(
+            self.compiled.address, region, self.values, start, scale, row, normal, point,
+            self.compiled.size, self.compiled.m, 40,
+        )  # fmt: skip
+        if converged:
+            return Located(u, residual, True, _NONE, size)
+
+        def condition(u: Array) -> tuple[float, Array]:
+            if row < 0:
+                return float((u - point) @ normal), normal
+            _, _, h, slopes = self.at(region, u)
+            return float(h[row]), slopes[row]
+
+        # least-norm steps where the equations are singular
+        return with_condition(lambda u: self.curve(region, u), condition, start, scale)
 
     def slides_into(self, region: int, beyond: int, point: Array) -> int | None:
         """The sliding or escaping motion that an equilibrium of a region on an interface enters.

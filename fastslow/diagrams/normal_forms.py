@@ -168,10 +168,16 @@ def first_lyapunov(forms: Multilinear, jacobian: Array, frequency: float) -> flo
         turning = np.linalg.solve(2j * frequency * np.eye(n) - jacobian, forms.form(q, q))
     except np.linalg.LinAlgError:
         return np.nan
-    terms = (
-        forms.form(q, q, conjugate) - 2.0 * forms.form(q, straight) + forms.form(conjugate, turning)
-    )
-    return float(np.vdot(p, terms).real / (2.0 * frequency))
+    terms = [
+        np.vdot(p, forms.form(q, q, conjugate)),
+        -2.0 * np.vdot(p, forms.form(q, straight)),
+        np.vdot(p, forms.form(conjugate, turning)),
+    ]
+    total = sum(terms).real
+    # what cancels to rounding is zero: the Hopf point is degenerate
+    if abs(total) <= 1e-12 * sum(map(abs, terms)):
+        return 0.0
+    return float(total / (2.0 * frequency))
 
 
 def _eigenvector(matrix: Array, value: complex) -> Vector:

@@ -13,11 +13,11 @@ from fastslow.continuation import curves
 from fastslow.continuation.curves import Frame
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.codimension_two import Found, along, coefficients, criteria, search
+from fastslow.diagrams.curve_ends import outcome_of
 from fastslow.diagrams.defining import Crossing, Defining, Fold, OnInterface, Pair
 from fastslow.diagrams.fields import FrozenField
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
-from fastslow.results.outcome import Outcome
 from fastslow.results.point_branches import PointBranch
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
@@ -101,7 +101,7 @@ def continue_points(
     model = _model(point, (first, second))
     field = FrozenField(model, first, second)
     settings = settings or Continuation()
-    region = field.regions.index(point.regions[0])
+    region = _region_of(field, point)
     u = np.append(point.state, [point.parameters[n] for n in (first, second)])
     if np.any(u[-2:] < lower) or np.any(u[-2:] > upper):
         raise ArgumentError(
@@ -179,6 +179,15 @@ def _model(point: SpecialPoint, names: tuple[str, str]) -> Model:
             raise unknown_name("parameter", name, known)
     whole = model.with_parameters({n: point.parameters[n] for n in known if n in point.parameters})
     return whole.freed(names[0]).freed(names[1])
+
+
+def _region_of(field: FrozenField, point: SpecialPoint) -> int:
+    """The region whose rates vanish; of a boundary equilibrium not the sliding motion."""
+    numbers = [field.regions.index(r) for r in point.regions if r in field.regions]
+    plain = [k for k in numbers if field.modes[k].sides is None]
+    if point.interface is not None and plain:
+        return plain[0]
+    return numbers[0]
 
 
 def _system(
@@ -273,7 +282,7 @@ def _traced(
         coefficient,
         SpecialPoints(special),
         tuple(place + k for k, place in enumerate(places)),
-        (_outcome(first, system, rows[0], names), _outcome(last, system, rows[-1], names)),
+        (outcome_of(first, system, rows[0], names), outcome_of(last, system, rows[-1], names)),
         last == curves.CLOSED,
     )
 
@@ -350,45 +359,3 @@ def _special(
         source=point.source,
         **data,
     )
-
-
-def _outcome(status: str, system: Defining, z: Array, names: tuple[str, str]) -> Outcome:
-    plane = z[system.width - 2 : system.width]
-    where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, plane, strict=True))
-    if status == curves.RANGE:
-        return Outcome("end of range", f"reached the end of the range at {where}.", True)
-    if status == curves.CLOSED:
-        return Outcome("closed loop", "the curve returned to its start: a closed loop.", True)
-    if status == curves.STOPPED and isinstance(system, Crossing):
-        return Outcome(
-            "no branch point",
-            f"branch points do not persist beyond {where}: the model has no symmetry that keeps "
-            "them, so they are isolated in this plane.",
-            False,
-        )
-    if status == curves.STOPPED:
-        return Outcome(
-            "left the region", f"the points leave region {_region(system)} at {where}.", True
-        )
-    if status == curves.WINDOW:
-        return Outcome(
-            "left the window",
-            f"a state grew without bound near {where}; raise Continuation(reach=…).",
-            False,
-        )
-    if status == curves.FULL:
-        return Outcome(
-            "too many points",
-            f"the curve goes on at {where}; raise Continuation(points=…) or largest_step.",
-            False,
-        )
-    return Outcome(
-        "step too small",
-        f"no next point was found from {where}: the curve is singular there, or the rates are not "
-        "defined beyond.",
-        False,
-    )
-
-
-def _region(system: Defining) -> str:
-    return system.field.regions[system.region]

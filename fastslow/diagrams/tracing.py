@@ -3,31 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from fastslow.continuation.loops import loop
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.assembly import Curve, branch_of, joined, rising
-from fastslow.diagrams.critical import critical_values
 from fastslow.diagrams.equations import region_equations
 from fastslow.diagrams.fields import FrozenField
-from fastslow.diagrams.solving import point_at, solve_at
+from fastslow.diagrams.solving import point_at
+from fastslow.diagrams.starts import starts_of
 from fastslow.diagrams.walking import Piece, Window, beside, on_interface, walk
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.branches import Branch
-from fastslow.results.diagrams import Corrector, Diagram
+from fastslow.results.diagrams import SEARCHED, Corrector, Diagram
 from fastslow.results.outcome import Outcome
 from fastslow.results.points import Equilibrium, SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
+
+#: First step along the branch that crosses at a branch point, in units of the window.
+SWITCH = 1e-3
 
 ADMISSIBLE = Outcome(
     "becomes admissible", "the virtual branch meets the interface and is admissible beyond.", True
@@ -98,19 +102,22 @@ def continue_equilibria(
         raise ModelError(
             f"'{quantity}' still varies in time; trace the branches of model.frozen() instead"
         )
-    field = FrozenField(model.freed(name), name)
+    field = _field(model, name)
     settings = settings or Continuation()
-    starts = _Starts(field, lower, upper, settings.starts)
+    starts = starts_of(field, lower, upper, settings.starts)
     window = Window(lower, upper, starts.scale())
     branches: list[Branch] = []
     for admissible in (True, False) if virtual else (True,):
         for value in starts.values(branches):
-            for start in starts.at(value, admissible):
+            if len(branches) >= settings.branches:
+                break
+            for start in starts.at(value, admissible)[: settings.branches - len(branches)]:
                 if not any(_passes(field, b, start, value, window) for b in branches):
                     curve = _traced(field, start, value, window, settings, admissible)
                     branches += _branches(field, curve, window, marks, admissible)
-    ends = (o for branch in branches for o in branch.outcomes)
-    traced = all(o.success for o in ends)
+        branches += _switched(field, branches, window, settings, marks, admissible)
+    full = len(branches) >= settings.branches
+    traced = not full and all(o.success for branch in branches for o in branch.outcomes)
     return Diagram(
         model.states,
         name,
@@ -120,9 +127,19 @@ def continue_equilibria(
         "complete" if starts.complete and traced else "found",
         field.interfaces,
         field.regions,
-        _interface_values(field.model),
-        repr(model),
+        _interface_values(field),
+        _text(model),
         _corrector(field),
+        _too_many(settings) if full else SEARCHED,
+    )
+
+
+def _too_many(settings: Continuation) -> Outcome:
+    return Outcome(
+        "too many branches",
+        f"{settings.branches} branches were traced and there may be more; raise "
+        "Continuation(branches=…) to look for them.",
+        False,
     )
 
 
@@ -141,50 +158,16 @@ def _range(name: str, over: Any) -> tuple[float, float]:
     return lower, upper
 
 
-class _Starts:
-    """Equilibria from which branches are traced, solved for once at each value."""
+@lru_cache(maxsize=64)
+def _field(model: Model, name: str) -> FrozenField:
+    """The field of a model, made once."""
+    return FrozenField(model.freed(name), name)
 
-    def __init__(self, field: FrozenField, lower: float, upper: float, inside: int) -> None:
-        self._field = field
-        self._over = (lower, upper)
-        # the golden ratio keeps the values clear of each other and of round numbers
-        parts = [(0.5 + k * 0.6180339887498949) % 1.0 for k in range(inside)]
-        spread = [lower + p * (upper - lower) for p in parts]
-        equations = dict.fromkeys(region_equations(field))
-        between = [critical_values(e, lower, upper) for e in equations]
-        self.complete = all(b is not None for b in between)
-        levels = sorted({lower, upper, *(v for b in between for v in b or ())})
-        middles = [0.5 * (a + b) for a, b in pairwise(levels)]
-        self._first = [lower, upper, *(middles if self.complete else [*middles, *spread])]
-        self._found: dict[float, list[Equilibrium]] = {}
 
-    def at(self, value: float, admissible: bool) -> list[Equilibrium]:
-        if value not in self._found:
-            self._found[value] = solve_at(self._field, value, virtual=True)
-        return [e for e in self._found[value] if e.admissible == admissible and not e.continuum]
-
-    def values(self, branches: list[Branch]) -> Iterable[float]:
-        """The first values, then one between each two special points found so far."""
-        yield from self._first
-        done: set[float] = set()
-        while True:
-            special = {p[b.parameter_name] for b in branches for p in b.special}
-            levels = sorted({*self._over, *special})
-            gap = 1e-6 * (self._over[1] - self._over[0])
-            middles = {0.5 * (a + b) for a, b in pairwise(levels) if b - a > gap}
-            fresh = sorted(middles - done)
-            if not fresh or len(done) > 200:
-                return
-            done |= set(fresh)
-            yield from fresh
-
-    def scale(self) -> Array:
-        """Unit of each state, the size of its equilibria, and the length of the range."""
-        states = [e.state for v in self._first for e in (*self.at(v, True), *self.at(v, False))]
-        n = self._field.n
-        size = np.abs(states).max(axis=0) if states else np.zeros(n)
-        size = np.where(size > 1e-14 * max(size.max(initial=0.0), 1e-300), size, 1.0)
-        return np.append(size, self._over[1] - self._over[0])
+@lru_cache(maxsize=64)
+def _text(model: Model) -> str:
+    """The equations in words, written once."""
+    return repr(model)
 
 
 def _traced(
@@ -204,6 +187,41 @@ def _traced(
         return joined(None, forward)
     backward = walk(field, region, u, -tangent, window, settings, bounded=bounded)
     return rising(joined(backward, forward))
+
+
+def _switched(
+    field: FrozenField,
+    branches: Sequence[Branch],
+    window: Window,
+    settings: Continuation,
+    marks: Sequence[float],
+    admissible: bool,
+) -> list[Branch]:
+    """Branches that cross another at a branch point and that no start has led to."""
+    found: list[Branch] = []
+    waiting = [p for b in branches if b.admissible == admissible for p in b.special("BP")]
+    while waiting:
+        point = waiting.pop(0)
+        if point.switch is None or len(branches) + len(found) >= settings.branches:
+            continue
+        region = field.regions.index(point.regions[0])
+        u = np.append(point.state, point.parameters[field.parameter])
+        for step in (SWITCH, -SWITCH):
+            guess = u + step * point.switch
+            near = beside(field, region, guess, point.switch * window.weight, guess, window)
+            value = float(near.u[-1])
+            if not near.converged or not window.lower <= value <= window.upper:
+                continue
+            if field.admissible(region, near.u) != admissible:
+                continue
+            start = point_at(field, region, near.u, admissible)
+            if any(_passes(field, b, start, value, window) for b in (*branches, *found)):
+                continue
+            curve = _traced(field, start, value, window, settings, admissible)
+            fresh = _branches(field, curve, window, marks, admissible)
+            found += fresh
+            waiting += [p for b in fresh for p in b.special("BP")]
+    return found
 
 
 def _branches(
@@ -258,20 +276,19 @@ def _passes(
     """Whether a branch goes through an equilibrium."""
     if branch.admissible != start.admissible:
         return False
-    u = np.append(start.state, value) / window.scale
-    rows = np.column_stack([branch.state, branch.parameter]) / window.scale
+    u = np.append(start.state, value)
+    rows = np.column_stack([branch.state, branch.parameter])
     if len(rows) < 2:
-        return bool(np.abs(rows[0] - u).max() < 1e-6)
-    chords = np.diff(rows, axis=0)
-    length = np.maximum((chords**2).sum(axis=1), 1e-300)
-    part = np.clip(((u - rows[:-1]) * chords).sum(axis=1) / length, 0.0, 1.0)
-    near = rows[:-1] + part[:, None] * chords
-    apart = np.linalg.norm(near - u, axis=1)
-    for k in np.flatnonzero(apart < 1e-2):
+        return bool(np.abs((rows[0] - u) / window.scale).max() < 1e-6)
+    for k in loop("passing")(rows, window.scale, u, 1e-2):
+        chord = (rows[k + 1] - rows[k]) / window.scale
+        length = max(float(chord @ chord), 1e-300)
+        part = float(np.clip(((u - rows[k]) / window.scale) @ chord / length, 0.0, 1.0))
+        near = rows[k] + part * (rows[k + 1] - rows[k])
+        normal = chord / np.sqrt(length) / window.scale
         region = field.regions.index(str(branch.region[k]))
-        normal = chords[k] / np.sqrt(length[k]) / window.scale
-        found = beside(field, region, u * window.scale, normal, near[k] * window.scale, window)
-        if found.converged and np.abs(found.u / window.scale - u).max() < 1e-6:
+        found = beside(field, region, u, normal, near, window)
+        if found.converged and np.abs((found.u - u) / window.scale).max() < 1e-6:
             return True
     return False
 
@@ -301,9 +318,11 @@ def _near(one: SpecialPoint, other: SpecialPoint) -> bool:
     return bool(np.all(np.abs(first - second) <= 1e-7 * np.maximum(1.0, np.abs(first))))
 
 
-def _interface_values(model: Model) -> dict[str, tuple[str, float]]:
+@lru_cache(maxsize=64)
+def _interface_values(field: FrozenField) -> dict[str, tuple[str, float]]:
     """Interfaces that are a constant value of one state, for drawing them as lines."""
     values = {}
+    model = field.model
     for name, interface in model.interfaces.items():
         h = sp.sympify(interface.function).subs(model.values)
         for state in model.states:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import loops
-from fastslow.continuation.location import Located, with_condition
+from fastslow.continuation.location import Located
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.two_folds import cut_at_two_fold, two_fold_ahead
@@ -191,24 +191,14 @@ def on_interface(
     field: FrozenField, region: int, interface: int, guess: Array, window: Window
 ) -> Located:
     """The boundary equilibrium F = 0, h = 0 near a guess."""
-
-    def condition(u: Array) -> tuple[float, Array]:
-        _, _, h, slopes = field.at(region, u)
-        return float(h[interface]), slopes[interface]
-
-    return with_condition(lambda u: field.curve(region, u), condition, guess, window.scale)
+    return field.refined(region, guess, window.scale, row=interface)
 
 
 def beside(
     field: FrozenField, region: int, point: Array, normal: Array, guess: Array, window: Window
 ) -> Located:
     """Where the curve meets the plane through a point with a given normal."""
-    return with_condition(
-        lambda z: field.curve(region, z),
-        lambda z: (float((z - point) @ normal), normal),
-        guess,
-        window.scale,
-    )
+    return field.refined(region, guess, window.scale, normal=normal, point=point)
 
 
 def _interface_of(field: FrozenField, region: int, row: int) -> int:
@@ -308,12 +298,8 @@ def _cut_at_range(
     part = (bound - before[-1]) / (last - before[-1]) if last != before[-1] else 0.0
     along = np.zeros(u.shape[1])
     along[-1] = 1.0
-    found = with_condition(
-        lambda z: field.curve(region, z),
-        lambda z: (z[-1] - bound, along),
-        before + part * (u[-1] - before),
-        window.scale,
-    )
+    guess = before + part * (u[-1] - before)
+    found = field.refined(region, guess, window.scale, normal=along, point=bound * along)
     if not found.converged or not np.all(np.isfinite(found.u)):
         return u[:-1], tangents[:-1]
     u[-1] = found.u

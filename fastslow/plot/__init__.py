@@ -4,6 +4,7 @@ from fastslow.plot.branches import DiagramDrawing, diagram
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.panels import PanelDrawing, panel
 from fastslow.plot.passages import OverlayDrawing, overlay
+from fastslow.plot.planes import PlaneDrawing, parameter_plane
 from fastslow.plot.style import Drawing
 
 __all__ = [
@@ -12,9 +13,11 @@ __all__ = [
     "MotionDrawing",
     "OverlayDrawing",
     "PanelDrawing",
+    "PlaneDrawing",
     "diagram",
     "overlay",
     "panel",
+    "parameter_plane",
     "phase_portrait",
     "time_series",
 ]

@@ -35,6 +35,23 @@ MARKERS: dict[str, tuple[str, str]] = {
     "BE": ("^", PURPLE),
     "UZ": ("x", BLACK),
     "EP": ("|", BLACK),
+    "CP": ("v", VERMILION),
+    "BT": ("o", BLACK),
+    "GH": ("s", BLUE),
+    "ZH": ("D", BLACK),
+    "HH": ("P", BLACK),
+    "BF": ("^", PURPLE),
+    "BH": ("^", GREEN),
+}
+
+#: Colour and line of a curve of special points by code, and of its virtual parts.
+CURVES: dict[str, dict[str, Any]] = {
+    "LP": {"color": VERMILION, "linestyle": "-", "linewidth": 1.5},
+    "HB": {"color": GREEN, "linestyle": (0, (6, 1.5)), "linewidth": 1.5},
+    "BE": {"color": PURPLE, "linestyle": (0, (5, 1.5, 1, 1.5)), "linewidth": 1.5},
+    "BP": {"color": ORANGE, "linestyle": "-", "linewidth": 1.2},
+    "NSD": {"color": GREY, "linestyle": "-", "linewidth": 0.7},
+    "virtual": {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.6},
 }
 
 #: Marker, colour and legend text of a transition by kind.

@@ -11,10 +11,15 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.branches import Branch
+from fastslow.results.outcome import Outcome
 from fastslow.results.points import Equilibrium, SpecialPoints
 
 #: Solves for the equilibrium of a region near a state: (region, state, value) -> Equilibrium.
 Corrector = Callable[[str, NDArray[np.float64], float], Equilibrium | None]
+
+
+#: The usual end of the search for branches.
+SEARCHED = Outcome("searched", "every start was followed.", True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +46,8 @@ class Diagram:
         For every interface that is a plain value of one state, (state, value).
     equations : str
         The model as text.
+    outcome : Outcome
+        How the search for branches ended.
     """
 
     states: tuple[str, ...]
@@ -54,6 +61,7 @@ class Diagram:
     interface_values: Mapping[str, tuple[str, float]]
     equations: str
     corrector: Corrector | None = field(default=None, repr=False)
+    outcome: Outcome = SEARCHED
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "corrector": None}
@@ -178,6 +186,8 @@ class Diagram:
             f"Diagram of {', '.join(self.states)} over {self.parameter} in [{low:g}, {high:g}] "
             f"({self.coverage})"
         ]
+        if not self.outcome:
+            lines.append(f"   {self.outcome}")
         for number, branch in enumerate(self.branches):
             last = number == len(self.branches) - 1
             lines.append(("└─ " if last else "├─ ") + repr(branch))

@@ -31,9 +31,6 @@ CODE_NAMES = {
     "BH": "Hopf on an interface",
 }
 
-#: A first Lyapunov coefficient below this decides nothing.
-FLAT = 1e-10
-
 
 def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
     """Stable, unstable or neutral, for eigenvalues of shape (..., n).
@@ -324,7 +321,7 @@ class SpecialPoint(_Point):
         """Of a Hopf point: ``"supercritical"`` (l₁ < 0), ``"subcritical"`` or ``"degenerate"``."""
         if self.code != "HB" or self.lyapunov is None:
             return None
-        if abs(self.lyapunov) <= FLAT:
+        if self.lyapunov == 0:
             return "degenerate"
         return "supercritical" if self.lyapunov < 0 else "subcritical"
 

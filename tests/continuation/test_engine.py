@@ -11,7 +11,6 @@ from fastslow.continuation import engine
 from fastslow.continuation.location import (
     branch_point,
     fold,
-    fold_coefficient,
     turning_pair,
     with_condition,
 )
@@ -45,7 +44,6 @@ def test_fold_of_a_parabola_to_rounding():
     found = fold(parabola, np.array([0.1, 0.05, 0.02]), np.ones(3))
     assert found.converged
     np.testing.assert_allclose(found.u, 0, atol=1e-14)
-    assert fold_coefficient(parabola, found.u, found.extra) == pytest.approx(-1, abs=1e-11)
 
 
 def test_point_with_a_condition():

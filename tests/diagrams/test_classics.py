@@ -5,6 +5,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.diagrams import starts
 
 x, y, z, p, q, rho, u1, u2, p1, p2, p3 = sp.symbols("x y z p q rho u1 u2 p1 p2 p3")
 
@@ -202,3 +203,79 @@ def test_twelve_states():
     diagram = fs.continue_equilibria(fs.Model(rates, parameters={p: 0}), "p", (-1, 1))
     bound = 2 / (3 * np.sqrt(3))
     assert sorted(f["p"] for f in diagram.folds) == pytest.approx([-bound, bound], rel=1e-12)
+
+
+def test_switching_at_branch_points_alone_finds_the_other_branches(monkeypatch):
+    """Starts are kept off every state but x = 0; the circle x² + p² = 1 crosses there twice."""
+    solve = starts.solve_at
+
+    def at_zero(field, value, virtual=False):
+        found = solve(field, value, virtual)
+        return [e for e in found if abs(e["x"]) < 1e-8]
+
+    monkeypatch.setattr(starts, "solve_at", at_zero)
+    model = fs.Model({x: x * (1 - p**2 - x**2)}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, "p", (-2, 2))
+    assert len(diagram.branches) == 2
+    loop = diagram.branches[1]
+    assert loop.closed
+    assert np.hypot(loop["x"], loop["p"]) == pytest.approx(np.ones(len(loop)), abs=1e-13)
+    assert {b.label for b in diagram.special("BP")} == {"BP1", "BP2"}
+    # the tangent of the other branch: along p on the circle, along x on the line
+    for point in diagram.branches[0].special("BP"):
+        assert np.abs(point.switch[1]) < 1e-6
+    for point in loop.special("BP"):
+        assert np.abs(point.switch[0]) < 1e-6
+
+
+def test_transcritical_tangents():
+    """x(p − 2x) = 0: slopes 0 and 1/2."""
+    model = fs.Model({x: x * (p - 2 * x)}, parameters={p: 0})
+    points = fs.continue_equilibria(model, "p", (-1, 1)).special("BP")
+    slopes = sorted(point.switch[0] / point.switch[1] for point in points)
+    assert slopes == pytest.approx([0, 0.5], abs=1e-7)
+
+
+def test_twenty_states():
+    """A ring of twenty bistable cells, coupled so that all are alike: folds at ±2/√27."""
+    names = sp.symbols("s0:20")
+    rates = {
+        s: p + s - s**3 + (names[k - 1] + names[(k + 1) % 20] - 2 * s) * 12
+        for k, s in enumerate(names)
+    }
+    model = fs.Model(rates, parameters={p: 0})
+    settings = fs.Continuation(starts=1)
+    diagram = fs.continue_equilibria(model, "p", (-1, 1), settings=settings)
+    bound = 2 / (3 * np.sqrt(3))
+    uniform = [f["p"] for f in diagram.folds if np.ptp(f.state) < 1e-9]
+    assert sorted(uniform) == pytest.approx([-bound, bound], rel=1e-12)
+    for branch in diagram.branches:
+        values = np.array(
+            [field_of(branch.state[k], branch.parameter[k]) for k in range(len(branch))]
+        )
+        assert np.abs(values).max() < 1e-11
+
+
+def field_of(s, level):
+    return level + s - s**3 + (np.roll(s, 1) + np.roll(s, -1) - 2 * s) * 12
+
+
+@pytest.mark.parametrize(
+    ("unit", "time"), [(1e6, 1.0), (1e-6, 1.0), (1.0, 1e6), (1e6, 1e-6), (1e-6, 1e6)]
+)
+def test_badly_scaled(unit, time):
+    """The reactor with u2 and p1 in units of 10⁶ or 10⁻⁶ and another unit of time."""
+    a, b, c = u1, u2 / unit, p1 * unit
+    rate = c * (1 - a) * sp.exp(b)
+    model = fs.Model(
+        {u1: time * (-a + rate), u2: unit * time * (-b + 14 * rate - 2 * b)}, parameters={p1: 0}
+    )
+    diagram = fs.continue_equilibria(model, p1, (0, 0.2 / unit))
+    assert [f["p1"] * unit for f in diagram.folds] == pytest.approx(
+        [0.105738978271650651, 0.0889318461857728026], rel=1e-12
+    )
+    (hopf,) = diagram.special("HB")
+    assert hopf["p1"] * unit == pytest.approx(0.130900044820043325, rel=1e-12)
+    assert hopf["u2"] / unit == pytest.approx(4.17704, rel=1e-5)
+    assert all(p.converged for p in diagram.special)
+    assert [o.code for o in diagram.branches[0].outcomes] == ["end of range"] * 2

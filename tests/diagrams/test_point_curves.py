@@ -32,7 +32,7 @@ def test_reactor_folds_meet_bogdanov_takens_and_cusp(reactor):
     assert [bt["p1"], bt["p2"]] == pytest.approx([np.exp(-1.5) / 2, 13.5], rel=1e-14)
     assert [cusp["p1"], cusp["p2"]] == pytest.approx([np.exp(-2), 12], rel=1e-14)
     assert np.abs(bt.eigenvalues).max() < 1e-7
-    assert bt.residual < 1e-13
+    assert bt.residual < 1e-12
     assert cusp.accuracy < 1e-13
     # folds at u2 solve p3 + 1 = u2 (p2 - …): here −det J = 0 along all rows, and F = 0
     hot = curve["p1"] * (1 - curve["u1"]) * np.exp(curve["u2"])
@@ -302,3 +302,15 @@ def test_bad_input(reactor):
         curve["p3"]
     with pytest.raises(fs.FastSlowError, match="unknown special point code"):
         curve.special("XX")
+
+
+def test_boundary_equilibria_of_a_discontinuous_field():
+    """x' = p − q x − sgn x: the equilibrium of x > 0 is on x = 0 at p = 1 for every q."""
+    model = fs.Model({x: p - q * x - sp.sign(x)}, parameters={p: 0, q: 1})
+    points = fs.continue_equilibria(model, "p", (-2, 2)).boundary_equilibria
+    over = {"p": (-2, 2), "q": (0.5, 3)}
+    for point in points:
+        curve = fs.continue_points(point, ("p", "q"), over=over)
+        assert np.abs(np.abs(curve["p"]) - 1).max() < 1e-14
+        assert np.abs(curve["x"]).max() < 1e-15
+        assert [o.code for o in curve.outcomes] == ["end of range"] * 2

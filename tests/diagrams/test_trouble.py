@@ -117,3 +117,13 @@ def test_a_double_root_is_one_equilibrium():
     found = fs.equilibria(fs.Model({x: (x - 1) ** 2}))
     assert [e["x"] for e in found] == pytest.approx([1.0], abs=1e-7)
     assert found[0].stability == "neutral"
+
+
+def test_too_many_branches_are_said():
+    """sin x = p has a branch for every half turn of x that the search meets."""
+    model = fs.Model({x: p - sp.sin(x)}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, p, (-0.5, 0.5), settings=fs.Continuation(branches=5))
+    assert len(diagram.branches) == 5
+    assert diagram.coverage == "found"
+    assert diagram.outcome.code == "too many branches"
+    assert "Continuation(branches" in repr(diagram)

@@ -1,0 +1,278 @@
+"""Compiled evaluation along curves: rates, tests at rows, Newton at a condition."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from fastslow.compiled.pointers import call_address
+from fastslow.continuation.engine import solve
+
+
+@njit(error_model="numpy")
+def evaluate(address, modes, points, parameters, width):  # type: ignore[no-untyped-def]
+    """Output of the generated function at every row of points, shape (N, width)."""
+    result = np.empty((points.shape[0], width))
+    for k in range(points.shape[0]):
+        call_address(address, modes[k], points[k], parameters, result[k])
+    return result
+
+
+@njit(error_model="numpy")
+def value_at(address, mode, point, parameters, width):  # type: ignore[no-untyped-def]
+    """Output of the generated function at one point, shape (width,)."""
+    out = np.empty(width)
+    call_address(address, mode, point, parameters, out)
+    return out
+
+
+@njit(error_model="numpy")
+def newton_from(  # type: ignore[no-untyped-def]
+    address, mode, parameters, starts, value, width, iterations
+):
+    """Newton's method at a fixed last component from many starts.
+
+    A step longer than ten times the state's size is shortened to it.
+
+    Returns
+    -------
+    states : ndarray, shape (m, n)
+        Where each start led.
+    converged : ndarray of bool, shape (m,)
+    """
+    count, n = starts.shape
+    states = starts.copy()
+    converged = np.zeros(count, dtype=np.bool_)
+    u = np.empty(n + 1)
+    out = np.empty(width)
+    matrix = np.empty((n, n))
+    right = np.empty(n)
+    for k in range(count):
+        u[:n] = starts[k]
+        u[n] = value
+        for _ in range(iterations):
+            call_address(address, mode, u, parameters, out)
+            for i in range(n):
+                right[i] = -out[i]
+                for j in range(n):
+                    matrix[i, j] = out[n + i * (n + 1) + j]
+            if not solve(matrix, right):
+                break
+            length = 0.0
+            size = 1.0
+            for i in range(n):
+                length = max(length, abs(right[i]))
+                size = max(size, abs(u[i]))
+            shrink = min(1.0, 10.0 * size / length) if length > 0.0 else 1.0
+            for i in range(n):
+                u[i] += shrink * right[i]
+            if length <= 1e-7 * size:
+                converged[k] = True
+                break
+        states[k] = u[:n]
+    return states, converged
+
+
+@njit(error_model="numpy")
+def refine(  # type: ignore[no-untyped-def]
+    address, mode, parameters, start, scale, row, normal, point, width, m, iterations
+):
+    """Newton's method for F = 0 with one more equation along the curve.
+
+    Parameters
+    ----------
+    row : int
+        Number of the switching function that vanishes; -1 for the plane through
+        ``point`` with ``normal``.
+
+    Returns
+    -------
+    u : ndarray, shape (n + 1,)
+    residual, size : float
+        Of the equations, and of the last correction in units of the scale.
+    converged : bool
+    """
+    columns = start.shape[0]
+    n = columns - 1
+    u = start.copy()
+    out = np.empty(width)
+    slopes = np.empty((columns, columns))
+    matrix = np.empty((columns, columns))
+    value = np.empty(columns)
+    right = np.empty(columns)
+    size = np.inf
+    least = np.inf
+    heights = n * (n + 2)
+    for turn in range(iterations + 1):
+        call_address(address, mode, u, parameters, out)
+        for i in range(n):
+            value[i] = out[i]
+            for j in range(columns):
+                slopes[i, j] = out[n + i * columns + j]
+        if row >= 0:
+            value[n] = out[heights + row]
+            for j in range(columns):
+                slopes[n, j] = out[heights + m + row * columns + j]
+        else:
+            value[n] = 0.0
+            for j in range(columns):
+                value[n] += normal[j] * (u[j] - point[j])
+                slopes[n, j] = normal[j]
+        if turn > 0 and (size < 1e-16 or (size < 1e-10 and size >= 0.5 * least)):
+            break
+        if turn > 0:
+            least = size
+        if turn == iterations:
+            break
+        for i in range(columns):
+            largest = 0.0
+            for j in range(columns):
+                matrix[i, j] = slopes[i, j] * scale[j]
+                largest = max(largest, abs(matrix[i, j]))
+            if not (math.isfinite(largest) and math.isfinite(value[i])):
+                return u, np.inf, np.inf, False
+            largest = largest if largest > 0.0 else 1.0
+            for j in range(columns):
+                matrix[i, j] /= largest
+            right[i] = -value[i] / largest
+        if not solve(matrix, right):
+            return u, np.inf, np.inf, False
+        size = 0.0
+        for j in range(columns):
+            u[j] += right[j] * scale[j]
+            size = max(size, abs(right[j]))
+    for j in range(columns):
+        if abs(u[j]) < 1e-20 * scale[j]:
+            u[j] = 0.0
+    residual = 0.0
+    balanced = True
+    for i in range(columns):
+        terms = 0.0
+        for j in range(columns):
+            terms += abs(slopes[i, j]) * max(abs(u[j]), scale[j])
+        residual = max(residual, abs(value[i]))
+        balanced = balanced and abs(value[i]) <= 1e-9 * terms + 1e-300
+    return u, residual, size, size < 1e-8 and balanced
+
+
+@njit(error_model="numpy")
+def survey(  # type: ignore[no-untyped-def]
+    address, mode, parameters, points, tangents, scale, width
+):
+    """What is tested at every row of a piece.
+
+    Returns
+    -------
+    branching : ndarray, shape (N,)
+        Determinant of [F_x F_p; tangent] over the product of its row norms.
+    jacobians : ndarray, shape (N, n, n)
+    """
+    count, columns = points.shape
+    n = columns - 1
+    out = np.empty(width)
+    matrix = np.empty((columns, columns))
+    branching = np.empty(count)
+    jacobians = np.empty((count, n, n))
+    for k in range(count):
+        call_address(address, mode, points[k], parameters, out)
+        for i in range(n):
+            for j in range(n):
+                jacobians[k, i, j] = out[n + i * columns + j]
+        size = 1.0
+        for i in range(columns):
+            squares = 0.0
+            for j in range(columns):
+                if i < n:
+                    matrix[i, j] = out[n + i * columns + j] * scale[j]
+                else:
+                    matrix[i, j] = tangents[k, j] / scale[j]
+                squares += matrix[i, j] * matrix[i, j]
+            size *= math.sqrt(squares)
+        branching[k] = determinant(matrix) / (size if size > 0.0 else 1.0)
+    return branching, jacobians
+
+
+@njit(error_model="numpy")
+def determinant(matrix):  # type: ignore[no-untyped-def]
+    """Determinant by elimination in place."""
+    size = matrix.shape[0]
+    result = 1.0
+    for k in range(size):
+        best = k
+        for i in range(k + 1, size):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        if matrix[best, k] == 0.0:
+            return 0.0
+        if best != k:
+            result = -result
+            for j in range(k, size):
+                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+        result *= matrix[k, k]
+        for i in range(k + 1, size):
+            factor = matrix[i, k] / matrix[k, k]
+            for j in range(k + 1, size):
+                matrix[i, j] -= factor * matrix[k, j]
+    return result
+
+
+@njit(error_model="numpy")
+def pairs(jacobians):  # type: ignore[no-untyped-def]
+    """Eigenvalues of 2×2 matrices as LAPACK's dlanv2 finds them, shape (N, 2)."""
+    count = jacobians.shape[0]
+    result = np.empty((count, 2), dtype=np.complex128)
+    for k in range(count):
+        a, b = jacobians[k, 0, 0], jacobians[k, 0, 1]
+        c, d = jacobians[k, 1, 0], jacobians[k, 1, 1]
+        if not math.isfinite(a + b + c + d):
+            result[k, :] = np.nan
+            continue
+        half = 0.5 * (a - d)
+        inside = half * half + b * c
+        if inside >= 0.0:
+            z = half + math.copysign(math.sqrt(inside), half)
+            result[k, 0] = d + z
+            result[k, 1] = d - b * c / z if z != 0.0 else d
+        else:
+            result[k, 0] = complex(0.5 * (a + d), math.sqrt(-inside))
+            result[k, 1] = complex(0.5 * (a + d), -math.sqrt(-inside))
+    return result
+
+
+@njit(error_model="numpy")
+def passing(points, scale, u, within):  # type: ignore[no-untyped-def]
+    """Chords of a curve that are nearest to a point, each nearer than its two neighbours.
+
+    Returns
+    -------
+    ndarray of int
+        Numbers of the chords with a distance below ``within``, in scaled units.
+    """
+    count, columns = points.shape
+    apart = np.empty(count - 1)
+    for k in range(count - 1):
+        length = 0.0
+        ahead = 0.0
+        for j in range(columns):
+            chord = (points[k + 1, j] - points[k, j]) / scale[j]
+            length += chord * chord
+            ahead += (u[j] - points[k, j]) / scale[j] * chord
+        part = min(max(ahead / max(length, 1e-300), 0.0), 1.0)
+        total = 0.0
+        for j in range(columns):
+            off = (points[k, j] + part * (points[k + 1, j] - points[k, j]) - u[j]) / scale[j]
+            total += off * off
+        apart[k] = math.sqrt(total)
+    found = np.empty(count - 1, dtype=np.int64)
+    number = 0
+    for k in range(count - 1):
+        if (
+            apart[k] < within
+            and (k == 0 or apart[k] <= apart[k - 1])
+            and (k == count - 2 or apart[k] <= apart[k + 1])
+        ):
+            found[number] = k
+            number += 1
+    return found[:number]
