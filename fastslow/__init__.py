@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from fastslow.symbolic.reduction import reduce_to
     from fastslow.symbolic.scaling import disagreements, nondimensionalise
     from fastslow.symbolic.sources import export
+    from fastslow.warming import warm
 
 __version__ = "0.1.0"
 
@@ -66,6 +67,7 @@ _HOME = {
     "simulate": "simulation.trajectories",
     "systems": "",
     "tangencies": "diagrams.tangency_points",
+    "warm": "warming",
 }
 
 __all__ = [
@@ -97,6 +99,7 @@ __all__ = [
     "simulate",
     "systems",
     "tangencies",
+    "warm",
 ]
 
 

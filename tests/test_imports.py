@@ -18,6 +18,7 @@ LAYERS = [
     "systems",
     "interactive",
     "plot",
+    "warming",
     "passage",
     "sweeps",
     "orbits",

@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
+import pickletools
 import platform
+import shutil
 import sys
 import tempfile
 from functools import cache
@@ -63,8 +65,10 @@ def load_generated(source: str, stem: str) -> ModuleType:
     """Import generated source as a module kept on disk, so that Numba keeps its code too.
 
     The file name carries a hash of the source and of everything else the
-    machine code depends on. Two processes may do this at once: the file is
-    written aside and moved into place.
+    machine code depends on, so that another version of Numba or another
+    processor never meets code that is not its own. Two processes may do this at
+    once: files are written aside and moved into place. Code that was cut short
+    is built again; a directory that cannot be written is read all the same.
 
     Parameters
     ----------
@@ -81,7 +85,11 @@ def load_generated(source: str, stem: str) -> ModuleType:
     name = f"fastslow_{stem}_{digest}"
     if name in _loaded:
         return _loaded[name]
-    path = _writable_directory() / f"{name}.py"
+    directory = _writable_directory()
+    path = directory / f"{name}.py"
+    if directory != cache_directory():
+        _copy(name, cache_directory(), directory)
+    _sweep(name, directory)
     if not path.exists() or path.read_text(encoding="utf-8") != source:
         handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
         with os.fdopen(handle, "w", encoding="utf-8") as file:
@@ -95,3 +103,45 @@ def load_generated(source: str, stem: str) -> ModuleType:
     spec.loader.exec_module(module)
     _loaded[name] = module
     return module
+
+
+def _stored(name: str, directory: Path) -> list[Path]:
+    """What Numba keeps for a module."""
+    return sorted((directory / "__pycache__").glob(f"{name}.*.nb[ci]"))
+
+
+def _copy(name: str, origin: Path, target: Path) -> None:
+    """Take what a read-only directory holds of a module, with its times, by which it is known."""
+    source = origin / f"{name}.py"
+    if (target / source.name).exists() or not source.exists():
+        return
+    (target / "__pycache__").mkdir(exist_ok=True)
+    for file in _stored(name, origin):
+        shutil.copy2(file, target / "__pycache__" / file.name)
+    shutil.copy2(source, target / source.name)
+
+
+def _sweep(name: str, directory: Path) -> None:
+    """Remove the machine code of a module if one of its files is not whole."""
+    files = _stored(name, directory)
+    if not all(map(_whole, files)):
+        for file in files:
+            file.unlink(missing_ok=True)
+
+
+def _whole(file: Path) -> bool:
+    """Whether a file is a sequence of complete pickles; nothing in it is executed."""
+    try:
+        with file.open("rb") as stream:
+            size = os.fstat(stream.fileno()).st_size
+            if size == 0:
+                return False
+            while stream.tell() < size:
+                for _ in pickletools.genops(stream):
+                    pass
+    except OSError:
+        return True  # another process has just replaced it
+    except Exception:
+        # whatever the reader of opcodes stumbles over
+        return False
+    return True

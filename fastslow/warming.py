@@ -1,0 +1,65 @@
+"""Compiling ahead of use."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import sympy as sp
+
+from fastslow.compiled.store import cache_directory
+from fastslow.continuation.settings import Continuation
+from fastslow.diagrams.tracing import continue_equilibria
+from fastslow.model.model import Model
+from fastslow.simulation.trajectories import simulate
+
+
+def warm(*models: Model) -> Path:
+    """Compile what simulation and continuation need, and keep it on disk.
+
+    For a cluster, a container image or a class: run it once where the
+    directory can be written; all later processes of the same processor and
+    versions start fast, also where the directory is read-only.
+
+    Parameters
+    ----------
+    *models : Model
+        Whose equations to compile; the parts common to all models are compiled
+        in any case. Parameter values play no part.
+
+    Returns
+    -------
+    Path
+        The directory, chosen by the environment variable ``FASTSLOW_CACHE``.
+
+    Examples
+    --------
+    >>> warm().is_dir()
+    True
+    """
+    x, v, w = sp.symbols("x v w")
+    # planar, with an interface, a fold and no polynomial: every common loop has its turn
+    common = Model({x: v, v: w - v - sp.sin(x) - sp.Abs(x)}, forcing={w: sp.sin(sp.Symbol("t"))})
+    for model in (common, *models):
+        _use(model)
+    return cache_directory()
+
+
+def _use(model: Model) -> None:
+    free = [name for name in model.free if name not in model.parameters]
+    whole = model.with_parameters(dict.fromkeys(free, 0.0)) if free else model
+    state = np.zeros(len(model.states) + len(model.slow_states))
+    simulate(whole, state, t=(0.0, 1e-6), max_steps=1)
+    timed = any("t" in {s.name for s in rate.free_symbols} for rate in model.rates.values())
+    if timed:
+        return
+    fast = model.frozen()
+    names = [*fast.free, *fast.parameters]
+    if not names:
+        return
+    slow = {name: 0.0 for name in fast.free[1:] if name not in fast.parameters}
+    value = fast.parameters.get(names[0]) or 0.0
+    few = Continuation(branches=2)
+    continue_equilibria(
+        fast.with_parameters(slow), names[0], (value - 1.0, value + 1.0), settings=few
+    )

@@ -1,0 +1,41 @@
+"""What is warmed is not compiled again."""
+
+import os
+import subprocess
+import sys
+
+MODEL = """
+import sympy as sp, fastslow as fs
+x, v, t, w, D = sp.symbols("x v t w D")
+gap = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
+model = fs.Model({x: v, v: w - v - gap}, forcing={w: sp.sin(t)}, parameters={D: 0.25})
+"""
+
+WARM = MODEL + "print(fs.warm(model))"
+USE = MODEL + (
+    "other = model.with_parameters(D=0.5);"
+    "fs.simulate(other, [0, 0], periods=1);"
+    "fs.continue_equilibria(other.frozen(), 'w', (-1, 1))"
+)
+
+
+def test_a_warmed_model_is_compiled_once(tmp_path):
+    environment = {**os.environ, "FASTSLOW_CACHE": str(tmp_path)}
+
+    def run(program):
+        done = subprocess.run(
+            [sys.executable, "-c", program],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout.strip()
+
+    assert run(WARM) == str(tmp_path)
+    before = {p.name for p in tmp_path.rglob("*.nbc")}
+    assert any("series" in name for name in before)
+    assert any("field" in name for name in before)
+    run(USE)
+    assert {p.name for p in tmp_path.rglob("*.nbc")} == before
