@@ -10,63 +10,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import unknown_name
+from fastslow.results.contacts import (
+    Contacts,
+    contacts_of,
+    count_hits,
+    regime_of,
+    residence_in,
+)
+from fastslow.results.crossings import Crossing, Segment, segments_of
+from fastslow.results.dense import columns_at, refined_table
 from fastslow.results.outcome import Outcome
-
-#: A plotted curve may leave the solution by this part of the range of each column.
-FLATNESS = 2e-4
-
-#: Most points that one step is divided into for plotting.
-MOST_POINTS = 48
-
-
-@dataclass(frozen=True, eq=False)
-class Crossing:
-    """One passage through an interface, or one touch.
-
-    Parameters
-    ----------
-    time : float
-    state : ndarray, shape (n,)
-        States and slow states, on the interface.
-    interface : str
-    direction : int
-        +1 where h grows, −1 where it falls, 0 where it only touches zero.
-    from_region, to_region : str
-        The same region for a touch; ``"A|B"`` is sliding between A and B.
-    tangential : bool
-        Whether a change of h by a millionth of its size would undo the crossing,
-        so that its time is known less well than others.
-    """
-
-    time: float
-    state: NDArray[np.float64]
-    interface: str
-    direction: int
-    from_region: str
-    to_region: str
-    tangential: bool
-
-    def __repr__(self) -> str:
-        arrow = {1: "upwards", -1: "downwards", 0: "touching"}[self.direction]
-        near = ", near-tangential" if self.tangential and self.direction else ""
-        return (
-            f"Crossing(t = {self.time:.9g}, {self.interface} {arrow}, "
-            f"{self.from_region} → {self.to_region}{near})"
-        )
-
-
-@dataclass(frozen=True)
-class Segment:
-    """A stretch of time within one region (or of sliding between two)."""
-
-    start: float
-    end: float
-    region: str
-
-    @property
-    def duration(self) -> float:
-        return self.end - self.start
+from fastslow.results.sections import (
+    Section,
+    poincare_section,
+    stroboscopic_section,
+    window_of,
+)
+from fastslow.results.spectra import Spectrum, spectrum_of
+from fastslow.results.steady import SteadyState, steady_state
+from fastslow.results.turning import extremes_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -174,59 +137,15 @@ class Trajectory:
         ArgumentError
             For a time outside the run, or without dense output.
         """
-        where = np.asarray(times, dtype=float)
-        if self.series is None:
-            raise ArgumentError(
-                "this run kept no dense output; simulate with dense=True, or ask for samples="
-            )
-        low, high = self.span
-        outside = ~((where >= low) & (where <= high))
-        if outside.any():
-            worst = float(where[outside].flat[0])
-            raise ArgumentError(f"time {worst:g} is outside the run, which is [{low:g}, {high:g}]")
-        if not len(self.steps):
-            raise ArgumentError(f"the run made no step: {self.outcome}")
-        flat = where.reshape(-1)
-        row = np.searchsorted(self.steps[:, 0], flat, side="right") - 1
-        values = self._evaluate(row, flat - self.steps[row, 0])
-        return values.reshape(len(self.columns), *where.shape)
-
-    def _evaluate(self, row: NDArray[np.intp], offset: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Columns at offsets into given steps, shape (n + n_forcing, N)."""
-        assert self.series is not None
-        value = self.series[row, :, -1].T
-        for k in range(self.series.shape[2] - 2, -1, -1):
-            value = value * offset + self.series[row, :, k].T
-        return np.ascontiguousarray(value)
+        return columns_at(self, times)
 
     @cached_property
     def _table(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return self.sampled if self.sampled is not None else self._refined()
+        return self.sampled if self.sampled is not None else refined_table(self)
 
     @cached_property
     def _all_sampled(self) -> NDArray[np.float64]:
         return self.dense_columns(self.t)
-
-    def _refined(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Every step divided finely enough that straight lines look smooth."""
-        if self.series is None or not len(self.steps):
-            return self.end[:1], self.end[1:, None]
-        length = self.steps[:, 1]
-        order = self.series.shape[2] - 1
-        k = np.arange(2, order + 1)
-        power = length[:, None] ** k
-        bend = np.abs(self.series[:, :, 2:] * (k * (k - 1) * power)[:, None, :]).sum(axis=2)
-        reach = np.ptp(self.series[:, :, 0], axis=0)
-        reach = np.where(reach > 0, reach, np.abs(bend).max(axis=0) + np.finfo(float).tiny)
-        pieces = np.sqrt((bend / (8 * FLATNESS * reach)).max(axis=1))
-        pieces = np.clip(np.nan_to_num(np.ceil(pieces), nan=1.0), 1, MOST_POINTS).astype(int)
-        row = np.repeat(np.arange(len(length)), pieces)
-        first = np.repeat(np.cumsum(pieces) - pieces, pieces)
-        offset = (np.arange(len(row)) - first) * (length / pieces)[row]
-        row, offset = np.append(row, len(length) - 1), np.append(offset, length[-1])
-        times = self.steps[row, 0] + offset
-        times[-1] = self.span[1]
-        return times, self._evaluate(row, offset)
 
     @cached_property
     def crossings(self) -> tuple[Crossing, ...]:
@@ -247,15 +166,7 @@ class Trajectory:
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
         """Stretches of one region, in order."""
-        if not len(self.steps):
-            return ()
-        mode = self.steps[:, 2].astype(int)
-        starts = np.flatnonzero(np.r_[True, mode[1:] != mode[:-1]])
-        times = np.append(self.steps[starts, 0], self.span[1])
-        return tuple(
-            Segment(float(times[i]), float(times[i + 1]), self.modes[mode[first]])
-            for i, first in enumerate(starts)
-        )
+        return segments_of(self)
 
     @property
     def word(self) -> tuple[str, ...]:
@@ -270,40 +181,185 @@ class Trajectory:
         ``"meshed upper"``, ``"meshed lower"`` or ``"free"``; None for models
         without a gap or without a period.
         """
-        if self.gap is None or self.period is None:
-            return None
-        begin = self.span[1] - self.period
-        seen = {s.region for s in self.segments if s.end > begin}
-        lower, inside, upper = (name in seen for name in self.gap)
-        if lower and upper:
-            return "bilateral"
-        if lower or upper:
-            side = "upper" if upper else "lower"
-            return f"unilateral {side}" if inside else f"meshed {side}"
-        return "free" if inside else None
+        return regime_of(self)
 
     @property
     def residence(self) -> dict[str, float]:
         """The part of the run spent in every region (and in every sliding motion)."""
-        total = self.span[1] - self.span[0]
-        spent = dict.fromkeys(self.regions, 0.0)
-        for segment in self.segments:
-            spent[segment.region] = spent.get(segment.region, 0.0) + segment.duration / total
-        return spent
+        return residence_in(self, self.span)
 
-    def hits(self, interface: object, direction: int | None = None) -> int:
+    def hits(
+        self,
+        interface: object,
+        direction: int | None = None,
+        *,
+        since: float | None = None,
+        until: float | None = None,
+    ) -> int:
         """How often an interface was crossed, upwards (+1), downwards (−1) or either way.
+
+        Parameters
+        ----------
+        interface : str or Expr
+        direction : int, optional
+        since, until : float, optional
+            The part of the run, by default all of it.
 
         Raises
         ------
         UnknownNameError
             For an interface that is not in the model.
+        ArgumentError
+            For another direction, or times outside the run.
         """
-        if str(interface) not in self.interfaces:
-            raise unknown_name("interface", interface, self.interfaces)
-        table = self.crossing_table
-        mine = table[table[:, 1] == self.interfaces.index(str(interface)), 2]
-        return int(np.count_nonzero(mine != 0 if direction is None else mine == direction))
+        return count_hits(self, interface, direction, window_of(self, since, until))
+
+    def contacts(
+        self,
+        since: float | None = None,
+        until: float | None = None,
+        *,
+        period: float | None = None,
+    ) -> Contacts:
+        """Crossings and residence in a part of the run, in all and period by period.
+
+        Parameters
+        ----------
+        since, until : float, optional
+            The part of the run, by default all of it.
+        period : float, optional
+            By default that of the forcing.
+
+        Returns
+        -------
+        Contacts
+        """
+        return contacts_of(self, period, window_of(self, since, until))
+
+    def stroboscopic(
+        self, period: float | None = None, phase: float = 0.0, since: float | None = None
+    ) -> Section:
+        """States once every period, at start + phase + k·period.
+
+        Parameters
+        ----------
+        period : float, optional
+            By default that of the forcing.
+        phase : float
+            Time after the start of the run, in units of time.
+        since : float, optional
+            Earlier points are left out.
+
+        Raises
+        ------
+        ArgumentError
+            Without a period, or without dense output.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, v, t = sp.symbols("x v t")
+        >>> run = fs.simulate(fs.Model({x: v, v: sp.sin(t) - x - v}), [-1, 0], periods=3)
+        >>> run.stroboscopic()["x"].round(9)
+        array([-1., -1., -1., -1.])
+        """
+        return stroboscopic_section(self, period, phase, since)
+
+    def section(
+        self,
+        expression: object = None,
+        level: float = 0.0,
+        *,
+        direction: int | None = None,
+        interface: object = None,
+        since: float | None = None,
+        until: float | None = None,
+    ) -> Section:
+        """Poincaré section: where an expression passes a level, or an interface is crossed.
+
+        Every root of every step's polynomial is found, to rounding; where the
+        run begins on the section there is no point.
+
+        Parameters
+        ----------
+        expression : str or Expr, optional
+            A column, or a polynomial in columns, parameters and t.
+        level : float
+        direction : int, optional
+            +1 upwards, −1 downwards, 0 for touches; all by default.
+        interface : str or Expr, optional
+            Instead of an expression: the crossings of this interface.
+        since, until : float, optional
+            The part of the run, by default all of it.
+
+        Raises
+        ------
+        UnknownNameError
+            For an unknown column, parameter or interface.
+        ArgumentError
+            For an expression that is no polynomial, or without dense output.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, v = sp.symbols("x v")
+        >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 10), tol=1e-13)
+        >>> (run.section("x", 0.0, direction=-1).times / sp.pi.evalf()).astype(float).round(9)
+        array([0.5, 2.5])
+        """
+        window = window_of(self, since, until)
+        return poincare_section(self, expression, level, direction, interface, window)
+
+    def spectrum(
+        self,
+        name: object,
+        since: float | None = None,
+        window: str = "hann",
+        samples: int | None = None,
+    ) -> Spectrum:
+        """Frequencies and amplitudes of a column.
+
+        Parameters
+        ----------
+        name : str or Symbol
+        since : float, optional
+            The transient before is left out; with forcing, so is what is left
+            over of a period, so that its multiples fall on bins.
+        window : str
+            ``"hann"``, ``"flattop"``, ``"blackman"``, ``"hamming"`` or ``"rectangular"``.
+        samples : int, optional
+            Even samples of the dense output; by default 16 a step, 4096 at least.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no column, or no window.
+        ArgumentError
+            For a time outside the run, or without dense output.
+        """
+        return spectrum_of(self, name, since, window, samples)
+
+    def steady(self, period: float | None = None, tol: float = 1e-6, most: int = 16) -> SteadyState:
+        """After how many periods the states repeat, and from which time on.
+
+        Without forcing, the returns to a Poincaré section take the place of
+        the periods: the state with the largest range passes its mean upwards.
+
+        Parameters
+        ----------
+        period : float, optional
+            By default that of the forcing.
+        tol : float
+            Largest difference that counts as a repeat, in units of each state's range.
+        most : int
+            Largest multiple that is tried.
+
+        Returns
+        -------
+        SteadyState
+            Also where nothing repeats: ``multiple`` is then None, and ``outcome`` says why.
+        """
+        return steady_state(self, period, tol, most)
 
     def extremes(self, name: object, since: float | None = None) -> tuple[float, float]:
         """Minimum and maximum of a column from a time to the end, to rounding.
@@ -324,26 +380,7 @@ class Trajectory:
         ArgumentError
             For a time outside the run, or without dense output.
         """
-        if str(name) not in self.columns:
-            raise unknown_name("column", name, self.columns)
-        row = self.columns.index(str(name))
-        begin = self.span[0] if since is None else float(since)
-        ends = self.dense_columns([begin, self.span[1]])[row]
-        assert self.series is not None
-        used = np.flatnonzero(self.steps[:, 0] + self.steps[:, 1] > begin)
-        length = self.steps[used, 1]
-        scaled = self.series[used, row] * length[:, None] ** np.arange(self.series.shape[2])
-        after = np.maximum(begin - self.steps[used, 0], 0.0) / length
-        inside = scaled[after == 0, 0]
-        low, high = float(np.append(ends, inside).min()), float(np.append(ends, inside).max())
-        reach = np.abs(scaled[:, 1:]).sum(axis=1)
-        for i in np.flatnonzero((scaled[:, 0] + reach > high) | (scaled[:, 0] - reach < low)):
-            roots = np.polynomial.polynomial.polyroots(np.polynomial.polynomial.polyder(scaled[i]))
-            turning = roots.real[np.abs(roots.imag) < 1e-6]
-            turning = turning[(turning >= after[i]) & (turning <= 1)]
-            values = np.polynomial.polynomial.polyval(turning, scaled[i])
-            low, high = float(np.append(values, low).min()), float(np.append(values, high).max())
-        return low, high
+        return extremes_of(self, name, since)
 
     def __getstate__(self) -> dict[str, Any]:
         names = self.__dataclass_fields__

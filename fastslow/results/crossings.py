@@ -1,0 +1,74 @@
+"""Crossings of interfaces, and the stretches of time between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from fastslow.results.trajectories import Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """One passage through an interface, or one touch.
+
+    Parameters
+    ----------
+    time : float
+    state : ndarray, shape (n,)
+        States and slow states, on the interface.
+    interface : str
+    direction : int
+        +1 where h grows, −1 where it falls, 0 where it only touches zero.
+    from_region, to_region : str
+        The same region for a touch; ``"A|B"`` is sliding between A and B.
+    tangential : bool
+        Whether a change of h by a millionth of its size would undo the crossing,
+        so that its time is known less well than others.
+    """
+
+    time: float
+    state: NDArray[np.float64]
+    interface: str
+    direction: int
+    from_region: str
+    to_region: str
+    tangential: bool
+
+    def __repr__(self) -> str:
+        arrow = {1: "upwards", -1: "downwards", 0: "touching"}[self.direction]
+        near = ", near-tangential" if self.tangential and self.direction else ""
+        return (
+            f"Crossing(t = {self.time:.9g}, {self.interface} {arrow}, "
+            f"{self.from_region} → {self.to_region}{near})"
+        )
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of time within one region (or of sliding between two)."""
+
+    start: float
+    end: float
+    region: str
+
+    @property
+    def duration(self) -> float:
+        return self.end - self.start
+
+
+def segments_of(run: Trajectory) -> tuple[Segment, ...]:
+    """Stretches of one region, in order."""
+    if not len(run.steps):
+        return ()
+    mode = run.steps[:, 2].astype(int)
+    starts = np.flatnonzero(np.r_[True, mode[1:] != mode[:-1]])
+    times = np.append(run.steps[starts, 0], run.span[1])
+    return tuple(
+        Segment(float(times[i]), float(times[i + 1]), run.modes[mode[first]])
+        for i, first in enumerate(starts)
+    )

@@ -1,0 +1,72 @@
+"""Values of a run between its steps, from the series of every step."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastslow.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from fastslow.results.trajectories import Trajectory
+
+#: A plotted curve may leave the solution by this part of the range of each column.
+FLATNESS = 2e-4
+
+#: Most points that one step is divided into for plotting.
+MOST_POINTS = 48
+
+
+def columns_at(run: Trajectory, times: ArrayLike) -> NDArray[np.float64]:
+    """All columns at any times; see `Trajectory.dense_columns`."""
+    where = np.asarray(times, dtype=float)
+    if run.series is None:
+        raise ArgumentError(
+            "this run kept no dense output; simulate with dense=True, or ask for samples="
+        )
+    low, high = run.span
+    outside = ~((where >= low) & (where <= high))
+    if outside.any():
+        worst = float(where[outside].flat[0])
+        raise ArgumentError(f"time {worst:g} is outside the run, which is [{low:g}, {high:g}]")
+    if not len(run.steps):
+        raise ArgumentError(f"the run made no step: {run.outcome}")
+    flat = where.reshape(-1)
+    row = np.searchsorted(run.steps[:, 0], flat, side="right") - 1
+    values = evaluate(run, row, flat - run.steps[row, 0])
+    return values.reshape(len(run.columns), *where.shape)
+
+
+def evaluate(
+    run: Trajectory, row: NDArray[np.intp], offset: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """All columns at offsets into given steps, shape (n + n_forcing, N)."""
+    assert run.series is not None
+    value = run.series[row, :, -1].T
+    for k in range(run.series.shape[2] - 2, -1, -1):
+        value = value * offset + run.series[row, :, k].T
+    return np.ascontiguousarray(value)
+
+
+def refined_table(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Every step divided finely enough that straight lines look smooth."""
+    if run.series is None or not len(run.steps):
+        return run.end[:1], run.end[1:, None]
+    length = run.steps[:, 1]
+    order = run.series.shape[2] - 1
+    k = np.arange(2, order + 1)
+    power = length[:, None] ** k
+    bend = np.abs(run.series[:, :, 2:] * (k * (k - 1) * power)[:, None, :]).sum(axis=2)
+    reach = np.ptp(run.series[:, :, 0], axis=0)
+    reach = np.where(reach > 0, reach, np.abs(bend).max(axis=0) + np.finfo(float).tiny)
+    pieces = np.sqrt((bend / (8 * FLATNESS * reach)).max(axis=1))
+    pieces = np.clip(np.nan_to_num(np.ceil(pieces), nan=1.0), 1, MOST_POINTS).astype(int)
+    row = np.repeat(np.arange(len(length)), pieces)
+    first = np.repeat(np.cumsum(pieces) - pieces, pieces)
+    offset = (np.arange(len(row)) - first) * (length / pieces)[row]
+    row, offset = np.append(row, len(length) - 1), np.append(offset, length[-1])
+    times = run.steps[row, 0] + offset
+    times[-1] = run.span[1]
+    return times, evaluate(run, row, offset)

@@ -1,0 +1,170 @@
+"""Points of a trajectory where it meets a section, or once every period."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.dense import evaluate
+from fastslow.results.expressions import along_steps
+from fastslow.results.step_roots import find_roots
+
+if TYPE_CHECKING:
+    from fastslow.results.trajectories import Trajectory
+
+DIRECTIONS = (None, -1, 0, 1)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Section:
+    """Points of a trajectory on a section.
+
+    Parameters
+    ----------
+    rule : str
+        What the points have in common, e.g. ``"v = 0 downwards"``.
+    names : tuple of str
+        Columns: states, slow states and, where known, slow quantities.
+    times : ndarray, shape (K,)
+    table : ndarray, shape (len(names), K)
+        Every column at those times.
+    directions : ndarray of int, shape (K,)
+        +1 upwards, −1 downwards, 0 for a touch; 0 throughout for a stroboscopic section.
+    """
+
+    rule: str
+    names: tuple[str, ...]
+    times: NDArray[np.float64]
+    table: NDArray[np.float64]
+    directions: NDArray[np.int64]
+
+    def __getitem__(self, name: object) -> NDArray[np.float64]:
+        """A column at the times of the section, shape (K,)."""
+        key = str(name)
+        if key == "t":
+            return self.times
+        if key not in self.names:
+            raise unknown_name("column", key, self.names)
+        return self.table[self.names.index(key)]
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __repr__(self) -> str:
+        when = f", t from {self.times[0]:.6g} to {self.times[-1]:.6g}" if len(self) else ""
+        return f"Section {self.rule}: {len(self)} points of {', '.join(self.names)}{when}"
+
+
+def window_of(
+    run: Trajectory, since: float | None = None, until: float | None = None
+) -> tuple[float, float]:
+    """The part of a run that is looked at, by default all of it.
+
+    Raises
+    ------
+    ArgumentError
+        For times outside the run, or in the wrong order.
+    """
+    low, high = run.span
+    first = low if since is None else float(since)
+    last = high if until is None else float(until)
+    if not low <= first <= high:
+        raise ArgumentError(f"since = {first:g} is outside the run, which is [{low:g}, {high:g}]")
+    if not first <= last <= high:
+        raise ArgumentError(f"until = {last:g}; expected a time from {first:g} to {high:g}")
+    return first, last
+
+
+def period_of(run: Trajectory, period: float | None) -> float:
+    """The period given, else that of the forcing.
+
+    Raises
+    ------
+    ArgumentError
+        For a period that is not positive, or without any.
+    """
+    if period is None:
+        period = run.period
+    if period is None:
+        raise ArgumentError("this run has no forcing with a common period; give period=")
+    if not (math.isfinite(period) and period > 0):
+        raise ArgumentError(f"period = {period!r}; expected a positive number")
+    return float(period)
+
+
+def stroboscopic_section(
+    run: Trajectory, period: float | None, phase: float, since: float | None
+) -> Section:
+    """States once every period; see `Trajectory.stroboscopic`."""
+    length = period_of(run, period)
+    if not math.isfinite(phase):
+        raise ArgumentError(f"phase = {phase!r}; expected a finite time")
+    first, last = window_of(run, since)
+    begin = run.span[0] + phase
+    # the ends of a run of whole periods belong to it whatever the rounding
+    slack = 1e-9
+    lowest = math.ceil((first - begin) / length - slack)
+    highest = math.floor((last - begin) / length + slack)
+    times = np.clip(begin + length * np.arange(lowest, highest + 1), *run.span)
+    rule = f"every {length:.6g}" + (f" at phase {phase:.6g}" if phase else "")
+    table = run.dense_columns(times)
+    return Section(rule, run.columns, times, table, np.zeros(len(times), dtype=np.int64))
+
+
+def poincare_section(
+    run: Trajectory,
+    expression: object,
+    level: float,
+    direction: int | None,
+    interface: object,
+    window: tuple[float, float],
+) -> Section:
+    """Points on a level or an interface; see `Trajectory.section`."""
+    if direction not in DIRECTIONS:
+        raise ArgumentError(f"direction = {direction!r}; expected -1, 0, 1 or None")
+    if (expression is None) == (interface is None):
+        received = "both" if interface is not None else "neither"
+        raise ArgumentError(
+            f"expected an expression with its level, or interface=, received {received}"
+        )
+    if interface is None:
+        if not math.isfinite(level):
+            raise ArgumentError(f"level = {level!r}; expected a finite number")
+        found = _on_level(run, expression, float(level))
+        rule = f"{expression} = {level:g}"
+    else:
+        found = _on_interface(run, interface)
+        rule = f"{interface} = 0"
+    rule += {1: " upwards", -1: " downwards", 0: " touching", None: ""}[direction]
+    kept = (found.times >= window[0]) & (found.times <= window[1])
+    if direction is not None:
+        kept &= found.directions == direction
+    return Section(
+        rule, found.names, found.times[kept], found.table[:, kept], found.directions[kept]
+    )
+
+
+def _on_level(run: Trajectory, expression: object, level: float) -> Section:
+    roots = find_roots(along_steps(run, expression).minus(level))
+    offset = roots.part * run.steps[roots.step, 1]
+    table = evaluate(run, roots.step, offset)
+    times = run.steps[roots.step, 0] + offset
+    return Section("", run.columns, times, table, roots.direction)
+
+
+def _on_interface(run: Trajectory, interface: object) -> Section:
+    if str(interface) not in run.interfaces:
+        raise unknown_name("interface", interface, run.interfaces)
+    mine = run.crossing_table[run.crossing_table[:, 1] == run.interfaces.index(str(interface))]
+    times, states = mine[:, 0], mine[:, 6:].T
+    names, table = run.states, states
+    if run.series is not None:
+        # the state as it was put on the interface, slow quantities from the series
+        slow = run.dense_columns(times)[len(run.states) :]
+        names, table = run.columns, np.vstack([states, slow])
+    return Section("", names, times, table, mine[:, 2].astype(np.int64))

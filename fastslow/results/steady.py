@@ -1,0 +1,133 @@
+"""Whether a run has settled, and after how many periods it repeats."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError
+from fastslow.results.outcome import Outcome
+from fastslow.results.sections import Section, poincare_section, stroboscopic_section
+
+if TYPE_CHECKING:
+    from fastslow.results.trajectories import Trajectory
+
+Array = NDArray[np.float64]
+
+#: Only the last half of a run says what it settles on.
+LATE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyState:
+    """What a run settles on.
+
+    Parameters
+    ----------
+    multiple : int or None
+        After how many periods of the forcing (without forcing: after how many
+        returns to the section) the states repeat: 1, 2 for a doubled period, …;
+        None when they do not.
+    period : float or None
+        Length of time after which they repeat.
+    since : float or None
+        Time from which they do.
+    distance : float
+        Largest change over that time, in units of each state's range; without
+        a period, the smallest among those tried.
+    section : Section
+        The states compared.
+    outcome : Outcome
+        ``"periodic"``, ``"equilibrium"``, ``"too short"`` or ``"not periodic"``.
+    """
+
+    multiple: int | None
+    period: float | None
+    since: float | None
+    distance: float
+    section: Section
+    outcome: Outcome
+
+    def __repr__(self) -> str:
+        return f"SteadyState: {self.outcome}"
+
+
+def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -> SteadyState:
+    """Look for a period; see `Trajectory.steady`."""
+    if not tol > 0:
+        raise ArgumentError(f"tol = {tol!r}; expected a positive number")
+    if most < 1:
+        raise ArgumentError(f"most = {most!r}; expected at least 1")
+    late = run.span[1] - LATE * (run.span[1] - run.span[0])
+    ranges = np.array([run.extremes(name, since=late) for name in run.states])
+    # a state that does not move is compared with its own size
+    scale = np.maximum(np.ptp(ranges, axis=1), 1e-9 * (1.0 + np.abs(ranges).max(axis=1)))
+    if period is not None or run.period is not None:
+        section = stroboscopic_section(run, period, 0.0, None)
+        unit = "periods"
+    else:
+        whole = np.array([np.ptp(run.extremes(name)) for name in run.states])
+        level = run.dense_columns(run.span[1])[: len(run.states)]
+        if (np.ptp(ranges, axis=1) <= tol * np.maximum(whole, 1e-9 * (1 + np.abs(level)))).all():
+            section = Section("", run.states, np.empty(0), np.empty((len(run.states), 0)), _NONE)
+            still = Outcome("equilibrium", "the run settles on an equilibrium.", True)
+            return SteadyState(
+                None, None, late, float(np.ptp(ranges, axis=1).max()), section, still
+            )
+        widest = int(np.argmax(np.ptp(ranges, axis=1)))
+        mean = _mean(run, widest, late)
+        name = run.states[widest]
+        section = poincare_section(run, name, mean, 1, None, run.span)
+        unit = f"returns to {name} = {mean:.6g}"
+    states = section.table[: len(run.states)] / scale[:, None]
+    smallest = np.inf
+    for multiple in range(1, most + 1):
+        change = np.abs(states[:, multiple:] - states[:, :-multiple]).max(axis=0)
+        wrong = np.flatnonzero(change > tol)
+        first = int(wrong[-1]) + 1 if len(wrong) else 0
+        agreeing = change[first:]
+        if len(change):
+            smallest = min(smallest, float(change[-max(multiple, 2) :].max()))
+        # as many repeats as there are points, or the next point might still differ
+        if len(agreeing) >= max(multiple, 2):
+            length = float(section.times[-1] - section.times[-1 - multiple])
+            text = f"repeats after {multiple} {unit if multiple > 1 else _single(unit)}"
+            text += f", {length:.9g}, from t = {section.times[first]:.6g} on."
+            return SteadyState(
+                multiple,
+                length,
+                float(section.times[first]),
+                float(agreeing.max()),
+                section,
+                Outcome("periodic", text, True),
+            )
+    if len(section) < 3:
+        text = f"only {len(section)} {unit} within the run; simulate for longer."
+        return SteadyState(None, None, None, smallest, section, Outcome("too short", text, False))
+    text = (
+        f"no repeat within {tol:g} after up to {most} {unit}: quasi-periodic, chaotic, or not "
+        "yet settled; simulate for longer, or raise most= or tol=."
+    )
+    return SteadyState(None, None, None, smallest, section, Outcome("not periodic", text, False))
+
+
+_NONE = np.empty(0, dtype=np.int64)
+
+
+def _single(unit: str) -> str:
+    return unit.replace("periods", "period").replace("returns", "return")
+
+
+def _mean(run: Trajectory, row: int, since: float) -> float:
+    """Time average of a state over the steps that begin after a time."""
+    assert run.series is not None
+    late = run.steps[:, 0] >= since
+    if not late.any():
+        late = np.ones(len(run.steps), dtype=bool)
+    length = run.steps[late, 1]
+    k = np.arange(run.series.shape[2])
+    area = run.series[late, row] * length[:, None] ** (k + 1) / (k + 1)
+    return float(area.sum() / length.sum())
