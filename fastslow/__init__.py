@@ -29,7 +29,12 @@ if TYPE_CHECKING:
     from fastslow.results.overlays import Overlay
     from fastslow.results.point_branches import PointBranch
     from fastslow.results.points import Equilibrium, SpecialPoint
+    from fastslow.results.sections import Section
+    from fastslow.results.spectra import Spectrum
+    from fastslow.results.steady import SteadyState
+    from fastslow.results.sweeps import Sweep
     from fastslow.results.trajectories import Trajectory
+    from fastslow.simulation.sweeping import bifurcation_sweep
     from fastslow.simulation.trajectories import simulate
     from fastslow.symbolic.derivation import Derivation, derive
     from fastslow.symbolic.reduction import reduce_to
@@ -51,9 +56,14 @@ _HOME = {
     "ModelError": "errors",
     "Overlay": "results.overlays",
     "PointBranch": "results.point_branches",
+    "Section": "results.sections",
     "SpecialPoint": "results.points",
+    "Spectrum": "results.spectra",
+    "SteadyState": "results.steady",
+    "Sweep": "results.sweeps",
     "Trajectory": "results.trajectories",
     "UnknownNameError": "errors",
+    "bifurcation_sweep": "simulation.sweeping",
     "continue_equilibria": "diagrams.tracing",
     "continue_points": "diagrams.point_curves",
     "derive": "symbolic.derivation",
@@ -82,10 +92,15 @@ __all__ = [
     "ModelError",
     "Overlay",
     "PointBranch",
+    "Section",
     "SpecialPoint",
+    "Spectrum",
+    "SteadyState",
+    "Sweep",
     "Trajectory",
     "UnknownNameError",
     "__version__",
+    "bifurcation_sweep",
     "continue_equilibria",
     "continue_points",
     "derive",

@@ -5,7 +5,10 @@ from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.panels import PanelDrawing, panel
 from fastslow.plot.passages import OverlayDrawing, overlay
 from fastslow.plot.planes import PlaneDrawing, parameter_plane
+from fastslow.plot.sections import SectionDrawing, section
+from fastslow.plot.spectra import SpectrumDrawing, spectrum
 from fastslow.plot.style import Drawing
+from fastslow.plot.sweeping import SweepDrawing, sweep
 
 __all__ = [
     "DiagramDrawing",
@@ -14,10 +17,16 @@ __all__ = [
     "OverlayDrawing",
     "PanelDrawing",
     "PlaneDrawing",
+    "SectionDrawing",
+    "SpectrumDrawing",
+    "SweepDrawing",
     "diagram",
     "overlay",
     "panel",
     "parameter_plane",
     "phase_portrait",
+    "section",
+    "spectrum",
+    "sweep",
     "time_series",
 ]

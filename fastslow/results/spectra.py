@@ -77,7 +77,7 @@ class Spectrum:
         """Angular frequencies, shape (N,)."""
         return 2.0 * np.pi * self.frequency
 
-    def peaks(self, n: int = 5) -> tuple[Peak, ...]:
+    def peaks(self, n: int = 5, least: float = 1e-6) -> tuple[Peak, ...]:
         """The largest lines beside the mean, largest first.
 
         A line between two bins is placed where the window's own transform has
@@ -89,6 +89,8 @@ class Spectrum:
         ----------
         n : int
             How many at most.
+        least : float
+            Lines smaller than this part of the largest are left out.
 
         Returns
         -------
@@ -102,6 +104,7 @@ class Spectrum:
         around = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
         top = np.flatnonzero((around.max(axis=1) == a) & (a > 0))
         top = top[(top > 0) & (top < len(a) - 1)]
+        top = top[a[top] >= least * a[top].max(initial=0.0)]
         top = top[np.argsort(-a[top], kind="stable")][:n]
         return tuple(self._interpolated(int(k)) for k in top)
 

@@ -61,23 +61,25 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
         raise ArgumentError(f"tol = {tol!r}; expected a positive number")
     if most < 1:
         raise ArgumentError(f"most = {most!r}; expected at least 1")
+    if run.series is None or not len(run.steps):
+        raise ArgumentError(f"no dense output to compare; simulate with dense=True ({run.outcome})")
     late = run.span[1] - LATE * (run.span[1] - run.span[0])
-    ranges = np.array([run.extremes(name, since=late) for name in run.states])
+    # the ends of steps are close enough to each other to tell how far a state ranges
+    everywhere = np.vstack([run.series[:, : len(run.states), 0], run.end[1:]])
+    settled = everywhere[np.append(run.steps[:, 0] >= late, True)]
+    ranges, whole = np.ptp(settled, axis=0), np.ptp(everywhere, axis=0)
     # a state that does not move is compared with its own size
-    scale = np.maximum(np.ptp(ranges, axis=1), 1e-9 * (1.0 + np.abs(ranges).max(axis=1)))
+    least = 1e-9 * (1.0 + np.abs(settled).max(axis=0))
+    scale = np.maximum(ranges, least)
     if period is not None or run.period is not None:
         section = stroboscopic_section(run, period, 0.0, None)
         unit = "periods"
     else:
-        whole = np.array([np.ptp(run.extremes(name)) for name in run.states])
-        level = run.dense_columns(run.span[1])[: len(run.states)]
-        if (np.ptp(ranges, axis=1) <= tol * np.maximum(whole, 1e-9 * (1 + np.abs(level)))).all():
+        if (ranges <= tol * np.maximum(whole, least)).all():
             section = Section("", run.states, np.empty(0), np.empty((len(run.states), 0)), _NONE)
             still = Outcome("equilibrium", "the run settles on an equilibrium.", True)
-            return SteadyState(
-                None, None, late, float(np.ptp(ranges, axis=1).max()), section, still
-            )
-        widest = int(np.argmax(np.ptp(ranges, axis=1)))
+            return SteadyState(None, None, late, float(ranges.max()), section, still)
+        widest = int(np.argmax(ranges))
         mean = _mean(run, widest, late)
         name = run.states[widest]
         section = poincare_section(run, name, mean, 1, None, run.span)

@@ -361,8 +361,10 @@ class Trajectory:
         """
         return steady_state(self, period, tol, most)
 
-    def extremes(self, name: object, since: float | None = None) -> tuple[float, float]:
-        """Minimum and maximum of a column from a time to the end, to rounding.
+    def extremes(
+        self, name: object, since: float | None = None, until: float | None = None
+    ) -> tuple[float, float]:
+        """Minimum and maximum of a column in a part of the run, to rounding.
 
         Every step's polynomial is maximised where its coefficients allow more
         than the extremes at the ends of the steps.
@@ -370,8 +372,8 @@ class Trajectory:
         Parameters
         ----------
         name : str or Symbol
-        since : float, optional
-            By default the start of the run.
+        since, until : float, optional
+            The part, by default all of it.
 
         Raises
         ------
@@ -380,7 +382,7 @@ class Trajectory:
         ArgumentError
             For a time outside the run, or without dense output.
         """
-        return extremes_of(self, name, since)
+        return extremes_of(self, name, since, until)
 
     def __getstate__(self) -> dict[str, Any]:
         names = self.__dataclass_fields__

@@ -1,0 +1,129 @@
+"""Amplitude spectra."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
+
+from fastslow.errors import ArgumentError
+from fastslow.plot.labels import settle, tag
+from fastslow.plot.style import MM, MOTION, VERMILION, Drawing, axes_for, typeset
+from fastslow.results.spectra import Spectrum
+
+#: Amplitudes below this part of the largest are not looked for when the axes are chosen.
+FLOOR = 1e-4
+
+#: The lower edge of the axes in parts of the largest amplitude, and the part kept for labels.
+LOWEST, ROOM = 1e-7, 0.28
+
+
+@dataclass(frozen=True, eq=False)
+class SpectrumDrawing(Drawing):
+    """A drawn spectrum.
+
+    Parameters
+    ----------
+    ax : Axes
+    line : Line2D
+    peaks : Line2D or None
+        The largest lines, interpolated between bins.
+    labels : tuple of Annotation
+        Their frequencies.
+    """
+
+    line: Line2D
+    peaks: Line2D | None
+    labels: tuple[Annotation, ...]
+
+
+def spectrum(
+    spectrum: Spectrum,
+    *,
+    ax: Axes | None = None,
+    angular: bool = False,
+    over: tuple[float, float] | None = None,
+    peaks: int = 3,
+    color: str = MOTION,
+    **style: Any,
+) -> SpectrumDrawing:
+    """Draw amplitude over frequency, with a logarithmic vertical axis.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    ax : Axes, optional
+        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+    angular : bool
+        Whether to show angular frequency.
+    over : (float, float), optional
+        Frequencies to show; by default up to the last that is worth it.
+    peaks : int
+        How many lines to mark with their frequencies.
+    color : str
+        Colour of the curve.
+    **style
+        Properties of the curve.
+
+    Returns
+    -------
+    SpectrumDrawing
+
+    Raises
+    ------
+    ArgumentError
+        For an empty range.
+    """
+    unit = 2.0 * np.pi if angular else 1.0
+    frequency, amplitude = unit * spectrum.frequency[1:], spectrum.amplitude[1:]
+    largest = float(amplitude.max()) or 1.0
+    if over is None:
+        last = int(np.flatnonzero(amplitude >= FLOOR * largest)[-1]) if amplitude.any() else -1
+        over = 0.0, float(frequency[min(int(1.15 * last) + 8, len(frequency) - 1)])
+    if not over[0] < over[1]:
+        raise ArgumentError(f"over = {over!r}; expected a range of frequencies, low < high")
+    ax = axes_for(ax, height=54 * MM)
+    look = {"color": color, "linewidth": 0.8, **style}
+    # an exact zero has no place on a logarithmic axis
+    (line,) = ax.plot(frequency, np.maximum(amplitude, 1e-300), **look)
+    ax.set_yscale("log")
+    ax.set_xlim(*over)
+    # room above the largest line for its frequency, written upright
+    ax.set_ylim(LOWEST * largest, largest * LOWEST ** (-ROOM / (1.0 - ROOM)))
+    ax.set_xlabel("angular frequency" if angular else "frequency")
+    ax.set_ylabel(f"amplitude of {typeset(spectrum.name)}")
+    found = [p for p in spectrum.peaks(peaks) if over[0] <= unit * p.frequency <= over[1]]
+    if not found:
+        return SpectrumDrawing(ax, line, None, ())
+    (marks,) = ax.plot(
+        [unit * p.frequency for p in found],
+        [p.amplitude for p in found],
+        linestyle="none",
+        marker="o",
+        markersize=3.0,
+        markerfacecolor="white",
+        markeredgecolor=VERMILION,
+        markeredgewidth=0.7,
+        zorder=4,
+    )
+    labels = _labels(ax, [(unit * p.frequency, p.amplitude) for p in found])
+    return SpectrumDrawing(ax, line, marks, labels)
+
+
+def _labels(ax: Axes, points: list[tuple[float, float]]) -> tuple[Annotation, ...]:
+    """Frequencies above their lines; one that would cover a larger line's is left out."""
+    kept: list[Annotation] = []
+    settle(ax)
+    for point in points:
+        label = tag(ax, f"{point[0]:.4g}", point)
+        label.set(position=(0.0, 4.0), rotation=90, verticalalignment="bottom")
+        box = label.get_window_extent()
+        if any(box.overlaps(other.get_window_extent()) for other in kept):
+            label.remove()
+        else:
+            kept.append(label)
+    return tuple(kept)

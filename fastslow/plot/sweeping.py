@@ -1,0 +1,127 @@
+"""Bifurcation diagrams by simulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+
+from fastslow.plot.labels import key
+from fastslow.plot.style import BLACK, BLUE, GREY, VERMILION, Drawing, axes_for, typeset
+from fastslow.results.sweeps import Sweep, SweepPass
+
+#: More points than this are stored as pixels, in files of vectors too.
+MANY = 20_000
+
+#: Look of a pass by its direction: rings that show around dots where both passes agree.
+LOOKS: dict[int, dict[str, Any]] = {
+    1: {"color": BLUE, "markerfacecolor": "none", "markeredgewidth": 0.5, "label": "swept up"},
+    -1: {"color": VERMILION, "markeredgewidth": 0.0, "label": "swept down"},
+}
+
+
+@dataclass(frozen=True, eq=False)
+class SweepDrawing(Drawing):
+    """A drawn sweep.
+
+    Parameters
+    ----------
+    ax : Axes
+    x, y : str
+        What the axes show.
+    up, down : Line2D or None
+        The points of each pass.
+    failures : Line2D or None
+        Values whose run failed, along the lower edge.
+    legend : Legend or None
+    """
+
+    x: str
+    y: str
+    up: Line2D | None
+    down: Line2D | None
+    failures: Line2D | None
+    legend: Legend | None
+
+
+def sweep(
+    sweep: Sweep,
+    *,
+    ax: Axes | None = None,
+    size: float | None = None,
+    legend: bool = True,
+    **style: Any,
+) -> SweepDrawing:
+    """Draw a bifurcation diagram by simulation, both passes over each other.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    ax : Axes, optional
+        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+    size : float, optional
+        Diameter of the dots in points; by default smaller for more points.
+    legend : bool
+        Whether to say which pass is which.
+    **style
+        Properties of the points of both passes.
+
+    Returns
+    -------
+    SweepDrawing
+    """
+    own = ax is None
+    ax = axes_for(ax)
+    most = max(len(p.x) for p in sweep.passes)
+    if size is None:
+        size = 1.6 if most <= MANY / 10 else 0.8
+    one = len(sweep.passes) == 1
+    up = _points(ax, sweep.up, size if one else 2.2 * size, one, style)
+    down = _points(ax, sweep.down, size, one, style)
+    failed = sorted({value for value, _ in sweep.failures})
+    crosses = None
+    if failed:
+        (crosses,) = ax.plot(
+            failed,
+            np.full(len(failed), 0.02),
+            linestyle="none",
+            marker="x",
+            markersize=3.0,
+            markeredgewidth=0.7,
+            color=GREY,
+            transform=ax.get_xaxis_transform(),
+            label="run failed",
+        )
+    margin = 0.02 * (sweep.values[-1] - sweep.values[0]) or 0.5
+    ax.set_xlim(sweep.values[0] - margin, sweep.values[-1] + margin)
+    ax.set_xlabel(typeset(sweep.parameter_name))
+    ax.set_ylabel(f"{typeset(sweep.name)} ({sweep.what})")
+    drawn = [line for line in (up, down, crosses) if line is not None]
+    words = None
+    if legend and len(drawn) > 1:
+        words = key(ax, [_sample(line) for line in drawn], own)
+    return SweepDrawing(ax, sweep.parameter_name, sweep.name, up, down, crosses, words)
+
+
+def _points(
+    ax: Axes, one: SweepPass | None, size: float, alone: bool, style: dict[str, Any]
+) -> Line2D | None:
+    if one is None:
+        return None
+    look = {"color": BLACK, "markeredgewidth": 0.0} if alone else LOOKS[one.direction]
+    look = {"linestyle": "none", "marker": "o", "markersize": size, **look, **style}
+    (line,) = ax.plot(one.parameter, one.x, rasterized=len(one.x) > MANY, **look)
+    return line
+
+
+def _sample(line: Line2D) -> Line2D:
+    """The same points, large enough for a legend."""
+    sample = Line2D([], [])
+    sample.update_from(line)
+    sample.set_label(str(line.get_label()))
+    sample.set_markersize(max(line.get_markersize(), 3.0))
+    return sample

@@ -1,0 +1,279 @@
+"""Bifurcation diagrams by simulation: a parameter swept up and down, the last state carried on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from tqdm import tqdm
+
+from fastslow.errors import ArgumentError, FastSlowError, unknown_name
+from fastslow.model.model import Model
+from fastslow.results.outcome import Outcome
+from fastslow.results.sweeps import Sweep, SweepPass
+from fastslow.results.trajectories import Trajectory
+from fastslow.simulation.arguments import initial_state, whole_number
+from fastslow.simulation.trajectories import simulate
+
+Array = NDArray[np.float64]
+
+What = Literal["stroboscopic", "extremes", "section"]
+KINDS = ("stroboscopic", "extremes", "section")
+
+
+def bifurcation_sweep(
+    model: Model,
+    parameter: object,
+    values: ArrayLike,
+    state: object = None,
+    *,
+    start: Sequence[float] | Mapping[Any, float] | NDArray[np.float64],
+    settle: int = 200,
+    keep: int = 32,
+    what: What = "stroboscopic",
+    phase: float = 0.0,
+    section: object = None,
+    level: float = 0.0,
+    direction: int | None = 1,
+    period: float | None = None,
+    back: bool = True,
+    tol: float = 1e-9,
+    max_steps: int = 1_000_000,
+    progress: bool = False,
+) -> Sweep:
+    """Bifurcation diagram by simulation: what is left after the transient, value by value.
+
+    Every run begins in the state in which the last one ended, so that a stable
+    motion is followed until it is lost; swept back, the values between show
+    coexisting motions. The equations are compiled once.
+
+    Parameters
+    ----------
+    model : Model
+    parameter : str or Symbol
+    values : array_like, shape (m,)
+        Rising or falling; the first pass takes them in this order.
+    state : str or Symbol, optional
+        The column recorded, by default the first state.
+    start : sequence of float, shape (n,), or mapping
+        Initial states of the first run.
+    settle, keep : int
+        How many periods are dropped, and how many recorded, at each value.
+    what : {"stroboscopic", "extremes", "section"}
+        Record the state once every period, its minimum and maximum in every
+        period, or its values on a Poincaré section.
+    phase : float
+        For stroboscopic points: when in the period, as a part of it, 0 to 1.
+    section : str or Expr
+        For a section: the expression, see `Trajectory.section`. With the rate
+        of the state and direction −1, its maxima are recorded.
+    level, direction
+        The level that the expression passes, and which way (None for both).
+    period : float, optional
+        By default that of the forcing at each value. A model without forcing
+        needs it: the unit of time of ``settle`` and ``keep``.
+    back : bool
+        Whether to sweep back as well.
+    tol : float
+        Tolerance of the simulations.
+    max_steps : int
+        Where a run at one value stops.
+    progress : bool
+        Whether to show a progress bar.
+
+    Returns
+    -------
+    Sweep
+        A value whose run fails has an outcome that says why, and no points; the
+        next value goes on from the last state that did not fail.
+
+    Raises
+    ------
+    UnknownNameError
+        For an unknown parameter, state, column or kind.
+    ArgumentError
+        For values that neither rise nor fall, a wrong start, or a missing period.
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> x, c, t = sp.symbols("x c t")
+    >>> model = Model({x: c * sp.cos(t) - x}, parameters={c: 1})
+    >>> swept = bifurcation_sweep(model, "c", [1, 2], start=[0], settle=5, keep=1, back=False)
+    >>> swept.x.round(9)
+    array([0.5, 1. ])
+    """
+    if str(parameter) not in model.parameters:
+        raise unknown_name("parameter", parameter, model.parameters)
+    order = _values(values)
+    columns = (*model.states, *model.slow_states, *model.forcing)
+    name = columns[0] if state is None else str(state)
+    if name not in columns:
+        raise unknown_name("state", name, columns)
+    settings = _Settings(
+        str(parameter),
+        columns.index(name),
+        what,
+        whole_number("settle", settle, 0, 10**9),
+        whole_number("keep", keep, 1, 10**9),
+        float(phase),
+        section,
+        float(level),
+        direction,
+        period,
+        {"tol": tol, "max_steps": max_steps},
+    )
+    begin = initial_state(model, start)
+    rule = _rule(settings, name)
+    _try_first(model, order[0], begin, settings)
+    turns = [order, order[::-1]] if back else [order]
+    passes: list[SweepPass] = []
+    with tqdm(total=sum(map(len, turns)), unit="value", disable=not progress) as bar:
+        for turn in turns:
+            passes.append(_one_pass(model, turn, begin, settings, bar.update))
+            finished = passes[-1].ends[np.isfinite(passes[-1].ends).all(axis=1)]
+            begin = finished[-1] if len(finished) else begin
+    return Sweep(settings.parameter, name, what, rule, tuple(passes))
+
+
+@dataclass(frozen=True)
+class _Settings:
+    """What is done at every value."""
+
+    parameter: str
+    column: int
+    what: str
+    settle: int
+    keep: int
+    phase: float
+    section: object
+    level: float
+    direction: int | None
+    period: float | None
+    limits: dict[str, Any]
+
+
+def _values(values: ArrayLike) -> Array:
+    try:
+        order = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"values: expected numbers, received {values!r}") from None
+    if order.ndim != 1 or not len(order) or not np.isfinite(order).all():
+        raise ArgumentError("values: expected a one-dimensional array of finite numbers")
+    change = np.diff(order)
+    if not ((change > 0).all() or (change < 0).all()):
+        raise ArgumentError("values: expected strictly rising or strictly falling numbers")
+    return order
+
+
+def _rule(settings: _Settings, name: str) -> str:
+    """What is recorded, in words; raises for what cannot be."""
+    if settings.what not in KINDS:
+        raise unknown_name("kind of point", settings.what, KINDS)
+    if (settings.section is not None) != (settings.what == "section"):
+        raise ArgumentError(
+            'section= goes with what="section", and what="section" needs it: the expression that '
+            "passes the level"
+        )
+    if not 0.0 <= settings.phase <= 1.0:
+        raise ArgumentError(f"phase = {settings.phase!r}; expected a part of the period, 0 to 1")
+    if settings.what == "section":
+        way = {1: " upwards", -1: " downwards", 0: " touching", None: ""}
+        if settings.direction not in way:
+            raise ArgumentError(f"direction = {settings.direction!r}; expected -1, 0, 1 or None")
+        passed = f"{settings.section} = {settings.level:g}{way[settings.direction]}"
+        return f"{name} where {passed}"
+    if settings.what == "extremes":
+        return f"minimum and maximum of {name} in every period"
+    return f"{name} once every period" + (f" at {settings.phase:g} of it" * (settings.phase > 0))
+
+
+def _try_first(model: Model, value: float, begin: Array, settings: _Settings) -> None:
+    """A short run at the first value: a wrong argument is wrong at every value."""
+    run = simulate(
+        model.with_parameters({settings.parameter: value}),
+        begin,
+        periods=1,
+        period=settings.period,
+        **{**settings.limits, "max_steps": 1},
+    )
+    if len(run.steps):
+        _points(run, settings)
+
+
+def _one_pass(
+    model: Model, values: Array, begin: Array, settings: _Settings, advance: Callable[[], Any]
+) -> SweepPass:
+    points: list[Array] = []
+    ends = np.full((len(values), len(begin)), np.nan)
+    outcomes = []
+    for row, value in enumerate(values):
+        found, outcome, end = _at_value(model, float(value), begin, settings)
+        points.append(found)
+        outcomes.append(outcome)
+        if end is not None:
+            begin = ends[row] = end
+        advance()
+    counts = np.array([len(p) for p in points], dtype=np.intp)
+    return SweepPass(
+        1 if len(values) < 2 or values[1] > values[0] else -1,
+        values,
+        counts,
+        np.repeat(values, counts),
+        np.concatenate(points),
+        ends,
+        tuple(outcomes),
+    )
+
+
+def _at_value(
+    model: Model, value: float, begin: Array, settings: _Settings
+) -> tuple[Array, Outcome, Array | None]:
+    """Points, outcome and last state (None after a failure) at one value."""
+    nothing = np.empty(0)
+    try:
+        here = model.with_parameters({settings.parameter: value})
+        first = 0.0
+        if settings.settle:
+            settled = simulate(
+                here,
+                begin,
+                periods=settings.settle,
+                period=settings.period,
+                dense=False,
+                **settings.limits,
+            )
+            if not settled.outcome:
+                return nothing, settled.outcome, None
+            begin, first = settled.end[1:], settled.span[1]
+        run = simulate(
+            here,
+            begin,
+            periods=settings.keep,
+            start=first,
+            period=settings.period,
+            **settings.limits,
+        )
+        if not run.outcome:
+            return nothing, run.outcome, None
+        return _points(run, settings), run.outcome, run.end[1:]
+    except FastSlowError as error:
+        return nothing, Outcome("error", str(error), False), None
+
+
+def _points(run: Trajectory, settings: _Settings) -> Array:
+    """What is recorded of a run that has settled."""
+    name = run.columns[settings.column]
+    assert run.period is not None
+    if settings.what == "section":
+        return run.section(settings.section, settings.level, direction=settings.direction)[name]
+    if settings.what == "stroboscopic":
+        # the end of the last period is the beginning of the next value's first
+        return run.stroboscopic(phase=settings.phase * run.period)[name][: settings.keep]
+    edges = np.linspace(*run.span, settings.keep + 1)
+    pairs = [run.extremes(name, *pair) for pair in pairwise(edges.tolist())]
+    return np.array(pairs).reshape(-1)
