@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 DEEPEST = 44
 
 #: Roots closer than this part of a step are looked at again: are they one touch?
-CLOSE = 1e-5
+CLOSE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,10 +212,14 @@ def _merged(zeros: list[_Zero], b: Array, noise: Array) -> list[_Zero]:
             gap = zero.low - last.high
             if gap <= CLOSE:
                 step, value = _value(b, last.high + 0.5 * gap)
-                if gap <= 0.0 or abs(value) <= 2.0 * noise[step]:
-                    high = max(last.high, zero.high)
-                    after = zero.after if zero.high >= last.high else last.after
-                    kept[-1] = _Zero(last.low, high, last.before, after)
+                # signs that contradict each other were read from rounding
+                doubt = last.after != zero.before or abs(value) <= 2.0 * noise[step]
+                if gap <= 0.0 or doubt:
+                    low, high = last.low, max(last.high, zero.high)
+                    before, after = (
+                        _sign_beyond(b, noise, u, side) for u, side in ((low, -1), (high, 1))
+                    )
+                    kept[-1] = _Zero(low, high, before, after)
                     continue
         kept.append(zero)
     return kept

@@ -1,0 +1,95 @@
+"""Sweeps, sections and spectra as drawn."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import fastslow as fs
+from fastslow.results.outcome import Outcome
+from fastslow.results.sections import Section
+from fastslow.results.spectra import Spectrum
+from fastslow.results.sweeps import Sweep, SweepPass
+
+FINE = Outcome("end of time", "reached the end.", True)
+LOST = Outcome("blow-up", "the state grew.", False)
+
+
+def one_pass(direction):
+    values = np.array([1.0, 2.0, 3.0])[::direction]
+    counts = np.where(values == 3.0, 0, 2)
+    return SweepPass(
+        direction,
+        values,
+        counts,
+        np.repeat(values, counts),
+        np.array([0.1, 0.2, 0.3, 0.4]),
+        np.zeros((3, 2)),
+        tuple(LOST if v == 3.0 else FINE for v in values),
+    )
+
+
+@pytest.fixture
+def swept():
+    return Sweep("Omega", "x", "extremes", "…", (one_pass(1), one_pass(-1)))
+
+
+def test_both_passes_differ_in_more_than_colour(swept):
+    drawn = fs.plot.sweep(swept)
+    assert np.array_equal(drawn.up.get_xdata(), [1, 1, 2, 2])
+    assert np.array_equal(drawn.down.get_xdata(), [2, 2, 1, 1])
+    assert drawn.up.get_markerfacecolor() == "none"
+    assert drawn.up.get_markersize() > drawn.down.get_markersize()
+    assert drawn.ax.get_xlabel() == r"$\Omega$"
+    assert drawn.ax.get_ylabel() == "$x$ (extremes)"
+    assert [t.get_text() for t in drawn.legend.get_texts()] == [
+        "swept up",
+        "swept down",
+        "run failed",
+    ]
+    assert drawn.failures.get_xdata().tolist() == [3.0]
+
+
+def test_one_pass_into_given_axes():
+    ax = Figure().add_subplot()
+    drawn = fs.plot.sweep(Sweep("c", "y", "section", "…", (one_pass(-1),)), ax=ax, color="red")
+    assert drawn.ax is ax
+    assert drawn.up is None
+    assert drawn.down.get_color() == "red"
+
+
+def test_hysteresis_is_read_off_the_points(swept):
+    # the passes have the same points at neither value, and none at the failed one
+    assert swept.hysteresis().tolist() == [[1.0, 2.0]]
+    assert swept.hysteresis(tol=1.0).shape == (0, 2)
+
+
+def test_section_by_direction():
+    section = Section(
+        "x = 0", ("x", "v"), np.arange(4.0), np.arange(8.0).reshape(2, 4), np.array([1, -1, 1, 0])
+    )
+    drawn = fs.plot.section(section, "x", "v")
+    assert [line.get_marker() for line in drawn.points] == ["^", "v", "o"]
+    assert drawn.points[0].get_xdata().tolist() == [0.0, 2.0]
+    assert drawn.legend is not None
+    over_time = fs.plot.section(section, "t", "x", ax=Figure().add_subplot())
+    assert over_time.ax.get_xlabel() == "$t$"
+    with pytest.raises(fs.UnknownNameError, match="unknown column 'y'"):
+        fs.plot.section(section, "y", "v")
+    alone = Section("", ("x",), np.zeros(1), np.zeros((1, 1)), np.zeros(1, dtype=int))
+    with pytest.raises(fs.ArgumentError, match="no plane"):
+        fs.plot.section(alone)
+    assert fs.plot.section(alone, "t", "x").legend is None
+
+
+def test_spectrum_marks_its_lines():
+    frequency = np.arange(200) / 10
+    amplitude = np.full(200, 1e-9)
+    amplitude[[49, 50, 51, 99, 100, 101]] = [0.5, 1.0, 0.5, 0.05, 0.1, 0.05]
+    spectrum = Spectrum("x", "hann", (0.0, 10.0), frequency, amplitude)
+    drawn = fs.plot.spectrum(spectrum, angular=True, peaks=5)
+    assert drawn.peaks.get_xdata() == pytest.approx(2 * np.pi * np.array([5.0, 10.0]))
+    assert [label.get_text() for label in drawn.labels] == ["31.42", "62.83"]
+    assert drawn.ax.get_yscale() == "log"
+    assert drawn.ax.get_xlabel() == "angular frequency"
+    with pytest.raises(fs.ArgumentError, match="low < high"):
+        fs.plot.spectrum(spectrum, over=(2, 1))
