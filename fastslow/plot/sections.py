@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from fastslow.errors import ArgumentError
 from fastslow.plot.labels import key
-from fastslow.plot.style import BLACK, BLUE, VERMILION, Drawing, axes_for, typeset
+from fastslow.plot.style import BLACK, BLUE, VERMILION, Drawing, axes_for, typeset, widen
 from fastslow.results.sections import Section
 
 #: Marker, colour and words by direction.
@@ -102,6 +102,7 @@ def section(
         }
         look |= {"linestyle": "none", "label": words, **style}
         points += ax.plot(horizontal[mine], vertical[mine], **look)
+    widen(ax)
     ax.set_xlabel(typeset(across))
     ax.set_ylabel(typeset(up))
     legend = key(ax, points, own) if len(points) > 1 else None

@@ -113,6 +113,15 @@ def axes_for(ax: Axes | None, width: float = COLUMN, height: float = 64 * MM) ->
     return dressed(new_figure(width, height).add_subplot()) if ax is None else ax
 
 
+def widen(ax: Axes) -> None:
+    """Keep points that agree to rounding from filling the axes with their noise."""
+    limits = ((ax.dataLim.intervalx, ax.set_xlim), (ax.dataLim.intervaly, ax.set_ylim))
+    for (low, high), set_limits in limits:
+        size = max(abs(low), abs(high))
+        if 0.0 < size < float("inf") and high - low <= 1e-6 * size:
+            set_limits(0.5 * (low + high) - 0.1 * size, 0.5 * (low + high) + 0.1 * size)
+
+
 @dataclass(frozen=True, eq=False)
 class Drawing:
     """What was drawn, and where.

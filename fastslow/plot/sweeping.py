@@ -11,7 +11,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
 from fastslow.plot.labels import key
-from fastslow.plot.style import BLACK, BLUE, GREY, VERMILION, Drawing, axes_for, typeset
+from fastslow.plot.style import BLACK, BLUE, GREY, VERMILION, Drawing, axes_for, typeset, widen
 from fastslow.results.sweeps import Sweep, SweepPass
 
 #: More points than this are stored as pixels, in files of vectors too.
@@ -96,6 +96,7 @@ def sweep(
             transform=ax.get_xaxis_transform(),
             label="run failed",
         )
+    widen(ax)
     margin = 0.02 * (sweep.values[-1] - sweep.values[0]) or 0.5
     ax.set_xlim(sweep.values[0] - margin, sweep.values[-1] + margin)
     ax.set_xlabel(typeset(sweep.parameter_name))

@@ -34,6 +34,17 @@ class Contacts:
         Length of a period; None for a run without one.
     per_period : ndarray of int, shape (n_periods, n_interfaces, 2)
         The same in every whole period, counted back from ``until``.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, v = sp.symbols("x v")
+    >>> run = fs.simulate(fs.Model({x: v, v: -sp.sign(x)}), [0.5, 0.0], t=(0, 8))
+    >>> contacts = run.contacts(period=4)
+    >>> contacts.per_period.tolist()
+    [[[1, 1]], [[1, 1]]]
+    >>> {name: round(share, 9) for name, share in contacts.residence.items()}
+    {'S1': 0.5, 'S2': 0.5}
     """
 
     interfaces: tuple[str, ...]

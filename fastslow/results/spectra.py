@@ -64,6 +64,15 @@ class Spectrum:
     amplitude : ndarray, shape (N,)
         A sine of amplitude a at the centre of a bin has amplitude a there; at
         zero, the modulus of the mean.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, v, t = sp.symbols("x v t")
+    >>> run = fs.simulate(fs.Model({x: v, v: sp.sin(t) - x - v}), [-1, 0], periods=20)
+    >>> (peak,) = run.spectrum("x").peaks(1)
+    >>> round(peak.angular, 6), round(peak.amplitude, 6)
+    (1.0, 1.0)
     """
 
     name: str

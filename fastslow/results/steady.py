@@ -42,6 +42,14 @@ class SteadyState:
         The states compared.
     outcome : Outcome
         ``"periodic"``, ``"equilibrium"``, ``"too short"`` or ``"not periodic"``.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, v, t = sp.symbols("x v t")
+    >>> run = fs.simulate(fs.Model({x: v, v: sp.sin(t) - x - v}), [-1, 0], periods=20)
+    >>> run.steady()
+    SteadyState: repeats after 1 period, 6.28318531, from t = 0 on.
     """
 
     multiple: int | None

@@ -130,8 +130,10 @@ class Sweep:
         Returns
         -------
         ndarray, shape (k, 2)
-            First and last differing value of each interval; the jumps lie within
-            one step of the sweep outside them. A value that failed is passed over.
+            First and last differing value of each interval; each jump lies within
+            one step of the sweep outside it, when the runs settle. Just past a
+            fold a lost motion lingers, and may still be there when a run ends. A
+            value that failed is passed over.
 
         Raises
         ------

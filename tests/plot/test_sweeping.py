@@ -79,6 +79,16 @@ def test_section_by_direction():
     with pytest.raises(fs.ArgumentError, match="no plane"):
         fs.plot.section(alone)
     assert fs.plot.section(alone, "t", "x").legend is None
+    nothing = Section("", ("x", "v"), np.zeros(0), np.zeros((2, 0)), np.zeros(0, dtype=int))
+    assert fs.plot.section(nothing).points == ()
+
+
+def test_points_that_agree_do_not_show_their_rounding():
+    table = np.array([[2.0, 2.0 + 1e-12], [1.0, 3.0]])
+    section = Section("every 1", ("x", "v"), np.arange(2.0), table, np.zeros(2, dtype=int))
+    drawn = fs.plot.section(section)
+    assert drawn.ax.get_xlim() == pytest.approx((1.8, 2.2))
+    assert drawn.ax.get_ylim() == pytest.approx((0.9, 3.1))
 
 
 def test_spectrum_marks_its_lines():
