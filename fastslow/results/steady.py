@@ -69,8 +69,9 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
         raise ArgumentError(f"tol = {tol!r}; expected a positive number")
     if most < 1:
         raise ArgumentError(f"most = {most!r}; expected at least 1")
-    if run.series is None or not len(run.steps):
-        raise ArgumentError(f"no dense output to compare; simulate with dense=True ({run.outcome})")
+    # says what is wrong with a run that kept nothing, or made no step
+    run.dense_columns(run.span[1])
+    assert run.series is not None
     late = run.span[1] - LATE * (run.span[1] - run.span[0])
     # the ends of steps are close enough to each other to tell how far a state ranges
     everywhere = np.vstack([run.series[:, : len(run.states), 0], run.end[1:]])
@@ -115,7 +116,8 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
                 Outcome("periodic", text, True),
             )
     if len(section) < 3:
-        text = f"only {len(section)} {unit} within the run; simulate for longer."
+        count = f"{len(section)} {unit if len(section) != 1 else _single(unit)}"
+        text = f"only {count} within the run; simulate for longer."
         return SteadyState(None, None, None, smallest, section, Outcome("too short", text, False))
     text = (
         f"no repeat within {tol:g} after up to {most} {unit}: quasi-periodic, chaotic, or not "
