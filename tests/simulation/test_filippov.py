@@ -31,6 +31,18 @@ def test_sticking_ends_when_the_force_exceeds_friction(friction):
     assert run.crossings[0].from_region == "S1|S2"
 
 
+def test_a_section_counts_sticking_once_where_it_begins(friction):
+    model = friction.with_parameters(a=2.0, mu=1.9)
+    run = simulate(model, [3, 0], t=(0, 60), tol=1e-13)
+    begin = [s.start for s in run.segments[1:] if "|" in s.region]
+    assert len(begin) > 3
+    follows = zip(run.segments[:-1], run.segments[1:], strict=True)
+    passed = [s.start for before, s in follows if "|" not in before.region]
+    section = run.section("v")
+    assert section.times == pytest.approx(passed, abs=1e-12)
+    assert np.abs(section["v"]).max() < 1e-12
+
+
 def test_sliding_field_and_its_exit():
     # slides on y = 0 with x' = 1 while -1 < x < 1, leaves upwards at x = 1
     field = {x: 1, y: sp.Piecewise((x - 1, y > 0), (1 + 0 * x, True))}
