@@ -29,9 +29,9 @@ def bifurcation_sweep(
     model: Model,
     parameter: object,
     values: ArrayLike,
-    state: object = None,
+    state: Sequence[float] | Mapping[Any, float] | NDArray[np.float64],
     *,
-    start: Sequence[float] | Mapping[Any, float] | NDArray[np.float64],
+    column: object = None,
     settle: int = 200,
     keep: int = 32,
     what: What = "stroboscopic",
@@ -57,20 +57,20 @@ def bifurcation_sweep(
     parameter : str or Symbol
     values : array_like, shape (m,)
         Rising or falling; the first pass takes them in this order.
-    state : str or Symbol, optional
-        The column recorded, by default the first state.
-    start : sequence of float, shape (n,), or mapping
+    state : sequence of float, shape (n,), or mapping
         Initial states of the first run.
+    column : str or Symbol, optional
+        What is recorded, by default the first state.
     settle, keep : int
         How many periods are dropped, and how many recorded, at each value.
     what : {"stroboscopic", "extremes", "section"}
-        Record the state once every period, its minimum and maximum in every
+        Record the column once every period, its minimum and maximum in every
         period, or its values on a Poincaré section.
     phase : float
         For stroboscopic points: when in the period, as a part of it, 0 to 1.
     section : str or Expr
         For a section: the expression, see `Trajectory.section`. With the rate
-        of the state and direction −1, its maxima are recorded.
+        of a state and direction −1, its maxima are recorded.
     level, direction
         The level that the expression passes, and which way (None for both).
     period : float, optional
@@ -96,14 +96,14 @@ def bifurcation_sweep(
     UnknownNameError
         For an unknown parameter, state, column or kind.
     ArgumentError
-        For values that neither rise nor fall, a wrong start, or a missing period.
+        For values that neither rise nor fall, a wrong initial state, or a missing period.
 
     Examples
     --------
     >>> import sympy as sp
     >>> x, c, t = sp.symbols("x c t")
     >>> model = Model({x: c * sp.cos(t) - x}, parameters={c: 1})
-    >>> swept = bifurcation_sweep(model, "c", [1, 2], start=[0], settle=5, keep=1, back=False)
+    >>> swept = bifurcation_sweep(model, "c", [1, 2], [0], settle=5, keep=1, back=False)
     >>> swept.x.round(9)
     array([0.5, 1. ])
     """
@@ -111,9 +111,9 @@ def bifurcation_sweep(
         raise unknown_name("parameter", parameter, model.parameters)
     order = _values(values)
     columns = (*model.states, *model.slow_states, *model.forcing)
-    name = columns[0] if state is None else str(state)
+    name = columns[0] if column is None else str(column)
     if name not in columns:
-        raise unknown_name("state", name, columns)
+        raise unknown_name("column", name, columns)
     settings = _Settings(
         str(parameter),
         columns.index(name),
@@ -127,7 +127,7 @@ def bifurcation_sweep(
         period,
         {"tol": tol, "max_steps": max_steps},
     )
-    begin = initial_state(model, start)
+    begin = initial_state(model, state)
     rule = _rule(settings, name)
     _try_first(model, order[0], begin, settings)
     turns = [order, order[::-1]] if back else [order]

@@ -36,7 +36,7 @@ def swept(pair):
         pair,
         "Omega",
         values,
-        start=[1.1, 0],
+        [1.1, 0],
         settle=150,
         keep=4,
         what="extremes",
@@ -72,7 +72,7 @@ def test_a_sweep_in_flat_arrays(swept):
 def test_stroboscopic_points_in_closed_form(pair):
     values = [0.3, 0.5, 0.6]
     drawn = fs.bifurcation_sweep(
-        pair, "Omega", values, "v", start={"x": 1.1, "v": 0}, settle=60, keep=2, phase=0.25,
+        pair, "Omega", values, {"x": 1.1, "v": 0}, column="v", settle=60, keep=2, phase=0.25,
         back=False, tol=1e-12,
     )  # fmt: skip
     assert drawn.down is None
@@ -89,7 +89,7 @@ def test_period_doubling(roessler):
     values = np.arange(2.74, 2.9401, 0.04)
     # the maxima of y: its rate falls through zero
     drawn = fs.bifurcation_sweep(
-        roessler, c, values, y, start=[1, 1, 0], settle=300, keep=12, what="section",
+        roessler, c, values, [1, 1, 0], column=y, settle=300, keep=12, what="section",
         section=x + a * y, direction=-1, period=6.0, back=False,
     )  # fmt: skip
     apart = np.array([np.ptp(drawn.up.at(value)) for value in values])
@@ -126,7 +126,7 @@ def test_doubled_orbit_closes_in_scipy_too(roessler):
 def test_nothing_is_lost_where_values_fail(roessler):
     # for a = 0.6 the motion escapes
     drawn = fs.bifurcation_sweep(
-        roessler, "a", [0.1, 0.2, 2.0], start=[1, 1, 0], settle=20, keep=5, period=6.0
+        roessler, "a", [0.1, 0.2, 2.0], [1, 1, 0], settle=20, keep=5, period=6.0
     )
     assert [value for value, _ in drawn.failures] == [2.0, 2.0]
     assert drawn.up.counts.tolist() == drawn.down.counts[::-1].tolist() == [5, 5, 0]
@@ -137,7 +137,7 @@ def test_nothing_is_lost_where_values_fail(roessler):
 
 def test_falling_values_and_progress(pair, capsys):
     drawn = fs.bifurcation_sweep(
-        pair, "Omega", [0.6, 0.5], start=[1.1, 0], settle=1, keep=1, tol=1e-12, progress=True
+        pair, "Omega", [0.6, 0.5], [1.1, 0], settle=1, keep=1, tol=1e-12, progress=True
     )
     assert drawn.passes[0] is drawn.down
     assert drawn.values.tolist() == [0.5, 0.6]
@@ -158,8 +158,8 @@ def test_values_are_not_compiled(pair):
         ({"values": []}, fs.ArgumentError, "one-dimensional array"),
         ({"values": "abc"}, fs.ArgumentError, "expected numbers"),
         ({"values": [np.nan]}, fs.ArgumentError, "finite"),
-        ({"state": "z"}, fs.UnknownNameError, "unknown state 'z'"),
-        ({"start": [1]}, fs.ArgumentError, "expected 2 values"),
+        ({"column": "z"}, fs.UnknownNameError, "unknown column 'z'"),
+        ({"state": [1]}, fs.ArgumentError, "expected 2 values"),
         ({"keep": 0}, fs.ArgumentError, "keep = 0"),
         ({"settle": 1.5}, fs.ArgumentError, "whole number"),
         ({"what": "extreme"}, fs.UnknownNameError, "did you mean 'extremes'"),
@@ -171,11 +171,11 @@ def test_values_are_not_compiled(pair):
     ],
 )
 def test_wrong_arguments(pair, changes, error, text):
-    given = {"parameter": "Omega", "values": [0.5], "start": [1.1, 0], "tol": 1e-12, **changes}
+    given = {"parameter": "Omega", "values": [0.5], "state": [1.1, 0], "tol": 1e-12, **changes}
     with pytest.raises(error, match=text):
         fs.bifurcation_sweep(pair, **given)
 
 
 def test_a_model_without_forcing_needs_a_unit_of_time(roessler):
     with pytest.raises(fs.ArgumentError, match="period="):
-        fs.bifurcation_sweep(roessler, "c", [2.5], start=[1, 1, 0])
+        fs.bifurcation_sweep(roessler, "c", [2.5], [1, 1, 0])
