@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from fastslow.passage.overlays import overlay
     from fastslow.results.branches import Branch
     from fastslow.results.diagrams import Diagram
+    from fastslow.results.ensembles import Ensemble
     from fastslow.results.overlays import Overlay
     from fastslow.results.point_branches import PointBranch
     from fastslow.results.points import Equilibrium, SpecialPoint
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from fastslow.results.steady import SteadyState
     from fastslow.results.sweeps import Sweep
     from fastslow.results.trajectories import Trajectory
+    from fastslow.simulation.ensembles import simulate_many
     from fastslow.simulation.sweeping import bifurcation_sweep
     from fastslow.simulation.trajectories import simulate
     from fastslow.symbolic.derivation import Derivation, derive
@@ -50,6 +52,7 @@ _HOME = {
     "Continuation": "continuation.settings",
     "Derivation": "symbolic.derivation",
     "Diagram": "results.diagrams",
+    "Ensemble": "results.ensembles",
     "Equilibrium": "results.points",
     "FastSlowError": "errors",
     "Model": "model.model",
@@ -75,6 +78,7 @@ _HOME = {
     "plot": "",
     "reduce_to": "symbolic.reduction",
     "simulate": "simulation.trajectories",
+    "simulate_many": "simulation.ensembles",
     "systems": "",
     "tangencies": "diagrams.tangency_points",
     "warm": "warming",
@@ -86,6 +90,7 @@ __all__ = [
     "Continuation",
     "Derivation",
     "Diagram",
+    "Ensemble",
     "Equilibrium",
     "FastSlowError",
     "Model",
@@ -112,6 +117,7 @@ __all__ = [
     "plot",
     "reduce_to",
     "simulate",
+    "simulate_many",
     "systems",
     "tangencies",
     "warm",

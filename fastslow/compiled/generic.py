@@ -22,7 +22,7 @@ from numba import njit
 from {module} import {function} as loop
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def entry({arguments}):
     return loop({arguments})
 '''

@@ -6,7 +6,9 @@ import math
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
 
+import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 
 def common_period(
@@ -39,18 +41,57 @@ def common_period(
     >>> common_period([sp.sin(t) + sp.sin(sp.sqrt(2)*t)], t, {}) is None
     True
     """
-    frequencies: list[float] = []
-    for expression in expressions:
-        if time in expression.free_symbols:
-            found = _frequencies(expression, time, values)
-            if found is None:
-                return None
-            frequencies += [f for f in found if f > 0]
-    if not frequencies:
+    found = frequencies(expressions, time)
+    if found is None:
         return None
-    base = min(frequencies)
-    ratios = [Fraction(f / base).limit_denominator(10_000) for f in frequencies]
-    if any(abs(r - f / base) > 1e-12 * f / base for r, f in zip(ratios, frequencies, strict=True)):
+    numbers = [frequency.subs(values) for frequency in found]
+    if not all(number.is_number and number.is_real for number in numbers):
+        return None
+    return period_of([float(number) for number in numbers])
+
+
+def common_periods(
+    expressions: Iterable[sp.Expr], time: sp.Symbol, values: Mapping[sp.Symbol, NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """The common period at each of many parameter sets, NaN where there is none.
+
+    Parameters
+    ----------
+    expressions : iterable of sympy.Expr
+    time : Symbol
+    values : mapping
+        Parameter to its values, all of one shape (m,).
+
+    Examples
+    --------
+    >>> t, k = sp.symbols("t k", real=True)
+    >>> common_periods([sp.sin(k * t)], t, {k: np.array([1.0, 2.0])}) / np.pi
+    array([2., 1.])
+    """
+    count = len(next(iter(values.values())))
+    found = frequencies(expressions, time)
+    if found is None:
+        return np.full(count, np.nan)
+    table = np.empty((count, len(found)))
+    for column, frequency in enumerate(found):
+        used = sorted(frequency.free_symbols, key=lambda s: s.name)
+        if any(symbol not in values for symbol in used):
+            return np.full(count, np.nan)
+        function = sp.lambdify(used, frequency, "numpy")
+        table[:, column] = function(*(values[symbol] for symbol in used))
+    rows, which = np.unique(table, axis=0, return_inverse=True)
+    periods = np.array([period_of(row) or np.nan for row in rows.tolist()])
+    return periods[which.reshape(-1)]
+
+
+def period_of(frequencies: Iterable[float]) -> float | None:
+    """The common period of harmonics from their angular frequencies, None if there is none."""
+    positive = [abs(f) for f in frequencies if f != 0]
+    if not positive:
+        return None
+    base = min(positive)
+    ratios = [Fraction(f / base).limit_denominator(10_000) for f in positive]
+    if any(abs(r - f / base) > 1e-12 * f / base for r, f in zip(ratios, positive, strict=True)):
         return None
     # the greatest common divisor of the ratios, all brought to one denominator
     bottom = math.lcm(*(r.denominator for r in ratios))
@@ -58,11 +99,21 @@ def common_period(
     return 2.0 * math.pi * bottom / (top * base)
 
 
-def _frequencies(
-    expression: sp.Expr, time: sp.Symbol, values: Mapping[sp.Symbol, float]
-) -> list[float] | None:
+def frequencies(expressions: Iterable[sp.Expr], time: sp.Symbol) -> list[sp.Expr] | None:
+    """Angular frequencies of all harmonics, in the parameters; None where not periodic."""
+    collected: list[sp.Expr] = []
+    for expression in expressions:
+        if time in expression.free_symbols:
+            found = _frequencies(expression, time)
+            if found is None:
+                return None
+            collected += [f for f in found if f not in collected]
+    return collected
+
+
+def _frequencies(expression: sp.Expr, time: sp.Symbol) -> list[sp.Expr] | None:
     """Angular frequencies of the harmonics, or of the periodic functions' arguments."""
-    harmonics = _harmonics(expression, time, values)
+    harmonics = _harmonics(expression, time)
     if harmonics is not None:
         return harmonics
     periodic = [
@@ -74,35 +125,31 @@ def _frequencies(
     outside = expression.xreplace({node: sp.Dummy(real=True) for node in periodic})
     if time in outside.free_symbols:
         return None
-    slopes = [_slope(node.args[0], time, values) for node in periodic]
-    return None if any(s is None for s in slopes) else [abs(s) for s in slopes if s is not None]
+    slopes = [_slope(node.args[0], time) for node in periodic]
+    return None if any(s is None for s in slopes) else [s for s in slopes if s is not None]
 
 
-def _harmonics(
-    expression: sp.Expr, time: sp.Symbol, values: Mapping[sp.Symbol, float]
-) -> list[float] | None:
+def _harmonics(expression: sp.Expr, time: sp.Symbol) -> list[sp.Expr] | None:
     """Frequencies of a polynomial in sines and cosines, None for anything else."""
     if expression.has(sp.Piecewise, sp.Abs, sp.Max, sp.Min, sp.sign, sp.Heaviside):
         return None
     terms = sp.expand(expression.rewrite(sp.exp), power_exp=False)
     terms = sp.Add.make_args(sp.expand(sp.powsimp(terms)))
-    frequencies: set[float] = set()
+    found: list[sp.Expr] = []
     for term in terms:
         _, moving = term.as_independent(time, as_Add=False)
         if moving == 1:
             continue
         if not isinstance(moving, sp.exp):
             return None
-        slope = _slope(sp.expand(moving.args[0] / sp.I), time, values)
+        slope = _slope(sp.expand(moving.args[0] / sp.I), time)
         if slope is None:
             return None
-        frequencies.add(abs(slope))
-    return sorted(frequencies)
+        if slope not in found and -slope not in found:
+            found.append(slope)
+    return found
 
 
-def _slope(phase: sp.Expr, time: sp.Symbol, values: Mapping[sp.Symbol, float]) -> float | None:
+def _slope(phase: sp.Expr, time: sp.Symbol) -> sp.Expr | None:
     slope = phase.diff(time)
-    if time in slope.free_symbols:
-        return None
-    number = slope.subs(values)
-    return float(number) if number.is_real and number.is_number else None
+    return None if time in slope.free_symbols or slope.has(sp.I) else slope

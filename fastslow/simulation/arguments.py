@@ -43,7 +43,7 @@ def initial_state(model: Model, start: Any) -> NDArray[np.float64]:
                 f"of {', '.join(names)}"
             )
         start = [given[n] for n in names]
-    values = _floats("the initial state", start)
+    values = floats("the initial state", start)
     if values.shape != (len(names),):
         raise ArgumentError(
             f"the initial state has shape {values.shape}; expected {len(names)} values, for "
@@ -70,19 +70,19 @@ def time_span(
         received = "both" if t is not None else "neither"
         raise ArgumentError(f"expected t=(start, end) or periods=, received {received}")
     if period is not None:
-        period = _positive("period", period)
+        period = positive("period", period)
     if t is not None:
         if start != 0:
             raise ArgumentError("start= goes with periods=; with t=(start, end) it is in t")
-        values = _floats("t", t)
+        values = floats("t", t)
         if values.shape != (2,):
             raise ArgumentError(f"t = {t!r}; expected a pair (start, end)")
         first, last = map(float, values)
         if not (math.isfinite(first) and math.isfinite(last) and first < last):
             raise ArgumentError(f"t = ({first:g}, {last:g}); expected finite times, start < end")
         return (first, last), period if period is not None else own_period()
-    count = _positive("periods", periods)
-    first = float(_floats("start", start))
+    count = positive("periods", periods)
+    first = float(floats("start", start))
     if not math.isfinite(first):
         raise ArgumentError(f"start = {first}; expected a finite time")
     if period is None:
@@ -111,7 +111,7 @@ def sample_times(
         if samples < 2:
             raise ArgumentError(f"samples = {samples}; expected at least 2, or an array of times")
         return np.linspace(*span, int(samples))
-    times = np.atleast_1d(_floats("samples", samples))
+    times = np.atleast_1d(floats("samples", samples))
     if times.ndim != 1 or not np.isfinite(times).all() or np.any(np.diff(times) < 0):
         raise ArgumentError("samples: expected increasing, finite times")
     if len(times) and (times[0] < span[0] or times[-1] > span[1]):
@@ -123,7 +123,7 @@ def sample_times(
 
 def tolerance(tol: Any) -> float:
     """A tolerance between rounding and 0.1."""
-    value = _positive("tol", tol)
+    value = positive("tol", tol)
     if not 1e-16 <= value <= 0.1:
         raise ArgumentError(f"tol = {value:g}; expected a number from 1e-16 to 0.1")
     return value
@@ -203,15 +203,17 @@ def _growth(model: Model, function: sp.Expr) -> int:
     return 1
 
 
-def _floats(name: str, value: Any) -> NDArray[np.float64]:
+def floats(name: str, value: Any) -> NDArray[np.float64]:
+    """An array of numbers."""
     try:
         return np.array(value, dtype=float)
     except (TypeError, ValueError):
         raise ArgumentError(f"{name}: expected numbers, received {value!r}") from None
 
 
-def _positive(name: str, value: Any) -> float:
-    number = _floats(name, value)
+def positive(name: str, value: Any) -> float:
+    """One finite number above zero."""
+    number = floats(name, value)
     if number.ndim or not math.isfinite(number) or number <= 0:
         raise ArgumentError(f"{name} = {value!r}; expected a positive number")
     return float(number)

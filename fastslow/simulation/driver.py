@@ -7,6 +7,7 @@ import numpy as np
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
 from fastslow.simulation.events import find_event, holds, put_on
+from fastslow.simulation.extremes import widen_extremes
 from fastslow.simulation.modes import (
     MANY_MODES,
     NOT_DEFINED,
@@ -79,12 +80,20 @@ def drive(
     span,
     tol,
     times,
-    sampled_rows,
+    samples,
+    since,
+    tables,
     dense,
     limits,
     store,
+    extremes,
+    hits,
+    seen,
 ):
     """Follow one trajectory from start to end.
+
+    Either every step and every crossing is put into a table, or they are
+    summed up as the run goes.
 
     Parameters
     ----------
@@ -102,14 +111,24 @@ def drive(
     tol : float
     times : float64 array
         Increasing times of the samples, within the span.
-    sampled_rows : int
-        How many rows are sampled.
+    samples : float64 array, shape (n_rows, n_times)
+        The first rows at those times, as far as they are reached; filled here.
+    since : float
+        Time from which extremes and hits count.
+    tables : bool
+        Whether steps and crossings are listed, not summed up.
     dense : bool
         Whether the series of every step is kept.
     limits : tuple of int
         Largest numbers of steps and crossings.
     store : float64 array
         Room for the series, replaced by a larger one where it does not suffice.
+    extremes : float64 array, shape (2, n_states)
+        Smallest and largest value of every state; widened here, without tables.
+    hits : int64 array, shape (n_interfaces, 2)
+        Crossings upwards and downwards; counted here, without tables.
+    seen : float64 array, shape (n_modes,)
+        When each mode was last left; set here, without tables.
 
     Returns
     -------
@@ -117,13 +136,13 @@ def drive(
         How it ended, and in which mode.
     end : ndarray, shape (1 + n_states,)
         Time and state reached.
+    n_steps : int
     steps : ndarray, shape (n_steps, 3)
-        Time, length and mode of every step.
+        Time, length and mode of every step; no rows without tables.
     store : ndarray
         Coefficients of states and slow quantities, step by step, when ``dense``.
     crossings : ndarray, shape (n_crossings, 6 + n_states)
         Time, interface, direction, mode before, mode after, near-tangential, state.
-    samples : ndarray, shape (sampled_rows, n_times)
     n_samples : int
         How many samples were reached.
     """
@@ -141,7 +160,7 @@ def drive(
     for i in range(n_states):
         inputs[1 + i] = start[i]
     work, W = np.empty(size), np.empty(size)
-    b = np.empty(columns)
+    b, d = np.empty(columns), np.empty(columns)
     stack = np.empty((stack_rows, columns + 3))
     gradient = np.empty(2 + n_states)
     noise = np.zeros(n_interfaces)
@@ -149,9 +168,8 @@ def drive(
     hit = np.zeros(n_interfaces, dtype=np.bool_)
     rests = np.zeros(n_interfaces, dtype=np.bool_)
     side = np.zeros(n_interfaces, dtype=np.int64)
-    steps = np.empty((64, 3))
-    crossings = np.empty((16, 6 + n_states))
-    samples = np.empty((sampled_rows, times.shape[0]))
+    steps = np.empty((64 if tables else 0, 3))
+    crossings = np.empty((16 if tables else 0, 6 + n_states))
     offsets = np.empty(times.shape[0])
     n_steps = n_crossings = n_samples = crowd = ZERO
     mode = interface = np.int64(-1)
@@ -197,17 +215,20 @@ def drive(
             for j in range(n_interfaces):
                 changed = before >= 0 and signs[before, j] != signs[mode, j]
                 if changed or (touched and mode == before and j == interface):
-                    if n_crossings == crossings.shape[0]:
-                        crossings = grown(crossings)
                     turn = signs[mode, j] - signs[before, j]
-                    crossings[n_crossings, 0] = t
-                    crossings[n_crossings, 1] = j
-                    crossings[n_crossings, 2] = min(max(turn, -1), 1)
-                    crossings[n_crossings, 3] = before
-                    crossings[n_crossings, 4] = mode
-                    crossings[n_crossings, 5] = depth < TANGENTIAL or not changed
-                    for i in range(n_states):
-                        crossings[n_crossings, 6 + i] = inputs[1 + i]
+                    if tables:
+                        if n_crossings == crossings.shape[0]:
+                            crossings = grown(crossings)
+                        crossings[n_crossings, 0] = t
+                        crossings[n_crossings, 1] = j
+                        crossings[n_crossings, 2] = min(max(turn, -1), 1)
+                        crossings[n_crossings, 3] = before
+                        crossings[n_crossings, 4] = mode
+                        crossings[n_crossings, 5] = depth < TANGENTIAL or not changed
+                        for i in range(n_states):
+                            crossings[n_crossings, 6 + i] = inputs[1 + i]
+                    elif turn != 0 and t >= since:
+                        hits[j, 0 if turn > 0 else 1] += 1
                     n_crossings += 1
             if n_crossings >= limits[1]:
                 code = TOO_MANY_CROSSINGS
@@ -274,9 +295,15 @@ def drive(
         else:
             t = begin + h
         if taken > 0.0:
-            if n_steps == steps.shape[0]:
-                steps = grown(steps)
-            steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, taken, mode
+            if tables:
+                if n_steps == steps.shape[0]:
+                    steps = grown(steps)
+                steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, taken, mode
+            else:
+                seen[mode] = t
+                if t > since:
+                    unused = (since - begin) - lag
+                    widen_extremes(W, n_states, order, unused, taken, extremes, b, d, stack)
             if dense:
                 if (n_steps + 1) * stride > store.shape[0]:
                     larger = np.empty(2 * store.shape[0] + 64 * stride)
@@ -291,7 +318,7 @@ def drive(
                 offsets[n_samples] = (times[n_samples] - begin) - lag
                 n_samples += 1
             if n_samples > first:
-                sample(W, columns, sampled_rows, offsets[first:n_samples], samples, first)
+                sample(W, columns, samples.shape[0], offsets[first:n_samples], samples, first)
             for i in range(kept):
                 inputs[1 + i] = horner(W, i * columns, i * columns + order, taken)
         inputs[0] = t
@@ -314,4 +341,5 @@ def drive(
     end[0] = t
     for i in range(n_states):
         end[1 + i] = inputs[1 + i]
-    return (code, mode, end, steps[:n_steps], store, crossings[:n_crossings], samples, n_samples)
+    listed = (steps[:n_steps], store, crossings[:n_crossings])
+    return (code, mode, end, n_steps, listed, n_samples)

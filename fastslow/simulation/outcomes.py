@@ -14,11 +14,11 @@ _BLOW_UP = 1e6
 def outcome_of(
     code: int,
     mode: int,
-    modes: tuple[str, ...],
     end: NDArray[np.float64],
-    steps: NDArray[np.float64],
-    limits: tuple[int, int],
+    n_steps: int,
     start_size: float,
+    modes: tuple[str, ...],
+    limits: tuple[int, int],
 ) -> Outcome:
     """The outcome of a run, from the code of the loop (see `fastslow.simulation.driver`)."""
     time = f"t = {end[0]:.10g}"
@@ -31,10 +31,10 @@ def outcome_of(
             False,
         )
     size = float(np.abs(end[1:]).max())
-    if code in (1, 3, 4) and len(steps) and not size <= _BLOW_UP * (1.0 + start_size):
+    if code in (1, 3, 4) and n_steps and not size <= _BLOW_UP * (1.0 + start_size):
         return Outcome(
             "blow-up",
-            f"the state grew to {size:.3g} within {len(steps)} steps, by {time}.",
+            f"the state grew to {size:.3g} within {n_steps} steps, by {time}.",
             False,
         )
     if code == 1:
@@ -43,7 +43,7 @@ def outcome_of(
             f"stopped at {time} after {limits[0]} steps; raise max_steps= or tol=.",
             False,
         )
-    if code in (3, 4) and len(steps):
+    if code in (3, 4) and n_steps:
         return Outcome(
             "singular",
             f"the step was driven to nothing at {time}, where the rates or their derivatives "

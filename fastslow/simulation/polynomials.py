@@ -66,6 +66,37 @@ def excluded(b, first, last):
 
 
 @part
+def to_bernstein(b, first, n, stack):
+    """Bernstein coefficients on [0, 1] of sum b_k s**(k - first), then its begin and width."""
+    # divide by the binomials, then sum as in Pascal's triangle
+    binomial = 1.0
+    for k in range(n + 1):
+        stack[0, k] = b[first + k] / binomial
+        binomial = binomial * (n - k) / (k + 1)
+    for level in range(1, n + 1):
+        for j in range(n, level - 1, -1):
+            stack[0, j] += stack[0, j - 1]
+    stack[0, n + 1] = 0.0
+    stack[0, n + 2] = 1.0
+
+
+@part
+def halve(stack, row, n):
+    """Halve an interval by de Casteljau; its left half goes on top of the stack."""
+    for j in range(n + 1):
+        stack[row + 1, j] = stack[row, j]
+    for level in range(1, n + 1):
+        for j in range(n, level - 1, -1):
+            stack[row + 1, j] = 0.5 * (stack[row + 1, j] + stack[row + 1, j - 1])
+    for level in range(1, n + 1):
+        for j in range(n - level + 1):
+            stack[row, j] = 0.5 * (stack[row, j] + stack[row, j + 1])
+    begin, half = stack[row, n + 1], 0.5 * stack[row, n + 2]
+    stack[row, n + 1], stack[row, n + 2] = begin + half, half
+    stack[row + 1, n + 1], stack[row + 1, n + 2] = begin, half
+
+
+@part
 def first_root(b, first, last, noise, stack):
     """First root on (0, 1] of sum b_k s**(k - first), and whether it is a touch.
 
@@ -91,16 +122,7 @@ def first_root(b, first, last, noise, stack):
         Whether the sign is the same on both sides, as far as rounding can tell.
     """
     n = last - first
-    # power to Bernstein form: divide by the binomials, then sum as in Pascal's triangle
-    binomial = 1.0
-    for k in range(n + 1):
-        stack[0, k] = b[first + k] / binomial
-        binomial = binomial * (n - k) / (k + 1)
-    for level in range(1, n + 1):
-        for j in range(n, level - 1, -1):
-            stack[0, j] += stack[0, j - 1]
-    stack[0, n + 1] = 0.0
-    stack[0, n + 2] = 1.0
+    to_bernstein(b, first, n, stack)
     depth = 1
     while depth > 0:
         row = depth - 1
@@ -127,18 +149,7 @@ def first_root(b, first, last, noise, stack):
             if low + wide < 1.0:
                 return low + 0.5 * wide, True
             return low + wide, True
-        # halve by de Casteljau; the left half goes on top of the stack
-        for j in range(n + 1):
-            stack[row + 1, j] = stack[row, j]
-        for level in range(1, n + 1):
-            for j in range(n, level - 1, -1):
-                stack[row + 1, j] = 0.5 * (stack[row + 1, j] + stack[row + 1, j - 1])
-        for level in range(1, n + 1):
-            for j in range(n - level + 1):
-                stack[row, j] = 0.5 * (stack[row, j] + stack[row, j + 1])
-        half = 0.5 * wide
-        stack[row, n + 1], stack[row, n + 2] = low + half, half
-        stack[row + 1, n + 1], stack[row + 1, n + 2] = low, half
+        halve(stack, row, n)
         depth += 1
     return 2.0, False
 

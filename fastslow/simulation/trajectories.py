@@ -38,21 +38,31 @@ _ARGUMENTS = (
     "span",
     "tol",
     "times",
-    "sampled_rows",
+    "samples",
+    "since",
+    "tables",
     "dense",
     "limits",
     "store",
+    "extremes",
+    "hits",
+    "seen",
 )
-_SOURCES = (
+SOURCES = (
+    "fastslow.simulation.driver",
     "fastslow.simulation.events",
+    "fastslow.simulation.extremes",
     "fastslow.simulation.modes",
     "fastslow.simulation.polynomials",
     "fastslow.compiled.parts",
     "fastslow.compiled.pointers",
 )
 
+#: Without tables a run fills these; with them it does not.
+_NOTHING = (np.empty((2, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
+
 #: Depth of the work space of the event search.
-_STACK_ROWS = 46
+STACK_ROWS = 46
 
 
 P = ParamSpec("P")
@@ -75,9 +85,9 @@ def _once_a_model(
     return remembered
 
 
-_gap = _once_a_model(gap_regions)
-_series = _once_a_model(compile_series)
-_period = _once_a_model(Model.period)
+gap_of = _once_a_model(gap_regions)
+series_of = _once_a_model(compile_series)
+period_of = _once_a_model(Model.period)
 
 
 def simulate(
@@ -158,7 +168,7 @@ def simulate(
     require_values(model)
     tol = tolerance(tol)
     begin = initial_state(model, state)
-    span, period = time_span(t, periods, start, period, lambda: _period(model))
+    span, period = time_span(t, periods, start, period, lambda: period_of(model))
     times = sample_times(samples, span)
     if order is None:
         order = default_order(tol)
@@ -167,14 +177,15 @@ def simulate(
         whole_number("max_steps", max_steps, 1, 2**40),
         whole_number("max_crossings", max_crossings, 1, 2**40),
     )
-    between = _gap(model, gap)
-    compiled = _series(model, order)
+    between = gap_of(model, gap)
+    compiled = series_of(model, order)
     kept = compiled.n_states + compiled.n_forcing
     rows = compiled.n_states if dense else kept
-    code, mode, end, steps, store, crossings, sampled, reached = drive_loop()(
+    sampled = np.empty((rows, len(times)))
+    code, mode, end, n_steps, (steps, store, crossings), reached = drive_loop()(
         compiled.address,
         layout_of(compiled),
-        (compiled.n_rows, _STACK_ROWS),
+        (compiled.n_rows, STACK_ROWS),
         compiled.signs,
         compiled.continuous,
         compiled.parameter_array(model),
@@ -182,10 +193,13 @@ def simulate(
         span,
         tol,
         times,
-        rows,
+        sampled,
+        span[0],
+        True,
         bool(dense),
         limits,
         _room.store,
+        *_NOTHING,
     )
     return Trajectory(
         (*model.states, *model.slow_states),
@@ -195,7 +209,7 @@ def simulate(
         dict(model.parameters),
         period,
         between,
-        outcome_of(code, mode, compiled.modes, end, steps, limits, float(np.abs(begin).max())),
+        outcome_of(code, mode, end, n_steps, float(np.abs(begin).max()), compiled.modes, limits),
         (span[0], float(end[0])),
         end,
         steps,
@@ -246,4 +260,4 @@ def layout_of(compiled: CompiledSeries) -> tuple[int, int, int, int, int]:
 
 def drive_loop() -> Callable[..., Any]:
     """The compiled stepping loop."""
-    return load_loop("fastslow.simulation.driver", "drive", _ARGUMENTS, _SOURCES)
+    return load_loop("fastslow.simulation.driver", "drive", _ARGUMENTS, SOURCES)

@@ -1,0 +1,200 @@
+"""Many solutions in time, each by what sums it up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.outcome import Outcome
+
+#: The regimes by which sides of a gap were touched: lower, inside, upper as bits 1, 2, 4.
+REGIMES = (
+    "",
+    "meshed lower",
+    "free",
+    "unilateral lower",
+    "meshed upper",
+    "bilateral",
+    "unilateral upper",
+    "bilateral",
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Ensemble:
+    """What sums up each of m trajectories.
+
+    A trajectory that could not go on keeps what it had reached; where it did
+    not reach the time from which extremes count, they are NaN.
+
+    Parameters
+    ----------
+    states : tuple of str
+        States, then slow states: the columns of `start`, `final`, `minimum` and `maximum`.
+    forcing, interfaces : tuple of str
+        Names in the model's order.
+    modes : tuple of str
+        Regions, then sliding motions, of all parameter sets.
+    parameters : mapping
+        The parameters that were varied, each an array of shape (m,).
+    start : ndarray, shape (m, n)
+    span : ndarray, shape (m, 2)
+        First time and last time asked for.
+    since : ndarray, shape (m,)
+        Time from which extremes and hits count.
+    minimum, maximum : ndarray, shape (m, n)
+        Extremes of every state, exact within the steps.
+    final : ndarray, shape (m, n)
+        State at the time reached.
+    reached : ndarray, shape (m,)
+        Time reached.
+    hits : ndarray of int, shape (m, n_interfaces, 2)
+        How often each interface was crossed, upwards (index 0) and downwards (index 1).
+    regime : ndarray of str, shape (m,)
+        How the sides of a gap were touched in the last period, as in
+        `Trajectory.regime`; empty for models without a gap or a period.
+    n_steps : ndarray of int, shape (m,)
+    codes, last_mode : ndarray of int, shape (m,)
+        How each ended, and in which of the modes.
+    sampled : tuple of ndarray, optional
+        Times (N,) or (m, N) and columns (m, n + n_forcing, N), NaN after the end of a trajectory.
+    describe : callable
+        Words for one outcome, from its code, mode, time with state, number of
+        steps and largest number in the state at the start.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, v = sp.symbols("x v")
+    >>> bounce = fs.Model({x: v, v: -sp.sign(x)})
+    >>> many = fs.simulate_many(bounce, [[0.5, 0], [2.0, 0]], t=(0, 3))
+    >>> many.hits[:, 0]
+    array([[0, 1],
+           [0, 1]])
+    >>> many.final.round(9) + 0.0
+    array([[ 0. ,  1. ],
+           [-1.5, -1. ]])
+    """
+
+    states: tuple[str, ...]
+    forcing: tuple[str, ...]
+    interfaces: tuple[str, ...]
+    modes: tuple[str, ...]
+    parameters: Mapping[str, NDArray[np.float64]]
+    start: NDArray[np.float64]
+    span: NDArray[np.float64]
+    since: NDArray[np.float64]
+    minimum: NDArray[np.float64]
+    maximum: NDArray[np.float64]
+    final: NDArray[np.float64]
+    reached: NDArray[np.float64]
+    hits: NDArray[np.int64]
+    regime: NDArray[np.str_]
+    n_steps: NDArray[np.int64]
+    codes: NDArray[np.int64]
+    last_mode: NDArray[np.int64]
+    sampled: tuple[NDArray[np.float64], NDArray[np.float64]] | None
+    describe: Callable[[int, int, NDArray[np.float64], int, float], Outcome]
+
+    def __len__(self) -> int:
+        return len(self.final)
+
+    @property
+    def success(self) -> NDArray[np.bool_]:
+        """Whether each trajectory reached the end of time, shape (m,)."""
+        return self.codes == 0
+
+    @cached_property
+    def outcomes(self) -> tuple[Outcome, ...]:
+        """How each trajectory ended, in words."""
+        size = np.abs(self.start).max(axis=1)
+        ends = np.column_stack([self.reached, self.final])
+        return tuple(
+            self.describe(
+                int(self.codes[i]),
+                int(self.last_mode[i]),
+                ends[i],
+                int(self.n_steps[i]),
+                float(size[i]),
+            )
+            for i in range(len(self))
+        )
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names that can be asked for: states, slow states, slow quantities."""
+        return (*self.states, *self.forcing)
+
+    @property
+    def t(self) -> NDArray[np.float64]:
+        """Times of the samples, shape (N,), or (m, N) where the trajectories differ in them."""
+        return self._samples[0]
+
+    def __getitem__(self, name: object) -> NDArray[np.float64]:
+        """A state, slow state or slow quantity at the times ``t``, shape (m, N).
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no column.
+        ArgumentError
+            When no samples were asked for.
+        """
+        if str(name) == "t":
+            return self.t
+        if str(name) not in self.columns:
+            raise unknown_name("column", name, self.columns)
+        return self._samples[1][:, self.columns.index(str(name))]
+
+    @property
+    def _samples(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        if self.sampled is None:
+            raise ArgumentError("this ensemble kept no samples; simulate_many with samples=")
+        return self.sampled
+
+    def __getstate__(self) -> dict[str, Any]:
+        names = self.__dataclass_fields__
+        return {name: value for name, value in self.__dict__.items() if name in names}
+
+    def __repr__(self) -> str:
+        count = len(self)
+        first, last = self.span[:, 0].min(), self.span[:, 1].max()
+        lines = [f"Ensemble of {count} trajectories of {', '.join(self.columns)}"]
+        lines[0] += f" for t from {first:.6g} to {last:.6g}"
+        for name, values in self.parameters.items():
+            lines.append(f"  {name} from {values.min():.6g} to {values.max():.6g}")
+        kinds, counts = np.unique(self.regime[self.regime != ""], return_counts=True)
+        if len(kinds):
+            lines.append("  " + ", ".join(f"{k}: {n}" for k, n in zip(kinds, counts, strict=True)))
+        done = int(np.count_nonzero(self.success))
+        lines.append(f"  {done} of {count} reached the end of time")
+        if done < count:
+            worst = int(np.flatnonzero(~self.success)[0])
+            lines.append(f"  trajectory {worst}: {self.outcomes[worst]}")
+        return "\n".join(lines)
+
+
+def regimes(
+    seen: NDArray[np.float64],
+    end: NDArray[np.float64],
+    period: NDArray[np.float64],
+    gap: tuple[int, int, int],
+) -> NDArray[np.str_]:
+    """The regime of each trajectory from the times at which each mode was last left.
+
+    Parameters
+    ----------
+    seen : ndarray, shape (m, n_modes)
+        Minus infinity for a mode never entered.
+    end, period : ndarray, shape (m,)
+    gap : tuple of int
+        Modes below, inside and above the gap.
+    """
+    touched = seen[:, gap] > (end - period)[:, None]
+    return np.array(REGIMES)[touched @ np.array([1, 2, 4])]

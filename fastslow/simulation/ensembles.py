@@ -1,0 +1,356 @@
+"""Simulating a model from many states or at many parameter sets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastslow.compiled.generic import load_loop
+from fastslow.compiled.parts import part
+from fastslow.compiled.series import CompiledSeries
+from fastslow.model.model import Model
+from fastslow.results.ensembles import Ensemble, regimes
+from fastslow.results.named import Named
+from fastslow.simulation.arguments import tolerance, whole_number
+from fastslow.simulation.driver import drive
+from fastslow.simulation.grouping import alike
+from fastslow.simulation.many_arguments import (
+    periods_of,
+    spans_of,
+    starts_and_parameters,
+    threads_of,
+    times_of,
+)
+from fastslow.simulation.outcomes import outcome_of
+from fastslow.simulation.trajectories import (
+    SOURCES,
+    STACK_ROWS,
+    default_order,
+    gap_of,
+    layout_of,
+    series_of,
+)
+
+Floats = NDArray[np.float64]
+
+_ARGUMENTS = (
+    "bounds",
+    "address",
+    "layout",
+    "sizes",
+    "signs",
+    "continuous",
+    "tol",
+    "limits",
+    "parameters",
+    "starts",
+    "spans",
+    "since",
+    "times",
+    "samples",
+    "extremes",
+    "hits",
+    "seen",
+    "ends",
+    "codes",
+)
+
+#: Trajectories that a thread takes at a time, at most.
+_CHUNK = 64
+
+
+@part
+def drive_many(
+    bounds,
+    address,
+    layout,
+    sizes,
+    signs,
+    continuous,
+    tol,
+    limits,
+    parameters,
+    starts,
+    spans,
+    since,
+    times,
+    samples,
+    extremes,
+    hits,
+    seen,
+    ends,
+    codes,
+):
+    """Follow the trajectories from one number to another, each by itself.
+
+    The arguments are those of `drive` with one row for each trajectory
+    (``times`` may have one row for all); ``ends`` is filled with time and
+    state reached, ``codes`` with how it ended, in which mode, after how many steps.
+    """
+    store = np.empty(0)
+    for i in range(bounds[0], bounds[1]):
+        code, mode, end, n_steps, _, _ = drive(
+            address,
+            layout,
+            sizes,
+            signs,
+            continuous,
+            parameters[i],
+            starts[i],
+            (spans[i, 0], spans[i, 1]),
+            tol,
+            times[min(i, times.shape[0] - 1)],
+            samples[i],
+            since[i],
+            False,
+            False,
+            limits,
+            store,
+            extremes[i],
+            hits[i],
+            seen[i],
+        )
+        for k in range(end.shape[0]):
+            ends[i, k] = end[k]
+        codes[i, 0], codes[i, 1], codes[i, 2] = code, mode, n_steps
+
+
+def simulate_many(
+    model: Model,
+    states: ArrayLike | Mapping[Any, ArrayLike],
+    *,
+    parameters: Mapping[Any, ArrayLike] | None = None,
+    t: tuple[float, float] | None = None,
+    periods: float | None = None,
+    start: float = 0.0,
+    period: ArrayLike | None = None,
+    settle: float = 0.0,
+    tol: float = 1e-9,
+    samples: int | Sequence[float] | Floats | None = None,
+    order: int | None = None,
+    gap: str | None = None,
+    max_steps: int = 1_000_000,
+    max_crossings: int = 1_000_000,
+    threads: int | None = None,
+    progress: bool = False,
+) -> Ensemble:
+    """Follow many trajectories, and keep of each what sums it up.
+
+    Every trajectory is computed as `simulate` does, by itself: it is the same
+    to the last bit whatever the others, their order and the number of threads.
+    One that cannot go on stops nothing; `Ensemble.outcomes` says why it ended.
+
+    Parameters
+    ----------
+    model : Model
+        With forcing, with slow states, or frozen with every parameter given.
+    states : array_like, shape (m, n) or (n,), or mapping
+        Initial states and slow states; by name, each a number or of shape (m,).
+    parameters : mapping, optional
+        Parameter to its values, a number or of shape (m,): the first values make
+        the first set, and so on; no product is formed.
+    t : (float, float)
+        Start and end of time, for all.
+    periods : float
+        Instead of ``t``: how many periods of the forcing, each trajectory by its own.
+    start : float
+        Start of time with ``periods``.
+    period : float or array_like, shape (m,), optional
+        The period, where the model's own is not wanted or cannot be found.
+    settle : float
+        How much is left out of extremes, hits and evenly spaced samples at the
+        beginning: periods with ``periods``, time with ``t``.
+    tol : float
+        Error allowed in a step, relative to 1 + |y| for every state y.
+    samples : int or sequence of float, optional
+        How many evenly spaced samples of every column to keep, or at which times.
+    order : int, optional
+        Order of the series, 4 to 40; by default that of `simulate`.
+    gap : str, optional
+        The region that counts as the gap for `Ensemble.regime`.
+    max_steps, max_crossings : int
+        Where to stop a trajectory.
+    threads : int, optional
+        By default the cores that this process may use.
+    progress : bool
+        Whether to show a progress bar.
+
+    Returns
+    -------
+    Ensemble
+
+    Raises
+    ------
+    ArgumentError
+        For lengths that differ, numbers that are not finite, a wrong span or
+        tolerance, or ``periods`` without a common period.
+    UnknownNameError
+        For a state, parameter or gap that is not in the model.
+    ModelError
+        For a function that has no Taylor recurrence.
+
+    Examples
+    --------
+    >>> import numpy as np, sympy as sp
+    >>> x, v, k = sp.symbols("x v k")
+    >>> oscillator = Model({x: v, v: -k * x}, parameters={k: 1})
+    >>> many = simulate_many(oscillator, [1, 0], parameters={k: [1, 4]}, t=(0, np.pi), tol=1e-12)
+    >>> many.minimum.round(9)
+    array([[-1., -1.],
+           [-1., -2.]])
+    """
+    starts, swept = starts_and_parameters(model, states, parameters)
+    count = len(starts)
+    tol = tolerance(tol)
+    order = whole_number("order", default_order(tol) if order is None else order, 4, 40)
+    limits = (
+        whole_number("max_steps", max_steps, 1, 2**40),
+        whole_number("max_crossings", max_crossings, 1, 2**40),
+    )
+    threads = threads_of(threads)
+    own = periods_of(model, period, count, swept)
+    spans, since = spans_of(t, periods, start, settle, own)
+    times = times_of(samples, spans, since)
+    groups = [(one, chosen, series_of(one, order)) for one, chosen in alike(model, swept, count)]
+    gaps = [gap_of(one, gap) for one, _, _ in groups]
+    modes = tuple(dict.fromkeys(name for *_, compiled in groups for name in compiled.modes))
+    interfaces = tuple(dict.fromkeys(name for one, *_ in groups for name in one.interfaces))
+    n = starts.shape[1]
+    columns = n + len(model.forcing)
+    extremes = np.empty((count, 2, n))
+    hits = np.zeros((count, len(interfaces), 2), dtype=np.int64)
+    ends = np.empty((count, 1 + n))
+    codes = np.empty((count, 3), dtype=np.int64)
+    regime = np.zeros(count, dtype="U16")
+    sampled = np.empty((count, columns if times.size else 0, times.shape[1]))
+    with _bar(count, progress) as bar:
+        for (one, chosen, compiled), between in zip(groups, gaps, strict=True):
+            values = _parameter_table(compiled, one, swept, chosen)
+            run = _run(
+                compiled,
+                (tol, limits, threads),
+                (values, starts[chosen], spans[chosen], since[chosen]),
+                times if len(times) == 1 else times[chosen],
+                columns if times.size else 0,
+                bar.update,
+            )
+            extremes[chosen], ends[chosen], codes[chosen], sampled[chosen] = run[0], *run[3:]
+            for j, name in enumerate(one.interfaces):
+                hits[chosen, interfaces.index(name)] = run[1][:, j]
+            # the mode is -1 before any was chosen
+            names = [*map(modes.index, compiled.modes), -1]
+            codes[chosen, 1] = np.array(names)[codes[chosen, 1]]
+            if between is not None:
+                lower, inside, upper = map(compiled.modes.index, between)
+                regime[chosen] = regimes(
+                    run[2], ends[chosen, 0], own[chosen], (lower, inside, upper)
+                )
+    return Ensemble(
+        (*model.states, *model.slow_states),
+        tuple(model.forcing),
+        interfaces,
+        modes,
+        Named("parameter", swept),
+        starts,
+        spans,
+        since,
+        extremes[:, 0],
+        extremes[:, 1],
+        ends[:, 1:],
+        ends[:, 0],
+        hits,
+        regime,
+        codes[:, 2],
+        codes[:, 0],
+        codes[:, 1],
+        (times if len(times) > 1 else times[0], sampled) if samples is not None else None,
+        partial(outcome_of, modes=modes, limits=limits),
+    )
+
+
+def _parameter_table(
+    compiled: CompiledSeries, model: Model, swept: Mapping[str, Floats], chosen: NDArray[np.intp]
+) -> Floats:
+    """Parameter values for each trajectory in the order of the compiled function."""
+    table = np.zeros((len(chosen), max(1, len(compiled.parameters))))
+    for column, name in enumerate(compiled.parameters):
+        table[:, column] = swept[name][chosen] if name in swept else model.parameters[name]
+    return table
+
+
+def _run(
+    compiled: CompiledSeries,
+    settings: tuple[float, tuple[int, int], int],
+    rows: tuple[Floats, Floats, Floats, Floats],
+    times: Floats,
+    n_columns: int,
+    report: Callable[[int], object],
+) -> tuple[Any, ...]:
+    """Extremes, hits, times seen, ends, codes and samples of trajectories with one series."""
+    tol, limits, threads = settings
+    _, starts, spans, since = rows
+    count, n = starts.shape
+    counted = (since <= spans[:, 0])[:, None]
+    extremes = np.stack(
+        [np.where(counted, starts, np.inf), np.where(counted, starts, -np.inf)], axis=1
+    )
+    hits = np.zeros((count, compiled.n_interfaces, 2), dtype=np.int64)
+    seen = np.full((count, len(compiled.modes)), -np.inf)
+    ends = np.empty((count, 1 + n))
+    codes = np.empty((count, 3), dtype=np.int64)
+    samples = np.full((count, n_columns, times.shape[1]), np.nan)
+    loop = partial(
+        _many_loop(),
+        address=compiled.address,
+        layout=layout_of(compiled),
+        sizes=(compiled.n_rows, STACK_ROWS),
+        signs=compiled.signs,
+        continuous=compiled.continuous,
+        tol=tol,
+        limits=limits,
+        parameters=rows[0],
+        starts=starts,
+        spans=spans,
+        since=since,
+        times=times,
+        samples=samples,
+        extremes=extremes,
+        hits=hits,
+        seen=seen,
+        ends=ends,
+        codes=codes,
+    )
+    size = min(_CHUNK, max(1, count // (4 * threads)))
+    chunks = [(i, min(i + size, count)) for i in range(0, count, size)]
+    if min(threads, len(chunks)) == 1:
+        for chunk in chunks:
+            loop(chunk)
+            report(chunk[1] - chunk[0])
+    else:
+        pool = ThreadPoolExecutor(min(threads, len(chunks)))
+        try:
+            waiting = {pool.submit(loop, chunk): chunk for chunk in chunks}
+            for done in as_completed(waiting):
+                done.result()
+                first, last = waiting[done]
+                report(last - first)
+        finally:
+            pool.shutdown(cancel_futures=True)
+    extremes[np.isinf(extremes)] = np.nan
+    return extremes, hits, seen, ends, codes, samples
+
+
+def _bar(count: int, shown: bool) -> Any:
+    from tqdm import tqdm
+
+    return tqdm(total=count, disable=not shown, unit="run")
+
+
+def _many_loop() -> Callable[..., Any]:
+    """The compiled loop over trajectories."""
+    return load_loop("fastslow.simulation.ensembles", "drive_many", _ARGUMENTS, SOURCES)

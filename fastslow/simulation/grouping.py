@@ -1,0 +1,139 @@
+"""Parameter sets that share one set of regions, so that one compiled series serves them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.model.geometry import possible_patterns
+from fastslow.model.model import Model
+from fastslow.model.reading import factorise, switching_expressions
+from fastslow.model.structure import real
+
+Values = Mapping[str, NDArray[np.float64]]
+
+
+def alike(model: Model, values: Values, count: int) -> list[tuple[Model, NDArray[np.intp]]]:
+    """Groups of parameter sets with the same regions, each with a model of that group.
+
+    Which regions are empty depends on parameter values, and so does the
+    meaning of a condition with a factor of parameters alone. Most often there
+    is one group, and its model is the one given.
+
+    Parameters
+    ----------
+    model : Model
+    values : mapping
+        Parameter to its values, all of shape (m,).
+    count : int
+        m.
+
+    Returns
+    -------
+    list of (Model, ndarray of int)
+        A model at the values of the first set of each group, and the positions of its sets.
+    """
+    everything = np.arange(count)
+    if not values:
+        return [(model, everything)]
+    own = {name: value for name, value in model.parameters.items() if name not in values}
+    complete = all(name in model.parameters for name in values)
+    if complete:
+        # the model's own values are one more set, whose group needs no other model
+        values = {n: np.append(v, model.parameters[n]) for n, v in values.items()}
+    key = _signs(model, values, own)
+    _, first, which = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    which = which.reshape(-1)
+    groups = []
+    current = model
+    for number in np.argsort(first):
+        members = everything[which[:count] == number]
+        if not len(members):
+            continue
+        if complete and which[-1] == number:
+            groups.append((model, members))
+            continue
+        # each from the last, so that a region seen once keeps its name in all
+        current = current.with_parameters({n: v[members[0]] for n, v in values.items()})
+        groups.append((current, members))
+    return groups
+
+
+def _signs(model: Model, values: Values, own: Mapping[str, float]) -> NDArray[np.float64]:
+    """Numbers that are equal for parameter sets with the same regions, shape (m, any)."""
+    structure = model.structure
+    count = len(next(iter(values.values())))
+    swept = {real(name) for name in values}
+
+    def numbers(expression: sp.Expr) -> NDArray[np.float64]:
+        given = expression.subs({real(n): v for n, v in own.items()})
+        used = sorted(given.free_symbols, key=lambda s: s.name)
+        function = sp.lambdify(used, given, "numpy")
+        return np.broadcast_to(function(*(values[s.name] for s in used)), (count,)).astype(float)
+
+    moving = [s for s in structure.moving if s not in swept]
+    columns: list[NDArray[np.float64]] = []
+    for scale in _scales(model, moving):
+        if scale.free_symbols & swept:
+            columns.append(np.sign(numbers(scale)))
+    rows = []
+    for interface in structure.interfaces:
+        h = interface.function
+        slopes = [h.diff(z) for z in moving]
+        if any(slope.free_symbols & set(moving) for slope in slopes):
+            # never excludes a region, unless a vanishing parameter makes it affine
+            columns += [values[s.name] == 0.0 for s in h.free_symbols & swept]
+            continue
+        rows.append([*slopes, h.subs(dict.fromkeys(moving, 0))])
+    if any(e.free_symbols & swept for row in rows for e in row):
+        table = np.stack([np.stack([numbers(e) for e in row], axis=-1) for row in rows], axis=1)
+        columns += list(_patterns(table).T)
+    return np.stack(columns, axis=1) if columns else np.zeros((count, 1))
+
+
+def _scales(model: Model, moving: list[sp.Symbol]) -> list[sp.Expr]:
+    """Factors of the switching expressions that hold parameters alone."""
+    written = (*model.structure.rates.values(), *model.structure.forcing.values())
+    found: list[sp.Expr] = []
+    for expression in written:
+        for switching in switching_expressions(expression):
+            parts = factorise(switching, moving)
+            for factor, _ in parts.scales:
+                if factor not in found:
+                    found.append(factor)
+    return found
+
+
+def _patterns(table: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same for affine functions a·z + b alone, given as (m, functions, moving + 1)."""
+    slopes, offsets = table[..., :-1], table[..., -1]
+    signs = np.sign(slopes).reshape(len(table), -1)
+    still = ~slopes.any(axis=2)
+    signs = np.hstack([signs, np.where(still, np.sign(offsets), 0.0)])
+    if not still.any():
+        first = slopes[:, :1]
+        along = (slopes * first).sum(axis=2) / (first * first).sum(axis=2)
+        if np.allclose(slopes, along[..., None] * first, rtol=0, atol=1e-14):
+            # parallel: the order of the edges decides
+            edges = -offsets / along
+            order = np.sign(edges[:, :, None] - edges[:, None, :]).reshape(len(table), -1)
+            return np.hstack([signs, order])
+        if np.all(np.linalg.matrix_rank(slopes) == slopes.shape[1]):
+            # independent: no pattern is empty
+            return signs
+    return np.hstack([signs, _one_by_one(table)])
+
+
+def _one_by_one(table: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A number for each set of possible patterns."""
+    unique, which = np.unique(table, axis=0, return_inverse=True)
+    seen: dict[tuple[tuple[int, ...], ...], int] = {}
+    numbers = []
+    for rows in unique:
+        sizes = np.abs(rows[:, :-1]).max(axis=1, initial=0.0)
+        scaled = rows / np.where(sizes > 0.0, sizes, 1.0)[:, None]
+        numbers.append(seen.setdefault(tuple(possible_patterns(list(scaled))), len(seen)))
+    return np.array(numbers, dtype=float)[which.reshape(-1), None]

@@ -1,0 +1,197 @@
+"""What `simulate_many` is given, checked before anything is computed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.model import Model
+from fastslow.model.periods import common_periods
+from fastslow.model.structure import TIME, real
+from fastslow.simulation.arguments import floats, positive
+
+Floats = NDArray[np.float64]
+
+
+def starts_and_parameters(
+    model: Model, states: Any, parameters: Any
+) -> tuple[Floats, dict[str, Floats]]:
+    """Initial states (m, n) and the parameters that vary, each (m,).
+
+    Raises
+    ------
+    ArgumentError
+        For lengths that differ, wrong shapes, or numbers that are not finite.
+    UnknownNameError
+        For a name that is no state or no parameter.
+    """
+    names = (*model.states, *model.slow_states)
+    given = {str(k): floats(f"parameter {k}", v) for k, v in (parameters or {}).items()}
+    valid = [*model.parameters, *(n for n in model.free if n not in model.parameters)]
+    for name, values in given.items():
+        if name not in valid:
+            raise unknown_name("parameter", name, valid)
+        if values.ndim > 1:
+            raise ArgumentError(f"parameter {name} has shape {values.shape}; expected (m,)")
+    missing = [n for n in model.free if n not in model.parameters and n not in given]
+    if missing:
+        raise ArgumentError(
+            f"{', '.join(missing)} of this frozen model has no value; give one in parameters="
+        )
+    _one_length("parameters", given)
+    if isinstance(states, Mapping):
+        columns = {str(k): floats(f"initial {k}", v) for k, v in states.items()}
+        for name, values in columns.items():
+            if name not in names:
+                raise unknown_name("state", name, names)
+            if values.ndim > 1:
+                raise ArgumentError(f"initial {name} has shape {values.shape}; expected (m,)")
+        missing = [n for n in names if n not in columns]
+        if missing:
+            raise ArgumentError(
+                f"the initial states have no value for {', '.join(missing)}; expected one for "
+                f"each of {', '.join(names)}"
+            )
+        _one_length("initial states", columns)
+        table = np.stack(np.broadcast_arrays(*(columns[n] for n in names)), axis=-1)
+    else:
+        table = floats("the initial states", states)
+    if table.ndim not in (1, 2) or table.shape[-1] != len(names):
+        raise ArgumentError(
+            f"the initial states have shape {table.shape}; expected (m, {len(names)}) or "
+            f"({len(names)},), for {', '.join(names)}"
+        )
+    lengths = {len(v) for v in given.values() if v.ndim} - {1}
+    if table.ndim == 2 and len(table) != 1:
+        lengths.add(len(table))
+    if len(lengths) > 1:
+        received = [f"states {table.shape}", *(f"{n} {v.shape}" for n, v in given.items())]
+        raise ArgumentError(
+            "states and parameters broadcast to one length: received " + ", ".join(received)
+        )
+    count = lengths.pop() if lengths else 1
+    if count == 0:
+        raise ArgumentError("received no trajectory: the length of the states or parameters is 0")
+    swept = {n: np.ascontiguousarray(np.broadcast_to(v, count)) for n, v in given.items()}
+    starts = np.ascontiguousarray(np.broadcast_to(table, (count, len(names))))
+    for name, values in (*swept.items(), *zip(names, starts.T, strict=True)):
+        wrong = np.flatnonzero(~np.isfinite(values))
+        if len(wrong):
+            raise ArgumentError(
+                f"{name} = {values[wrong[0]]} of trajectory {wrong[0]}; expected a finite number"
+            )
+    return starts, swept
+
+
+def _one_length(what: str, given: Mapping[str, Floats]) -> None:
+    if len({len(v) for v in given.values() if v.ndim} - {1}) > 1:
+        received = ", ".join(f"{n} {v.shape}" for n, v in given.items())
+        raise ArgumentError(f"{what} broadcast to one length: received {received}")
+
+
+def periods_of(model: Model, period: Any, count: int, swept: Mapping[str, Floats]) -> Floats:
+    """The period of every trajectory, shape (m,), NaN where there is none."""
+    if period is not None:
+        given = floats("period", period)
+        if given.ndim > 1 or given.size not in (1, count):
+            raise ArgumentError(f"period has shape {given.shape}; expected one, or ({count},)")
+        for value in given.reshape(-1):
+            positive("period", value)
+        return np.broadcast_to(given, count).astype(float)
+    laws = [e for e in (*model.forcing.values(), *model.rates.values()) if e.has(TIME)]
+    if not any(real(name) in law.free_symbols for name in swept for law in laws):
+        own = model.period()
+        return np.full(count, np.nan if own is None else own)
+    values = {real(n): np.full(count, v) for n, v in model.parameters.items()}
+    values.update((real(n), v) for n, v in swept.items())
+    return common_periods(laws, TIME, values)
+
+
+def spans_of(t: Any, periods: Any, start: Any, settle: Any, own: Floats) -> tuple[Floats, Floats]:
+    """First and last time of every trajectory (m, 2), and the time from which it counts (m,).
+
+    Raises
+    ------
+    ArgumentError
+        For none or both of ``t`` and ``periods``, an empty or non-finite span,
+        a trajectory without a period, or nothing left after ``settle``.
+    """
+    if (t is None) == (periods is None):
+        received = "both" if t is not None else "neither"
+        raise ArgumentError(f"expected t=(start, end) or periods=, received {received}")
+    dropped = floats("settle", settle)
+    if dropped.ndim or not (np.isfinite(dropped) and dropped >= 0):
+        raise ArgumentError(f"settle = {settle!r}; expected a number from 0")
+    if t is not None:
+        if start != 0:
+            raise ArgumentError("start= goes with periods=; with t=(start, end) it is in t")
+        values = floats("t", t)
+        if values.shape != (2,):
+            raise ArgumentError(f"t = {t!r}; expected a pair (start, end)")
+        if not (np.isfinite(values).all() and values[0] < values[1]):
+            raise ArgumentError(
+                f"t = ({values[0]:g}, {values[1]:g}); expected finite times, start < end"
+            )
+        length, unit = values[1] - values[0], np.ones(len(own))
+        spans = np.tile(values, (len(own), 1))
+    else:
+        length = positive("periods", periods)
+        first = floats("start", start)
+        if first.ndim or not np.isfinite(first):
+            raise ArgumentError(f"start = {start!r}; expected a finite time")
+        without = np.flatnonzero(np.isnan(own))
+        if len(without):
+            raise ArgumentError(
+                f"periods={periods!r}, but nothing in trajectory {without[0]} has a common "
+                "period; give t=(start, end), or the period as period="
+            )
+        unit = own
+        spans = np.stack([np.full(len(own), float(first)), first + length * own], axis=1)
+    if dropped >= length:
+        raise ArgumentError(f"settle = {settle!r} leaves nothing of the run, which is {length:g}")
+    return spans, spans[:, 0] + dropped * unit
+
+
+def times_of(samples: Any, spans: Floats, since: Floats) -> Floats:
+    """Times to sample at: (1, N) for all, or (m, N); N = 0 for none.
+
+    Raises
+    ------
+    ArgumentError
+        For fewer than two, or for times that do not increase within every span.
+    """
+    if samples is None:
+        return np.empty((1, 0))
+    common = bool(np.all(spans == spans[0]) and np.all(since == since[0]))
+    if isinstance(samples, (int, np.integer)) and not isinstance(samples, bool):
+        if samples < 2:
+            raise ArgumentError(f"samples = {samples}; expected at least 2, or an array of times")
+        rows = slice(0, 1) if common else slice(None)
+        times = np.linspace(since[rows], spans[rows, 1], int(samples), axis=1)
+        return np.ascontiguousarray(times)
+    times = np.atleast_1d(floats("samples", samples))
+    if times.ndim != 1 or not np.isfinite(times).all() or np.any(np.diff(times) < 0):
+        raise ArgumentError("samples: expected increasing, finite times")
+    low, high = spans[:, 0].max(), spans[:, 1].min()
+    if len(times) and (times[0] < low or times[-1] > high):
+        raise ArgumentError(
+            f"samples from {times[0]:g} to {times[-1]:g} leave the runs, which share "
+            f"[{low:g}, {high:g}]"
+        )
+    return np.ascontiguousarray(times[None, :])
+
+
+def threads_of(threads: Any) -> int:
+    """The number of threads: as given, else the cores that this process may use."""
+    if threads is not None:
+        if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
+            raise ArgumentError(f"threads = {threads!r}; expected a whole number from 1")
+        return int(threads)
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
