@@ -333,7 +333,7 @@ class Recurrences:
             else:
                 lines.append("for j in range(1, k + 1):")
                 lines.append(f"    s += j * W[{U} + j] * W[{G} + k - j]")
-        node.lines = [*lines, f"{self.at(row)} = s / k"]
+        node.lines = [*lines, f"{self.at(row)} = s * q"]
         return row
 
     def _steady_rate(self, argument: sp.Expr) -> str | None:

@@ -281,11 +281,12 @@ def _mode_source(equations: _Equations, mode: _Mode) -> tuple[list[str], int]:
     body += [f"{name} = {code}" for code, name in work.scalars.items()]
     body += work.values()
     body += [f"{work.at(i, '1')} = {work.at(r, '0')}" for i, r in enumerate(rates)]
-    body += [f"for k in range(1, {n}):", *("    " + line for line in work.general())]
+    body += [f"for k in range(1, {n}):", "    q = 1.0 / k"]
+    body += ["    " + line for line in work.general()]
     body += ["    r = 1.0 / (k + 1)"]
     body += [f"    {work.at(i, 'k + 1')} = {work.at(r)} * r" for i, r in enumerate(rates)]
     last = work.general(tuple(held.values()))
-    body += [f"k = {n}", *last] if last else []
+    body += [f"k = {n}", "q = 1.0 / k", *last] if last else []
     if copies:
         body += [f"for k in range({n + 1}):"]
         body += [f"    {work.at(row)} = {work.at(source)}" for row, source in copies.items()]

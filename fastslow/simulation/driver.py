@@ -82,7 +82,6 @@ def drive(
     times,
     samples,
     since,
-    tables,
     dense,
     limits,
     store,
@@ -92,8 +91,9 @@ def drive(
 ):
     """Follow one trajectory from start to end.
 
-    Either every step and every crossing is put into a table, or they are
-    summed up as the run goes.
+    Every step and every crossing is put into a table, or, where there are
+    arrays for it, they are summed up as the run goes. Which of the two is
+    settled when this is compiled: without arrays their place holds None.
 
     Parameters
     ----------
@@ -115,20 +115,18 @@ def drive(
         The first rows at those times, as far as they are reached; filled here.
     since : float
         Time from which extremes and hits count.
-    tables : bool
-        Whether steps and crossings are listed, not summed up.
     dense : bool
         Whether the series of every step is kept.
     limits : tuple of int
         Largest numbers of steps and crossings.
     store : float64 array
         Room for the series, replaced by a larger one where it does not suffice.
-    extremes : float64 array, shape (2, n_states)
-        Smallest and largest value of every state; widened here, without tables.
-    hits : int64 array, shape (n_interfaces, 2)
-        Crossings upwards and downwards; counted here, without tables.
-    seen : float64 array, shape (n_modes,)
-        When each mode was last left; set here, without tables.
+    extremes : float64 array, shape (2, n_states), or None
+        Smallest and largest value of every state, widened here.
+    hits : int64 array, shape (n_interfaces, 2), or None
+        Crossings upwards and downwards, counted here.
+    seen : float64 array, shape (n_modes,), or None
+        When each mode was last left, set here.
 
     Returns
     -------
@@ -138,7 +136,7 @@ def drive(
         Time and state reached.
     n_steps : int
     steps : ndarray, shape (n_steps, 3)
-        Time, length and mode of every step; no rows without tables.
+        Time, length and mode of every step; no rows where they are summed up.
     store : ndarray
         Coefficients of states and slow quantities, step by step, when ``dense``.
     crossings : ndarray, shape (n_crossings, 6 + n_states)
@@ -168,8 +166,8 @@ def drive(
     hit = np.zeros(n_interfaces, dtype=np.bool_)
     rests = np.zeros(n_interfaces, dtype=np.bool_)
     side = np.zeros(n_interfaces, dtype=np.int64)
-    steps = np.empty((64 if tables else 0, 3))
-    crossings = np.empty((16 if tables else 0, 6 + n_states))
+    steps = np.empty((64 if extremes is None else 0, 3))
+    crossings = np.empty((16 if extremes is None else 0, 6 + n_states))
     offsets = np.empty(times.shape[0])
     n_steps = n_crossings = n_samples = crowd = ZERO
     mode = interface = np.int64(-1)
@@ -216,7 +214,7 @@ def drive(
                 changed = before >= 0 and signs[before, j] != signs[mode, j]
                 if changed or (touched and mode == before and j == interface):
                     turn = signs[mode, j] - signs[before, j]
-                    if tables:
+                    if extremes is None:
                         if n_crossings == crossings.shape[0]:
                             crossings = grown(crossings)
                         crossings[n_crossings, 0] = t
@@ -227,8 +225,8 @@ def drive(
                         crossings[n_crossings, 5] = depth < TANGENTIAL or not changed
                         for i in range(n_states):
                             crossings[n_crossings, 6 + i] = inputs[1 + i]
-                    elif turn != 0 and t >= since:
-                        hits[j, 0 if turn > 0 else 1] += 1
+                    else:
+                        hits[j, 0 if turn > 0 else 1] += turn != 0 and t >= since
                     n_crossings += 1
             if n_crossings >= limits[1]:
                 code = TOO_MANY_CROSSINGS
@@ -295,7 +293,7 @@ def drive(
         else:
             t = begin + h
         if taken > 0.0:
-            if tables:
+            if extremes is None:
                 if n_steps == steps.shape[0]:
                     steps = grown(steps)
                 steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, taken, mode

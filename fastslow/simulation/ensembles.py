@@ -108,7 +108,6 @@ def drive_many(
             samples[i],
             since[i],
             False,
-            False,
             limits,
             store,
             extremes[i],

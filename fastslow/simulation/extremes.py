@@ -10,6 +10,7 @@ from fastslow.simulation.polynomials import (
     excluded,
     halve,
     horner,
+    reach,
     refine,
     to_bernstein,
 )
@@ -39,11 +40,8 @@ def widen_extremes(W, n_states, order, begin, taken, extremes, b, d, stack):
         low, high = extremes[0, i], extremes[1, i]
         if begin <= 0.0:
             # most steps cannot reach the extremes so far, whatever they do
-            reach = abs(W[first + order])
-            for k in range(order - 1, 0, -1):
-                reach = reach * taken + abs(W[first + k])
-            reach *= taken
-            if W[first] - reach >= low and W[first] + reach <= high:
+            most = reach(W, first, first + order, taken)
+            if W[first] - most >= low and W[first] + most <= high:
                 continue
         for k in range(columns):
             b[k] = W[first + k]

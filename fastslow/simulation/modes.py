@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from fastslow.compiled.parts import part
@@ -44,14 +46,15 @@ def step_length(W, n_rows, order, tol):
         finite += 0.0 * (W[row + order] + W[row + order - 1])
     if finite != 0.0:
         return np.nan
-    length = np.inf
+    # logarithms of the lengths: powers with whole exponents take longer
+    allowed, length = math.log(tol), np.inf
     if last > 0.0:
-        length = (tol / last) ** (1.0 / order)
-    if before > 0.0 and (length == np.inf or tol < before * length ** (order - 1)):
-        length = min(length, (tol / before) ** (1.0 / (order - 1)))
-    if third > 0.0 and (length == np.inf or tol < third * length ** (order - 2)):
-        length = min(length, (tol / third) ** (1.0 / (order - 2)))
-    return length
+        length = (allowed - math.log(last)) / order
+    if before > 0.0:
+        length = min(length, (allowed - math.log(before)) / (order - 1))
+    if third > 0.0:
+        length = min(length, (allowed - math.log(third)) / (order - 2))
+    return math.exp(length)
 
 
 @part

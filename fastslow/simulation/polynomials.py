@@ -23,10 +23,17 @@ ONE: Any = np.int64(1)
 @part
 def horner(b, first, last, s):
     """Value of sum b_k s**(k - first) over first <= k <= last."""
-    value = b[last]
-    for k in range(last - 1, first - 1, -1):
-        value = value * s + b[k]
-    return value
+    if last - first < 2:
+        return b[first] if last == first else b[last] * s + b[first]
+    # even and odd powers apart, because each sum waits for its own last product
+    square = s * s
+    even, odd = b[last], b[last - 1]
+    for k in range(last - 2, first, -2):
+        even = even * square + b[k]
+        odd = odd * square + b[k - 1]
+    if (last - first) & 1 == 0:
+        return even * square + b[first] + odd * s
+    return even * s + odd
 
 
 @part
@@ -50,10 +57,20 @@ def curvature(b, order, s):
 @part
 def kept_away(c, first, last, h):
     """Whether |c_0| > sum |c_k| h**k, so that there is no root on [0, h]."""
-    rest = abs(c[last])
-    for k in range(last - 1, first, -1):
-        rest = rest * h + abs(c[k])
-    return abs(c[first]) > rest * h
+    return abs(c[first]) > reach(c, first, last, h)
+
+
+@part
+def reach(c, first, last, h):
+    """The sum of |c_k| h**(k - first) over first < k <= last."""
+    square = h * h
+    even, odd = abs(c[last]), abs(c[last - 1])
+    for k in range(last - 2, first + 1, -2):
+        even = even * square + abs(c[k])
+        odd = odd * square + abs(c[k - 1])
+    if (last - first) & 1 == 0:
+        return even * square + odd * h
+    return (even * square + abs(c[first + 1])) * h + odd * square
 
 
 @part

@@ -40,7 +40,6 @@ _ARGUMENTS = (
     "times",
     "samples",
     "since",
-    "tables",
     "dense",
     "limits",
     "store",
@@ -57,9 +56,6 @@ SOURCES = (
     "fastslow.compiled.parts",
     "fastslow.compiled.pointers",
 )
-
-#: Without tables a run fills these; with them it does not.
-_NOTHING = (np.empty((2, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
 
 #: Depth of the work space of the event search.
 STACK_ROWS = 46
@@ -195,11 +191,12 @@ def simulate(
         times,
         sampled,
         span[0],
-        True,
         bool(dense),
         limits,
         _room.store,
-        *_NOTHING,
+        None,
+        None,
+        None,
     )
     return Trajectory(
         (*model.states, *model.slow_states),
