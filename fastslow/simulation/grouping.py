@@ -84,8 +84,11 @@ def _signs(model: Model, values: Values, own: Mapping[str, float]) -> NDArray[np
         h = interface.function
         slopes = [h.diff(z) for z in moving]
         if any(slope.free_symbols & set(moving) for slope in slopes):
-            # never excludes a region, unless a vanishing parameter makes it affine
-            columns += [values[s.name] == 0.0 for s in h.free_symbols & swept]
+            # never excludes a region, unless a vanishing parameter makes it affine: such a
+            # set, which is rare, is alike to itself alone
+            for symbol in h.free_symbols & swept:
+                gone = values[symbol.name] == 0.0
+                columns += [gone, *(np.where(gone, values[s.name], 0.0) for s in swept)]
             continue
         rows.append([*slopes, h.subs(dict.fromkeys(moving, 0))])
     if any(e.free_symbols & swept for row in rows for e in row):
@@ -110,21 +113,32 @@ def _scales(model: Model, moving: list[sp.Symbol]) -> list[sp.Expr]:
 def _patterns(table: NDArray[np.float64]) -> NDArray[np.float64]:
     """The same for affine functions a·z + b alone, given as (m, functions, moving + 1)."""
     slopes, offsets = table[..., :-1], table[..., -1]
-    signs = np.sign(slopes).reshape(len(table), -1)
-    still = ~slopes.any(axis=2)
-    signs = np.hstack([signs, np.where(still, np.sign(offsets), 0.0)])
-    if not still.any():
-        first = slopes[:, :1]
-        along = (slopes * first).sum(axis=2) / (first * first).sum(axis=2)
-        if np.allclose(slopes, along[..., None] * first, rtol=0, atol=1e-14):
-            # parallel: the order of the edges decides
-            edges = -offsets / along
-            order = np.sign(edges[:, :, None] - edges[:, None, :]).reshape(len(table), -1)
-            return np.hstack([signs, order])
-        if np.all(np.linalg.matrix_rank(slopes) == slopes.shape[1]):
-            # independent: no pattern is empty
-            return signs
-    return np.hstack([signs, _one_by_one(table)])
+    count, n = offsets.shape
+    still = np.all(slopes == 0.0, axis=2)
+    key = [np.sign(slopes).reshape(count, -1), np.where(still, np.sign(offsets), 0.0)]
+    moving = [j for j in range(n) if not still[:, j].any()]
+    if len(moving) + np.count_nonzero(still.all(axis=0)) < n:
+        return np.hstack([*key, _one_by_one(table)])
+    # among parallel functions the order of the edges decides; others exclude nothing when
+    # one of each direction are independent
+    leaders: list[int] = []
+    edges: list[list[NDArray[np.float64]]] = []
+    for j in moving:
+        for k, leader in enumerate(leaders):
+            first = slopes[:, leader]
+            along = (slopes[:, j] * first).sum(axis=1) / (first * first).sum(axis=1)
+            if np.allclose(slopes[:, j], along[:, None] * first, rtol=0, atol=1e-14):
+                edges[k].append(-offsets[:, j] / along)
+                break
+        else:
+            leaders.append(j)
+            edges.append([-offsets[:, j]])
+    if leaders and np.any(np.linalg.matrix_rank(slopes[:, leaders]) < len(leaders)):
+        return np.hstack([*key, _one_by_one(table)])
+    for together in edges:
+        edge = np.stack(together, axis=1)
+        key.append(np.sign(edge[:, :, None] - edge[:, None, :]).reshape(count, -1))
+    return np.hstack(key)
 
 
 def _one_by_one(table: NDArray[np.float64]) -> NDArray[np.float64]:
