@@ -11,6 +11,7 @@ from fastslow.compiled.store import cache_directory
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.tracing import continue_equilibria
 from fastslow.model.model import Model
+from fastslow.simulation.ensembles import simulate_many
 from fastslow.simulation.trajectories import simulate
 
 
@@ -50,6 +51,7 @@ def _use(model: Model) -> None:
     whole = model.with_parameters(dict.fromkeys(free, 0.0)) if free else model
     state = np.zeros(len(model.states) + len(model.slow_states))
     simulate(whole, state, t=(0.0, 1e-6), max_steps=1)
+    simulate_many(whole, state, t=(0.0, 1e-6), max_steps=1)
     timed = any("t" in {s.name for s in rate.free_symbols} for rate in model.rates.values())
     if timed:
         return
