@@ -113,8 +113,12 @@ def corrected(
         z = z + step * frame.scale
         if np.abs(step).max() <= settings.tolerance:
             # one more, whose matrix is the same to rounding
-            right = np.append(-system.residual(z, guide), (guess - z) @ normal)
+            left = system.residual(z, guide)
+            right = np.append(-left, (guess - z) @ normal)
             z = z + np.linalg.solve(matrix / rows[:, None], right / rows) * frame.scale
+            terms = np.abs(matrix[:-1] / frame.scale) @ np.maximum(np.abs(z), frame.scale)
+            if np.any(np.abs(left) > 1e-6 * terms):
+                return None
             return system.renewed(z), used
     return None
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.location import crossing_tangents
 from fastslow.diagrams.detection import Detected, special_points
-from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.fields import FrozenField, Source
 from fastslow.diagrams.two_folds import two_fold_residual
 from fastslow.diagrams.walking import Piece, Walk, Window
 from fastslow.results.branches import Branch
@@ -104,6 +104,7 @@ def branch_of(
     region = np.repeat(names, [len(t[0]) for t in tables])
     if not curve.closed:
         special, at_row = _with_ends(field, curve, special, at_row, rows)
+    source = Source(field.model, window.scale[:-1])
     return Branch(
         field.model.states,
         field.parameter,
@@ -112,7 +113,7 @@ def branch_of(
         tangents,
         eigenvalues,
         region,
-        SpecialPoints(special),
+        SpecialPoints(replace(p, source=source, admissible=admissible) for p in special),
         tuple(at_row),
         curve.outcomes,
         curve.closed,
@@ -129,7 +130,6 @@ def _special(
         "regions": (field.regions[region],),
         "residual": float(np.abs(rates).max()),
         "converged": True,
-        "source": field.model,
         **more,
     }
     return SpecialPoint(

@@ -14,8 +14,8 @@ from fastslow.continuation.location import (
     branch_point,
     fold,
     turning_pair,
-    with_condition,
 )
+from fastslow.diagrams.brackets import Search
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.normal_forms import first_lyapunov, fold_form, forms_at
 from fastslow.diagrams.walking import Piece, Window
@@ -60,22 +60,6 @@ def special_points(
     return found, eigenvalues
 
 
-def _changes(test: Array) -> Iterator[tuple[int, int]]:
-    """Pairs of rows, next to each other but for zeros, between which a test changes sign."""
-    if not (np.any(test < 0) and np.any(test > 0)):
-        return
-    rows = np.flatnonzero(test != 0)
-    signs = np.sign(test[rows])
-    for k in np.flatnonzero(signs[:-1] * signs[1:] < 0):
-        yield int(rows[k]), int(rows[k + 1])
-
-
-def _meeting(test: Array, piece: Piece, before: int, after: int) -> Array:
-    """Where the test vanishes by linear interpolation."""
-    part = test[before] / (test[before] - test[after])
-    return np.asarray(piece.u[before] + part * (piece.u[after] - piece.u[before]))
-
-
 def _folds(field: FrozenField, piece: Piece, window: Window) -> Iterator[Detected]:
     test = piece.tangents[:, -1] / window.scale[-1]
     test = np.where(np.abs(test) < 1e-10, 0.0, test)
@@ -83,25 +67,40 @@ def _folds(field: FrozenField, piece: Piece, window: Window) -> Iterator[Detecte
     def curve(u: Array) -> tuple[Array, Array]:
         return field.curve(piece.region, u)
 
-    for before, after in _changes(test):
-        if after - before > 2:
-            continue
-        located = fold(curve, _meeting(test, piece, before, after), window.scale)
-        jacobian = field.curve(piece.region, located.u)[1][:, : field.n]
+    def turning(u: Array, along: Array) -> float:
+        tangent, _ = field.tangent(piece.region, u, window.weight)
+        side = 1.0 if (tangent * window.weight) @ along >= 0 else -1.0
+        return float(side * tangent[-1] / window.scale[-1])
+
+    search = Search(field, piece, window, turning)
+    for bracket in search.brackets(test):
+        located = search.solve(bracket, lambda u: fold(curve, u, window.scale))
+        jacobian = curve(located.u)[1][:, : field.n]
         coefficient = fold_form(forms_at(field, piece.region, located.u), jacobian)
-        yield Detected(before, "LP", located, coefficient=coefficient)
+        yield Detected(bracket.row, "LP", located, coefficient=coefficient)
 
 
 def _branch_points(
     field: FrozenField, piece: Piece, window: Window, test: Array
 ) -> Iterator[Detected]:
-    for before, after in _changes(np.where(np.abs(test) < 1e-14, 0.0, test)):
-        if after - before > 2:
-            continue
-        guess = _meeting(test, piece, before, after)
-        located = branch_point(lambda u: field.curve(piece.region, u), guess, window.scale)
+    test = np.where(np.abs(test) < 1e-14, 0.0, test)
+
+    def locate(u: Array) -> Located:
+        return branch_point(lambda z: field.curve(piece.region, z), u, window.scale)
+
+    def crossing(u: Array, along: Array) -> float:
+        _, slopes = field.curve(piece.region, u)
+        tangent, _ = field.tangent(piece.region, u, window.weight)
+        side = 1.0 if (tangent * window.weight) @ along >= 0 else -1.0
+        rows = np.vstack([slopes * window.scale, side * tangent / window.scale])
+        size = np.linalg.norm(rows, axis=1).prod()
+        return float(np.linalg.det(rows) / (size if size > 0 else 1.0))
+
+    search = Search(field, piece, window, crossing)
+    for bracket in search.brackets(test):
+        located = search.solve(bracket, locate)
         if located.converged:
-            yield Detected(before, "BP", located)
+            yield Detected(bracket.row, "BP", located)
 
 
 @cache
@@ -111,33 +110,45 @@ def _pairs(n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return first, second
 
 
+def _sums(eigenvalues: NDArray[np.complex128]) -> Array:
+    """Product of the sums of all pairs, each in units of the largest eigenvalue."""
+    first, second = _pairs(eigenvalues.shape[-1])
+    sums = eigenvalues[..., first] + eigenvalues[..., second]
+    size = np.maximum(np.abs(eigenvalues).max(axis=-1, keepdims=True), np.finfo(float).tiny)
+    return np.asarray(np.prod(sums / size, axis=-1).real)
+
+
 def _turning_pairs(
     field: FrozenField, piece: Piece, window: Window, eigenvalues: NDArray[np.complex128]
 ) -> Iterator[Detected]:
-    n = field.n
+    n, region = field.n, piece.region
     if eigenvalues.shape[1] < 2:
         return
     first, second = _pairs(eigenvalues.shape[1])
-    sums = eigenvalues[:, first] + eigenvalues[:, second]
-    size = np.maximum(np.abs(eigenvalues).max(axis=1, keepdims=True), np.finfo(float).tiny)
-    test = np.prod(sums / size, axis=1).real
-    for before, after in _changes(np.where(np.abs(test) < 1e-14, 0.0, test)):
-        guess = _meeting(test, piece, before, after)
-        near = before if abs(test[before]) < abs(test[after]) else after
-        pair = int(np.argmin(np.abs(sums[near])))
-        squared = float((eigenvalues[near, first[pair]] * eigenvalues[near, second[pair]]).real)
-        located = turning_pair(lambda u: field.curve(piece.region, u), guess, window.scale, squared)
+    test = _sums(eigenvalues)
+
+    def curve(u: Array) -> tuple[Array, Array]:
+        return field.curve(region, u)
+
+    def locate(u: Array) -> Located:
+        values = field.finite_eigenvalues(region, u)
+        pair = int(np.argmin(np.abs(values[first] + values[second])))
+        squared = float((values[first[pair]] * values[second[pair]]).real)
+        return turning_pair(curve, u, window.scale, squared)
+
+    search = Search(
+        field, piece, window, lambda u, _: float(_sums(field.finite_eigenvalues(region, u)))
+    )
+    for bracket in search.brackets(np.where(np.abs(test) < 1e-14, 0.0, test)):
+        located = search.solve(bracket, locate)
         kappa = float(located.extra[0])
         if kappa > 0:
             frequency = float(np.sqrt(kappa))
-            lyapunov = first_lyapunov(
-                forms_at(field, piece.region, located.u),
-                field.curve(piece.region, located.u)[1][:, :n],
-                frequency,
-            )
-            yield Detected(before, "HB", located, frequency=frequency, lyapunov=lyapunov)
+            jacobian = curve(located.u)[1][:, :n]
+            lyapunov = first_lyapunov(forms_at(field, region, located.u), jacobian, frequency)
+            yield Detected(bracket.row, "HB", located, frequency=frequency, lyapunov=lyapunov)
         else:
-            yield Detected(before, "NSD", located)
+            yield Detected(bracket.row, "NSD", located)
 
 
 def _marks(
@@ -146,14 +157,15 @@ def _marks(
     along = np.zeros(field.n + 1)
     along[-1] = 1.0
     for mark in marks:
-        for before, after in _changes(piece.u[:, -1] - mark):
-            located = with_condition(
-                lambda u: field.curve(piece.region, u),
-                lambda u, mark=mark: (u[-1] - mark, along),  # type: ignore[misc]
-                _meeting(piece.u[:, -1] - mark, piece, before, after),
-                window.scale,
+        search = Search(field, piece, window, lambda u, _, mark=mark: float(u[-1] - mark))  # type: ignore[misc]
+        for bracket in search.brackets(piece.u[:, -1] - mark):
+            located = search.solve(
+                bracket,
+                lambda u, mark=mark: field.refined(  # type: ignore[misc]
+                    piece.region, u, window.scale, normal=along, point=mark * along
+                ),
             )
-            yield Detected(before, "UZ", located)
+            yield Detected(bracket.row, "UZ", located)
 
 
 def _ahead(u: Array, piece: Piece, row: int, window: Window) -> float:

@@ -23,6 +23,20 @@ _NONE = np.empty(0)
 
 
 @dataclass(frozen=True, eq=False)
+class Source:
+    """Where a special point comes from: the frozen model, and the units of its states.
+
+    Parameters
+    ----------
+    model : Model
+    unit : ndarray, shape (n,)
+    """
+
+    model: Model
+    unit: Array
+
+
+@dataclass(frozen=True, eq=False)
 class FrozenField:
     """The frozen rates of every region over (states, varying parameters).
 

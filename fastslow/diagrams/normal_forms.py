@@ -116,7 +116,9 @@ def fold_form(forms: Multilinear, jacobian: Array) -> float:
     which is taken with its largest component positive.
     """
     p, q = null_vectors(jacobian)
-    return float(0.5 * (p @ forms.form(q, q)).real / (p @ q))
+    overlap = float(p @ q)
+    # at a Bogdanov-Takens point the two are at right angles
+    return float(0.5 * (p @ forms.form(q, q)).real / overlap) if overlap else np.nan
 
 
 def cusp_form(forms: Multilinear, jacobian: Array) -> float:

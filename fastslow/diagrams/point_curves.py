@@ -108,7 +108,7 @@ def continue_points(
             f"the point {point.label} at {first} = {u[-2]:g}, {second} = {u[-1]:g} lies outside "
             f"over={dict(over)}"
         )
-    system, start = _system(field, region, code, point, u, upper - lower)
+    system, start = _system(field, region, code, point, u)
     frame = _frame(system, start, lower, upper)
     landing = curves.landed(system, start, frame)
     if landing is None:
@@ -172,7 +172,7 @@ def _model(point: SpecialPoint, names: tuple[str, str]) -> Model:
             f"the point {point.label} carries no model (it was read from a file or another "
             "process); trace its diagram again and take the point from there"
         )
-    model: Model = point.source
+    model: Model = point.source.model
     known = (*model.parameters, *model.free)
     for name in names:
         if name not in known:
@@ -191,13 +191,10 @@ def _region_of(field: FrozenField, point: SpecialPoint) -> int:
 
 
 def _system(
-    field: FrozenField, region: int, code: str, point: SpecialPoint, u: Array, spans: Array
+    field: FrozenField, region: int, code: str, point: SpecialPoint, u: Array
 ) -> tuple[Defining, Array]:
-    """The defining system with its first z, the states in units of how far they move."""
-    _, slopes, _, _ = field.at(region, u)
-    slope = np.linalg.lstsq(slopes[:, : field.n], -slopes[:, field.n :] * spans, rcond=1e-6)[0]
-    unit = np.maximum(np.abs(u[: field.n]), np.abs(slope).max(axis=1))
-    unit = np.where(unit > 1e-12 * max(float(unit.max()), 1e-300), unit, 1.0)
+    """The defining system with its first z, the states in units of their diagram."""
+    unit = np.maximum(np.abs(u[: field.n]), point.source.unit)
     if code == "LP":
         fold = Fold(field, region, unit)
         return fold, fold.start(u)

@@ -288,7 +288,7 @@ class SpecialPoint(_Point):
     note : str
         What else a reader should know, e.g. why an end point is one.
     source : object, optional
-        The frozen model, for `continue_points`; not kept in a file.
+        The frozen model and units of its states, for `continue_points`; not kept in a file.
     """
 
     code: str
