@@ -20,13 +20,14 @@ from fastslow.continuation.settings import Continuation
 Array = NDArray[np.float64]
 
 #: How a trace ends.
-FULL, RANGE, SMALL_STEP, WINDOW, CLOSED, STOPPED = (
+FULL, RANGE, SMALL_STEP, WINDOW, CLOSED, STOPPED, BOUND = (
     "full",
     "range",
     "small step",
     "window",
     "closed",
     "stopped",
+    "bound",
 )
 
 
@@ -137,6 +138,7 @@ def follow(
     frame: Frame,
     settings: Continuation,
     stop: Callable[[Array], bool] = lambda _: False,
+    bounds: Callable[[Array], Array] | None = None,
 ) -> tuple[Array, Array, str]:
     """Follow a curve from one of its points until something ends it.
 
@@ -148,6 +150,9 @@ def follow(
     settings : Continuation
     stop : callable
         Whether the curve ends after a point.
+    bounds : callable, optional
+        Numbers that are positive where the curve may be; it ends, exactly, where
+        the first of them vanishes.
 
     Returns
     -------
@@ -177,6 +182,12 @@ def follow(
                 rows.append(edge)
                 tangents.append(turned)
             return np.array(rows), np.array(tangents), RANGE
+        if bounds is not None and np.any(bounds(z) < 0):
+            edge = _on_bound(system, last, z, frame, bounds)
+            if edge is not None:
+                rows.append(edge)
+                tangents.append(turned)
+            return np.array(rows), np.array(tangents), BOUND
         rows.append(z)
         tangents.append(turned)
         states = frame.size - 2
@@ -217,6 +228,26 @@ def _on_edge(system: System, inside: Array, outside: Array, frame: Frame) -> Arr
                 z[entry] = bound
                 best = share, system.renewed(z)
     return None if best is None else best[1]
+
+
+def _on_bound(
+    system: System,
+    inside: Array,
+    outside: Array,
+    frame: Frame,
+    bounds: Callable[[Array], Array],
+) -> Array | None:
+    """Where the first of the bounds between two points of the curve vanishes."""
+    before, after = bounds(inside), bounds(outside)
+    share, number = min(
+        (before[k] / (before[k] - after[k]), int(k)) for k in np.flatnonzero(after < 0)
+    )
+    guess = inside + min(max(share, 0.0), 1.0) * (outside - inside)
+    guide = system.renewed(guess)
+    z, _, converged, _ = newton(
+        lambda z: np.append(system.residual(z, guide), bounds(z)[number]), guess, frame.scale
+    )
+    return system.renewed(z) if converged else None
 
 
 def _returns(

@@ -20,6 +20,13 @@ def outcome_of(status: str, system: Defining, z: Array, names: tuple[str, str]) 
         return Outcome("end of range", f"reached the end of the range at {where}.", True)
     if status == curves.CLOSED:
         return Outcome("closed loop", "the curve returned to its start: a closed loop.", True)
+    if status == curves.BOUND:
+        return Outcome(
+            "interfaces meet",
+            f"another interface of region {_region(system)} is met at {where}; beyond it other "
+            "regions join there.",
+            True,
+        )
     if status == curves.STOPPED and isinstance(system, Crossing):
         return Outcome(
             "no branch point",

@@ -75,13 +75,17 @@ class Defining(ABC):
 
     def inside(self, z: Array, but: int | None = None) -> bool:
         """Whether a point lies in the closure of the region, one interface left aside."""
-        u = z[: self.width]
-        _, _, h, gradients = self.field.at(self.region, u)
-        size = np.maximum(1.0, np.abs(gradients) @ np.maximum(np.abs(u), 1.0))
-        heights = self.field.signs[self.region] * h / size
+        heights = self.heights(z)
         if but is not None:
             heights[but] = 0.0
         return bool(np.all(heights >= -1e-9))
+
+    def heights(self, z: Array) -> Array:
+        """What bounds the region, positive inside and relative to its terms, at a point."""
+        u = z[: self.width]
+        _, _, h, gradients = self.field.at(self.region, u)
+        size = np.maximum(1.0, np.abs(gradients) @ np.maximum(np.abs(u), 1.0))
+        return np.asarray(self.field.signs[self.region] * h / size)
 
 
 class Fold(Defining):

@@ -29,6 +29,17 @@ SHARE = "(alpha)"
 DEGREE = 60
 
 
+def exact(expression: sp.Expr) -> sp.Expr:
+    """With rational numbers in place of floats, so that polynomials divide without remainder.
+
+    Examples
+    --------
+    >>> exact(sp.Float(0.25) * sp.Symbol("x"))
+    x/4
+    """
+    return sp.nsimplify(expression, rational=True) if expression.has(sp.Float) else expression
+
+
 @dataclass(frozen=True, eq=False)
 class RegionEquations:
     """The equilibrium equations of one region, eliminated, at fixed other parameters.
@@ -53,13 +64,13 @@ class RegionEquations:
     def elimination(self) -> Elimination:
         """Of the rates with every other parameter a number, so that its sign is known."""
         states = self.field.model.states
-        rates = [rate.subs(self.numbers) for rate in self.field.modes[self.region].rates]
+        rates = [exact(rate).subs(self.numbers) for rate in self.field.modes[self.region].rates]
         return eliminate(dict(zip(states, rates, strict=True)), states)
 
     @property
     def bounds(self) -> list[sp.Expr]:
         """Functions one of which vanishes where an equilibrium leaves the region."""
-        return [i.function.subs(self.numbers) for i in self.field.model.interfaces.values()]
+        return [exact(i.function).subs(self.numbers) for i in self.field.model.interfaces.values()]
 
     @cached_property
     def polynomial(self) -> sp.Poly | None:
@@ -132,6 +143,25 @@ class RegionEquations:
             return False
         p = real(self.field.parameter)
         return all(abs(float(e.subs(p, value))) < 1e-14 for e in self._conditions)
+
+    def continua(self) -> list[float]:
+        """Parameter values at which the equilibria of the region form a continuum."""
+        p = real(self.field.parameter)
+        if self._conditions is not None:
+            forms = self._conditions
+        elif self.polynomial is not None and self.polynomial.degree() > 0:
+            forms = self.polynomial.all_coeffs()
+        else:
+            return []
+        common = sp.Integer(0)
+        for form in forms:
+            if not form.is_polynomial(p):
+                return []
+            common = sp.gcd(common, form)
+        if not common.has(p):
+            return []
+        coefficients = np.array([float(c) for c in sp.Poly(common, p).all_coeffs()])
+        return real_roots(coefficients)
 
     def edges(self, value: float) -> list[Array]:
         """Where a one-parameter continuum of equilibria meets an interface, or its middle."""

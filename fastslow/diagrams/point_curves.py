@@ -232,15 +232,20 @@ def _traced(
     def stop(z: Array) -> bool:
         if isinstance(system, Crossing) and abs(z[-1]) > 1e-7:
             return True
-        if isinstance(system, OnInterface):
-            return not _inside(system, z)
         return not virtual and inside and not _inside(system, z)
 
+    def others(z: Array) -> Array:
+        heights = system.heights(z)
+        return np.delete(heights, system.interface if isinstance(system, OnInterface) else [])
+
+    bounds = others if isinstance(system, OnInterface) else None
     direction = curves.tangent(system, start, frame)
-    rows, tangents, last = curves.follow(system, start, direction, frame, settings, stop)
+    rows, tangents, last = curves.follow(system, start, direction, frame, settings, stop, bounds)
     first = last
     if last != curves.CLOSED:
-        back, turned, first = curves.follow(system, start, -direction, frame, settings, stop)
+        back, turned, first = curves.follow(
+            system, start, -direction, frame, settings, stop, bounds
+        )
         rows = np.concatenate([back[:0:-1], rows])
         tangents = np.concatenate([-turned[:0:-1], tangents])
     watched = criteria(system, _meeting(system))
@@ -255,6 +260,12 @@ def _traced(
         rows = np.insert(rows, places, [f.z for f in found], axis=0)
         tangents = np.insert(tangents, places, [tangents[f.row] for f in found], axis=0)
         coefficient = np.insert(coefficient, places, along(system, np.array([f.z for f in found])))
+    spots = [place + k for k, place in enumerate(places)]
+    if not virtual and inside:
+        kept = _up_to_interfaces(found, spots, len(rows), first, last)
+        rows, tangents, coefficient = rows[kept], tangents[kept], coefficient[kept]
+        found = [f for f, k in zip(found, spots, strict=True) if kept.start <= k < kept.stop]
+        spots = [k - kept.start for k in spots if kept.start <= k < kept.stop]
     w, n = system.width, field.n
     admissible = np.array([_inside(system, z) for z in rows])
     codes = np.full(len(rows), system.code, dtype="<U3")
@@ -262,8 +273,8 @@ def _traced(
         codes[rows[:, w] < 0] = "NSD"
     counts: dict[str, int] = {}
     special = [
-        _special(system, f, point, names, tangents[place + k], counts)
-        for k, (f, place) in enumerate(zip(found, places, strict=True))
+        _special(system, f, point, names, tangents[k], counts)
+        for f, k in zip(found, spots, strict=True)
     ]
     return PointBranch(
         field.model.states,
@@ -278,10 +289,20 @@ def _traced(
         admissible,
         coefficient,
         SpecialPoints(special),
-        tuple(place + k for k, place in enumerate(places)),
+        tuple(spots),
         (outcome_of(first, system, rows[0], names), outcome_of(last, system, rows[-1], names)),
         last == curves.CLOSED,
     )
+
+
+def _up_to_interfaces(
+    found: list[Found], spots: list[int], count: int, first: str, last: str
+) -> slice:
+    """The rows up to the points on an interface beyond which a curve was stopped."""
+    on = [k for f, k in zip(found, spots, strict=True) if f.criterion.code in ("BF", "BH")]
+    start = on[0] if on and first == curves.STOPPED else 0
+    stop = on[-1] + 1 if on and last == curves.STOPPED else count
+    return slice(start, stop)
 
 
 def _inside(system: Defining, z: Array) -> bool:

@@ -31,6 +31,12 @@ class Starts:
         equations = dict.fromkeys(region_equations(field))
         between = [critical_values(e, lower, upper) for e in equations]
         self.complete = all(b is not None for b in between)
+        self._continua = [
+            (equation.region, value)
+            for equation in equations
+            for value in equation.continua()
+            if lower <= value <= upper
+        ]
         levels = sorted({lower, upper, *(v for b in between for v in b or ())})
         middles = [0.5 * (a + b) for a, b in pairwise(levels)]
         self._first = [lower, upper, *(middles if self.complete else [*middles, *spread])]
@@ -57,6 +63,20 @@ class Starts:
             done |= set(fresh)
             yield from fresh
 
+    def missed(self, branches: Sequence[Branch]) -> list[tuple[str, float]]:
+        """Regions and values at which a continuum of equilibria is part of no branch."""
+        found = []
+        for region, value in self._continua:
+            inside = self._field.signs.shape[1] == 0 or any(
+                e.continuum and e.admissible and e.region == self._field.regions[region]
+                for e in solve_at(self._field, value, virtual=True)
+            )
+            near = 1e-9 * (self._over[1] - self._over[0])
+            vertical = any(_upright(b, value, near, self.scale()) for b in branches)
+            if inside and not vertical:
+                found.append((self._field.regions[region], value))
+        return found
+
     def scale(self) -> Array:
         """Unit of each state, the size of its equilibria, and the length of the range."""
         if self._scale is not None:
@@ -64,9 +84,19 @@ class Starts:
         states = [e.state for v in self._first for e in (*self.at(v, True), *self.at(v, False))]
         n = self._field.n
         size = np.abs(states).max(axis=0) if states else np.zeros(n)
-        size = np.where(size > 1e-14 * max(size.max(initial=0.0), 1e-300), size, 1.0)
+        spread = np.ptp(states, axis=0) if states else np.zeros(n)
+        # far from zero it is the differences that count
+        moved = np.where(spread > 1e-9 * size, np.maximum(spread, 1e-3 * size), size)
+        size = np.where(size > 1e-14 * max(size.max(initial=0.0), 1e-300), moved, 1.0)
         self._scale = np.append(size, self._over[1] - self._over[0])
         return self._scale
+
+
+def _upright(branch: Branch, value: float, near: float, scale: Array) -> bool:
+    """Whether a branch has a vertical piece at a parameter value."""
+    step = np.abs(np.diff(branch.state, axis=0) / scale[:-1]).max(axis=1)
+    there = np.abs(branch.parameter - value) < near
+    return bool(np.any(there[1:] & there[:-1] & (step > 1e-6)))
 
 
 @lru_cache(maxsize=64)

@@ -117,7 +117,9 @@ def continue_equilibria(
                     branches += _branches(field, curve, window, marks, admissible)
         branches += _switched(field, branches, window, settings, marks, admissible)
     full = len(branches) >= settings.branches
-    traced = not full and all(o.success for branch in branches for o in branch.outcomes)
+    missed = starts.missed(branches)
+    sound = all(o.success for branch in branches for o in branch.outcomes)
+    traced = sound and not full and not missed
     return Diagram(
         model.states,
         name,
@@ -130,7 +132,16 @@ def continue_equilibria(
         _interface_values(field),
         _text(model),
         _corrector(field),
-        _too_many(settings) if full else SEARCHED,
+        _too_many(settings) if full else _continuum(name, missed) if missed else SEARCHED,
+    )
+
+
+def _continuum(name: str, missed: Sequence[tuple[str, float]]) -> Outcome:
+    places = "; ".join(f"{name} = {value:.6g} in {region}" for region, value in missed)
+    return Outcome(
+        "continuum",
+        f"the equilibria form a continuum that no branch runs through: {places}.",
+        False,
     )
 
 
@@ -279,7 +290,9 @@ def _passes(
     u = np.append(start.state, value)
     rows = np.column_stack([branch.state, branch.parameter])
     if len(rows) < 2:
-        return bool(np.abs((rows[0] - u) / window.scale).max() < 1e-6)
+        # where the equations are singular all along a line, one point of it is enough
+        apart = np.abs((rows[0] - u) / window.scale)
+        return bool(apart[:-1].max() < 1e-6)
     for k in loop("passing")(rows, window.scale, u, 1e-2):
         chord = (rows[k + 1] - rows[k]) / window.scale
         length = max(float(chord @ chord), 1e-300)

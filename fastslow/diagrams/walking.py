@@ -16,6 +16,9 @@ from fastslow.results.outcome import Outcome
 
 Array = NDArray[np.float64]
 
+#: How far inside the range, in parts of it, an end is looked for where there is none at its edge.
+SHORT_OF_RANGE = (0.0, 1e-9, 1e-6, 1e-3)
+
 #: Pieces (regions in order) that one branch may have.
 PIECES = 1000
 
@@ -291,23 +294,31 @@ def _led_into(
 def _cut_at_range(
     field: FrozenField, region: int, u: Array, tangents: Array, window: Window
 ) -> tuple[Array, Array]:
-    """Replace the last row, beyond the range, by the point exactly at its end."""
-    last = u[-1, -1]
-    bound = window.lower if last < window.lower else window.upper
-    before = u[-2]
-    part = (bound - before[-1]) / (last - before[-1]) if last != before[-1] else 0.0
+    """Replace the last row, beyond the range, by the point exactly at its end.
+
+    Where the rates are not defined there, by the nearest that is found inside.
+    """
+    beyond, before = u[-1], u[-2]
+    below = beyond[-1] < window.lower
+    bound = window.lower if below else window.upper
     along = np.zeros(u.shape[1])
     along[-1] = 1.0
-    guess = before + part * (u[-1] - before)
-    found = field.refined(region, guess, window.scale, normal=along, point=bound * along)
-    if not found.converged or not np.all(np.isfinite(found.u)):
-        return u[:-1], tangents[:-1]
-    u[-1] = found.u
-    u[-1, -1] = bound
-    tangents[-1] = _oriented(field.tangent(region, u[-1], window.weight)[0], tangents[-1], window)
-    if np.abs((u[-1] - u[-2]) / window.scale).max() < 1e-13:
-        return u[:-1], tangents[:-1]
-    return u, tangents
+    for short in SHORT_OF_RANGE:
+        target = bound + (short if below else -short) * (window.upper - window.lower)
+        if not min(before[-1], beyond[-1]) <= target <= max(before[-1], beyond[-1]):
+            break
+        part = (target - before[-1]) / (beyond[-1] - before[-1]) if beyond[-1] != before[-1] else 0
+        guess = before + part * (beyond - before)
+        found = field.refined(region, guess, window.scale, normal=along, point=target * along)
+        if found.converged and np.all(np.isfinite(found.u)):
+            end = found.u
+            end[-1] = target
+            if np.abs((end - before) / window.scale).max() < 1e-13:
+                break
+            tangent = field.tangent(region, end, window.weight)[0]
+            u[-1], tangents[-1] = end, _oriented(tangent, tangents[-1], window)
+            return u, tangents
+    return u[:-1], tangents[:-1]
 
 
 def _oriented(tangent: Array, along: Array, window: Window) -> Array:
@@ -351,6 +362,14 @@ def _outcome(
     settings: Continuation,
 ) -> Outcome:
     where = _where(field, u)
+    near = 1e-12 * max(abs(window.lower), abs(window.upper), window.upper - window.lower)
+    if status == loops.RANGE and min(u[-1] - window.lower, window.upper - u[-1]) > near:
+        return Outcome(
+            "edge of domain",
+            f"followed to {where}; no equilibrium was found at the end of the range itself, where "
+            "the rates may not be defined.",
+            False,
+        )
     if status == loops.RANGE:
         return Outcome(
             "end of range", f"reached {field.parameter} = {u[-1]:g}, the end of the range.", True

@@ -1,0 +1,117 @@
+"""Pairs of special points in one step, edges of the domain, continua, offsets and bad scales."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+
+x, y, p, q = sp.symbols("x y p q")
+
+
+def test_a_fold_curve_is_one_of_folds_from_every_fold():
+    """x' = p + q x + x²/2 − x⁴/4: folds on q = x³ − x, cusps at (1/12, ∓2/√27)."""
+    model = fs.Model({x: p + q * x - x**4 / 4 + x**2 / 2}, parameters={p: 0, q: 0.1})
+    folds = fs.continue_equilibria(model, "p", (-1, 1)).folds
+    assert len(folds) == 3
+    for fold in folds:
+        curve = fs.continue_points(fold, ("p", "q"), over={"p": (-1, 1), "q": (-1, 1)})
+        s = curve["x"]
+        assert curve["q"] == pytest.approx(s**3 - s, abs=1e-14)
+        assert curve["p"] + curve["q"] * s - s**4 / 4 + s**2 / 2 == pytest.approx(0, abs=1e-14)
+        assert sorted(c["q"] for c in curve.special("CP")) == pytest.approx(
+            [-2 / np.sqrt(27), 2 / np.sqrt(27)], rel=1e-12
+        )
+
+
+def test_two_folds_within_one_step_are_both_found():
+    diagram = fs.continue_equilibria(
+        fs.Model({x: p + x / 10000 - x**3}, parameters={p: 0}), "p", (-1, 1)
+    )
+    at = 0.01 / np.sqrt(3)
+    assert sorted(f["x"] for f in diagram.folds) == pytest.approx([-at, at], rel=1e-11)
+    assert [f["p"] for f in diagram.folds] == pytest.approx([2 * at**3, -2 * at**3], rel=1e-11)
+    assert np.all(np.diff(diagram.branches[0]["x"]) > 0)
+
+
+def test_two_hopf_points_within_one_step_are_both_found():
+    """Growth p² − 10⁻⁶: stable only for |p| < 10⁻³."""
+    growth = p**2 - sp.Rational(1, 10**6) - x**2 - y**2
+    model = fs.Model({x: growth * x - y, y: x + growth * y}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, "p", (-1, 1.1))
+    assert [h["p"] for h in diagram.special("HB")] == pytest.approx([-1e-3, 1e-3], rel=1e-10)
+    assert diagram.at(p=0)[0].stable
+
+
+def test_a_fold_far_from_zero():
+    diagram = fs.continue_equilibria(
+        fs.Model({x: p - (x - 10**6) ** 2}, parameters={p: 0}), "p", (-1, 1)
+    )
+    (fold,) = diagram.folds
+    assert [fold["x"], fold["p"]] == pytest.approx([1e6, 0], abs=1e-9)
+    assert diagram.branches[0].outcome.code == "end of range"
+
+
+def test_where_the_rates_end_the_branch_says_so():
+    """Logistic growth to the capacity q, which must not be zero."""
+    diagram = fs.continue_equilibria(fs.Model({x: x * (1 - x / q)}, parameters={q: 1}), "q", (0, 5))
+    assert len(diagram.branches) == 2
+    for branch in diagram.branches:
+        assert branch.parameter.min() < 1e-7
+        assert branch.outcomes[0].code == "edge of domain"
+        assert not branch.outcomes[0].success
+        assert "may not be defined" in branch.outcomes[0].message
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+@pytest.mark.parametrize("level", [1e-6, 1e6])
+def test_floats_of_any_size_in_equations_with_an_interface(unit, level):
+    a, b = x / sp.Float(unit), p / sp.Float(level)
+    rate = sp.Float(unit) * (b + a - a**3 + sp.Abs(a - sp.Rational(1, 5)) / 4)
+    diagram = fs.continue_equilibria(fs.Model({x: rate}, parameters={p: 0}), "p", (-level, level))
+    assert diagram.coverage == "complete"
+    # slopes 1 ± 1/4 − 3a²
+    folds = sorted(f["x"] / unit for f in diagram.folds)
+    assert folds == pytest.approx([-0.5, np.sqrt(5 / 12)], rel=1e-12)
+    (corner,) = diagram.boundary_equilibria
+    assert corner["x"] / unit == pytest.approx(0.2, rel=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("rate", "value"), [(p, 0), ((3 * p - 1) * (x**2 + 1), 1 / 3), (p * (1 - x), 0)]
+)
+def test_a_continuum_that_is_no_branch_is_said(rate, value):
+    diagram = fs.continue_equilibria(fs.Model({x: rate}, parameters={p: 0}), "p", (-1, 1.2))
+    assert diagram.coverage == "found"
+    assert diagram.outcome.code == "continuum"
+    assert f"p = {value:.6g}" in diagram.outcome.message
+
+
+def test_a_line_of_double_roots_is_one_branch():
+    diagram = fs.continue_equilibria(fs.Model({x: x**2}, parameters={p: 0}), "p", (-1, 1))
+    assert len(diagram.branches) == 1
+
+
+def test_virtual_folds_are_called_virtual():
+    model = fs.Model({x: p - sp.Abs(x) - x**2 / 4}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, "p", (-2, 1), virtual=True)
+    assert {(f["x"], f.admissible) for f in diagram.folds} == {(-2.0, False), (2.0, False)}
+    assert all("virtual" in f.description for f in diagram.folds)
+    (corner,) = [c for c in diagram.boundary_equilibria if c.admissible]
+    assert corner.subtype == "non-smooth fold"
+
+
+def test_curves_end_exactly_on_interfaces():
+    both = fs.Model({x: p - x - sp.Abs(x) / 2, y: q - y - sp.Abs(y) / 2}, parameters={p: 0, q: 0.5})
+    corner = fs.continue_equilibria(both, "p", (-1, 1)).boundary_equilibria[0]
+    curve = fs.continue_points(corner, ("p", "q"), over={"p": (-1, 1), "q": (-1, 1)})
+    assert {o.code for o in curve.outcomes} == {"interfaces meet", "end of range"}
+    assert sorted(curve["q"][[0, -1]]) == pytest.approx([0, 1], abs=1e-15)
+    bent = fs.Model({x: sp.Max(x - q, 0) + p - x**2}, parameters={p: 0, q: 0.5})
+    fold = fs.continue_equilibria(bent, "p", (-1, 1)).folds[0]
+    over = {"p": (-1, 1), "q": (-1, 1)}
+    curve = fs.continue_points(fold, ("p", "q"), over=over, virtual=False)
+    assert curve.admissible.all()
+    (point,) = curve.special("BF")
+    assert curve.special_rows[0] in (0, len(curve) - 1)
+    assert [point["p"], point["q"]] == pytest.approx([0, 0], abs=1e-14)
