@@ -178,12 +178,26 @@ def _way(scaled: Array, old: Array, new: Array) -> Array:
     return np.asarray(done / np.where(length > 0, length, np.inf))
 
 
+def _first_of(first: Array, candidate: Array) -> int:
+    """The nearest sheet at the start; of several as near, the one that the motion turns to."""
+    # sheets are interpolated, to about four digits of their distance
+    tied = np.flatnonzero(first <= 1.001 * first.min())
+    if len(tied) > 1:
+        later = candidate[:, tied]
+        present = np.isfinite(later).all(axis=1)
+        later = later[present]
+        split = np.flatnonzero(later.min(axis=1) < 0.5 * later.max(axis=1))
+        if len(split):
+            return int(tied[np.argmin(later[split[0]])])
+    return int(tied[0])
+
+
 def _followed(scaled: Array, places: Array, present: NDArray[np.bool_]) -> NDArray[np.intp]:
     """The followed sheet at each sample."""
     apart = np.linalg.norm(scaled[:, None] - places, axis=2)
     candidate = np.where(present, apart, np.inf)
     first = candidate[0] if np.isfinite(candidate[0]).any() else apart[0]
-    current = int(np.argmin(first))
+    current = _first_of(first, candidate)
     followed = np.empty(len(apart), dtype=np.intp)
     done = 0
     while done < len(apart):

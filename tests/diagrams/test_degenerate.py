@@ -77,14 +77,24 @@ def test_floats_of_any_size_in_equations_with_an_interface(unit, level):
     assert corner["x"] / unit == pytest.approx(0.2, rel=1e-13)
 
 
-@pytest.mark.parametrize(
-    ("rate", "value"), [(p, 0), ((3 * p - 1) * (x**2 + 1), 1 / 3), (p * (1 - x), 0)]
-)
+@pytest.mark.parametrize(("rate", "value"), [(p, 0), ((3 * p - 1) * (x**2 + 1), 1 / 3)])
 def test_a_continuum_that_is_no_branch_is_said(rate, value):
     diagram = fs.continue_equilibria(fs.Model({x: rate}, parameters={p: 0}), "p", (-1, 1.2))
     assert diagram.coverage == "found"
     assert diagram.outcome.code == "continuum"
     assert f"p = {value:.6g}" in diagram.outcome.message
+
+
+def test_a_vertical_branch_is_reached_from_a_branch_point():
+    """p (1 − x): the line x = 1 and every x at p = 0, which has no end."""
+    model = fs.Model({x: p * (1 - x)}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, "p", (-1, 1.2), settings=fs.Continuation(points=200))
+    line, vertical = diagram.branches
+    assert np.abs(line["x"] - 1).max() < 1e-14
+    assert np.abs(vertical.parameter).max() < 1e-14
+    assert np.ptp(vertical["x"]) > 1
+    assert vertical.outcome.code == "too many points"
+    assert diagram.coverage == "found"
 
 
 def test_a_line_of_double_roots_is_one_branch():

@@ -107,3 +107,16 @@ def test_wrong_pairs_are_refused(lay, gear):
     frozen = fs.continue_equilibria(gear.frozen().with_parameters(w=1), "A", (1, 2))
     with pytest.raises(fs.FastSlowError, match="unknown slow quantity of the trajectory 'A'"):
         fs.overlay(frozen, lay.run)
+
+
+def test_at_equal_distances_the_sheet_that_the_motion_turns_to_is_the_first():
+    """From x = 0 the sheets at ±1 of x' = x − x³ + w are as near; the load goes up."""
+    x, w, t = sp.symbols("x w t")
+    model = fs.Model({x: x - x**3 + w}, forcing={w: sp.sin(t / 100) / 10})
+    diagram = fs.continue_equilibria(model.frozen(), "w", (-0.2, 0.2))
+    run = fs.simulate(model, [0], t=(0, 300))
+    lay = fs.overlay(diagram, run)
+    assert lay.transitions == ()
+    down = fs.Model({x: x - x**3 + w}, forcing={w: -sp.sin(t / 100) / 10})
+    other = fs.overlay(diagram, fs.simulate(down, [0], t=(0, 300)))
+    assert other.transitions == ()
