@@ -66,13 +66,8 @@ class Search:
             before, after = int(known[k]), int(known[k + 1])
             if after - before <= 2:
                 yield Bracket(before, (u[before], u[after]), (test[before], test[after]))
-        size = np.abs(test)
-        low = np.flatnonzero(
-            (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:]) & (size[1:-1] > 0)
-        )
-        for k in low + 1:
-            if test[k - 1] * test[k] > 0 and test[k] * test[k + 1] > 0:
-                yield from self._dip(int(k), test)
+        for k in _dips(test):
+            yield from self._dip(k, test)
 
     def _dip(self, row: int, test: Array) -> Iterator[Bracket]:
         """Two changes of sign beside a row at which the test is smallest, if there are."""
@@ -146,3 +141,16 @@ class Search:
         part = float(gap @ chord) / length
         aside = float(np.linalg.norm(gap - part * chord))
         return -0.05 <= part <= 1.05 and aside <= 0.5 * np.sqrt(length) + 1e-9
+
+
+def _dips(test: Array) -> list[int]:
+    """Rows at which a test comes near to zero and turns: the parabola through three says so."""
+    if len(test) < 3:
+        return []
+    size = np.abs(test)
+    before, here, after = size[:-2], size[1:-1], size[2:]
+    alike = (test[:-2] * test[1:-1] > 0) & (test[1:-1] * test[2:] > 0)
+    bend, slope = before + after - 2.0 * here, 0.5 * (after - before)
+    low: NDArray[np.bool_] = alike & (here <= before) & (here <= after) & (bend > 0)
+    least = here - slope**2 / np.where(bend > 0, 2.0 * bend, 1.0)
+    return [int(k) + 1 for k in np.flatnonzero(low & (least < 0.5 * here))]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -65,17 +65,26 @@ class Starts:
 
     def missed(self, branches: Sequence[Branch]) -> list[tuple[str, float]]:
         """Regions and values at which a continuum of equilibria is part of no branch."""
-        found = []
-        for region, value in self._continua:
-            inside = self._field.signs.shape[1] == 0 or any(
+        near = 1e-9 * (self._over[1] - self._over[0])
+        return [
+            (self._field.regions[region], value)
+            for region, value in self._within
+            if not any(_upright(b, value, near, self.scale()) for b in branches)
+        ]
+
+    @cached_property
+    def _within(self) -> list[tuple[int, float]]:
+        """Those continua that lie in their region, at least in part."""
+        bounded = bool(self._field.interfaces)
+        return [
+            (region, value)
+            for region, value in self._continua
+            if not bounded
+            or any(
                 e.continuum and e.admissible and e.region == self._field.regions[region]
                 for e in solve_at(self._field, value, virtual=True)
             )
-            near = 1e-9 * (self._over[1] - self._over[0])
-            vertical = any(_upright(b, value, near, self.scale()) for b in branches)
-            if inside and not vertical:
-                found.append((self._field.regions[region], value))
-        return found
+        ]
 
     def scale(self) -> Array:
         """Unit of each state, the size of its equilibria, and the length of the range."""
