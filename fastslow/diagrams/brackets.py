@@ -66,8 +66,8 @@ class Search:
             before, after = int(known[k]), int(known[k + 1])
             if after - before <= 2:
                 yield Bracket(before, (u[before], u[after]), (test[before], test[after]))
-        for k in _dips(test):
-            yield from self._dip(k, test)
+        for row in _dips(test):
+            yield from self._dip(row, test)
 
     def _dip(self, row: int, test: Array) -> Iterator[Bracket]:
         """Two changes of sign beside a row at which the test is smallest, if there are."""
