@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fastslow.continuation.curves import Frame
 from fastslow.continuation.location import newton
 from fastslow.diagrams.defining import Defining, OnInterface, Pair
+from fastslow.diagrams.detection import pair_sums
 from fastslow.diagrams.normal_forms import (
     Vector,
     cusp_form,
@@ -212,7 +213,9 @@ def _fold_tests(system: Defining) -> Iterator[Criterion]:
         values = np.linalg.eigvals(system.jacobian(z))
         return np.asarray(values[np.argsort(np.abs(values))[1:]])
 
-    yield Criterion("ZH", lambda z: _sums(rest(z)), lambda z: _imaginary(rest(z)), region)
+    yield Criterion(
+        "ZH", lambda z: float(pair_sums(rest(z))), lambda z: _imaginary(rest(z)), region
+    )
 
 
 def _pair_tests(system: Pair) -> Iterator[Criterion]:
@@ -239,7 +242,7 @@ def _pair_tests(system: Pair) -> Iterator[Criterion]:
         return np.array(kept)
 
     yield Criterion(
-        "HH", lambda z: _sums(rest(z)), lambda z: hopf(z) and _imaginary(rest(z)), region
+        "HH", lambda z: float(pair_sums(rest(z))), lambda z: hopf(z) and _imaginary(rest(z)), region
     )
 
 
@@ -260,18 +263,11 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
         return
     yield Criterion(
         "BH",
-        lambda z: _sums(eigenvalues(z)),
+        lambda z: float(pair_sums(eigenvalues(z))),
         lambda z: _imaginary(eigenvalues(z)),
         region,
         system.interface,
     )
-
-
-def _sums(values: Vector) -> float:
-    """Product of the sums of all pairs, in units of the largest eigenvalue."""
-    first, second = np.triu_indices(len(values), 1)
-    size = max(float(np.abs(values).max()), 1e-300)
-    return float(np.prod((values[first] + values[second]) / size).real)
 
 
 def _imaginary(values: Vector) -> bool:

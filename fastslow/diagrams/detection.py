@@ -110,7 +110,7 @@ def _pairs(n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return first, second
 
 
-def _sums(eigenvalues: NDArray[np.complex128]) -> Array:
+def pair_sums(eigenvalues: NDArray[np.complex128]) -> Array:
     """Product of the sums of all pairs, each in units of the largest eigenvalue."""
     first, second = _pairs(eigenvalues.shape[-1])
     sums = eigenvalues[..., first] + eigenvalues[..., second]
@@ -125,7 +125,7 @@ def _turning_pairs(
     if eigenvalues.shape[1] < 2:
         return
     first, second = _pairs(eigenvalues.shape[1])
-    test = _sums(eigenvalues)
+    test = pair_sums(eigenvalues)
 
     def curve(u: Array) -> tuple[Array, Array]:
         return field.curve(region, u)
@@ -137,7 +137,7 @@ def _turning_pairs(
         return turning_pair(curve, u, window.scale, squared)
 
     search = Search(
-        field, piece, window, lambda u, _: float(_sums(field.finite_eigenvalues(region, u)))
+        field, piece, window, lambda u, _: float(pair_sums(field.finite_eigenvalues(region, u)))
     )
     for bracket in search.brackets(np.where(np.abs(test) < 1e-14, 0.0, test)):
         located = search.solve(bracket, locate)
