@@ -29,7 +29,14 @@ from fastslow.compiled.pointers import SIGNATURE
 
 @cfunc(SIGNATURE, cache=True, error_model="numpy")
 def series(mode, inputs, parameters, W):
+    n = {order}
+    if mode >= {short_from}:
+        mode -= {short_from}
+        n = {short}
 '''
+
+#: Order of the short series, which a mode and the number of all modes ask for together.
+SHORT = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +48,8 @@ class CompiledSeries:
     slow states, slow quantities, interface functions, the two drifts that
     decide where sliding ends, then work space. In a gradient mode ``inputs``
     goes on with the slow quantities, and the output is h, the sum of the
-    moduli of its terms, and its gradient by states and slow states.
+    moduli of its terms, and its gradient by states and slow states. A mode
+    beyond all these is the first of them again with only `SHORT` coefficients.
 
     Parameters
     ----------
@@ -255,7 +263,11 @@ def _source(equations: _Equations, n_parameters: int) -> tuple[str, int]:
         lines.append(f"    {'if' if number == 0 else 'elif'} mode == {number}:")
         lines += [f"        {line}" for line in body]
     header = _HEADER.format(
-        order=equations.order, modes=len(equations.modes), states=len(equations.states)
+        order=equations.order,
+        modes=len(equations.modes),
+        states=len(equations.states),
+        short=min(SHORT, equations.order),
+        short_from=len(bodies),
     )
     return header + "\n".join(lines) + "\n", n_rows
 
@@ -275,20 +287,19 @@ def _mode_source(equations: _Equations, mode: _Mode) -> tuple[list[str], int]:
     rates = [work.row(rate) for rate in mode.rates]
     held = {row: work.row(expression) for row, expression in outputs.items()}
     copies = {row: source for row, source in held.items() if row != source}
-    n = equations.order
     body = ["t = inputs[0]"]
     body += [f"{work.at(i, '0')} = inputs[{i + 1}]" for i in range(m)]
     body += [f"{name} = {code}" for code, name in work.scalars.items()]
     body += work.values()
     body += [f"{work.at(i, '1')} = {work.at(r, '0')}" for i, r in enumerate(rates)]
-    body += [f"for k in range(1, {n}):", "    q = 1.0 / k"]
+    body += ["for k in range(1, n):", "    q = 1.0 / k"]
     body += ["    " + line for line in work.general()]
     body += ["    r = 1.0 / (k + 1)"]
     body += [f"    {work.at(i, 'k + 1')} = {work.at(r)} * r" for i, r in enumerate(rates)]
     last = work.general(tuple(held.values()))
-    body += [f"k = {n}", "q = 1.0 / k", *last] if last else []
+    body += ["k = n", "q = 1.0 / k", *last] if last else []
     if copies:
-        body += [f"for k in range({n + 1}):"]
+        body += ["for k in range(n + 1):"]
         body += [f"    {work.at(row)} = {work.at(source)}" for row, source in copies.items()]
     return body, work.next
 

@@ -16,6 +16,7 @@ from fastslow.simulation.modes import (
     step_length,
 )
 from fastslow.simulation.polynomials import ZERO, horner
+from fastslow.simulation.settled import DAMPING, PAYS, long_step, settled
 
 #: How the loop ended.
 REACHED_END = 0
@@ -102,7 +103,8 @@ def drive(
     layout : tuple of int
         (n_states, n_forcing, n_interfaces, n_modes, order).
     sizes : tuple of int
-        (number of rows that the series fills, work space for the event search).
+        (number of rows that the series fills, work space for the event search,
+        number of fast states, or 0 for no implicit steps).
     signs : int64 array, shape (n_modes, n_interfaces)
     continuous : bool array, shape (n_interfaces,)
     parameters, start : float64 arrays
@@ -145,7 +147,7 @@ def drive(
         How many samples were reached.
     """
     n_states, n_forcing, n_interfaces, n_modes, order = layout
-    n_rows, stack_rows = sizes
+    n_rows, stack_rows, n_fast = sizes
     columns = order + 1
     kept = n_states + n_forcing
     drift = kept + n_interfaces
@@ -158,6 +160,9 @@ def drive(
     for i in range(n_states):
         inputs[1 + i] = start[i]
     work, W = np.empty(size), np.empty(size)
+    right, poly = np.empty(size if n_fast > 0 else 0), np.empty(size if n_fast > 0 else 0)
+    matrices = np.empty((2, n_states, n_states + 1))
+    vectors = np.empty((5, max(1 + kept, columns)))
     b, d = np.empty(columns), np.empty(columns)
     stack = np.empty((stack_rows, columns + 3))
     gradient = np.empty(2 + n_states)
@@ -171,9 +176,11 @@ def drive(
     offsets = np.empty(times.shape[0])
     n_steps = n_crossings = n_samples = crowd = ZERO
     mode = interface = np.int64(-1)
-    depth, floor, last_event, usual = 1.0, 0.0, -np.inf, 0.0
+    depth, floor, last_event, usual, longest = 1.0, 0.0, -np.inf, 0.0, 0.0
     code = REACHED_END
     choosing, touched = True, False
+    # implicit steps: when to try again, how long to wait after a failure, how many, how long
+    calm, pause, in_a_row, wanted = ZERO + 4, ZERO + 4, ZERO, 0.0
     while True:
         if choosing:
             call_address(address, max(mode, 0), inputs, parameters, work)
@@ -232,35 +239,48 @@ def drive(
                 code = TOO_MANY_CROSSINGS
                 break
             choosing = touched = False
+            calm = pause = ZERO + 4
+            in_a_row = ZERO
         remaining = (stop - t) - late
         if not remaining > 0.0:
             break
         if n_steps == limits[0]:
             code = TOO_MANY_STEPS
             break
-        call_address(address, mode, inputs, parameters, W)
-        longest = step_length(W, drift, order, tol)
-        if not longest > 0.0:
-            code = NOT_FINITE
-            break
-        final = longest >= remaining
-        # a step between two times that are exact in floating point loses none of it
-        h = remaining if final else (t + longest) - t
-        if h == 0.0:
-            code = STEP_TOO_SMALL
-            break
+        if in_a_row > 0:
+            # an implicit step has left the first coefficients of the series at its end
+            W, right = right, W
+        else:
+            call_address(address, mode, inputs, parameters, W)
+            longest = step_length(W, drift, order, tol)
+            if not longest > 0.0:
+                code = NOT_FINITE
+                break
+        taken, long = 0.0, False
         for i in range(n_states, kept):
             inputs[1 + i] = W[i * columns]
-        while True:
-            s, interface, touched, depth, floor = find_event(
+        calm -= 1
+        if n_fast > 0 and calm <= 0 and (in_a_row > 0 or settled(W, drift, order, longest, tol)):
+            if in_a_row == 0:
+                wanted = 1.25 * longest
+            taken, growth = long_step(
                 address,
                 layout,
+                n_fast,
                 signs,
                 mode,
                 inputs,
                 parameters,
+                tol,
+                wanted,
+                (1.1 if in_a_row < DAMPING else PAYS) * longest,
+                longest,
+                remaining,
                 W,
-                h,
+                right,
+                poly,
+                matrices,
+                vectors,
                 on,
                 rests,
                 noise,
@@ -268,17 +288,52 @@ def drive(
                 stack,
                 gradient,
             )
-            taken = s * h if interface >= 0 else h
-            # where a step grew much its last terms may be small by accident
-            doubtful = taken > 2.0 * usual or longest > 4.0 * remaining
-            if (
-                h == 0.0
-                or not doubtful
-                or holds(address, layout, mode, inputs, parameters, W, taken, tol, work)
-            ):
+            long = taken > 0.0
+            if long:
+                wanted, pause, in_a_row = growth * taken, ZERO + 4, in_a_row + 1
+                W, poly = poly, W
+                s, h, interface, final = 2.0, taken, ZERO - 1, taken >= remaining
+            else:
+                if in_a_row > 0:
+                    call_address(address, mode, inputs, parameters, W)
+                    longest = step_length(W, drift, order, tol)
+                pause = min(2 * pause, 64)
+                calm, in_a_row = pause, ZERO
+        if not long:
+            final = longest >= remaining
+            # a step between two times that are exact in floating point loses none of it
+            h = remaining if final else (t + longest) - t
+            if h == 0.0:
+                code = STEP_TOO_SMALL
                 break
-            h, final = (t + 0.25 * taken) - t, False
-        usual = max(taken, 0.1 * usual)
+            while True:
+                s, interface, touched, depth, floor = find_event(
+                    address,
+                    layout,
+                    signs,
+                    mode,
+                    inputs,
+                    parameters,
+                    W,
+                    h,
+                    on,
+                    rests,
+                    noise,
+                    b,
+                    stack,
+                    gradient,
+                )
+                taken = s * h if interface >= 0 else h
+                # where a step grew much its last terms may be small by accident
+                doubtful = taken > 2.0 * usual or longest > 4.0 * remaining
+                if (
+                    h == 0.0
+                    or not doubtful
+                    or holds(address, layout, mode, inputs, parameters, W, taken, tol, work)
+                ):
+                    break
+                h, final = (t + 0.25 * taken) - t, False
+            usual = max(taken, 0.1 * usual)
         if h == 0.0:
             code = STEP_TOO_SMALL
             break

@@ -29,11 +29,11 @@ from fastslow.simulation.many_arguments import (
 from fastslow.simulation.outcomes import outcome_of
 from fastslow.simulation.trajectories import (
     SOURCES,
-    STACK_ROWS,
     default_order,
     gap_of,
     layout_of,
     series_of,
+    sizes_of,
 )
 
 Floats = NDArray[np.float64]
@@ -132,6 +132,7 @@ def simulate_many(
     tol: float = 1e-9,
     samples: int | Sequence[float] | Floats | None = None,
     order: int | None = None,
+    implicit: bool = True,
     gap: str | None = None,
     max_steps: int = 1_000_000,
     max_crossings: int = 1_000_000,
@@ -170,6 +171,8 @@ def simulate_many(
         How many evenly spaced samples of every column to keep, or at which times.
     order : int, optional
         Order of the series, 4 to 40; by default that of `simulate`.
+    implicit : bool
+        Whether an implicit method may take long steps through settled phases.
     gap : str, optional
         The region that counts as the gap for `Ensemble.regime`.
     max_steps, max_crossings : int
@@ -233,6 +236,7 @@ def simulate_many(
             run = _run(
                 compiled,
                 (tol, limits, threads),
+                sizes_of(model, compiled, implicit),
                 (values, starts[chosen], spans[chosen], since[chosen]),
                 times if len(times) == 1 else times[chosen],
                 columns if times.size else 0,
@@ -285,6 +289,7 @@ def _parameter_table(
 def _run(
     compiled: CompiledSeries,
     settings: tuple[float, tuple[int, int], int],
+    sizes: tuple[int, int, int],
     rows: tuple[Floats, Floats, Floats, Floats],
     times: Floats,
     n_columns: int,
@@ -307,7 +312,7 @@ def _run(
         _many_loop(),
         address=compiled.address,
         layout=layout_of(compiled),
-        sizes=(compiled.n_rows, STACK_ROWS),
+        sizes=sizes,
         signs=compiled.signs,
         continuous=compiled.continuous,
         tol=tol,

@@ -26,6 +26,7 @@ from fastslow.simulation.arguments import (
     whole_number,
 )
 from fastslow.simulation.outcomes import outcome_of
+from fastslow.simulation.settled import DEGREE
 
 _ARGUMENTS = (
     "address",
@@ -53,6 +54,7 @@ SOURCES = (
     "fastslow.simulation.extremes",
     "fastslow.simulation.modes",
     "fastslow.simulation.polynomials",
+    "fastslow.simulation.settled",
     "fastslow.compiled.parts",
     "fastslow.compiled.pointers",
 )
@@ -98,6 +100,7 @@ def simulate(
     samples: int | Sequence[float] | NDArray[np.float64] | None = None,
     dense: bool = True,
     order: int | None = None,
+    implicit: bool = True,
     gap: str | None = None,
     max_steps: int = 1_000_000,
     max_crossings: int = 1_000_000,
@@ -132,6 +135,9 @@ def simulate(
         memory does not grow with the number of steps by more than 24 bytes each.
     order : int, optional
         Order of the series, 4 to 40; by default chosen by the tolerance.
+    implicit : bool
+        Whether an implicit method may take long steps through settled phases,
+        in which stability and not accuracy limits the series.
     gap : str, optional
         The region that counts as the gap for `Trajectory.regime`.
     max_steps, max_crossings : int
@@ -181,7 +187,7 @@ def simulate(
     code, mode, end, n_steps, (steps, store, crossings), reached = drive_loop()(
         compiled.address,
         layout_of(compiled),
-        (compiled.n_rows, STACK_ROWS),
+        sizes_of(model, compiled, implicit),
         compiled.signs,
         compiled.continuous,
         compiled.parameter_array(model),
@@ -253,6 +259,12 @@ def layout_of(compiled: CompiledSeries) -> tuple[int, int, int, int, int]:
         len(compiled.modes),
         compiled.order,
     )
+
+
+def sizes_of(model: Model, compiled: CompiledSeries, implicit: bool) -> tuple[int, int, int]:
+    """Rows of the series, of the event search, and fast states if implicit steps are wanted."""
+    settling = implicit and compiled.order >= DEGREE
+    return compiled.n_rows, STACK_ROWS, len(model.states) if settling else 0
 
 
 def drive_loop() -> Callable[..., Any]:

@@ -1,0 +1,393 @@
+"""Long implicit steps through settled phases, where stability and not accuracy limits a series.
+
+A step of Hermite and Obreshkov matches the Taylor series at its two ends: with
+the Taylor coefficients Y_j at both, P of the first and Q of the second,
+
+    sum_{j=0}^{Q} (-1)^j c_j(Q, P) h^j Y_j(y_1) = sum_{j=0}^{P} c_j(P, Q) h^j Y_j(y_0),
+    c_j(q, p) = q! (q + p - j)! / ((p + q)! (q - j)!)
+
+(Obreshkov 1940; Nedialkov and Jackson 1999, eq. 2.4), of order P + Q. Its
+stability function is Padé's, L-stable for Q = P + 1 and P + 2 (Ehle 1973; Hairer
+and Wanner 1996, thm. IV.4.12). The polynomial of degree P + Q + 1 that has the
+same coefficients at both ends takes the place of the series of the step.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.compiled.parts import part
+from fastslow.compiled.pointers import call_address
+from fastslow.compiled.series import SHORT
+from fastslow.simulation.events import find_event
+
+#: Taylor coefficients that are matched at the beginning and at the end of a step.
+P, Q = 2, SHORT
+
+#: Degree of the polynomial of a step; its series must have this order at least.
+DEGREE = P + Q + 1
+
+#: A step must be this much longer than that of the series to be worth its cost, except
+#: for the first ones, which damp what the series has left of fast motions.
+PAYS = 3.0
+DAMPING = 6
+
+#: How much at least all motions of the fast states decay within a step of the series.
+CONTRACTION = 0.01
+
+
+def weights(q: int, p: int) -> tuple[float, ...]:
+    """The factors c_j(q, p) of the Taylor coefficients, without signs.
+
+    Examples
+    --------
+    >>> weights(1, 1)
+    (1.0, 0.5)
+    """
+    whole = math.factorial(p + q)
+    return tuple(
+        math.factorial(q) * math.factorial(q + p - j) / (whole * math.factorial(q - j))
+        for j in range(q + 1)
+    )
+
+
+_LEFT, _RIGHT = np.array(weights(P, Q)), np.array(weights(Q, P))
+# the method of one order less that shares the end, whose difference estimates the error
+_LESS_LEFT, _LESS_RIGHT = np.array(weights(P - 1, Q)), np.array(weights(Q, P - 1))
+
+#: Largest value of s**(P + 1) (1 - s)**(Q + 1) on [0, 1].
+_HUMP = (P + 1) ** (P + 1) * (Q + 1) ** (Q + 1) / (P + Q + 2) ** (P + Q + 2)
+
+
+def _quotient() -> NDArray[np.float64]:
+    """From the coefficients of s**(P + 1) q(s) about s = 1 to those of q about s = 0."""
+    rows = np.eye(Q + 1)
+    for _ in range(P + 1):
+        for i in range(1, Q + 1):
+            rows[i] -= rows[i - 1]
+    for j in range(Q):
+        for k in range(Q - 1, j - 1, -1):
+            rows[k] -= rows[k + 1]
+    return rows
+
+
+_QUOTIENT = _quotient()
+_BINOMIAL = np.array([[float(math.comb(k, i)) for i in range(P + 1)] for k in range(P + 1)])
+
+
+@part
+def long_step(
+    address,
+    layout,
+    n_fast,
+    signs,
+    mode,
+    inputs,
+    parameters,
+    tol,
+    wanted,
+    least,
+    longest,
+    remaining,
+    W,
+    right,
+    poly,
+    matrices,
+    vectors,
+    on,
+    rests,
+    noise,
+    b,
+    stack,
+    gradient,
+):
+    """An implicit step that pays and that ends before anything happens.
+
+    Parameters
+    ----------
+    n_fast : int
+        The first states, those of the fast subsystem.
+    wanted, least, longest : float
+        The length to try first, the least that is worth while, and that of the series.
+    remaining : float
+        Time that is left.
+    W, right, poly : float64 arrays
+        The series at the beginning, of which the first coefficients are used;
+        filled: the short series at the end, and the polynomials of the step.
+    matrices : float64 array, shape (2, n_states, n_states + 1)
+    vectors : float64 array, shape (5, 1 + n_states + n_forcing or 1 + order, the larger)
+        Work space.
+
+    Returns
+    -------
+    length : float
+        0 where no such step pays.
+    growth : float
+        How much longer the next one may be.
+    """
+    for j in range(on.shape[0]):
+        if on[j] or signs[mode, j] == 0:
+            return 0.0, 1.0
+    h = min(wanted, remaining)
+    for _ in range(4):
+        if not h >= least:
+            return 0.0, 1.0
+        if h < remaining:
+            h = (inputs[0] + h) - inputs[0]
+        error = implicit_step(
+            address,
+            layout,
+            n_fast,
+            mode,
+            inputs,
+            parameters,
+            tol,
+            CONTRACTION / longest,
+            h,
+            W,
+            right,
+            poly,
+            matrices,
+            vectors,
+        )
+        if error <= 1.0:
+            s, j, _, _, _ = find_event(
+                address, layout, signs, mode, inputs, parameters, poly, h, on, rests, noise, b,
+                stack, gradient,
+            )  # fmt: skip
+            if j < 0:
+                return h, min(4.0, 0.8 * max(error, 1e-9) ** (-1.0 / (P + Q)))
+            # the series goes through events; end a little before this one
+            h *= 0.9 * s
+        else:
+            h *= max(0.2, 0.8 * error ** (-1.0 / (P + Q))) if error < np.inf else 0.25
+    return 0.0, 1.0
+
+
+@part
+def settled(W, n_rows, order, h, tol):
+    """Whether a step is limited by stability: its middle terms are small beside what is allowed.
+
+    A motion exp(lambda t) of size a has the terms a z**k / k!, z = lambda h. Where
+    accuracy limits the step the middle ones far exceed the last, which is the
+    tolerance; on the edge of stability, |z| = order / e, all of them are near it.
+    """
+    most = tol * math.exp(0.5 * order)
+    for i in range(n_rows):
+        row = i * (order + 1)
+        scale = 1.0 / (1.0 + abs(W[row]))
+        k = order // 2
+        for m in range(k - 1, k + 1):
+            if not abs(W[row + m]) * h**m * scale <= most:
+                return False
+    return True
+
+
+@part
+def implicit_step(
+    address,
+    layout,
+    n_fast,
+    mode,
+    inputs,
+    parameters,
+    tol,
+    rate,
+    h,
+    W,
+    right,
+    poly,
+    matrices,
+    vectors,
+):
+    """One implicit step, its polynomials put into ``poly``; returns its error in units of ``tol``.
+
+    Infinite where the equation is not solved, or where the fast states do not
+    contract at the given rate: an implicit method would damp what grows.
+    """
+    n, n_forcing, n_interfaces, n_modes, order = layout
+    columns = order + 1
+    short = n_modes + n_interfaces + mode
+    slopes, jacobian = matrices[0], matrices[1]
+    ahead, start, residual, moved, rest = vectors
+    ahead[0] = inputs[0] + h
+    for i in range(n):
+        row = i * columns
+        ahead[1 + i] = W[row] + h * (W[row + 1] + h * (W[row + 2] + h * W[row + 3]))
+        start[i] = matched(W, row, h, _LEFT)
+    call_address(address, short, ahead, parameters, right)
+    for i in range(n):
+        residual[i] = matched(right, i * columns, -h, _RIGHT) - start[i]
+    for k in range(n):
+        kept = ahead[1 + k]
+        ahead[1 + k] = kept + 1e-7 * (1.0 + abs(kept))
+        step = ahead[1 + k] - kept
+        call_address(address, short, ahead, parameters, poly)
+        for i in range(n):
+            row = i * columns
+            slopes[i, k] = (matched(poly, row, -h, _RIGHT) - start[i] - residual[i]) / step
+            jacobian[i, k] = (poly[row + 1] - right[row + 1]) / step
+        ahead[1 + k] = kept
+    # also says no where something is not finite
+    if not contracts(jacobian, n_fast, rate) or not factorise_in_place(slopes, n):
+        return np.inf
+    before = np.inf
+    for turn in range(8):
+        solve_in_place(slopes, residual, moved, n)
+        size = 0.0
+        for i in range(n):
+            ahead[1 + i] -= moved[i]
+            size = max(size, abs(moved[i]) / (1.0 + abs(ahead[1 + i])))
+        call_address(address, short, ahead, parameters, right)
+        if not size <= 0.5 * before or turn == 7:
+            return np.inf
+        # nothing is known of the rate of convergence before the second turn
+        ratio, before = size / before if turn > 0 else 0.1, size
+        if size * ratio <= max(1e-6 * tol, 1e-15) * (1.0 - ratio):
+            break
+        for i in range(n):
+            residual[i] = matched(right, i * columns, -h, _RIGHT) - start[i]
+    for i in range(n):
+        row = i * columns
+        residual[i] = matched(right, row, -h, _LESS_RIGHT) - matched(W, row, h, _LESS_LEFT)
+    solve_in_place(slopes, residual, moved, n)
+    error = 0.0
+    for i in range(n):
+        error = max(error, abs(moved[i]) / (1.0 + abs(ahead[1 + i])))
+    for i in range(n + n_forcing + n_interfaces):
+        row = i * columns
+        join(W, right, row, h, poly, rest)
+        # the first coefficient that is not matched tells how far the motion within leaves it
+        power = h ** (P + 1)
+        error_within = abs(W[row + P + 1] - poly[row + P + 1]) * power * _HUMP
+        error = max(error, error_within / (1.0 + abs(W[row])))
+        for k in range(P + Q + 2, columns):
+            poly[row + k] = 0.0
+    return error / tol if error < np.inf else np.inf
+
+
+@part
+def matched(W, row, h, factors):
+    """The sum of c_j h**j Y_j over one row."""
+    value = 0.0
+    for j in range(factors.shape[0] - 1, -1, -1):
+        value = value * h + factors[j] * W[row + j]
+    return value
+
+
+@part
+def join(W, right, row, h, poly, rest):
+    """The polynomial with the first coefficients of ``W`` at 0 and of ``right`` at h, one row.
+
+    It is the Taylor polynomial at 0 and s**(P + 1) times another one of degree Q:
+    what the first leaves of the coefficients at s = 1, divided by that power.
+    """
+    power = 1.0
+    for i in range(Q + 1):
+        rest[i] = right[row + i] * power
+        power *= h
+    power = 1.0
+    for k in range(P + 1):
+        poly[row + k] = W[row + k]
+        term = W[row + k] * power
+        for i in range(k + 1):
+            rest[i] -= _BINOMIAL[k, i] * term
+        power *= h
+    scale = 1.0 / power
+    for j in range(Q + 1):
+        value = 0.0
+        for i in range(Q + 1):
+            value += _QUOTIENT[j, i] * rest[i]
+        poly[row + P + 1 + j] = value * scale
+        scale /= h
+
+
+@part
+def contracts(jacobian, n, rate):
+    """Whether all eigenvalues of the first rows and columns have a real part below -rate.
+
+    By the coefficients of the characteristic polynomial (Faddeev and Le Verrier)
+    of the matrix moved by the rate, and the scheme of Routh.
+    """
+    if n < 3:
+        last = jacobian[n - 1, n - 1] + rate
+        if n == 1:
+            return last < 0.0
+        first = jacobian[0, 0] + rate
+        return first + last < 0.0 and first * last > jacobian[0, 1] * jacobian[1, 0]
+    moved, product = np.empty((n, n)), np.zeros((n, n))
+    c = np.empty(n + 1)
+    c[0] = 1.0
+    for i in range(n):
+        for j in range(n):
+            moved[i, j] = jacobian[i, j] + (rate if i == j else 0.0)
+    for k in range(1, n + 1):
+        # product = moved @ (product + c[k - 1] I)
+        for j in range(n):
+            product[j, j] += c[k - 1]
+        last = product.copy()
+        trace = 0.0
+        for i in range(n):
+            for j in range(n):
+                value = 0.0
+                for m in range(n):
+                    value += moved[i, m] * last[m, j]
+                product[i, j] = value
+            trace += product[i, i]
+        c[k] = -trace / k
+        if not c[k] > 0.0:
+            return False
+    above, below = np.zeros(n // 2 + 2), np.zeros(n // 2 + 2)
+    for k in range(n + 1):
+        if k % 2 == 0:
+            above[k // 2] = c[k]
+        else:
+            below[k // 2] = c[k]
+    for _ in range(n - 1):
+        if not below[0] > 0.0:
+            return False
+        ratio = above[0] / below[0]
+        for k in range(n // 2 + 1):
+            above[k] = above[k + 1] - ratio * below[k + 1]
+        above, below = below, above
+    return below[0] > 0.0
+
+
+@part
+def factorise_in_place(matrix, n):
+    """LU factors with the largest pivots; the last column keeps the exchanges of rows."""
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[pivot, k]):
+                pivot = i
+        matrix[k, n] = pivot
+        if not 0.0 < abs(matrix[pivot, k]) < np.inf:
+            return False
+        for j in range(n):
+            matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+        for i in range(k + 1, n):
+            matrix[i, k] /= matrix[k, k]
+            for j in range(k + 1, n):
+                matrix[i, j] -= matrix[i, k] * matrix[k, j]
+    return True
+
+
+@part
+def solve_in_place(factors, right, solution, n):
+    """Solve with the factors of `factorise_in_place`; the right-hand side is kept."""
+    for i in range(n):
+        solution[i] = right[i]
+    for k in range(n):
+        pivot = int(factors[k, n])
+        solution[k], solution[pivot] = solution[pivot], solution[k]
+    for i in range(n):
+        for j in range(i):
+            solution[i] -= factors[i, j] * solution[j]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            solution[i] -= factors[i, j] * solution[j]
+        solution[i] /= factors[i, i]
