@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from fastslow.results.overlays import Overlay
     from fastslow.results.point_branches import PointBranch
     from fastslow.results.points import Equilibrium, SpecialPoint
+    from fastslow.results.refined_maps import RefinedMap
     from fastslow.results.sections import Section
     from fastslow.results.spectra import Spectrum
     from fastslow.results.steady import SteadyState
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from fastslow.simulation.ensembles import simulate_many
     from fastslow.simulation.sweeping import bifurcation_sweep
     from fastslow.simulation.trajectories import simulate
+    from fastslow.sweeps.refinement import refined_map
     from fastslow.symbolic.derivation import Derivation, derive
     from fastslow.symbolic.reduction import reduce_to
     from fastslow.symbolic.scaling import disagreements, nondimensionalise
@@ -59,6 +61,7 @@ _HOME = {
     "ModelError": "errors",
     "Overlay": "results.overlays",
     "PointBranch": "results.point_branches",
+    "RefinedMap": "results.refined_maps",
     "Section": "results.sections",
     "SpecialPoint": "results.points",
     "Spectrum": "results.spectra",
@@ -77,6 +80,7 @@ _HOME = {
     "overlay": "passage.overlays",
     "plot": "",
     "reduce_to": "symbolic.reduction",
+    "refined_map": "sweeps.refinement",
     "simulate": "simulation.trajectories",
     "simulate_many": "simulation.ensembles",
     "systems": "",
@@ -97,6 +101,7 @@ __all__ = [
     "ModelError",
     "Overlay",
     "PointBranch",
+    "RefinedMap",
     "Section",
     "SpecialPoint",
     "Spectrum",
@@ -116,6 +121,7 @@ __all__ = [
     "overlay",
     "plot",
     "reduce_to",
+    "refined_map",
     "simulate",
     "simulate_many",
     "systems",
