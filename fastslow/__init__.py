@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     )
     from fastslow.model.model import Model
     from fastslow.passage.overlays import overlay
+    from fastslow.passage.regimes import regime_map
+    from fastslow.passage.slow_loads import slow_load_criterion, slow_load_gap
     from fastslow.results.branches import Branch
     from fastslow.results.diagrams import Diagram
     from fastslow.results.ensembles import Ensemble
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from fastslow.results.points import Equilibrium, SpecialPoint
     from fastslow.results.refined_maps import RefinedMap
     from fastslow.results.sections import Section
+    from fastslow.results.slow_loads import SlowLoad
     from fastslow.results.spectra import Spectrum
     from fastslow.results.steady import SteadyState
     from fastslow.results.sweeps import Sweep
@@ -63,6 +66,7 @@ _HOME = {
     "PointBranch": "results.point_branches",
     "RefinedMap": "results.refined_maps",
     "Section": "results.sections",
+    "SlowLoad": "results.slow_loads",
     "SpecialPoint": "results.points",
     "Spectrum": "results.spectra",
     "SteadyState": "results.steady",
@@ -81,8 +85,11 @@ _HOME = {
     "plot": "",
     "reduce_to": "symbolic.reduction",
     "refined_map": "sweeps.refinement",
+    "regime_map": "passage.regimes",
     "simulate": "simulation.trajectories",
     "simulate_many": "simulation.ensembles",
+    "slow_load_criterion": "passage.slow_loads",
+    "slow_load_gap": "passage.slow_loads",
     "systems": "",
     "tangencies": "diagrams.tangency_points",
     "warm": "warming",
@@ -103,6 +110,7 @@ __all__ = [
     "PointBranch",
     "RefinedMap",
     "Section",
+    "SlowLoad",
     "SpecialPoint",
     "Spectrum",
     "SteadyState",
@@ -122,8 +130,11 @@ __all__ = [
     "plot",
     "reduce_to",
     "refined_map",
+    "regime_map",
     "simulate",
     "simulate_many",
+    "slow_load_criterion",
+    "slow_load_gap",
     "systems",
     "tangencies",
     "warm",

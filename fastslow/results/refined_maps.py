@@ -103,7 +103,7 @@ class RefinedMap:
         keys = self.corners @ np.array([height, 1])
         far = self.cells[:, 2, None, None] * np.array([[0, 1]])
         i, j = self.cells[:, 0, None, None] + far.swapaxes(1, 2), self.cells[:, 1, None, None] + far
-        return np.searchsorted(keys, i * height + j)
+        return np.asarray(np.searchsorted(keys, i * height + j))
 
     @property
     def corner_codes(self) -> Integers:
@@ -125,7 +125,8 @@ class RefinedMap:
     def areas(self) -> Floats:
         """How many of the finest cells each point evaluated stands for, shape (N,)."""
         quarter = np.repeat(0.25 * self.cells[:, 2].astype(float) ** 2, 4)
-        return np.bincount(self.corner_rows.reshape(-1), quarter, len(self.corners))
+        sums = np.bincount(self.corner_rows.reshape(-1), quarter, len(self.corners))
+        return sums.astype(float)
 
     @property
     def shares(self) -> dict[Label, float]:
