@@ -179,7 +179,7 @@ class Trajectory:
 
         ``"bilateral"``, ``"unilateral upper"``, ``"unilateral lower"``,
         ``"meshed upper"``, ``"meshed lower"`` or ``"free"``; None for models
-        without a gap or without a period.
+        without gap or period. Sliding along an edge touches it; rounding decides grazes.
         """
         return regime_of(self)
 
