@@ -66,8 +66,9 @@ def slow_load_gap(
     -------
     float or ndarray
         D*, broadcast: the far side is reached for half-widths up to it. 0 where
-        the near side is never left (C ≤ \|B\|). NaN, only with ``exact``, where the
-        state does not turn before the load is negative again.
+        the near side is never left: for C ≤ \|B\|, with ``exact`` where the steady
+        response of the contact never lets go. NaN, only with ``exact``, where
+        the state does not turn before the load is negative again.
 
     Raises
     ------
@@ -94,16 +95,14 @@ def slow_load_gap(
         _positive("stiffness", stiffness),
     )
     mean, swing, rate, c, k = np.broadcast_arrays(mean, swing, rate, c, k)
-    unloads = swing > mean
-    swing = np.where(unloads, swing, mean + 1.0)
-    widest = (_exact if exact else _expanded)(mean, swing, rate, c, k)
-    result = np.where(unloads, widest, 0.0)
+    result = np.asarray((_exact if exact else _expanded)(mean, swing, rate, c, k))
     return result if result.ndim else float(result)
 
 
 def _expanded(B: Floats, C: Floats, omega: Floats, c: Floats, k: Floats) -> Floats:
+    C = np.maximum(B, C)
     root = np.sqrt(C * C - B * B)
-    impulse = 2.0 * (root - B * np.arccos(B / C)) / omega
+    impulse = 2.0 * (root - B * np.arccos(_quotient(B, C))) / omega
     return (impulse - 0.5 * omega * root * (1.0 / c - c / k) ** 2) / (2.0 * c)
 
 
@@ -114,7 +113,7 @@ def _exact(B: Floats, C: Floats, omega: Floats, c: Floats, k: Floats) -> Floats:
     # y = B/k + r sin(phase - lag) in contact; a rigid one is left where the load vanishes
     lag = np.where(rigid, 0.0, np.arctan2(c * omega, spring - omega**2))
     r = C / np.hypot(spring - omega**2, c * omega)
-    sine = np.where(rigid, B / C, B / (spring * r))
+    sine = _quotient(B, np.where(rigid, C, spring * r))
     leaves = sine < 1.0
     sine = np.where(leaves, sine, 0.0)
     first = lag + np.pi + np.arcsin(sine)
@@ -128,7 +127,8 @@ def _exact(B: Floats, C: Floats, omega: Floats, c: Floats, k: Floats) -> Floats:
         decay = np.exp(-c * (phase - first) / omega)
         return np.asarray(steady(phase) + (speed - steady(first)) * decay)
 
-    falls = np.pi + np.arcsin(B / C)
+    # a load that stays positive may still throw a compliant contact off, for an instant
+    falls = np.where(C > B, np.pi + np.arcsin(_quotient(B, C)), first + 2.0 * np.pi)
     # the velocity can pass zero upwards only where the load is positive, and there only once
     early = (first < falls) & (velocity(np.maximum(first, falls)) > 0.0)
     low = np.where(early, first, np.maximum(first, 3.0 * np.pi - falls))
@@ -279,6 +279,11 @@ def _gap_motion(
         edges.append(edge)
         stiffness.append(stiff)
     return damping, load, harmonics[0], (edges[0], edges[1]), (stiffness[0], stiffness[1])
+
+
+def _quotient(B: Floats, C: Floats) -> Floats:
+    """B/C for B ≥ 0, 1 where it is larger or undefined."""
+    return np.where(C > B, B / np.where(C > B, C, 1.0), 1.0)
 
 
 def _finite(name: str, given: ArrayLike) -> Floats:

@@ -1,6 +1,7 @@
 """Figures from results: Matplotlib and results only, no display and no global settings."""
 
 from fastslow.plot.branches import DiagramDrawing, diagram
+from fastslow.plot.maps import MapDrawing, regime_map
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.panels import PanelDrawing, panel
 from fastslow.plot.passages import OverlayDrawing, overlay
@@ -13,6 +14,7 @@ from fastslow.plot.sweeping import SweepDrawing, sweep
 __all__ = [
     "DiagramDrawing",
     "Drawing",
+    "MapDrawing",
     "MotionDrawing",
     "OverlayDrawing",
     "PanelDrawing",
@@ -25,6 +27,7 @@ __all__ = [
     "panel",
     "parameter_plane",
     "phase_portrait",
+    "regime_map",
     "section",
     "spectrum",
     "sweep",

@@ -165,6 +165,21 @@ def test_bounds():
     assert 0 < slow_load_gap(1, 1.0001, 0.2, stiffness=50.0, exact=True) < 1e-3
 
 
+def test_a_load_that_only_just_stays_positive(gear):
+    # inertia amplifies the swing of the contact: let go of below C = B, at
+    # C/B = √((1 − ω²/k)² + (c ω/k)²), here with D = 0.3, ω = 0.2
+    omega, k = 0.2, 41.67 + 0.09
+    limit = np.hypot(1 - omega**2 / k, omega / k)
+    ratios = limit + np.array([-2e-5, 2e-5])
+    assert ratios[1] < 1
+    model = gear.with_parameters(D=0.3, omega=omega)
+    loads = {"C": 2.372 * ratios}
+    many = fs.simulate_many(model, [0.35, 0], parameters=loads, periods=4, tol=1e-12)
+    assert many.regime.tolist() == ["meshed upper", "unilateral upper"]
+    assert slow_load_criterion(model, loads, exact=True).regime.tolist() == many.regime.tolist()
+    assert slow_load_criterion(model, loads).regime.tolist() == ["meshed upper"] * 2
+
+
 def test_regimes(gear):
     gear = gear.with_parameters(omega=0.02)
     widths, loads = [0.5, 0.6, 0.25, 0.0, -0.1], [2.44316, 2.44316, 2.0, 3, 3]
