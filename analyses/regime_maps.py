@@ -28,7 +28,7 @@ GAP = 0.25
 #: Two widths of the source, on either side of the change that it states.
 WIDTHS = (0.25, 0.5)
 
-#: Level by level, so that the finest cells are 1/8 of the first.
+#: How often a cell is halved at most.
 LEVELS = 3
 
 

@@ -153,9 +153,11 @@ def _bar(shown: bool) -> Any:
 
 def _coded(found: Sequence[Label]) -> tuple[tuple[Label, ...], NDArray[np.int64]]:
     """The labels in order, failures last, and which of them each point has."""
-    # True is 1 to a dictionary, but not to a reader
+    kinds = {type(label) for label in found}
+    if {bool, int} <= kinds:
+        raise ArgumentError("some labels are bools, some counts; expected one or the other")
     keys = [(label == FAILED, type(label).__name__, label) for label in found]
-    order = sorted(set(keys), key=lambda k: (k[0], k[1], k[2]))
+    order = sorted(set(keys))
     number = {key: k for k, key in enumerate(order)}
     return tuple(key[2] for key in order), np.array([number[k] for k in keys], dtype=np.int64)
 

@@ -125,6 +125,8 @@ def test_a_single_label():
     assert found.boundaries == ()
     assert (len(found.cells), len(found.corners)) == (6, 12)
     assert found.at(0.3, y=-1) == 7
+    assert found.bounds[0] == pytest.approx([-1, -1 / 3, -1, 0])
+    assert found.bounds[-1] == pytest.approx([1 / 3, 1, 0, 1])
     assert "7: 100.00% of the area" in repr(found)
 
 
@@ -292,6 +294,7 @@ def test_progress(capsys):
         ({"guard": 0.5}, "guard = 0.5"),
         ({"tol": 0}, "tol = 0; expected a positive number"),
         ({"function": lambda x, y: x}, "0.125 is no label of a map"),
+        ({"function": lambda x, y: [k % 2 or False for k, _ in enumerate(x)]}, "some labels are"),
         ({"function": lambda x, y: [1]}, "returned 1 labels for 81 points"),
     ],
 )
