@@ -23,10 +23,14 @@ if TYPE_CHECKING:
         UnknownNameError,
     )
     from fastslow.model.model import Model
+    from fastslow.passage.delay_laws import predict_delay
+    from fastslow.passage.hopf_delays import hopf_exit
     from fastslow.passage.overlays import overlay
     from fastslow.passage.regimes import regime_map
+    from fastslow.passage.scaling_runs import delay_scaling
     from fastslow.passage.slow_loads import slow_load_criterion, slow_load_gap
     from fastslow.results.branches import Branch
+    from fastslow.results.delay_scalings import DelayScaling
     from fastslow.results.diagrams import Diagram
     from fastslow.results.ensembles import Ensemble
     from fastslow.results.overlays import Overlay
@@ -55,6 +59,7 @@ _HOME = {
     "ArgumentError": "errors",
     "Branch": "results.branches",
     "Continuation": "continuation.settings",
+    "DelayScaling": "results.delay_scalings",
     "Derivation": "symbolic.derivation",
     "Diagram": "results.diagrams",
     "Ensemble": "results.ensembles",
@@ -76,13 +81,16 @@ _HOME = {
     "bifurcation_sweep": "simulation.sweeping",
     "continue_equilibria": "diagrams.tracing",
     "continue_points": "diagrams.point_curves",
+    "delay_scaling": "passage.scaling_runs",
     "derive": "symbolic.derivation",
     "disagreements": "symbolic.scaling",
     "equilibria": "diagrams.solving",
     "export": "symbolic.sources",
+    "hopf_exit": "passage.hopf_delays",
     "nondimensionalise": "symbolic.scaling",
     "overlay": "passage.overlays",
     "plot": "",
+    "predict_delay": "passage.delay_laws",
     "reduce_to": "symbolic.reduction",
     "refined_map": "sweeps.refinement",
     "regime_map": "passage.regimes",
@@ -99,6 +107,7 @@ __all__ = [
     "ArgumentError",
     "Branch",
     "Continuation",
+    "DelayScaling",
     "Derivation",
     "Diagram",
     "Ensemble",
@@ -121,13 +130,16 @@ __all__ = [
     "bifurcation_sweep",
     "continue_equilibria",
     "continue_points",
+    "delay_scaling",
     "derive",
     "disagreements",
     "equilibria",
     "export",
+    "hopf_exit",
     "nondimensionalise",
     "overlay",
     "plot",
+    "predict_delay",
     "reduce_to",
     "refined_map",
     "regime_map",

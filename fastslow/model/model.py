@@ -244,7 +244,11 @@ class Model:
         freed = self.freed(key)
         first, speed = f"{key}_start", f"{key}_rate"
         numbers = {first: number(first, start), speed: number(speed, rate)}
-        taken = [n for n in numbers if n in (*freed.states, *freed.slow_states, *freed.forcing, *freed.parameters)]
+        taken = [
+            n
+            for n in numbers
+            if n in (*freed.states, *freed.slow_states, *freed.forcing, *freed.parameters)
+        ]
         if taken:
             raise ModelError(
                 f"a ramp of {key} needs the name {taken[0]}, which the model already uses"

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.diagrams.normal_forms import cusp_form, forms_at, null_vectors
-from fastslow.errors import ArgumentError
+from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.model import Model
 from fastslow.passage.sites import (
     Site,
@@ -24,6 +24,7 @@ from fastslow.passage.sites import (
 )
 from fastslow.results.delays import FoldDelay
 from fastslow.results.points import SpecialPoint
+from fastslow.simulation.trajectories import simulate
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,9 @@ OMEGA_0 = 2.338107410459767
 #: ∫₋∞^(Ω₀−z) −A'³/A ds / A'(Ω₀)² = ln(1/z) + MATCHING as z → 0, with A(s) = Ai(−s). By parts it
 #: is −½ ln A'(Ω₀)² − ½ + ∫₋∞^Ω₀ A² ln A ds / A'(Ω₀)².
 MATCHING = -1.0085182549893932
+
+#: Jumps are timed from this part of the way on which the normal form holds.
+NEAR = 1e-3
 
 #: A coefficient below this times its terms counts as zero.
 ZERO = 1e-9
@@ -77,8 +81,8 @@ def fold_delay(
         delay = Ω₀ |ab|^(−1/3) |rate|^(2/3) + (c/(3a²)) |rate| ln |rate| + O(rate).
 
     With a level, of a state whose value tells when the jump is done, the term of
-    order rate is known too, up to quartic terms of the rates; for one state with
-    a cubic rate the error is O(rate^(4/3)).
+    order rate is known too, by matching to the jump of the frozen model, which is
+    simulated; the error is then O(rate^(4/3)).
 
     Parameters
     ----------
@@ -129,30 +133,31 @@ def fold_delay(
     d, product = form.c / form.a**2, abs(form.a * form.b)
     first = OMEGA_0 * product ** (-1.0 / 3.0)
     scale = (product * abs(speed)) ** (1.0 / 3.0)
-    # order rate before the exit: the inner solution to first order, matched to y' = a y² + c y³
-    constant = d * math.log(product) / 3.0 - d * MATCHING - form.g / (2.0 * form.a * form.b)
     delay, third, words = first * abs(speed) ** (2.0 / 3.0), math.nan, _UNBOUNDED
     if height is not None:
-        exit_at = _along(form, *height)
-        reach = 1.0 + d * exit_at
-        if exit_at > 2.0 * scale and reach > 0.0:
-            third = constant - 1.0 / exit_at - d * math.log(exit_at / reach)
-            # the level within the inner solution: exact where it is near the fold
-            inner = airy_passage(exit_at / scale) + scale / exit_at - OMEGA_0
-            delay += d / 3.0 * abs(speed) * math.log(abs(speed)) + third * abs(speed)
-            delay += inner * abs(speed) / scale
-            words = "to the order of the rate, up to quartic terms of the rates between"
-        elif exit_at <= 2.0 * scale:
-            delay = airy_passage(exit_at / scale) * abs(speed) / scale
+        eta = _along(form, *height) / scale
+        if eta <= 2.0:
+            delay = airy_passage(eta) * abs(speed) / scale
             words = "leading order: the level lies within the slow part of the passage"
         else:
-            words = "leading order: the cubic normal form does not reach the level"
+            jump = jump_time(site, form, height)
+            # the inner solution to first order, matched to the jump
+            third = d * math.log(product) / 3.0 - d * MATCHING + jump
+            third -= form.g / (2.0 * form.a * form.b)
+            words = (
+                f"leading order: no jump of the frozen model to {_words(site, height)} was found"
+            )
+            if math.isfinite(jump):
+                delay += abs(speed) * (d / 3.0 * math.log(abs(speed)) + third)
+                # what the level sees of the end of the inner solution
+                delay += (airy_passage(eta) + 1.0 / eta - OMEGA_0) * abs(speed) / scale
+                words = "to the order of the rate"
     return FoldDelay(
         point=point,
         parameter=site.field.parameter,
         rate=speed,
         delay=delay,
-        validity=f"{words}; relative error of the order of {_smallness(form, d, scale):.2g}",
+        validity=f"{words}; relative error of the order of {_smallness(form, d, scale):.1g}",
         quadratic=form.a,
         slope=form.b,
         cubic=form.c,
@@ -162,7 +167,44 @@ def fold_delay(
     )
 
 
-_UNBOUNDED = "leading order, to a jump without bound; with level= the order of the rate follows"
+def jump_time(site: Site, form: FoldForm, level: tuple[int, float]) -> float:
+    """Finite part of the time of the jump in the frozen model, from the fold to a level.
+
+    From Y = a y on the unstable side the frozen model needs a time T(Y) that grows
+    as 1/Y + (c/a²) ln Y towards the fold; with those terms taken off, and with the
+    exact time of the cubic normal form in their place, it is simulated from two
+    small Y and extrapolated. nan where the level is not reached.
+    """
+    d = form.c / form.a**2
+    near = NEAR / max(abs(d), 1.0 / form.slowest, _turning(form), 1.0 / _along(form, *level))
+    model = site.field.model.ramped(site.field.parameter, 0.0, float(site.u[-1]))
+    found = []
+    for y in (near, 0.5 * near):
+        past = y / form.a
+        state = site.u[:-1] + past * form.along + 0.5 * past**2 * form.bend
+        try:
+            run = simulate(model, state, t=(0.0, 10.0 / y), tol=1e-15)
+        except ModelError:
+            return math.nan
+        number, height = level
+        hits = run.section(site.field.model.states[number], float(site.u[number]) + height)
+        if not len(hits):
+            return math.nan
+        found.append(float(hits.times[0]) - 1.0 / y - d * math.log(y / (1.0 + d * y)))
+    return 2.0 * found[1] - found[0]
+
+
+def _turning(form: FoldForm) -> float:
+    """How soon the centre manifold bends, by Y."""
+    return float(np.abs(form.bend).max() / (abs(form.a) * np.abs(form.along).max()))
+
+
+def _words(site: Site, level: tuple[int, float]) -> str:
+    number, height = level
+    return f"{site.field.model.states[number]} = {float(site.u[number]) + height:g}"
+
+
+_UNBOUNDED = "leading order, the order of the rate depends on the level of the jump"
 
 
 def _smallness(form: FoldForm, d: float, scale: float) -> float:
@@ -180,7 +222,7 @@ def fold_form_of(site: Site) -> FoldForm:
     overlap = float(p @ q)
     if abs(overlap) <= ZERO:
         raise ArgumentError(
-            f"{label} has a double zero eigenvalue (Bogdanov-Takens); the law of a fold does not hold"
+            f"{label} has a double zero eigenvalue (Bogdanov-Takens), where this law does not hold"
         )
     p = p / overlap
     forms = forms_at(site.field, region, site.u)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -211,18 +212,13 @@ class _Sheet:
         for row, start, stop in self._steps():
             part, following = self._over(row, start, stop, pair)
             if total + part >= target:
-                known, old = total, pair
-                return float(
-                    brentq(
-                        lambda end: known + self._over(row, start, end, old)[0] - target,
-                        start,
-                        stop,
-                        xtol=1e-15,
-                        rtol=1e-14,
-                    )
-                )
+                missing = partial(self._missing, row, start, pair, target - total)
+                return float(brentq(missing, start, stop, xtol=1e-15, rtol=1e-14))
             total, pair = total + part, following
         return math.nan
+
+    def _missing(self, row: int, start: float, pair: complex, target: float, end: float) -> float:
+        return self._over(row, start, end, pair)[0] - target
 
     def _pair(self) -> complex:
         values = self.branch.eigenvalues[self.row]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,19 +44,21 @@ class LinearFlow:
         return whole
 
     def quasi_static(self) -> tuple[Array, Array]:
-        """y = first·μ + second, the bounded motion: −J⁻¹b and −J⁻²b·rate."""
-        first = -np.linalg.solve(self.jacobian, self.slope)
-        return first, np.linalg.solve(self.jacobian, first) * self.rate
+        """The bounded motion y = first·μ + second: −J⁻¹b and −J⁻²b·rate."""
+        first: Array = -np.linalg.solve(self.jacobian, self.slope)
+        second: Array = np.linalg.solve(self.jacobian, first) * self.rate
+        return first, second
 
     def at(self, start: Array, time: float) -> Array:
-        """z at a time after it was ``start``."""
+        """Give z at a time after it was ``start``."""
         from scipy.linalg import expm
 
         return np.asarray(expm(self.matrix * time) @ start)
 
-    def reaches(
-        self, start: Array, row: Array, bound: Array | None = None
-    ) -> tuple[float, bool]:
+    def _height(self, row: Array, start: Array, time: float) -> float:
+        return float(row @ self.at(start, time))
+
+    def reaches(self, start: Array, row: Array, bound: Array | None = None) -> tuple[float, bool]:
         """When row·z first vanishes, and whether bound·z has turned negative before.
 
         Parameters
@@ -85,14 +88,7 @@ class LinearFlow:
             if bound is not None and float(bound @ following) < 0.0:
                 return math.nan, True
             if side * float(row @ following) <= 0.0:
-                from_here = z
-                part = brentq(
-                    lambda s: side * float(row @ self.at(from_here, s)),
-                    0.0,
-                    step,
-                    xtol=1e-15 * step,
-                    rtol=1e-15,
-                )
+                part = brentq(partial(self._height, row, z), 0.0, step, xtol=1e-15 * step)
                 return time + float(part), False
             z, time = following, time + step
             if count >= FINE and count % (FINE // 10) == 0:

@@ -93,5 +93,5 @@ def _power(eps: Array, size: Array) -> tuple[float, float, Array]:
     exponent = float(x @ y / (x @ x))
     left = y - exponent * x
     error = math.sqrt(float(left @ left) / max(len(x) - 2, 1) / float(x @ x))
-    farthest = float(np.nanmax(np.abs(local - exponent), initial=0.0))
+    farthest = float(np.abs(local[np.isfinite(local)] - exponent).max(initial=0.0))
     return exponent, max(error, farthest), local

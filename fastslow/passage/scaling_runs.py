@@ -20,9 +20,11 @@ from fastslow.passage.sites import Site, WrongWay, site_of
 from fastslow.results.branches import Branch
 from fastslow.results.delay_scalings import DelayScaling
 from fastslow.results.delays import BoundaryDelay, FoldDelay, GapTransit
+from fastslow.results.diagrams import Diagram
 from fastslow.results.outcome import Outcome
 from fastslow.results.points import SpecialPoint
 from fastslow.results.sections import Section
+from fastslow.results.trajectories import Trajectory
 from fastslow.simulation.trajectories import simulate
 
 Array = NDArray[np.float64]
@@ -110,7 +112,9 @@ def delay_scaling(
     ramp = site.field.model.ramped(name, direction * eps[0])
     before = _starts(site, laws, start)
     delays, outcomes = [], []
-    for law, (value, state) in zip(tqdm(laws, unit="rate", disable=not progress), before, strict=True):
+    for law, (value, state) in zip(
+        tqdm(laws, unit="rate", disable=not progress), before, strict=True
+    ):
         delay, outcome = _measured(ramp, site, law, value, state, tol, max_steps)
         delays.append(delay)
         outcomes.append(outcome)
@@ -179,18 +183,26 @@ def _starts(site: Site, laws: list[Law], start: float | None) -> list[tuple[floa
                 "smaller rates, or start="
             )
         region = str(branch.region[rows[len(rows) // 2]])
-        near = [e for e in diagram.at(**{name: value}, region=region) if e.stable]
-        across = np.argsort(branch.parameter[rows])
-        guess = [
-            np.interp(value, branch.parameter[rows][across], branch.state[rows, k][across])
-            for k in range(site.n)
-        ]
-        sheet = min(near, key=lambda e: float(np.abs(e.state - guess).max()))
-        _, slopes, _, _ = site.field.at(site.region(region), np.append(sheet.state, value))
+        order = np.argsort(branch.parameter[rows])
+        across, sheet = branch.parameter[rows][order], branch.state[rows][order]
+        guess = np.array([np.interp(value, across, sheet[:, k]) for k in range(site.n)])
+        corrected = _corrected(site, diagram, region, guess, value)
+        _, slopes, _, _ = site.field.at(site.region(region), np.append(corrected, value))
         jacobian, slope = slopes[:, : site.n], slopes[:, site.n]
         lag = np.linalg.solve(jacobian, np.linalg.solve(jacobian, slope)) * law.rate
-        found.append((value, sheet.state - lag))
+        found.append((value, corrected - lag))
     return found
+
+
+def _corrected(site: Site, diagram: Diagram, region: str, guess: Array, value: float) -> Array:
+    """The equilibrium near a state, to rounding."""
+    solved = diagram.corrector(region, guess, value) if diagram.corrector is not None else None
+    if solved is None:
+        raise ArgumentError(
+            f"no equilibrium was found at {site.field.parameter} = {value:.6g} on the sheet before "
+            f"{site.point.label}"
+        )
+    return solved.state
 
 
 def _distance(site: Site, law: Law) -> float:
@@ -229,7 +241,9 @@ def _monotone(branch: Branch, row: int, step: int, way: float) -> NDArray[np.int
     following = row + step
     while 0 <= following < len(branch.parameter):
         back = way * (branch.parameter[rows[-1]] - branch.parameter[following]) > 0
-        if not (back and branch.stable[following] and branch.region[following] == branch.region[row]):
+        if not (
+            back and branch.stable[following] and branch.region[following] == branch.region[row]
+        ):
             break
         rows.append(following)
         following += step
@@ -242,7 +256,7 @@ def _measured(
     """The delay of one run, nan with the reason where there is none."""
     name, speed = site.field.parameter, abs(law.rate)
     ahead = abs(float(site.u[-1]) - value)
-    span = law.delay if math.isfinite(law.delay) else ahead
+    span = abs(law.delay) if math.isfinite(law.delay) else ahead
     model = ramp.with_parameters({f"{name}_rate": law.rate, f"{name}_start": value})
     end = (ahead + REACH * span) / speed
     try:
@@ -251,16 +265,18 @@ def _measured(
         return math.nan, Outcome("not simulated", str(error), False)
     times = _hits(run, law, ahead / speed)
     if not len(times):
-        reason = str(run.outcome) if not run.outcome else f"not reached by {name} = {run[name][-1]:.6g}."
+        reason = (
+            str(run.outcome) if not run.outcome else f"not reached by {name} = {run[name][-1]:.6g}."
+        )
         return math.nan, Outcome("not reached", f"{_event(law)}: {reason}", False)
     delay = speed * (float(times.times[0]) - ahead / speed)
     return delay, Outcome("reached", f"{_event(law)} was reached.", True)
 
 
-def _hits(run: Any, law: Law, passed: float) -> Section:
+def _hits(run: Trajectory, law: Law, passed: float) -> Section:
     """Where the run reaches what ends the delay."""
     if isinstance(law, GapTransit):
-        found: Section = run.section(interface=law.interfaces[1])
+        found = run.section(interface=law.interfaces[1])
     elif law.level is None or (isinstance(law, BoundaryDelay) and law.subtype == "persistence"):
         found = run.section(interface=law.point.interface)
     else:

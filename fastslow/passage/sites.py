@@ -153,7 +153,9 @@ def level_of(site: Site, level: Mapping[Any, float] | None) -> tuple[int, float]
     if level is None:
         return None
     if not isinstance(level, Mapping) or len(level) != 1:
-        raise ArgumentError(f"level = {level!r}; expected one state and its value, as in {{'x': 1}}")
+        raise ArgumentError(
+            f"level = {level!r}; expected one state and its value, as in {{'x': 1}}"
+        )
     ((name, value),) = level.items()
     states = site.field.model.states
     if str(name) not in states:

@@ -1,6 +1,7 @@
 """Figures from results: Matplotlib and results only, no display and no global settings."""
 
 from fastslow.plot.branches import DiagramDrawing, diagram
+from fastslow.plot.delays import DelayDrawing, delay_scaling
 from fastslow.plot.maps import MapDrawing, regime_map
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.panels import PanelDrawing, panel
@@ -12,6 +13,7 @@ from fastslow.plot.style import Drawing
 from fastslow.plot.sweeping import SweepDrawing, sweep
 
 __all__ = [
+    "DelayDrawing",
     "DiagramDrawing",
     "Drawing",
     "MapDrawing",
@@ -22,6 +24,7 @@ __all__ = [
     "SectionDrawing",
     "SpectrumDrawing",
     "SweepDrawing",
+    "delay_scaling",
     "diagram",
     "overlay",
     "panel",
