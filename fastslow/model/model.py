@@ -243,7 +243,10 @@ class Model:
             raise ModelError(f"'{key}' already varies in time; ramp it in model.frozen() instead")
         freed = self.freed(key)
         first, speed = f"{key}_start", f"{key}_rate"
-        numbers = {first: number(first, start), speed: number(speed, rate)}
+        numbers = {
+            first: number(f"parameter {first}", start),
+            speed: number(f"parameter {speed}", rate),
+        }
         taken = [
             n
             for n in numbers

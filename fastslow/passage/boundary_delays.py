@@ -233,11 +233,6 @@ def gap_transit(
     p, q = null_vectors(jacobian)
     p, q = _normalised(site, p, q, way)
     drifts = float(p @ slope)
-    if abs(drifts) <= 1e-12 * float(np.abs(p) @ np.abs(slope)) or drifts == 0.0:
-        raise ArgumentError(
-            f"{site.field.parameter} does not push the trajectory along the continuum behind "
-            f"{point.label}"
-        )
     far, length, outward = _far_side(site, way, q)
     # the inverse of J on its range: the other motions lag behind by it
     bordered = np.block([[jacobian, q[:, None]], [p[None, :], np.zeros((1, 1))]])
@@ -246,8 +241,8 @@ def gap_transit(
     relaxation = float(outward[:n] @ lean / (outward[:n] @ q)) / drifts
     relaxation -= float(outward[n] / (outward[:n] @ q)) / drifts
     time, back = LinearFlow(jacobian, slope, speed).reaches(way.z, outward, way.inward)
-    others = np.linalg.eigvals(jacobian).real
-    slowest = float(np.sort(np.abs(others))[1]) if n > 1 else math.inf
+    values = np.linalg.eigvals(jacobian)
+    others = np.delete(values, np.argmin(np.abs(values))).real
     words = "exact for the linear motion in the gap, at a constant rate of drift"
     if not site.affine(way.behind):
         words = "from the rates in the gap linearised where it is entered"
@@ -256,7 +251,7 @@ def gap_transit(
     elif math.isnan(time):
         words = "none: the far interface is not reached"
     else:
-        left = math.exp(-min(slowest * time, 700.0))
+        left = math.exp(min(float(others.max(initial=-math.inf)) * time, 700.0))
         words += f"; of the slow-drift law a part {left:.1g} has not died out"
     return GapTransit(
         point=point,
@@ -283,7 +278,7 @@ def approach_of(site: Site, rate: float) -> Approach:
     field, n = site.field, site.n
     k = field.interfaces.index(str(site.point.interface))
     regions = [site.region(name) for name in site.point.regions]
-    unstable = -math.inf
+    unstable, moved = -math.inf, False
     for before, behind in (regions, regions[::-1]):
         jacobian, slope = site.slopes(before)
         values = np.linalg.eigvals(jacobian).real
@@ -294,7 +289,10 @@ def approach_of(site: Site, rate: float) -> Approach:
         _, _, _, gradients = field.at(behind, site.u)
         inward = np.append(field.signs[behind, k] * gradients[k], 0.0)
         speed = float(inward[:n] @ first + inward[n]) * rate
-        if speed <= 0:
+        if abs(speed) <= 1e-12 * abs(rate) * float(np.abs(inward[:n]) @ np.abs(first)):
+            continue
+        moved = True
+        if speed < 0:
             continue
         if values.max() >= 0:
             unstable = max(unstable, float(values.max()))
@@ -308,6 +306,11 @@ def approach_of(site: Site, rate: float) -> Approach:
             f"no stable sheet ends at {site.point.label}: before the interface an eigenvalue has "
             f"real part {unstable:.3g}"
         )
+    if not moved:
+        raise ArgumentError(
+            f"a drift of {field.parameter} leaves the equilibrium at {site.point.label} on the "
+            "interface"
+        )
     raise wrong_way(site, rate)
 
 
@@ -316,8 +319,8 @@ def _normalised(site: Site, p: Array, q: Array, way: Approach) -> tuple[Array, A
     overlap, inward = float(p @ q), float(way.inward[: site.n] @ q)
     if abs(overlap) <= 1e-9 or abs(inward) <= 1e-9 * float(np.linalg.norm(way.inward)):
         raise ArgumentError(
-            f"behind {site.point.label} there is no continuum of equilibria that leads away from "
-            "the interface"
+            f"behind {site.point.label} no continuum of equilibria with damped motion along it "
+            "leads away from the interface"
         )
     q = math.copysign(1.0, inward) * q
     return p / float(p @ q), q

@@ -35,7 +35,8 @@ OMEGA_0 = 2.338107410459767
 #: is −½ ln A'(Ω₀)² − ½ + ∫₋∞^Ω₀ A² ln A ds / A'(Ω₀)².
 MATCHING = -1.0085182549893932
 
-#: Jumps are timed from this part of the way on which the normal form holds.
+#: Jumps are timed from this part of the way on which the normal form holds: much nearer to the
+#: fold rounding, which grows as 1/Y³, is larger than what extrapolation leaves.
 NEAR = 1e-3
 
 #: A coefficient below this times its terms counts as zero.
@@ -276,13 +277,14 @@ def airy_passage(eta: float) -> float:
     (1.01879297, 2.3381074)
     """
     from scipy.optimize import brentq
-    from scipy.special import airy
+    from scipy.special import airy, airye
 
     if math.isinf(eta):
         return OMEGA_0
 
     def left(s: float) -> float:
-        value, slope, _, _ = airy(-s)
+        # scaled alike, their ratio counts
+        value, slope, _, _ = airye(-s) if s < 0.0 else airy(-s)
         return float(slope - eta * value)
 
     low = 1.0

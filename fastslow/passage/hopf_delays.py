@@ -90,8 +90,8 @@ def hopf_exit(
     if not (math.isfinite(gain) and gain > 0):
         raise ArgumentError(f"gain = {gain!r}; expected a positive ratio of amplitudes")
     name = diagram.parameter
-    here, way = point[name], 1 if speed > 0 else -1
     branch, row = _place(diagram, point)
+    here, way = point[name], 1 if speed > 0 else -1
     before = _Sheet(diagram, branch, row, -way)
     behind = _Sheet(diagram, branch, row, way)
     if before.first_growth() > 0:
@@ -134,14 +134,11 @@ def _place(diagram: Diagram, point: SpecialPoint) -> tuple[Branch, int]:
     """The branch and row of a special point of a diagram."""
     for branch in diagram.branches:
         for other, row in zip(branch.special, branch.special_rows, strict=True):
-            same = other.code == point.code and np.allclose(
-                [*other.state, other[diagram.parameter]],
-                [*point.state, point.parameters.get(diagram.parameter, math.nan)],
-                rtol=1e-9,
-                atol=1e-12,
-            )
-            if same:
-                return branch, row
+            alike = (other.code, other.states) == (point.code, point.states)
+            if alike and diagram.parameters.items() <= point.parameters.items():
+                apart = [other[n] - point[n] for n in (*other.states, diagram.parameter)]
+                if np.abs(apart).max() <= 1e-9 * (1.0 + np.abs(point.state).max()):
+                    return branch, row
     raise ArgumentError(f"{point.label} is not a point of this diagram over {diagram.parameter}")
 
 

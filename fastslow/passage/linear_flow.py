@@ -45,9 +45,9 @@ class LinearFlow:
 
     def quasi_static(self) -> tuple[Array, Array]:
         """The bounded motion y = first·μ + second: −J⁻¹b and −J⁻²b·rate."""
-        first: Array = -np.linalg.solve(self.jacobian, self.slope)
-        second: Array = np.linalg.solve(self.jacobian, first) * self.rate
-        return first, second
+        first = np.linalg.solve(-self.jacobian, self.slope)
+        second = np.linalg.solve(self.jacobian, self.rate * first)
+        return np.asarray(first, dtype=float), np.asarray(second, dtype=float)
 
     def at(self, start: Array, time: float) -> Array:
         """Give z at a time after it was ``start``."""
@@ -82,7 +82,8 @@ class LinearFlow:
         through = expm(self.matrix * step)
         z, side, time = start, math.copysign(1.0, float(row @ start)), 0.0
         for count in range(1, STEPS + 1):
-            following = through @ z
+            with np.errstate(over="ignore", invalid="ignore"):
+                following = through @ z
             if not np.isfinite(following).all():
                 break
             if bound is not None and float(bound @ following) < 0.0:
@@ -93,5 +94,6 @@ class LinearFlow:
             z, time = following, time + step
             if count >= FINE and count % (FINE // 10) == 0:
                 step *= 2.0
-                through = through @ through
+                with np.errstate(over="ignore", invalid="ignore"):
+                    through = through @ through
         return math.nan, False
