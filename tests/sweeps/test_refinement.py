@@ -295,7 +295,10 @@ def test_progress(capsys):
         ({"guard": 0.5}, "guard = 0.5"),
         ({"tol": 0}, "tol = 0; expected a positive number"),
         ({"function": lambda x, y: x}, "0.125 is no label of a map"),
-        ({"function": lambda x, y: [k % 2 or False for k, _ in enumerate(x)]}, "some labels are"),
+        (
+            {"function": lambda x, y: [k % 2 or False for k, _ in enumerate(x)], "levels": 0},
+            "some labels are",
+        ),
         ({"function": lambda x, y: [1]}, "returned 1 labels for 81 points"),
     ],
 )
