@@ -14,17 +14,18 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from fastslow.compiled.functions import without_recurrence
 from fastslow.compiled.recurrences import Recurrences, scalar_code
 from fastslow.compiled.store import load_generated
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
 
-_HEADER = '''"""Taylor coefficients of order {order} for {modes} modes of {states} states."""
+_HEADER = '''"""{what} for {modes} modes of {states} states."""
 import math
 
 from numba import cfunc
 
-from fastslow.compiled.pointers import SIGNATURE
+{special}from fastslow.compiled.pointers import SIGNATURE
 
 
 @cfunc(SIGNATURE, cache=True, error_model="numpy")
@@ -67,6 +68,10 @@ class CompiledSeries:
         Region names; sliding between A and B is named ``"A|B"``.
     continuous : ndarray of bool, shape (n_interfaces,)
         Whether the rates are continuous across each interface.
+    values_only : tuple of str
+        Functions without a Taylor recurrence. Where there are any, the compiled function
+        fills the values of all rows and the rates of states and interface functions alone,
+        and its last coefficient is NaN.
     """
 
     address: int
@@ -79,6 +84,7 @@ class CompiledSeries:
     signs: NDArray[np.int64]
     modes: tuple[str, ...]
     continuous: NDArray[np.bool_]
+    values_only: tuple[str, ...] = ()
 
     def parameter_array(self, model: Model) -> NDArray[np.float64]:
         """Parameter values in the order that the compiled function expects, never empty."""
@@ -112,7 +118,7 @@ class _Equations:
         used = set().union(*(h.free_symbols for h in self.interfaces))
         for mode in self.modes:
             used |= set().union(*(e.free_symbols for e in (*mode.rates, *mode.laws)))
-        return tuple(sorted(s.name for s in used - {*self.states, *self.quantities, TIME}))
+        return tuple(sorted(s.name for s in used - self.moving))
 
     def renamed(self) -> _Equations:
         """The same with symbols that are valid in any source: y0, w0, p0, …."""
@@ -137,6 +143,20 @@ class _Equations:
         )
 
 
+    @property
+    def moving(self) -> set[sp.Symbol]:
+        """All symbols that change with time."""
+        return {*self.states, *self.quantities, TIME}
+
+    @property
+    def without_recurrence(self) -> tuple[str, ...]:
+        """Names of functions for which a Taylor series cannot be generated."""
+        used = [*self.interfaces]
+        for mode in self.modes:
+            used += [*mode.rates, *mode.laws, *mode.drifts]
+        return tuple(sorted(set().union(*(without_recurrence(e, self.moving) for e in used))))
+
+
 _compiled: dict[_Equations, CompiledSeries] = {}
 
 
@@ -152,7 +172,7 @@ def compile_series(model: Model, order: int) -> CompiledSeries:
     Raises
     ------
     ModelError
-        If a function in the equations has no recurrence.
+        If a function in the equations cannot be compiled.
     """
     equations = _equations(model, order)
     if equations not in _compiled:
@@ -246,6 +266,7 @@ def _compile(equations: _Equations, continuous: NDArray[np.bool_]) -> CompiledSe
         signs.reshape(len(equations.modes), p),
         tuple(mode.name for mode in equations.modes),
         continuous,
+        equations.without_recurrence,
     )
 
 
@@ -254,22 +275,28 @@ def _source(equations: _Equations, n_parameters: int) -> tuple[str, int]:
     lines = [f"    p{i} = parameters[{i}]" for i in range(n_parameters)]
     n_rows = 0
     bodies: list[list[str]] = []
+    alone = bool(equations.without_recurrence)
     for mode in equations.modes:
-        body, rows = _mode_source(equations, mode)
+        body, rows = _values_source(equations, mode) if alone else _mode_source(equations, mode)
         bodies.append(body)
         n_rows = max(n_rows, rows)
     bodies += [_gradient_source(equations, h) for h in equations.interfaces]
     for number, body in enumerate(bodies):
         lines.append(f"    {'if' if number == 0 else 'elif'} mode == {number}:")
         lines += [f"        {line}" for line in body]
+    text = "\n".join(lines) + "\n"
+    what = "Values and rates" if alone else f"Taylor coefficients of order {equations.order}"
+    special = "from fastslow.compiled import special\n" if "special." in text else ""
     header = _HEADER.format(
+        what=what,
+        special=special,
         order=equations.order,
         modes=len(equations.modes),
         states=len(equations.states),
         short=min(SHORT, equations.order),
         short_from=len(bodies),
     )
-    return header + "\n".join(lines) + "\n", n_rows
+    return header + text, n_rows
 
 
 def _mode_source(equations: _Equations, mode: _Mode) -> tuple[list[str], int]:
@@ -302,6 +329,31 @@ def _mode_source(equations: _Equations, mode: _Mode) -> tuple[list[str], int]:
         body += ["for k in range(n + 1):"]
         body += [f"    {work.at(row)} = {work.at(source)}" for row, source in copies.items()]
     return body, work.next
+
+
+def _values_source(equations: _Equations, mode: _Mode) -> tuple[list[str], int]:
+    """What a mode fills without recurrences: values, and rates of states and interfaces."""
+    columns, m, q = equations.order + 1, len(equations.states), len(equations.quantities)
+    outputs = {i * columns + 1: rate for i, rate in enumerate(mode.rates)}
+    for row, h in enumerate(equations.interfaces, start=m + q):
+        outputs[row * columns] = h
+        outputs[row * columns + 1] = _drift(equations, h, mode)
+    n_rows = m + q + len(equations.interfaces)
+    outputs |= {(n_rows + k) * columns: drift for k, drift in enumerate(mode.drifts)}
+    shared, results = sp.cse(
+        list(outputs.values()), symbols=sp.numbered_symbols("s", real=True), list=True
+    )
+    body = ["t = inputs[0]"]
+    for i in range(m):
+        body += [f"y{i} = inputs[{i + 1}]", f"W[{i * columns}] = y{i}"]
+    for k, law in enumerate(mode.laws):
+        body += [f"w{k} = {scalar_code(law)}", f"W[{(m + k) * columns}] = w{k}"]
+    body += [f"{symbol} = {scalar_code(value)}" for symbol, value in shared]
+    body += [
+        f"W[{place}] = {scalar_code(value)}" for place, value in zip(outputs, results, strict=True)
+    ]
+    # what no recurrence gives
+    return [*body, f"W[{equations.order}] = math.nan"], n_rows + 2
 
 
 def _gradient_source(equations: _Equations, function: sp.Expr) -> list[str]:

@@ -6,14 +6,15 @@ import numpy as np
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
+from fastslow.simulation.collocation import memory_size
 from fastslow.simulation.events import find_event, holds, put_on
 from fastslow.simulation.extremes import widen_extremes
 from fastslow.simulation.modes import (
     MANY_MODES,
     NOT_DEFINED,
     choose_mode,
+    expand,
     interface_noise,
-    step_length,
 )
 from fastslow.simulation.polynomials import ZERO, horner
 from fastslow.simulation.settled import DAMPING, PAYS, long_step, settled
@@ -165,6 +166,7 @@ def drive(
     vectors = np.empty((5, max(1 + kept, columns)))
     b, d = np.empty(columns), np.empty(columns)
     stack = np.empty((stack_rows, columns + 3))
+    memory = np.zeros(memory_size(n_states, order))
     gradient = np.empty(2 + n_states)
     noise = np.zeros(n_interfaces)
     on = np.zeros(n_interfaces, dtype=np.bool_)
@@ -251,8 +253,7 @@ def drive(
             # an implicit step has left the first coefficients of the series at its end
             W, right = right, W
         else:
-            call_address(address, mode, inputs, parameters, W)
-            longest = step_length(W, drift, order, tol)
+            longest = expand(address, layout, mode, inputs, parameters, tol, remaining, W, memory)
             if not longest > 0.0:
                 code = NOT_FINITE
                 break
@@ -295,8 +296,9 @@ def drive(
                 s, h, interface, final = 2.0, taken, ZERO - 1, taken >= remaining
             else:
                 if in_a_row > 0:
-                    call_address(address, mode, inputs, parameters, W)
-                    longest = step_length(W, drift, order, tol)
+                    longest = expand(
+                        address, layout, mode, inputs, parameters, tol, remaining, W, memory
+                    )
                 pause = min(2 * pause, 64)
                 calm, in_a_row = pause, ZERO
         if not long:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fastslow.compiled.parts import part
-from fastslow.simulation.modes import EPSILON
 from fastslow.simulation.polynomials import (
+    EPSILON,
     DEEPEST,
     ZERO,
     excluded,

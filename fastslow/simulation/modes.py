@@ -8,9 +8,8 @@ import numpy as np
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
-from fastslow.simulation.polynomials import ONE, ZERO, first_nonzero, first_strong
-
-EPSILON = float(np.finfo(float).eps)
+from fastslow.simulation.collocation import collocate
+from fastslow.simulation.polynomials import EPSILON, ONE, ZERO, first_nonzero, first_strong
 
 #: The part of a step over which the beginning of a motion is judged: over a whole one that
 #: stability limits, the last terms of the series are much larger than the motion itself.
@@ -55,6 +54,40 @@ def step_length(W, n_rows, order, tol):
     if third > 0.0:
         length = min(length, (allowed - math.log(third)) / (order - 2))
     return math.exp(length)
+
+
+@part
+def expand(address, layout, mode, inputs, parameters, tol, room, W, memory):
+    """Fill ``W`` with polynomials of time from a point on.
+
+    The Taylor series where there is one; else, where its coefficients are not
+    known or not finite, a collocation polynomial.
+
+    Parameters
+    ----------
+    address, layout, mode, inputs, parameters
+        As for `drive`: the compiled function, and where.
+    tol : float
+    room : float
+        Longest step that is of use.
+    W : float64 array
+        Rows of coefficients, filled here.
+    memory : float64 array
+        What is carried from one step of a run to the next; zeros at its beginning,
+        `memory_size` numbers, or none for a single step.
+
+    Returns
+    -------
+    float
+        How far the polynomials hold, NaN where the rates are not finite.
+    """
+    n_states, n_forcing, n_interfaces, _, order = layout
+    drift = n_states + n_forcing + n_interfaces
+    call_address(address, mode, inputs, parameters, W)
+    length = step_length(W, drift, order, tol)
+    if length > 0.0:
+        return length
+    return collocate(address, layout, mode, inputs, parameters, tol, room, W, memory)
 
 
 @part
@@ -149,6 +182,7 @@ def choose_mode(
     if certain:
         # even the worst is then only as wrong as rounding
         best_score = DISAGREES - 1
+    memory = np.empty(0)
     # two passes: every mode is judged over the same step, and by the largest rounding error
     shared = longest
     for judging in (False, True):
@@ -159,8 +193,7 @@ def choose_mode(
                     possible = False
             if not possible:
                 continue
-            call_address(address, mode, inputs, parameters, W)
-            length = step_length(W, drift, order, tol)
+            length = expand(address, layout, mode, inputs, parameters, tol, longest, W, memory)
             if not length > 0.0:
                 broken = True
                 continue

@@ -12,6 +12,8 @@ import numpy as np
 
 from fastslow.compiled.parts import part
 
+EPSILON = float(np.finfo(float).eps)
+
 #: Intervals of the subdivision are not made shorter than 2 to the power of minus this.
 DEEPEST = 44
 

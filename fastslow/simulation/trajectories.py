@@ -49,6 +49,7 @@ _ARGUMENTS = (
     "seen",
 )
 SOURCES = (
+    "fastslow.simulation.collocation",
     "fastslow.simulation.driver",
     "fastslow.simulation.events",
     "fastslow.simulation.extremes",
@@ -218,7 +219,7 @@ def simulate(
         steps,
         compiled.modes,
         crossings,
-        _kept(store, len(steps), kept, order + 1) if dense else None,
+        _kept(store, len(steps), kept, compiled.order + 1) if dense else None,
         (times[:reached], sampled[:, :reached]) if samples is not None else None,
     )
 
