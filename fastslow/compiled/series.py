@@ -40,6 +40,10 @@ def series(mode, inputs, parameters, W):
 SHORT = 4
 
 
+#: Highest degree of the collocation polynomials that take the place of a Taylor series.
+COLLOCATION = 12
+
+
 @dataclass(frozen=True, eq=False)
 class CompiledSeries:
     """The compiled series of a model and how its arrays are laid out.
@@ -85,6 +89,14 @@ class CompiledSeries:
     modes: tuple[str, ...]
     continuous: NDArray[np.bool_]
     values_only: tuple[str, ...] = ()
+
+    @property
+    def method(self) -> str:
+        """How this model is stepped, in words."""
+        if self.values_only:
+            names = ", ".join(self.values_only)
+            return f"collocation of order {self.order} (no Taylor recurrence for {names})"
+        return f"Taylor series of order {self.order}"
 
     def parameter_array(self, model: Model) -> NDArray[np.float64]:
         """Parameter values in the order that the compiled function expects, never empty."""
@@ -163,11 +175,13 @@ _compiled: dict[_Equations, CompiledSeries] = {}
 def compile_series(model: Model, order: int) -> CompiledSeries:
     """Compile the Taylor series of a model, or find it compiled already.
 
+    A model with a function that has no recurrence is compiled to values and rates.
+
     Parameters
     ----------
     model : Model
     order : int
-        Highest coefficient.
+        Highest coefficient, lowered to `COLLOCATION` where no Taylor series exists.
 
     Raises
     ------
@@ -178,6 +192,8 @@ def compile_series(model: Model, order: int) -> CompiledSeries:
     if equations not in _compiled:
         sliding = tuple(_sliding_modes(equations, model))
         whole = replace(equations, modes=equations.modes + sliding)
+        if whole.without_recurrence:
+            whole = replace(whole, order=min(order, COLLOCATION))
         _compiled[equations] = _compile(
             whole, np.array(list(model.continuous.values()), dtype=bool)
         )

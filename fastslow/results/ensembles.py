@@ -64,6 +64,8 @@ class Ensemble:
         How each ended, and in which of the modes.
     sampled : tuple of ndarray, optional
         Times (N,) or (m, N) and columns (m, n + n_forcing, N), NaN after the end of a trajectory.
+    method : str
+        How the steps were made.
     describe : callable
         Words for one outcome, from its code, mode, time with state, number of
         steps and largest number in the state at the start.
@@ -100,6 +102,7 @@ class Ensemble:
     codes: NDArray[np.int64]
     last_mode: NDArray[np.int64]
     sampled: tuple[NDArray[np.float64], NDArray[np.float64]] | None
+    method: str
     describe: Callable[[int, int, NDArray[np.float64], int, float], Outcome]
 
     def __len__(self) -> int:
@@ -173,6 +176,7 @@ class Ensemble:
         if len(kinds):
             lines.append("  " + ", ".join(f"{k}: {n}" for k, n in zip(kinds, counts, strict=True)))
         done = int(np.count_nonzero(self.success))
+        lines.append(f"  {self.method}")
         lines.append(f"  {done} of {count} reached the end of time")
         if done < count:
             worst = int(np.flatnonzero(~self.success)[0])

@@ -18,7 +18,7 @@ from fastslow.results.contacts import (
     regime_of,
     residence_in,
 )
-from fastslow.results.crossings import Crossing, Segment, segments_of
+from fastslow.results.crossings import Crossing, Segment, crossings_of, segments_of
 from fastslow.results.dense import columns_at, refined_table
 from fastslow.results.outcome import Outcome
 from fastslow.results.sections import (
@@ -54,8 +54,10 @@ class Trajectory:
         Why the run ended.
     end : ndarray, shape (1 + n,)
         Time and state reached.
-    steps : ndarray, shape (n_steps, 3)
-        Time, length and mode of every step.
+    method : str
+        How the steps were made.
+    steps : ndarray, shape (n_steps, 4)
+        Time, length and mode of every step, and 1 where collocation took the place of a series.
     modes : tuple of str
         What the modes in ``steps`` and ``crossing_table`` are: regions, then sliding motions.
     crossing_table : ndarray, shape (n_crossings, 6 + n)
@@ -90,6 +92,7 @@ class Trajectory:
     outcome: Outcome
     span: tuple[float, float]
     end: NDArray[np.float64]
+    method: str
     steps: NDArray[np.float64]
     modes: tuple[str, ...]
     crossing_table: NDArray[np.float64]
@@ -150,18 +153,7 @@ class Trajectory:
     @cached_property
     def crossings(self) -> tuple[Crossing, ...]:
         """Every crossing in order of time."""
-        return tuple(
-            Crossing(
-                float(entry[0]),
-                entry[6:].copy(),
-                self.interfaces[int(entry[1])],
-                int(entry[2]),
-                self.modes[int(entry[3])],
-                self.modes[int(entry[4])],
-                bool(entry[5]),
-            )
-            for entry in self.crossing_table
-        )
+        return crossings_of(self)
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
@@ -394,6 +386,7 @@ class Trajectory:
             f"Trajectory of {', '.join(self.columns)} for t from {low:.6g} to {high:.6g}",
             f"  {len(self.steps)} steps, {len(self.crossing_table)} crossings, "
             f"{len(self.segments)} segments" + (f", regime {self.regime}" if self.regime else ""),
+            f"  {self.method}",
             f"  {self.outcome}",
         ]
         return "\n".join(lines)

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
+from fastslow.compiled.series import COLLOCATION
 from fastslow.simulation.polynomials import EPSILON
 
 Array = NDArray[np.float64]
 
 #: Lowest and highest degree.
-LOWEST, HIGHEST = 4, 12
+LOWEST, HIGHEST = 4, COLLOCATION
 
 #: Most iterations of one attempt, and most attempts for one step.
 ITERATIONS, ATTEMPTS = 40, 100
@@ -91,8 +92,8 @@ _C, _F, _TO_C, _TO_F, _AT_F, _ERRORS, _WORST = _tables()
 
 @part
 def memory_size(n_states, order):
-    """Numbers to carry from one step to the next: time, mode, lengths, rates."""
-    return 4 + n_states * min(order, HIGHEST)
+    """Numbers to carry: whether the last step was such a one, its place, lengths and rates."""
+    return 5 + n_states * min(order, HIGHEST)
 
 
 @part
@@ -121,8 +122,8 @@ def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
         return np.nan
     point, out = np.empty(inputs.shape[0]), np.zeros(W.shape[0])
     h = room
-    if memory.shape[0] > 0 and memory[2] > 0.0:
-        h = min(room, memory[2])
+    if memory.shape[0] > 0 and memory[1] > 0.0:
+        h = min(room, memory[1])
     else:
         h = min(room, first_length(address, layout, mode, inputs, parameters, tol, W, point, out))
     done = False
@@ -184,10 +185,10 @@ def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
             W[row + k] = work[k] * power
             power /= h
     if memory.shape[0] > 0:
-        memory[0], memory[1], memory[2], memory[3] = inputs[0], mode, growth * h, h
+        memory[0], memory[1], memory[2], memory[3], memory[4] = 1.0, growth * h, h, inputs[0], mode
         for i in range(n_states):
             for k in range(n):
-                memory[4 + i * n + k] = (k + 1) * W[i * columns + k + 1]
+                memory[5 + i * n + k] = (k + 1) * W[i * columns + k + 1]
     return h
 
 
@@ -218,10 +219,10 @@ def first_length(address, layout, mode, inputs, parameters, tol, W, point, out):
 @part
 def predict(memory, t, mode, h, n, n_states, rates):
     """Rates at the points of a step, continued from the step before or constant."""
-    known = memory.shape[0] > 0 and memory[1] == mode and memory[2] > 0.0
-    offset = t - memory[0] if known else 0.0
-    if known and offset + h > 2.5 * memory[3]:
-        known = False
+    known = memory.shape[0] > 0 and memory[2] > 0.0 and memory[4] == mode
+    offset = t - memory[3] if known else 0.0
+    # far beyond the step before its polynomial is no guide
+    known = known and offset + h <= 2.5 * memory[2]
     table = n - LOWEST
     for i in range(rates.shape[0]):
         for j in range(1, n):
@@ -232,7 +233,7 @@ def predict(memory, t, mode, h, n, n_states, rates):
                 s = offset + _C[table, j] * h
                 value = 0.0
                 for k in range(n - 1, -1, -1):
-                    value = value * s + memory[4 + i * n + k]
+                    value = value * s + memory[5 + i * n + k]
                 if j == 0:
                     here = value
                 else:

@@ -173,7 +173,7 @@ def drive(
     hit = np.zeros(n_interfaces, dtype=np.bool_)
     rests = np.zeros(n_interfaces, dtype=np.bool_)
     side = np.zeros(n_interfaces, dtype=np.int64)
-    steps = np.empty((64 if extremes is None else 0, 3))
+    steps = np.empty((64 if extremes is None else 0, 4))
     crossings = np.empty((16 if extremes is None else 0, 6 + n_states))
     offsets = np.empty(times.shape[0])
     n_steps = n_crossings = n_samples = crowd = ZERO
@@ -354,6 +354,7 @@ def drive(
                 if n_steps == steps.shape[0]:
                     steps = grown(steps)
                 steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, taken, mode
+                steps[n_steps, 3] = memory[0]
             else:
                 seen[mode] = t
                 if t > since:

@@ -194,7 +194,7 @@ def simulate_many(
     UnknownNameError
         For a state, parameter or gap that is not in the model.
     ModelError
-        For a function that has no Taylor recurrence.
+        For a function that cannot be compiled.
 
     Examples
     --------
@@ -272,6 +272,7 @@ def simulate_many(
         codes[:, 0],
         codes[:, 1],
         (times if len(times) > 1 else times[0], sampled) if samples is not None else None,
+        "; ".join(dict.fromkeys(compiled.method for *_, compiled in groups)),
         partial(outcome_of, modes=modes, limits=limits),
     )
 

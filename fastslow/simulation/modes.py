@@ -73,8 +73,8 @@ def expand(address, layout, mode, inputs, parameters, tol, room, W, memory):
     W : float64 array
         Rows of coefficients, filled here.
     memory : float64 array
-        What is carried from one step of a run to the next; zeros at its beginning,
-        `memory_size` numbers, or none for a single step.
+        What is carried from one step of a run to the next: `memory_size` numbers, zeros at
+        its beginning, or none for a single step. The first is 1 after a collocation.
 
     Returns
     -------
@@ -85,6 +85,8 @@ def expand(address, layout, mode, inputs, parameters, tol, room, W, memory):
     drift = n_states + n_forcing + n_interfaces
     call_address(address, mode, inputs, parameters, W)
     length = step_length(W, drift, order, tol)
+    if memory.shape[0] > 0:
+        memory[0] = 0.0
     if length > 0.0:
         return length
     return collocate(address, layout, mode, inputs, parameters, tol, room, W, memory)
@@ -220,7 +222,8 @@ def choose_mode(
                     best = mode
     if equals > 1 and best_score == AGREES and not certain:
         return MANY_MODES
-    return NOT_DEFINED if best == NO_MODE and broken else best
+    # one that disagrees is not taken in the place of one that is not known
+    return NOT_DEFINED if broken and best_score <= DISAGREES else best
 
 
 @part

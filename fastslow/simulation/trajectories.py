@@ -110,7 +110,9 @@ def simulate(
 
     Taylor series of the rates, step by step (Jorba and Zou 2005); crossings
     are roots of the interface functions along the series of a step, so that
-    two crossings within one step are both found.
+    two crossings within one step are both found. Where a function has no
+    recurrence (gamma, Bessel functions, …), or a series is singular at a point
+    where the rates are not, collocation polynomials take their place.
 
     Parameters
     ----------
@@ -135,7 +137,8 @@ def simulate(
         Whether the series is kept, for evaluation at any time. Without it the
         memory does not grow with the number of steps by more than 24 bytes each.
     order : int, optional
-        Order of the series, 4 to 40; by default chosen by the tolerance.
+        Order of the series, 4 to 40, by default chosen by the tolerance; of
+        collocation polynomials 12 at most.
     implicit : bool
         Whether an implicit method may take long steps through settled phases,
         in which stability and not accuracy limits the series.
@@ -157,7 +160,7 @@ def simulate(
     UnknownNameError
         For an initial value or gap that is not in the model.
     ModelError
-        For a function that has no Taylor recurrence.
+        For a function that cannot be compiled.
 
     Examples
     --------
@@ -216,6 +219,7 @@ def simulate(
         outcome_of(code, mode, end, n_steps, float(np.abs(begin).max()), compiled.modes, limits),
         (span[0], float(end[0])),
         end,
+        _method(compiled, steps),
         steps,
         compiled.modes,
         crossings,
@@ -244,6 +248,14 @@ def _kept(store: NDArray[np.float64], *shape: int) -> NDArray[np.float64]:
         _room.store = store
         series = series.copy()
     return series.reshape(shape)
+
+
+def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
+    """How a run was stepped, in words."""
+    count = int(np.count_nonzero(steps[:, 3]))
+    if compiled.values_only or not count:
+        return compiled.method
+    return f"{compiled.method}, {count} steps by collocation where it is singular"
 
 
 def default_order(tol: float) -> int:
