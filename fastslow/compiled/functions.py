@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Any
 
+import mpmath
 import sympy as sp
-from sympy.core.function import AppliedUndef, ArgumentIndexError
+from sympy.core.function import ArgumentIndexError
 from sympy.printing.codeprinter import CodePrinter
 
 from fastslow.errors import ModelError
@@ -86,8 +88,18 @@ OPEN = {
 
 VALUES = ELEMENTARY | CLOSED | OPEN
 
+#: Functions that mpmath knows under other names than SymPy.
+IN_MPMATH: dict[str, Callable[[Any], Any]] = {
+    "airyaiprime": lambda x: mpmath.airyai(x, derivative=1),
+    "airybiprime": lambda x: mpmath.airybi(x, derivative=1),
+    "erfcinv": lambda x: mpmath.erfinv(1 - x),
+}
+
 #: Functions that have a recurrence only in some of their arguments: their numbers.
 _IN_ARGUMENTS = {sp.LambertW: (0,), sp.expint: (1,), sp.uppergamma: (1,), sp.lowergamma: (1,)}
+
+#: What SymPy itself prints as Python.
+_PRINTED = (sp.Abs, sp.sign, sp.Max, sp.Min, sp.Heaviside, sp.Piecewise)
 
 #: Two forms of one name in SymPy: arguments that are left out there, another function here.
 _DEFAULTS = {sp.LambertW: (sp.Integer(0),)}
@@ -104,17 +116,28 @@ def value_code(expression: sp.Function, code_of: Callable[[sp.Expr], str]) -> st
     """
     function, arguments = expression.func, expression.args
     if function not in VALUES:
-        kind = "an undefined function" if isinstance(expression, AppliedUndef) else "a function"
-        raise ModelError(
-            f"{expression} has {kind}, {function}, that cannot be compiled; expected one of "
-            + ", ".join(sorted(f.__name__ for f in VALUES))
-        )
+        raise refusal([expression])
     if len(arguments) == 1:
         arguments += _DEFAULTS.get(function, ())
     code = _OTHERWISE.get((function, len(arguments)), VALUES[function])
     if code.count("{}") != len(arguments) or not _in_domain(function, arguments):
-        raise ModelError(f"{expression} cannot be compiled: {_form(function)}")
+        raise ModelError(f"{function} cannot be compiled in this form: {_form(function)}")
     return f"({code.format(*map(code_of, arguments))})"
+
+
+def refusal(expressions: Iterable[sp.Expr]) -> ModelError:
+    """The error that names what in some expressions has no value."""
+    held = set().union(*(e.atoms(sp.Function, sp.Derivative, sp.Integral) for e in expressions))
+    names = {
+        f"the derivative of {f.expr.func}" if isinstance(f, sp.Derivative) else str(f.func)
+        for f in held
+        if f.func not in (*VALUES, *_PRINTED)
+    }
+    return ModelError(
+        f"the equations or their derivatives contain {', '.join(sorted(names)) or 'complex numbers'}"
+        ", which cannot be compiled; expected one of "
+        + ", ".join(sorted(f.__name__ for f in VALUES))
+    )
 
 
 def teach_functions(printer: type[CodePrinter]) -> None:
@@ -123,7 +146,8 @@ def teach_functions(printer: type[CodePrinter]) -> None:
     def show(self: CodePrinter, expr: sp.Function) -> str:
         return value_code(expr, self._print)
 
-    # a printer looks for a method by the names of a class and of its parents
+    # a printer looks for a method by the names of a class and of its parents; a function
+    # that is not known anywhere has AppliedUndef among them
     for name in (*(f.__name__ for f in VALUES), "AppliedUndef"):
         setattr(printer, f"_print_{name}", show)
 

@@ -20,8 +20,7 @@ import sympy as sp
 from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.pycode import PythonCodePrinter
 
-from fastslow.compiled.functions import slope_of, teach_functions, value_code
-from fastslow.errors import ModelError
+from fastslow.compiled.functions import refusal, slope_of, teach_functions, value_code
 
 class ScalarPrinter(PythonCodePrinter):
     """Expressions of parameters as Python: every number a float, so that none overflows."""
@@ -68,7 +67,7 @@ def scalar_code(expression: sp.Expr) -> str:
     try:
         return str(ScalarPrinter({"fully_qualified_modules": True}).doprint(expression))
     except PrintMethodNotImplementedError:
-        raise ModelError(f"{expression} cannot be compiled: it has no known value") from None
+        raise refusal([expression]) from None
 
 
 @dataclass

@@ -51,7 +51,7 @@ def test_a_slow_quantity_without_value_is_named(gear):
 
 def test_a_function_that_cannot_be_compiled_is_named():
     x = sp.Symbol("x")
-    with pytest.raises(fs.FastSlowError, match=r"contain .*polygamma.* cannot be compiled"):
-        fs.equilibria(fs.Model({x: sp.gamma(x) - 2}))
+    with pytest.raises(fs.FastSlowError, match=r"contain the derivative of zeta, .* compiled"):
+        fs.equilibria(fs.Model({x: sp.zeta(x) - 2}))
     with pytest.raises(fs.FastSlowError, match=r"contain .*g.* cannot be compiled"):
         fs.equilibria(fs.Model({x: sp.Function("g")(x) - x}))

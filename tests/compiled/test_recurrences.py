@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from fastslow.compiled.functions import CLOSED, ELEMENTARY
+from fastslow.compiled.functions import CLOSED, ELEMENTARY, IN_MPMATH
 from fastslow.compiled.recurrences import scalar_code
 from fastslow.compiled.series import compile_series
 from fastslow.errors import ModelError
@@ -61,7 +61,7 @@ def call(compiled, mode, inputs, parameters, out):
 
 
 def expected(law):
-    function = sp.lambdify(t, law.subs(a, sp.Rational(7, 10)), "mpmath")
+    function = sp.lambdify(t, law.subs(a, sp.Rational(7, 10)), [IN_MPMATH, "mpmath"])
     with mpmath.workdps(40):
         return [float(c) for c in mpmath.taylor(function, mpmath.mpf("0.3"), ORDER)]
 
@@ -83,9 +83,20 @@ def test_every_operation():
         assert np.abs((found - reference) * scale).max() < 1e-13 * (1 + abs(reference[0])), law
 
 
-def test_a_function_without_recurrence_is_named():
-    with pytest.raises(ModelError, match=r"gamma.*has no Taylor recurrence"):
-        compile_series(Model({x: sp.gamma(1 + x**2)}), 12)
+@pytest.mark.parametrize(
+    ("rate", "said"),
+    [
+        (sp.Function("f")(x) - x, r"contain f, which cannot be compiled; expected one of .*gamma"),
+        (sp.gamma(x) - sp.Function("f")(x), r"contain f, which cannot be compiled"),
+        (sp.LambertW(x, 2), r"LambertW cannot be compiled .* branch must be 0 or -1"),
+        (sp.expint(x, 2), r"expint cannot be compiled .* whole number"),
+        (sp.zeta(x, 2), r"zeta cannot be compiled .* number of arguments"),
+        (sp.gamma(x) + sp.Derivative(sp.zeta(x), x), r"contain the derivative of zeta"),
+    ],
+)
+def test_what_cannot_be_compiled_is_named(rate, said):
+    with pytest.raises(ModelError, match=said):
+        compile_series(Model({x: rate}), 12)
 
 
 def test_new_values_compile_nothing(tmp_path, monkeypatch):
