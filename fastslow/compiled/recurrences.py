@@ -22,6 +22,7 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from fastslow.compiled.functions import refusal, slope_of, teach_functions, value_code
 
+
 class ScalarPrinter(PythonCodePrinter):
     """Expressions of parameters as Python: every number a float, so that none overflows."""
 

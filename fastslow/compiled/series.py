@@ -154,7 +154,6 @@ class _Equations:
             self.order,
         )
 
-
     @property
     def moving(self) -> set[sp.Symbol]:
         """All symbols that change with time."""

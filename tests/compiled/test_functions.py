@@ -42,9 +42,7 @@ def test_every_function_is_tried():
 
 def test_values():
     laws = [law for group in LAWS.values() for law in group]
-    model = Model(
-        {x: 1}, forcing={f"q{i}": law for i, law in enumerate(laws)}, parameters={a: 0.7}
-    )
+    model = Model({x: 1}, forcing={f"q{i}": law for i, law in enumerate(laws)}, parameters={a: 0.7})
     compiled = compile_series(model, 16)
     assert set(compiled.values_only) == {f.__name__ for f in LAWS}
     columns = compiled.order + 1
