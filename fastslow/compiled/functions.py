@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -47,40 +48,40 @@ ELEMENTARY = {
 
 #: Special functions whose derivatives lead back to functions of these two tables.
 CLOSED = {
-    sp.erfi: "special.erfi({})",
-    sp.erfinv: "special.erfinv({})",
-    sp.erfcinv: "special.erfcinv({})",
+    sp.erfi: "special.erfi({}, 0)",
+    sp.erfinv: "special.erfinv({}, 0)",
+    sp.erfcinv: "special.erfcinv({}, 0)",
     sp.fresnels: "special.fresnel({}, 0)",
     sp.fresnelc: "special.fresnel({}, 1)",
     sp.airyai: "special.airy({}, 0)",
     sp.airyaiprime: "special.airy({}, 1)",
     sp.airybi: "special.airy({}, 2)",
     sp.airybiprime: "special.airy({}, 3)",
-    sp.Ei: "special.expi({})",
-    sp.li: "special.expi(math.log({}))",
+    sp.Ei: "special.expi({}, 0)",
+    sp.li: "special.expi(math.log({}), 0)",
     sp.Ci: "special.sine_cosine_integral({}, 1)",
     sp.Chi: "special.hyperbolic_integral({}, 1)",
     sp.LambertW: "special.lambertw({}, {})",
-    sp.expint: "special.expint({}, {})",
-    sp.uppergamma: "special.uppergamma({}, {})",
-    sp.lowergamma: "special.lowergamma({}, {})",
+    sp.expint: "special.expn({}, {}, 0)",
+    sp.uppergamma: "special.gammaincc({0}, {1}, 0) * special.gamma({0}, 0)",
+    sp.lowergamma: "special.gammainc({0}, {1}, 0) * special.gamma({0}, 0)",
 }
 
 #: Special functions whose derivatives lead ever farther, or are quotients at a zero of both.
 OPEN = {
-    sp.gamma: "special.gamma({})",
-    sp.loggamma: "special.loggamma({})",
+    sp.gamma: "special.gamma({}, 0)",
+    sp.loggamma: "special.loggamma({}, 0)",
     sp.polygamma: "special.polygamma({}, {})",
-    sp.beta: "special.beta({}, {})",
-    sp.factorial: "special.gamma(1.0 + ({}))",
-    sp.zeta: "special.zeta({})",
-    sp.besselj: "special.besselj({}, {})",
-    sp.bessely: "special.bessely({}, {})",
-    sp.besseli: "special.besseli({}, {})",
-    sp.besselk: "special.besselk({}, {})",
-    sp.elliptic_k: "special.elliptic_k({})",
-    sp.elliptic_f: "special.elliptic_f({}, {})",
-    sp.elliptic_e: "special.elliptic_e({})",
+    sp.beta: "special.beta({}, {}, 0)",
+    sp.factorial: "special.gamma(1.0 + ({}), 0)",
+    sp.zeta: "1.0 + special.zetac({}, 0)",
+    sp.besselj: "special.jv({}, {}, 0)",
+    sp.bessely: "special.yv({}, {}, 0)",
+    sp.besseli: "special.iv({}, {}, 0)",
+    sp.besselk: "special.kv({}, {}, 0)",
+    sp.elliptic_k: "special.ellipk({}, 0)",
+    sp.elliptic_f: "special.ellipkinc({}, {}, 0)",
+    sp.elliptic_e: "special.ellipe({}, 0)",
     sp.sinc: "special.sinc({})",
     sp.Si: "special.sine_cosine_integral({}, 0)",
     sp.Shi: "special.hyperbolic_integral({}, 0)",
@@ -103,7 +104,7 @@ _PRINTED = (sp.Abs, sp.sign, sp.Max, sp.Min, sp.Heaviside, sp.Piecewise)
 
 #: Two forms of one name in SymPy: arguments that are left out there, another function here.
 _DEFAULTS = {sp.LambertW: (sp.Integer(0),)}
-_OTHERWISE = {(sp.elliptic_e, 2): "special.elliptic_e_incomplete({}, {})"}
+_OTHERWISE = {(sp.elliptic_e, 2): "special.ellipeinc({}, {}, 0)"}
 
 
 def value_code(expression: sp.Function, code_of: Callable[[sp.Expr], str]) -> str:
@@ -120,7 +121,7 @@ def value_code(expression: sp.Function, code_of: Callable[[sp.Expr], str]) -> st
     if len(arguments) == 1:
         arguments += _DEFAULTS.get(function, ())
     code = _OTHERWISE.get((function, len(arguments)), VALUES[function])
-    if code.count("{}") != len(arguments) or not _in_domain(function, arguments):
+    if _count(code) != len(arguments) or not _in_domain(function, arguments):
         raise ModelError(f"{function} cannot be compiled in this form: {_form(function)}")
     return f"({code.format(*map(code_of, arguments))})"
 
@@ -133,10 +134,10 @@ def refusal(expressions: Iterable[sp.Expr]) -> ModelError:
         for f in held
         if f.func not in (*VALUES, *_PRINTED)
     }
+    found = ", ".join(sorted(names)) or "complex numbers"
     return ModelError(
-        f"the equations or their derivatives contain {', '.join(sorted(names)) or 'complex numbers'}"
-        ", which cannot be compiled; expected one of "
-        + ", ".join(sorted(f.__name__ for f in VALUES))
+        f"the equations or their derivatives contain {found}, which cannot be compiled; "
+        "expected one of " + ", ".join(sorted(f.__name__ for f in VALUES))
     )
 
 
@@ -150,6 +151,11 @@ def teach_functions(printer: type[CodePrinter]) -> None:
     # that is not known anywhere has AppliedUndef among them
     for name in (*(f.__name__ for f in VALUES), "AppliedUndef"):
         setattr(printer, f"_print_{name}", show)
+
+
+def _count(code: str) -> int:
+    """How many arguments a template takes."""
+    return len(set(re.findall(r"{\d?}", code))) if "{0}" in code else code.count("{}")
 
 
 def _in_domain(function: type[sp.Function], arguments: tuple[sp.Expr, ...]) -> bool:

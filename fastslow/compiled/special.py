@@ -51,118 +51,24 @@ def _address(capsule: Any) -> int:
     return int(pointer_of(capsule, _signature(capsule).encode()))
 
 
-_gamma = _external("gamma", 1)
-_loggamma = _external("loggamma", 1)
-_psi = _external("psi", 1)
-_zetac = _external("zetac", 1)
-_jv, _yv = _external("jv", 2), _external("yv", 2)
-_iv, _kv = _external("iv", 2), _external("kv", 2)
-_expi = _external("expi", 1)
-_expn = _external("expn", 2)
-_erfi = _external("erfi", 1)
-_erfinv, _erfcinv = _external("erfinv", 1), _external("erfcinv", 1)
-_ellipk, _ellipe = _external("ellipk", 1), _external("ellipe", 1)
-_ellipkinc, _ellipeinc = _external("ellipkinc", 2), _external("ellipeinc", 2)
-_beta = _external("beta", 2)
-_gammainc, _gammaincc = _external("gammainc", 2), _external("gammaincc", 2)
+# each takes one more argument of no meaning, 0
+gamma = _external("gamma", 1)
+loggamma = _external("loggamma", 1)
+psi = _external("psi", 1)
+zetac = _external("zetac", 1)
+jv, yv = _external("jv", 2), _external("yv", 2)
+iv, kv = _external("iv", 2), _external("kv", 2)
+expi = _external("expi", 1)
+expn = _external("expn", 2)
+erfi = _external("erfi", 1)
+erfinv, erfcinv = _external("erfinv", 1), _external("erfcinv", 1)
+ellipk, ellipe = _external("ellipk", 1), _external("ellipe", 1)
+ellipkinc, ellipeinc = _external("ellipkinc", 2), _external("ellipeinc", 2)
+beta = _external("beta", 2)
+gammainc, gammaincc = _external("gammainc", 2), _external("gammaincc", 2)
 _airy = _external("airy", 1, 4)
 _sici, _shichi = _external("sici", 1, 2), _external("shichi", 1, 2)
 _fresnel = _external("fresnel", 1, 2)
-
-
-@part
-def gamma(x):
-    return _gamma(x, 0)
-
-
-@part
-def loggamma(x):
-    return _loggamma(x, 0)
-
-
-@part
-def zeta(s):
-    return 1.0 + _zetac(s, 0)
-
-
-@part
-def besselj(n, x):
-    return _jv(n, x, 0)
-
-
-@part
-def bessely(n, x):
-    return _yv(n, x, 0)
-
-
-@part
-def besseli(n, x):
-    return _iv(n, x, 0)
-
-
-@part
-def besselk(n, x):
-    return _kv(n, x, 0)
-
-
-@part
-def expi(x):
-    return _expi(x, 0)
-
-
-@part
-def expint(n, x):
-    return _expn(n, x, 0)
-
-
-@part
-def erfi(x):
-    return _erfi(x, 0)
-
-
-@part
-def erfinv(x):
-    return _erfinv(x, 0)
-
-
-@part
-def erfcinv(x):
-    return _erfcinv(x, 0)
-
-
-@part
-def elliptic_k(m):
-    return _ellipk(m, 0)
-
-
-@part
-def elliptic_e(m):
-    return _ellipe(m, 0)
-
-
-@part
-def elliptic_f(z, m):
-    return _ellipkinc(z, m, 0)
-
-
-@part
-def elliptic_e_incomplete(z, m):
-    return _ellipeinc(z, m, 0)
-
-
-@part
-def beta(x, y):
-    return _beta(x, y, 0)
-
-
-@part
-def lowergamma(s, x):
-    return _gammainc(s, x, 0) * _gamma(s, 0)
-
-
-@part
-def uppergamma(s, x):
-    return _gammaincc(s, x, 0) * _gamma(s, 0)
 
 
 @part
@@ -199,6 +105,7 @@ def fresnel(x, which):
 
 @part
 def sinc(x):
+    """Sine of x over x, also at 0."""
     return math.sin(x) / x if x != 0.0 else 1.0
 
 
@@ -218,7 +125,7 @@ _BERNOULLI = (
 def polygamma(n, x):
     """The n-th derivative of digamma, by its sum with Euler and Maclaurin's remainder."""
     if n == 0.0:
-        return _psi(x, 0)
+        return psi(x, 0)
     if x <= 0.0 and x == math.floor(x):
         return math.inf if n % 2.0 == 1.0 else math.nan
     s, total = n + 1.0, 0.0
@@ -232,7 +139,7 @@ def polygamma(n, x):
         total += _BERNOULLI[j] * factor
         factor *= (s + 2.0 * j + 1.0) * (s + 2.0 * j + 2.0) / (x * x)
     sign = 1.0 if n % 2.0 == 1.0 else -1.0
-    return sign * _gamma(n + 1.0, 0) * total
+    return sign * gamma(n + 1.0, 0) * total
 
 
 @part

@@ -38,9 +38,8 @@ def lobatto_points(n: int) -> Array:
     >>> lobatto_points(3)
     array([0. , 0.5, 1. ])
     """
-    roots = legendre.Legendre.basis(n - 1).deriv().roots()
-    inside = (1.0 + np.sort(roots)) / 2.0
-    inside = (inside + 1.0 - inside[::-1]) / 2.0
+    roots = np.sort(legendre.legroots(legendre.legder([0.0] * (n - 1) + [1.0])))
+    inside = 0.5 + (roots - roots[::-1]) / 4.0
     return np.array([0.0, *inside, 1.0])
 
 
@@ -195,7 +194,7 @@ def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
 @part
 def first_length(address, layout, mode, inputs, parameters, tol, W, point, out):
     """A length to try first, from the rates and how they change (Hairer et al. 1993, II.4)."""
-    n_states, n_forcing, _, _, order = layout
+    n_states, order = layout[0], layout[4]
     columns = order + 1
     rate = 0.0
     for i in range(n_states):

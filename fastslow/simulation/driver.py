@@ -151,7 +151,6 @@ def drive(
     n_rows, stack_rows, n_fast = sizes
     columns = order + 1
     kept = n_states + n_forcing
-    drift = kept + n_interfaces
     stride = kept * columns
     size = n_rows * columns
     t, late, stop = span[0], 0.0, span[1]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from fastslow.compiled.parts import part
 from fastslow.simulation.polynomials import (
-    EPSILON,
     DEEPEST,
+    EPSILON,
     ZERO,
     excluded,
     halve,

@@ -213,7 +213,7 @@ def choose_mode(
                     scaled(W, first_h + j, order, BEGINNING * shared, b)
                     score = min(score, agreement(b, order, noise[j], signs[mode, j]))
                 else:
-                    score = min(score, slides(W, drift, order, BEGINNING * shared, b))
+                    score = min(score, slides(W, drift, order, BEGINNING * shared, noise[j], b))
             if score > best_score:
                 best, best_score, equals = mode, score, 1
             elif score == best_score and best != NO_MODE:
@@ -227,10 +227,15 @@ def choose_mode(
 
 
 @part
-def slides(W, drift, order, h, b):
-    """Whether the fields of both sides point at the interface, a < 0 < b, now or next."""
+def slides(W, drift, order, h, noise, b):
+    """Whether the fields of both sides point at the interface, a < 0 < b, now or next.
+
+    A drift that moves h by less than its noise decides as little here as it
+    does of the motion to that side: where sliding ends, one of them goes on.
+    """
     columns = order + 1
     small = 32.0 * EPSILON * (abs(W[drift * columns]) + abs(W[(drift + 1) * columns]))
+    small = max(small, noise / h)
     for k in range(2):
         scaled(W, drift + k, order, h, b)
         first = first_strong(b, ZERO, order, small)

@@ -76,21 +76,19 @@ def pieces(rate, side_of, start, end, times):
     return found, crossings
 
 
+def grown(s):
+    return mpmath.exp(s) * mpmath.j0(s)
+
+
+def knots(s):
+    return mpmath.linspace(0, s, 9)[1:]
+
+
 @pytest.mark.parametrize("tol", TOLERANCES)
 def test_error_follows_the_tolerance(decay, tol):
     run = simulate(decay, [1], t=(0, 20), tol=tol)
     times = np.linspace(0, 20, 9)
-    with mpmath.workdps(20):
-        exact = [
-            float(
-                mpmath.exp(-s)
-                * (
-                    1
-                    + mpmath.quad(lambda r: mpmath.exp(r) * mpmath.j0(r), mpmath.linspace(0, s, 9))
-                )
-            )
-            for s in times
-        ]
+    exact = [float(mpmath.exp(-s) * (1 + mpmath.quad(grown, [0, *knots(s)]))) for s in times]
     assert np.abs(run(times)[0] - exact).max() < 10 * tol
     fine = np.linspace(0, 20, 999)
     assert np.abs(run.dense_columns(fine)[1] - j0(fine)).max() < 10 * tol
