@@ -122,7 +122,7 @@ def fold_delay(
     >>> fold = fs.continue_equilibria(fast, "p", over=(-1, 1)).folds[0]
     >>> law = fold_delay(fold, 1e-6, level={"x": 0.5})
     >>> round(law.coefficients[0], 8), round(law.coefficients[1], 8), f"{law.delay:.4e}"
-    (1.94692139, -0.11111111, '1.9608e-04')
+    (1.94690271, -0.11111111, '1.9582e-04')
     """
     require_code(point, "LP", "the delay of a fold")
     speed = drift(rate)

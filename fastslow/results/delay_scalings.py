@@ -41,8 +41,9 @@ class DelayScaling:
         Of those terms, fitted with equal relative weights, and by the law where it
         gives them (nan otherwise). The fit is nan with fewer good runs than terms.
     exponent, uncertainty : float
-        Of the power law fitted to all good runs, and the larger of its standard
-        error and the farthest local exponent. Nan where the law is no power.
+        Of the power fitted over these rates, and the larger of its standard error and
+        the distance of the farthest local exponent: how far it is from being one
+        power, not from its limit as eps goes to zero. Nan where the law is no power.
     local_exponents : ndarray, shape (m − 1,)
         d ln(delay − offset·eps) / d ln eps between neighbours.
     law_exponent : float
