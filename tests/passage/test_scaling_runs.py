@@ -140,7 +140,7 @@ def test_a_sheet_that_is_too_short(corner):
     model = fs.Model({x: p + x**2 - x**4 / 4 + x**3}, parameters={p: 0})
     diagram = fs.continue_equilibria(model, "p", over=(-5, 1))
     fold = next(f for f in diagram.folds if abs(f["x"]) < 1e-9)
-    with pytest.raises(fs.ArgumentError, match="the stable sheet before .* goes from"):
+    with pytest.raises(fs.ArgumentError, match=r"the stable sheet before .* goes from"):
         fs.delay_scaling(model, fold, [1.0, 0.1], level={"x": 0.5}, parameter="p")
 
 
