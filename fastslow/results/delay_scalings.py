@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +52,7 @@ class DelayScaling:
         How every run ended.
     """
 
-    point: SpecialPoint = field(repr=False)
+    point: SpecialPoint
     parameter: str
     direction: int
     event: str

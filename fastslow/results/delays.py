@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from fastslow.results.points import SpecialPoint
 
@@ -26,7 +26,7 @@ class Delay(ABC):
         How good the prediction is, and what it leaves out.
     """
 
-    point: SpecialPoint = field(repr=False)
+    point: SpecialPoint
     parameter: str
     rate: float
     delay: float

@@ -100,6 +100,12 @@ def test_a_level_that_is_not_reached(corner):
     assert "nan" in repr(law)
 
 
+def test_a_level_on_the_interface(corner):
+    """Reached when the interface is, with the lag."""
+    law = boundary_delay(corner_point(corner), 0.01, level={"x": 0})
+    assert law.delay == law.lag
+
+
 def test_wrong_boundary_points(corner, gap, cusp_fold):
     point = corner_point(corner)
     with pytest.raises(fs.ArgumentError, match=r"with p falling no stable sheet ends at BE1"):
