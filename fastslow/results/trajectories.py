@@ -57,7 +57,8 @@ class Trajectory:
     method : str
         How the steps were made.
     steps : ndarray, shape (n_steps, 4)
-        Time, length and mode of every step, and 1 where collocation took the place of a series.
+        Time, length and mode of every step, and what took the place of a
+        series: 0 nothing, 1 collocation, 2 an implicit method.
     modes : tuple of str
         What the modes in ``steps`` and ``crossing_table`` are: regions, then sliding motions.
     crossing_table : ndarray, shape (n_crossings, 6 + n)

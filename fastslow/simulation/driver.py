@@ -17,7 +17,7 @@ from fastslow.simulation.modes import (
     interface_noise,
 )
 from fastslow.simulation.polynomials import ZERO, horner
-from fastslow.simulation.settled import DAMPING, PAYS, long_step, settled
+from fastslow.simulation.settled import DAMPING, IMPLICIT, PAYS, long_step, settled
 
 #: How the loop ended.
 REACHED_END = 0
@@ -260,7 +260,7 @@ def drive(
         for i in range(n_states, kept):
             inputs[1 + i] = W[i * columns]
         calm -= 1
-        if n_fast > 0 and calm <= 0 and (in_a_row > 0 or settled(W, drift, order, longest, tol)):
+        if n_fast > 0 and calm <= 0 and (in_a_row > 0 or settled(W, layout, longest, tol)):
             if in_a_row == 0:
                 wanted = 1.25 * longest
             taken, growth = long_step(
@@ -353,7 +353,7 @@ def drive(
                 if n_steps == steps.shape[0]:
                     steps = grown(steps)
                 steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, taken, mode
-                steps[n_steps, 3] = memory[0]
+                steps[n_steps, 3] = IMPLICIT if long else memory[0]
             else:
                 seen[mode] = t
                 if t > since:

@@ -27,13 +27,17 @@ from fastslow.simulation.events import find_event
 #: Taylor coefficients that are matched at the beginning and at the end of a step.
 P, Q = 2, SHORT
 
-#: Degree of the polynomial of a step; its series must have this order at least.
+#: Order of a step, and degree of its polynomial, which its series must have at least.
+SETTLED_ORDER = P + Q
 DEGREE = P + Q + 1
 
 #: A step must be this much longer than that of the series to be worth its cost, except
 #: for the first ones, which damp what the series has left of fast motions.
 PAYS = 3.0
 DAMPING = 6
+
+#: What marks such a step in the table of a run's steps.
+IMPLICIT = 2
 
 #: How much at least all motions of the fast states decay within a step of the series.
 CONTRACTION = 0.01
@@ -168,15 +172,16 @@ def long_step(
 
 
 @part
-def settled(W, n_rows, order, h, tol):
+def settled(W, layout, h, tol):
     """Whether a step is limited by stability: its middle terms are small beside what is allowed.
 
     A motion exp(lambda t) of size a has the terms a z**k / k!, z = lambda h. Where
     accuracy limits the step the middle ones far exceed the last, which is the
     tolerance; on the edge of stability, |z| = order / e, all of them are near it.
     """
+    order = layout[4]
     most = tol * math.exp(0.5 * order)
-    for i in range(n_rows):
+    for i in range(layout[0] + layout[1] + layout[2]):
         row = i * (order + 1)
         scale = 1.0 / (1.0 + abs(W[row]))
         k = order // 2

@@ -26,7 +26,7 @@ from fastslow.simulation.arguments import (
     whole_number,
 )
 from fastslow.simulation.outcomes import outcome_of
-from fastslow.simulation.settled import DEGREE
+from fastslow.simulation.settled import DEGREE, IMPLICIT, SETTLED_ORDER
 
 _ARGUMENTS = (
     "address",
@@ -252,10 +252,13 @@ def _kept(store: NDArray[np.float64], *shape: int) -> NDArray[np.float64]:
 
 def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
     """How a run was stepped, in words."""
-    count = int(np.count_nonzero(steps[:, 3]))
-    if compiled.values_only or not count:
-        return compiled.method
-    return f"{compiled.method}, {count} steps by collocation where it is singular"
+    words = [compiled.method]
+    collocated, implicit = (int(np.count_nonzero(steps[:, 3] == k)) for k in (1, IMPLICIT))
+    if collocated and not compiled.values_only:
+        words.append(f"{collocated} steps by collocation where it is singular")
+    if implicit:
+        words.append(f"{implicit} implicit steps of order {SETTLED_ORDER} through settled phases")
+    return ", ".join(words)
 
 
 def default_order(tol: float) -> int:
@@ -276,7 +279,7 @@ def layout_of(compiled: CompiledSeries) -> tuple[int, int, int, int, int]:
 
 def sizes_of(model: Model, compiled: CompiledSeries, implicit: bool) -> tuple[int, int, int]:
     """Rows of the series, of the event search, and fast states if implicit steps are wanted."""
-    settling = implicit and compiled.order >= DEGREE
+    settling = implicit and compiled.order >= DEGREE and not compiled.values_only
     return compiled.n_rows, STACK_ROWS, len(model.states) if settling else 0
 
 
