@@ -37,6 +37,30 @@ def horner(b, first, last, s):
 
 
 @part
+def sample(W, columns, rows, s, out, first):
+    """Evaluate rows of a step at the offsets s, into the columns of ``out`` from the first."""
+    n = s.shape[0]
+    for i in range(rows):
+        top = i * columns + columns - 1
+        # four at a time, because each waits for its own last product
+        for c in range(0, n - 3, 4):
+            s0, s1, s2, s3 = s[c], s[c + 1], s[c + 2], s[c + 3]
+            v0 = v1 = v2 = v3 = W[top]
+            for k in range(1, columns):
+                coefficient = W[top - k]
+                v0 = v0 * s0 + coefficient
+                v1 = v1 * s1 + coefficient
+                v2 = v2 * s2 + coefficient
+                v3 = v3 * s3 + coefficient
+            out[i, first + c] = v0
+            out[i, first + c + 1] = v1
+            out[i, first + c + 2] = v2
+            out[i, first + c + 3] = v3
+        for c in range(n - n % 4, n):
+            out[i, first + c] = horner(W, top - columns + 1, top, s[c])
+
+
+@part
 def slope(b, first, last, s):
     """Derivative by s of the same sum."""
     value = 0.0

@@ -53,6 +53,7 @@ SOURCES = (
     "fastslow.simulation.extremes",
     "fastslow.simulation.modes",
     "fastslow.simulation.polynomials",
+    "fastslow.simulation.rooms",
     "fastslow.compiled.parts",
     "fastslow.compiled.pointers",
 )
