@@ -1,283 +1,311 @@
-"""Several trajectories at once: functions traced into vector instructions.
+"""Functions of several trajectories at once, traced into vector instructions.
 
-Each number of a traced function is a vector with one element, or lane, for
-every trajectory. The function is run once, as Python, on numbers that write
-down what is done with them; its loops and whole numbers are gone by then.
+Every number of such a function is a vector with one element, or lane, for each
+trajectory. The function runs once, as Python, on numbers that write down what
+is done with them; its loops and whole numbers are gone by then. An operation on
+lanes never mixes them, so that what comes out of one depends on it alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from llvmlite import ir
 
-#: Trajectories side by side.
+#: Trajectories side by side: enough to hide the latency of one by another.
 WIDTH = 8
 
-DOUBLE = ir.DoubleType()
-WHOLE = ir.IntType(64)
+_DOUBLE = ir.DoubleType()
+_WHOLE = ir.IntType(64)
+_BIT = ir.IntType(1)
+_VECTOR = ir.VectorType(_DOUBLE, WIDTH)
+_WHOLES = ir.VectorType(_WHOLE, WIDTH)
+_BITS = ir.VectorType(_BIT, WIDTH)
+
+
+class Mask:
+    """A truth value for every lane."""
+
+    def __init__(self, trace: Trace, value: Any) -> None:
+        self.trace, self.value = trace, value
+
+    def __and__(self, other: Mask) -> Mask:
+        return Mask(self.trace, self.trace.builder.and_(self.value, other.value))
+
+    def __or__(self, other: Mask) -> Mask:
+        return Mask(self.trace, self.trace.builder.or_(self.value, other.value))
+
+    def __invert__(self) -> Mask:
+        return Mask(self.trace, self.trace.builder.not_(self.value))
+
+    def choose(self, a: Any, b: Any) -> Lanes:
+        """The first number where it is true, else the second."""
+        a, b = self.trace.lanes(a), self.trace.lanes(b)
+        return Lanes(self.trace, self.trace.builder.select(self.value, a.value, b.value))
+
+    def everywhere(self) -> Any:
+        """Whether it is true of every lane, for a branch."""
+        builder = self.trace.builder
+        kind = ir.IntType(WIDTH)
+        packed = builder.bitcast(self.value, kind)
+        return builder.icmp_unsigned("==", packed, ir.Constant(kind, 2**WIDTH - 1))
 
 
 class Lanes:
-    """A vector of numbers, or a sum of products whose terms are not yet added.
+    """A vector of numbers, or a sum of products whose terms are not added yet.
 
     They are added when the sum is first used, the terms that are known first
-    before the others, so that none waits for the latest.
+    before the others, so that no addition waits for the latest of them.
     """
 
-    def __init__(self, trace: Trace, value: Any, terms: tuple[Any, ...] = (), steady: bool = False):
-        self.trace, self.terms, self.steady = trace, terms, steady
-        self._value = value
-        self.age = trace.next_age() if value is not None else -1
+    def __init__(
+        self, trace: Trace, value: Any, terms: tuple[Any, ...] = (), steady: bool = False
+    ) -> None:
+        self.trace, self._value, self._terms = trace, value, terms
+        self._steady, self._age = steady, trace.age()
 
     @property
     def value(self) -> Any:
-        """The vector, with its terms added."""
+        """The vector, its terms added."""
         if self._value is None:
-            total = self.trace.add_up(self.terms)
-            self._value, self.age, self.steady = total._value, total.age, total.steady
-            self.terms = ()
+            total = self.trace.sum_of(self._terms)
+            self._value, self._age, self._steady = total.value, total.age, total.steady
+            self._terms = ()
         return self._value
 
-    def _parts(self, sign: int = 1) -> tuple[Any, ...]:
+    @property
+    def age(self) -> int:
+        """A number that grows from each vector to the next."""
+        return self._age if self.value is not None else 0
+
+    @property
+    def steady(self) -> bool:
+        """Whether it depends on steady numbers alone, so that it is computed once for all steps."""
+        return self._steady and self.value is not None
+
+    def _parts(self, sign: int) -> tuple[Any, ...]:
         if self._value is not None:
             return ((sign, self, None),)
-        return tuple((sign * s, a, b) for s, a, b in self.terms)
+        return tuple((sign * s, a, b) for s, a, b in self._terms)
 
-    def _plus(self, other: Any, mine: int, its: int) -> Any:
-        if not isinstance(other, Lanes):
-            if other == 0:
-                return self if mine > 0 else -self
-            other = self.trace.constant(other)
+    def _plus(self, other: Any, mine: int, its: int) -> Lanes:
+        other = self.trace.lanes(other)
         return Lanes(self.trace, None, self._parts(mine) + other._parts(its))
 
-    def __add__(self, other: Any) -> Any:
-        return self._plus(other, 1, 1)
+    def __add__(self, other: Any) -> Lanes:
+        return self if _is(other, 0) else self._plus(other, 1, 1)
 
     __radd__ = __add__
 
-    def __sub__(self, other: Any) -> Any:
-        return self._plus(other, 1, -1)
+    def __sub__(self, other: Any) -> Lanes:
+        return self if _is(other, 0) else self._plus(other, 1, -1)
 
-    def __rsub__(self, other: Any) -> Any:
+    def __rsub__(self, other: Any) -> Lanes:
         return self._plus(other, -1, 1)
 
     def __mul__(self, other: Any) -> Any:
-        if not isinstance(other, Lanes):
-            if other == 0:
-                return 0.0
-            if other == 1:
-                return self
-            if other == -1:
-                return -self
-            other = self.trace.constant(other)
-        return Lanes(self.trace, None, ((1, self, other),))
+        if _is(other, 0):
+            return 0.0
+        if _is(other, 1):
+            return self
+        return Lanes(self.trace, None, ((1, self, self.trace.lanes(other)),))
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Any) -> Any:
-        return self.trace.emit("fdiv", self, other)
+    def __truediv__(self, other: Any) -> Lanes:
+        return self.trace.operation("fdiv", self, other)
 
     def __rtruediv__(self, other: Any) -> Any:
-        return 0.0 if other == 0 else self.trace.emit("fdiv", other, self)
+        return 0.0 if _is(other, 0) else self.trace.operation("fdiv", other, self)
 
-    def __neg__(self) -> Any:
-        return self.trace.emit("fneg", self)
+    def __neg__(self) -> Lanes:
+        return self.trace.operation("fneg", self)
 
-    def __abs__(self) -> Any:
+    def __abs__(self) -> Lanes:
         return self.trace.intrinsic("fabs", self)
 
-    def __lt__(self, other: Any) -> Any:
-        return self.trace.compare("<", self, other)
+    def __lt__(self, other: Any) -> Mask:
+        return self.trace.comparison("<", self, other)
 
-    def __gt__(self, other: Any) -> Any:
-        return self.trace.compare(">", self, other)
+    def __le__(self, other: Any) -> Mask:
+        return self.trace.comparison("<=", self, other)
 
-    def __le__(self, other: Any) -> Any:
-        return self.trace.compare("<=", self, other)
+    def __gt__(self, other: Any) -> Mask:
+        return self.trace.comparison(">", self, other)
 
-    def __ge__(self, other: Any) -> Any:
-        return self.trace.compare(">=", self, other)
+    def __ge__(self, other: Any) -> Mask:
+        return self.trace.comparison(">=", self, other)
+
+    @property
+    def bits(self) -> Bits:
+        """The same as whole numbers of 64 bits."""
+        return Bits(self.trace, self.trace.builder.bitcast(self.value, _WHOLES))
 
 
-class Workspace(dict):
-    """Coefficients by their place; what is put there is added up."""
+class Bits:
+    """A whole number of 64 bits for every lane."""
 
-    def __setitem__(self, place, number):
-        if isinstance(number, Lanes):
-            number.value  # noqa: B018
-        super().__setitem__(place, number)
+    def __init__(self, trace: Trace, value: Any) -> None:
+        self.trace, self.value = trace, value
+
+    def _with(self, name: str, other: int | Bits) -> Bits:
+        if isinstance(other, int):
+            other = Bits(self.trace, ir.Constant(_WHOLES, [other] * WIDTH))
+        return Bits(self.trace, getattr(self.trace.builder, name)(self.value, other.value))
+
+    def __and__(self, other: int | Bits) -> Bits:
+        return self._with("and_", other)
+
+    def __or__(self, other: int | Bits) -> Bits:
+        return self._with("or_", other)
+
+    def __xor__(self, other: int | Bits) -> Bits:
+        return self._with("xor", other)
+
+    def __add__(self, other: int | Bits) -> Bits:
+        return self._with("add", other)
+
+    def __lshift__(self, other: int) -> Bits:
+        return self._with("shl", other)
+
+    def __rshift__(self, other: int) -> Bits:
+        return self._with("lshr", other)
+
+    @property
+    def odd(self) -> Mask:
+        """Whether the last bit is set."""
+        return Mask(self.trace, self.trace.builder.trunc(self.value, _BITS))
+
+    @property
+    def number(self) -> Lanes:
+        """The number with these bits."""
+        return Lanes(self.trace, self.trace.builder.bitcast(self.value, _VECTOR))
+
+
+class Workspace(dict[int, Any]):
+    """Coefficients by their place; sums that are put there are added."""
+
+    def __setitem__(self, place: int, number: Any) -> None:
+        super().__setitem__(place, added(number))
 
 
 class Trace:
-    def __init__(self, context, builder, before, width):
-        self.context, self.builder, self.before, self.width = context, builder, before, width
-        self.vector = ir.VectorType(DOUBLE, width)
-        self.whole = ir.VectorType(WHOLE, width)
-        self.ages = 0
-        self.count = 0
-        self.valid = []
+    """Where the instructions of a traced function go.
 
-    def next_age(self):
-        self.ages += 1
-        return self.ages
+    Parameters
+    ----------
+    context
+        Numba's, to compile functions of single numbers.
+    before, builder : llvmlite.ir.IRBuilder
+        For what depends on steady numbers alone, and for everything else.
+    """
 
-    def constant(self, x):
-        return Lanes(self, ir.Constant(self.vector, [float(x)] * self.width), steady=True)
+    def __init__(self, context: Any, before: Any, builder: Any) -> None:
+        self.context, self.before, self.builder = context, before, builder
+        #: Where what was traced holds: a lane in which one of these is false is not to be used.
+        self.conditions: list[Mask] = []
+        self._count = 0
 
-    def lift(self, x):
-        return x if isinstance(x, Lanes) else self.constant(x)
+    def age(self) -> int:
+        """One more than the last time."""
+        self._count += 1
+        return self._count
 
-    def _builder(self, args):
-        return self.before if all(a.steady for a in args) else self.builder
+    def lanes(self, number: Any) -> Lanes:
+        """A number as lanes, the same in each."""
+        if isinstance(number, Lanes):
+            return number
+        return Lanes(self, ir.Constant(_VECTOR, [float(number)] * WIDTH), steady=True)
 
-    def emit(self, op, *args):
-        args = [self.lift(a) for a in args]
-        values = [a.value for a in args]
-        b = self._builder(args)
-        self.count += 1
-        return Lanes(self, getattr(b, op)(*values), steady=b is self.before)
+    def _place(self, arguments: Sequence[Any]) -> tuple[list[Lanes], Any, bool]:
+        numbers = [self.lanes(a) for a in arguments]
+        steady = all(number.steady for number in numbers)
+        return numbers, self.before if steady else self.builder, steady
 
-    def intrinsic(self, name, *args):
-        args = [self.lift(a) for a in args]
-        values = [a.value for a in args]
-        b = self._builder(args)
-        kind = ir.FunctionType(self.vector, [self.vector] * len(values))
-        full = f"llvm.{name}.v{self.width}f64"
-        f = b.module.globals.get(full) or ir.Function(b.module, kind, full)
-        self.count += 1
-        return Lanes(self, b.call(f, values), steady=b is self.before)
+    def operation(self, name: str, *arguments: Any) -> Lanes:
+        """An instruction such as ``"fdiv"``."""
+        numbers, builder, steady = self._place(arguments)
+        value = getattr(builder, name)(*(number.value for number in numbers))
+        return Lanes(self, value, steady=steady)
 
-    def compare(self, op, a, b):
-        a, b = self.lift(a), self.lift(b)
-        return self.builder.fcmp_ordered(op, a.value, b.value)
+    def intrinsic(self, name: str, *arguments: Any) -> Lanes:
+        """A function that LLVM knows for vectors, such as ``"sqrt"``."""
+        numbers, builder, steady = self._place(arguments)
+        name = f"llvm.{name}.v{WIDTH}f64"
+        function = builder.module.globals.get(name) or ir.Function(
+            builder.module, ir.FunctionType(_VECTOR, [_VECTOR] * len(numbers)), name
+        )
+        return Lanes(self, builder.call(function, [n.value for n in numbers]), steady=steady)
 
-    def select(self, mask, a, b):
-        a, b = self.lift(a), self.lift(b)
-        return Lanes(self, self.builder.select(mask, a.value, b.value))
-
-    def add_up(self, terms):
-        for _, a, b in terms:
-            a.value
-            if b is not None:
-                b.value
-        order = sorted(terms, key=lambda term: max(term[1].age, term[2].age if term[2] is not None else -1))
-        # a single number that is added begins
-        total = None
-        for sign, a, b in order:
-            if total is None:
-                total = a if b is None else self.emit("fmul", a, b)
-                if sign < 0:
-                    total = self.emit("fneg", total)
-            elif b is None:
-                total = self.emit("fadd" if sign > 0 else "fsub", total, a)
-            else:
-                if sign < 0:
-                    a = self.emit("fneg", a)
-                total = self.intrinsic("fmuladd", a, b, total)
-        return total
-
-    def scalars(self, function, *args):
-        """function of each lane, as Numba compiles it"""
+    def one_by_one(self, function: Callable[..., float], *arguments: Any) -> Lanes:
+        """A function of single numbers, compiled by Numba and called for every lane."""
         from numba import types
         from numba.core.typing import signature
-        args = [self.lift(a) for a in args]
-        values = [a.value for a in args]
-        b = self._builder(args)
-        sig = signature(types.float64, *[types.float64] * len(args))
-        result = ir.Constant(self.vector, ir.Undefined)
-        for i in range(self.width):
-            place = ir.Constant(ir.IntType(32), i)
-            one = self.context.compile_internal(b, function, sig, [b.extract_element(v, place) for v in values])
-            result = b.insert_element(result, one, place)
-        return Lanes(self, result, steady=b is self.before)
 
-    def bits(self, x):
-        return self.builder.bitcast(x.value, self.whole)
+        numbers, builder, steady = self._place(arguments)
+        kind = signature(types.float64, *[types.float64] * len(numbers))
+        value = ir.Constant(_VECTOR, ir.Undefined)
+        for lane in range(WIDTH):
+            place = ir.Constant(ir.IntType(32), lane)
+            values = [builder.extract_element(number.value, place) for number in numbers]
+            result = self.context.compile_internal(builder, function, kind, values)
+            value = builder.insert_element(value, result, place)
+        return Lanes(self, value, steady=steady)
 
-    def number(self, bits):
-        return Lanes(self, self.builder.bitcast(bits, self.vector))
+    def comparison(self, sign: str, a: Any, b: Any) -> Mask:
+        """Whether it holds, false of what is not a number."""
+        return Mask(
+            self, self.builder.fcmp_ordered(sign, self.lanes(a).value, self.lanes(b).value)
+        )
 
-    def whole_constant(self, n):
-        return ir.Constant(self.whole, [n] * self.width)
+    def sum_of(self, terms: Sequence[tuple[int, Lanes, Lanes | None]]) -> Lanes:
+        """The sum of products (of numbers where the second factor is None), with their signs."""
 
+        def age(term: tuple[int, Lanes, Lanes | None]) -> int:
+            return max(factor.age for factor in term[1:] if isinstance(factor, Lanes))
 
-MAGIC = 1.5 * 2.0**52
-P1 = float.fromhex("0x1.921fb54400000p+0")
-P2 = float.fromhex("0x1.0b4611a600000p-34")
-P3 = float.fromhex("0x1.3198a2e037073p-69")
-SIN = [-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04, 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10]
-COS = [4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05, -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11]
+        total: Lanes | None = None
+        for sign, a, b in sorted(terms, key=age):
+            if total is None:
+                total = a if b is None else self.operation("fmul", a, b)
+                total = -total if sign < 0 else total
+            elif b is None:
+                total = self.operation("fadd" if sign > 0 else "fsub", total, a)
+            else:
+                total = self.intrinsic("fmuladd", -a if sign < 0 else a, b, total)
+        assert total is not None
+        return total
 
+    def load(self, pointer: Any, row: int, *, steady: bool = False) -> Lanes:
+        """One row of an array of doubles whose rows hold a number for each lane."""
+        builder = self.before if steady else self.builder
+        return Lanes(self, builder.load(_row(builder, pointer, row), align=8), steady=steady)
 
-def horner(cs, x):
-    v = cs[-1]
-    for c in reversed(cs[:-1]):
-        v = v * x + c
-        if isinstance(v, Lanes): v.value
-    return v
-
-
-def sincos(x):
-    T = x.trace
-    if x.steady:
-        import math
-        return T.scalars(lambda z: math.sin(z), x), T.scalars(lambda z: math.cos(z), x)
-    shifted = x * (2 / 3.141592653589793) + MAGIC
-    n = shifted - MAGIC
-    n.value
-    r = x - n * P1
-    r.value
-    r = r - n * P2
-    r.value
-    r = r - n * P3
-    r.value
-    z = r * r
-    z.value
-    s = r + (z * r) * horner(SIN, z)
-    c = 1.0 - 0.5 * z + (z * z) * horner(COS, z)
-    q = T.bits(shifted)
-    b = T.builder
-    odd = b.trunc(q, ir.VectorType(ir.IntType(1), T.width))
-    def signed(v, q):
-        sign = b.shl(b.and_(q, T.whole_constant(2)), T.whole_constant(62))
-        return T.number(b.xor(T.bits(v), sign))
-    T.valid.append(abs(x) < 1e6)
-    sine = signed(T.select(odd, c, s), q)
-    cosine = signed(T.select(odd, s, c), b.add(q, T.whole_constant(1)))
-    return sine, cosine
+    def store(self, number: Any, pointer: Any, row: int) -> None:
+        """The counterpart of `load`."""
+        self.builder.store(self.lanes(number).value, _row(self.builder, pointer, row), align=8)
 
 
-LOG2 = None
-def _fit():
-    import numpy as np
-    from numpy.polynomial import chebyshev as C, polynomial as P
-    m = np.cos(np.pi * (np.arange(40) + .5) / 40)
-    c = C.chebfit(m, np.log2(1.5 + .5 * m), 4)
-    p = C.cheb2poly(c)  # in u = 2 m - 3
-    e = C.cheb2poly(C.chebfit(m, 2.0 ** (.5 * m), 4))
-    e = e * 2.0 ** np.arange(5)
-    return p, e
-_L, _E = _fit()
+def added(number: Any) -> Any:
+    """The number, its terms added if it is a sum."""
+    if isinstance(number, Lanes):
+        assert number.value is not None
+    return number
 
 
-def log2(x):
-    T = x.trace; b = T.builder
-    q = T.bits(x)
-    e = T.number(b.or_(b.lshr(q, T.whole_constant(52)), T.whole_constant(0x4330000000000000))) - (2.0**52 + 1023.0)
-    m = T.number(b.or_(b.and_(q, T.whole_constant(2**52 - 1)), T.whole_constant(0x3FF0000000000000)))
-    u = 2.0 * m - 3.0
-    u.value
-    return e + horner([float(c) for c in _L], u)
+def polynomial(coefficients: Sequence[Any], x: Any) -> Any:
+    """The sum of c_k x**k by Horner's rule."""
+    value = coefficients[-1]
+    for c in reversed(coefficients[:-1]):
+        value = added(value * x + c)
+    return value
 
 
-def exp2(y):
-    T = y.trace; b = T.builder
-    shifted = y + MAGIC
-    n = shifted - MAGIC
-    n.value
-    f = y - n
-    f.value
-    v = horner([float(c) for c in _E], f)
-    return T.number(b.add(T.bits(v), b.shl(T.bits(shifted), T.whole_constant(52))))
+def _is(number: Any, value: int) -> bool:
+    return isinstance(number, float | int) and number == value
+
+
+def _row(builder: Any, pointer: Any, row: int) -> Any:
+    place = builder.gep(pointer, [ir.Constant(_WHOLE, row * WIDTH)])
+    return builder.bitcast(place, _VECTOR.as_pointer())

@@ -66,7 +66,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def _once_a_model(
+def once_a_model(
     function: Callable[Concatenate[Model, P], R],
 ) -> Callable[Concatenate[Model, P], R]:
     """Keep what was derived from a model for as long as the model lives."""
@@ -82,9 +82,9 @@ def _once_a_model(
     return remembered
 
 
-gap_of = _once_a_model(gap_regions)
-series_of = _once_a_model(compile_series)
-period_of = _once_a_model(Model.period)
+gap_of = once_a_model(gap_regions)
+series_of = once_a_model(compile_series)
+period_of = once_a_model(Model.period)
 
 
 def simulate(
