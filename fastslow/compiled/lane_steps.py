@@ -7,8 +7,10 @@ whatever is not certain about a step is left to the loop of one trajectory.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 from fastslow.compiled.generic import digest_of
@@ -178,26 +180,19 @@ def _step(
     after = added(t + h)
     taken = (longest < added(number(LIMIT) - t) - late) & (h > 0.0) & (h <= 2.0 * usual)
     taken &= allowed >= 1.0
-    reach = _Reach(h)
-    for sign, row in zip(signs, rows[kept:], strict=True):
-        taken &= row[0] * sign > reach(row)
     state = [polynomial(row, h) for row in rows[:n]]
     for value in (*state, *(row[k] for row in rows[n:kept] for k in (0, order))):
         taken &= value - value <= 0.0
     for condition in trace.conditions:
         taken &= condition
-    plain = after < number(NEXT)
-    for i, (row, value) in enumerate(zip(rows, state, strict=False)):
-        low, high = number(ROWS + i), number(ROWS + n + i)
-        most = reach(row)
-        inside = (row[0] - most >= low) & (row[0] + most <= high)
-        # no turning point where the derivative keeps its sign
-        rate = polynomial([k * abs(row[k]) for k in range(2, order + 1)], h) * h
-        single = inside | (abs(row[1]) > rate)
-        plain &= single
-        reached = taken & single
-        trace.store((reached & (value < low)).choose(value, low), lanes, 1 + n + ROWS + i)
-        trace.store((reached & (value > high)).choose(value, high), lanes, 1 + n + ROWS + n + i)
+    extremes = [(number(ROWS + i), number(ROWS + n + i)) for i in range(n)]
+    away, single = _nothing_happens(trace, rows[:n], extremes, rows[kept:], signs, h)
+    taken &= away
+    plain = single & (after < number(NEXT))
+    widened = taken & single
+    for i, (value, (low, high)) in enumerate(zip(state, extremes, strict=True)):
+        trace.store((widened & (value < low)).choose(value, low), lanes, 1 + n + ROWS + i)
+        trace.store((widened & (value > high)).choose(value, high), lanes, 1 + n + ROWS + n + i)
     for i, (new, old) in enumerate(zip((after, *state), inputs, strict=True)):
         trace.store(taken.choose(new, old), lanes, i)
     tenth = added(0.1 * usual)
@@ -243,18 +238,75 @@ def _length(rows: Sequence[Sequence[Lanes]], tolerance: Lanes, order: int) -> La
     return exp2(shortest)
 
 
-class _Reach:
-    """The sum of |c_k| h**k over k > 0, once for all rows that differ in c_0 alone."""
+def _nothing_happens(
+    trace: Trace,
+    states: Sequence[Sequence[Lanes]],
+    extremes: Sequence[tuple[Lanes, Lanes]],
+    interfaces: Sequence[Sequence[Lanes]],
+    signs: Sequence[int],
+    h: Lanes,
+) -> list[Mask]:
+    """Whether no interface is met in a step, and whether its ends hold all new extremes.
 
-    def __init__(self, h: Lanes) -> None:
-        self.h = h
-        self.known: dict[tuple[int, ...], Lanes] = {}
+    The sums of the moduli of the terms tell for most steps; for the others
+    their Bernstein coefficients, between which the values lie.
+    """
 
-    def __call__(self, row: Sequence[Lanes]) -> Lanes:
+    def judged(bounds: _Bounds) -> list[Mask]:
+        away = single = h > 0.0
+        for sign, row in zip(signs, interfaces, strict=True):
+            least, most, _ = bounds(row)
+            away &= row[0] > -least if sign > 0 else row[0] < -most
+        for row, (low, high) in zip(states, extremes, strict=True):
+            least, most, monotone = bounds(row)
+            single &= ((row[0] + least >= low) & (row[0] + most <= high)) | monotone
+        return [away, single]
+
+    away, single = judged(_Bounds(h, _by_moduli))
+    return trace.unless(
+        away & single, [away, single], lambda: judged(_Bounds(h, _by_bernstein))
+    )
+
+
+class _Bounds:
+    """What bounds the change of a row within a step, once for rows that differ in c_0 alone."""
+
+    def __init__(
+        self, h: Lanes, rule: Callable[[Sequence[Lanes], Lanes], tuple[Lanes, Lanes, Mask]]
+    ) -> None:
+        self.h, self.rule = h, rule
+        self.known: dict[tuple[int, ...], tuple[Lanes, Lanes, Mask]] = {}
+
+    def __call__(self, row: Sequence[Lanes]) -> tuple[Lanes, Lanes, Mask]:
         key = tuple(id(c) for c in row[1:])
         if key not in self.known:
-            self.known[key] = added(polynomial([abs(c) for c in row[1:]], self.h) * self.h)
+            self.known[key] = self.rule(row, self.h)
         return self.known[key]
+
+
+def _by_moduli(row: Sequence[Lanes], h: Lanes) -> tuple[Lanes, Lanes, Mask]:
+    """Least and largest change, and whether the change has one sign: from sums of moduli."""
+    most = added(polynomial([abs(c) for c in row[1:]], h) * h)
+    rate = polynomial([k * abs(row[k]) for k in range(2, len(row))], h) * h
+    return -most, most, abs(row[1]) > rate
+
+
+def _by_bernstein(row: Sequence[Lanes], h: Lanes) -> tuple[Lanes, Lanes, Mask]:
+    """The same from the Bernstein coefficients of the step."""
+    n = len(row) - 1
+    power, values = h.trace.lanes(1.0), [h.trace.lanes(0.0)]
+    for k in range(1, n + 1):
+        power = added(power * h)
+        values.append(added(row[k] * power * (1.0 / math.comb(n, k))))
+    for level in range(1, n + 1):
+        for j in range(n, level - 1, -1):
+            values[j] = added(values[j] + values[j - 1])
+    least = most = values[0]
+    rising = falling = h > 0.0
+    for a, b in pairwise(values):
+        least, most = (b < least).choose(b, least), (b > most).choose(b, most)
+        rising, falling = rising & (b >= a), falling & (b <= a)
+    return least, most, rising | falling
 
 
 def _report(trace: Trace, rows: Sequence[Sequence[Lanes]], W: Any) -> None:

@@ -277,6 +277,25 @@ class Trace:
         assert total is not None
         return total
 
+    def unless(self, clear: Mask, masks: Sequence[Mask], closer: Callable[[], Any]) -> list[Mask]:
+        """The masks, or what a closer look says where one lane at least is not clear."""
+        builder = self.builder
+        first = builder.block
+        look, together = (builder.append_basic_block(name) for name in ("closer", "together"))
+        builder.cbranch(clear.everywhere(), together, look)
+        builder.position_at_end(look)
+        seen = list(closer())
+        last = builder.block
+        builder.branch(together)
+        builder.position_at_end(together)
+        merged = []
+        for mask, new in zip(masks, seen, strict=True):
+            value = builder.phi(_BITS)
+            value.add_incoming(mask.value, first)
+            value.add_incoming(new.value, last)
+            merged.append(Mask(self, value))
+        return merged
+
     def load(self, pointer: Any, row: int, *, steady: bool = False) -> Lanes:
         """One row of an array of doubles whose rows hold a number for each lane."""
         builder = self.before if steady else self.builder

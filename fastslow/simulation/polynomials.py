@@ -6,6 +6,7 @@ so that the step is 0 <= s <= 1.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,10 @@ from fastslow.compiled.parts import part
 
 #: Intervals of the subdivision are not made shorter than 2 to the power of minus this.
 DEEPEST = 44
+
+_INVERSE_BINOMIALS = np.array(
+    [[1.0 / math.comb(n, k) if k <= n else 0.0 for k in range(41)] for n in range(41)]
+)
 
 # plain integers would be literal types to Numba, and every function compiled once for each
 ZERO: Any = np.int64(0)
@@ -110,13 +115,14 @@ def excluded(b, first, last):
 def to_bernstein(b, first, n, stack):
     """Bernstein coefficients on [0, 1] of sum b_k s**(k - first), then its begin and width."""
     # divide by the binomials, then sum as in Pascal's triangle
-    binomial = 1.0
     for k in range(n + 1):
-        stack[0, k] = b[first + k] / binomial
-        binomial = binomial * (n - k) / (k + 1)
+        stack[0, k] = b[first + k] * _INVERSE_BINOMIALS[n, k]
     for level in range(1, n + 1):
-        for j in range(n, level - 1, -1):
-            stack[0, j] += stack[0, j - 1]
+        before = stack[0, level - 1]
+        for j in range(level, n + 1):
+            here = stack[0, j]
+            stack[0, j] = here + before
+            before = here
     stack[0, n + 1] = 0.0
     stack[0, n + 2] = 1.0
 
@@ -127,8 +133,11 @@ def halve(stack, row, n):
     for j in range(n + 1):
         stack[row + 1, j] = stack[row, j]
     for level in range(1, n + 1):
-        for j in range(n, level - 1, -1):
-            stack[row + 1, j] = 0.5 * (stack[row + 1, j] + stack[row + 1, j - 1])
+        before = stack[row + 1, level - 1]
+        for j in range(level, n + 1):
+            here = stack[row + 1, j]
+            stack[row + 1, j] = 0.5 * (here + before)
+            before = here
     for level in range(1, n + 1):
         for j in range(n - level + 1):
             stack[row, j] = 0.5 * (stack[row, j] + stack[row, j + 1])
@@ -201,14 +210,17 @@ def refine(b, first, last, low, high):
     at_low = horner(b, first, last, low)
     s = 0.5 * (low + high)
     for _ in range(100):
-        value = horner(b, first, last, s)
+        # value and derivative at once, because each waits for its own last product
+        value, rate = b[last], 0.0
+        for k in range(last - 1, first - 1, -1):
+            rate = rate * s + value
+            value = value * s + b[k]
         if value == 0.0:
             break
         if (value > 0.0) == (at_low > 0.0):
             low = s
         else:
             high = s
-        rate = slope(b, first, last, s)
         new = s - value / rate if rate != 0.0 else low - 1.0
         if not (low < new < high):
             new = 0.5 * (low + high)
