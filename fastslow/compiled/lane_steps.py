@@ -15,7 +15,7 @@ from typing import Any
 
 from fastslow.compiled.generic import digest_of
 from fastslow.compiled.lane_functions import Mathematics, exp2, log2
-from fastslow.compiled.lanes import WIDTH, Lanes, Mask, Trace, Workspace, added, polynomial
+from fastslow.compiled.lanes import Lanes, Mask, Trace, Workspace, added, polynomial
 from fastslow.compiled.series import equations_of, mode_source
 from fastslow.compiled.store import load_generated
 from fastslow.model.model import Model
@@ -286,9 +286,11 @@ class _Bounds:
 
 def _by_moduli(row: Sequence[Lanes], h: Lanes) -> tuple[Lanes, Lanes, Mask]:
     """Least and largest change, and whether the change has one sign: from sums of moduli."""
-    most = added(polynomial([abs(c) for c in row[1:]], h) * h)
-    rate = polynomial([k * abs(row[k]) for k in range(2, len(row))], h) * h
-    return -most, most, abs(row[1]) > rate
+    first = added(abs(row[1]) * h)
+    rest = added(polynomial([abs(c) for c in row[2:]], h) * added(h * h))
+    most = added(first + rest)
+    # k times the modulus of the k-th term is at most n times it
+    return -most, most, first > rest * (len(row) - 1)
 
 
 def _by_bernstein(row: Sequence[Lanes], h: Lanes) -> tuple[Lanes, Lanes, Mask]:

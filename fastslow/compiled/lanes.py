@@ -18,17 +18,21 @@ WIDTH = 8
 
 _DOUBLE = ir.DoubleType()
 _WHOLE = ir.IntType(64)
-_BIT = ir.IntType(1)
 _VECTOR = ir.VectorType(_DOUBLE, WIDTH)
 _WHOLES = ir.VectorType(_WHOLE, WIDTH)
-_BITS = ir.VectorType(_BIT, WIDTH)
 
 
 class Mask:
-    """A truth value for every lane."""
+    """A truth value for every lane: the first of 64 bits, as the processor's comparisons set it."""
 
     def __init__(self, trace: Trace, value: Any) -> None:
         self.trace, self.value = trace, value
+
+    @property
+    def bits(self) -> Any:
+        """One bit for every lane."""
+        nothing = ir.Constant(_WHOLES, [0] * WIDTH)
+        return self.trace.builder.icmp_signed("<", self.value, nothing)
 
     def __and__(self, other: Mask) -> Mask:
         return Mask(self.trace, self.trace.builder.and_(self.value, other.value))
@@ -42,13 +46,13 @@ class Mask:
     def choose(self, a: Any, b: Any) -> Lanes:
         """The first number where it is true, else the second."""
         a, b = self.trace.lanes(a), self.trace.lanes(b)
-        return Lanes(self.trace, self.trace.builder.select(self.value, a.value, b.value))
+        return Lanes(self.trace, self.trace.builder.select(self.bits, a.value, b.value))
 
     def everywhere(self) -> Any:
         """Whether it is true of every lane, for a branch."""
         builder = self.trace.builder
         kind = ir.IntType(WIDTH)
-        packed = builder.bitcast(self.value, kind)
+        packed = builder.bitcast(self.bits, kind)
         return builder.icmp_unsigned("==", packed, ir.Constant(kind, 2**WIDTH - 1))
 
 
@@ -175,7 +179,7 @@ class Bits:
     @property
     def odd(self) -> Mask:
         """Whether the last bit is set."""
-        return Mask(self.trace, self.trace.builder.trunc(self.value, _BITS))
+        return Mask(self.trace, (self << 63).value)
 
     @property
     def number(self) -> Lanes:
@@ -255,9 +259,8 @@ class Trace:
 
     def comparison(self, sign: str, a: Any, b: Any) -> Mask:
         """Whether it holds, false of what is not a number."""
-        return Mask(
-            self, self.builder.fcmp_ordered(sign, self.lanes(a).value, self.lanes(b).value)
-        )
+        holds = self.builder.fcmp_ordered(sign, self.lanes(a).value, self.lanes(b).value)
+        return Mask(self, self.builder.sext(holds, _WHOLES))
 
     def sum_of(self, terms: Sequence[tuple[int, Lanes, Lanes | None]]) -> Lanes:
         """The sum of products (of numbers where the second factor is None), with their signs."""
@@ -290,7 +293,7 @@ class Trace:
         builder.position_at_end(together)
         merged = []
         for mask, new in zip(masks, seen, strict=True):
-            value = builder.phi(_BITS)
+            value = builder.phi(_WHOLES)
             value.add_incoming(mask.value, first)
             value.add_incoming(new.value, last)
             merged.append(Mask(self, value))

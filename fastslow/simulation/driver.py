@@ -11,8 +11,10 @@ from fastslow.simulation.extremes import widen_extremes
 from fastslow.simulation.modes import (
     MANY_MODES,
     NOT_DEFINED,
+    across,
     choose_mode,
     interface_noise,
+    leaves,
     step_length,
 )
 from fastslow.simulation.polynomials import ZERO, horner, sample
@@ -219,35 +221,46 @@ def advance(
     mode, interface = counted[MODE], ZERO - 1
     usual, last_event, depth, floor = carried[USUAL], carried[LAST_EVENT], 1.0, 0.0
     code = REACHED_END
-    choosing, touched = mode < 0, False
+    choosing, touched, ahead = mode < 0, False, False
     while True:
         if choosing:
-            call_address(address, max(mode, 0), inputs, parameters, work)
+            # most often one interface is crossed where the rates are continuous
+            before = mode
+            mode = across(signs, before, interface) if interface >= 0 and not touched else before
+            call_address(address, max(mode, 0), inputs, parameters, W)
             for i in range(n_states, kept):
-                inputs[1 + i] = work[i * columns]
+                inputs[1 + i] = W[i * columns]
+            others = ZERO
             for j in range(n_interfaces):
                 noise[j] = interface_noise(address, n_modes, j, inputs, parameters, gradient)
                 if j == interface:
                     noise[j] = max(noise[j], floor)
                 on[j] = hit[j] or abs(gradient[0]) <= noise[j]
                 side[j] = 1 if gradient[0] > 0.0 else -1
-            before = mode
-            mode = choose_mode(
-                address,
-                layout,
-                signs,
-                continuous,
-                inputs,
-                parameters,
-                tol,
-                whole,
-                on,
-                side,
-                before,
-                work,
-                b,
-                noise,
+                others += on[j] and j != interface
+            ahead = (
+                mode != before
+                and others == 0
+                and continuous[interface]
+                and leaves(W, layout, interface, signs[mode, interface], tol, whole, noise)
             )
+            if not ahead:
+                mode = choose_mode(
+                    address,
+                    layout,
+                    signs,
+                    continuous,
+                    inputs,
+                    parameters,
+                    tol,
+                    whole,
+                    on,
+                    side,
+                    before,
+                    work,
+                    b,
+                    noise,
+                )
             if mode < 0:
                 code = NO_WAY_ON
                 if mode == MANY_MODES:
@@ -284,7 +297,9 @@ def advance(
         if n_steps == limits[0]:
             code = TOO_MANY_STEPS
             break
-        call_address(address, mode, inputs, parameters, W)
+        if not ahead:
+            call_address(address, mode, inputs, parameters, W)
+        ahead = False
         longest = step_length(W, drift, order, tol)
         if not longest > 0.0:
             code = NOT_FINITE

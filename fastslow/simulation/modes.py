@@ -78,6 +78,35 @@ def interface_noise(address, n_modes, j, inputs, parameters, gradient):
 
 
 @part
+def across(signs, mode, j):
+    """The mode on the other side of one interface, the same mode where there is none."""
+    for other in range(signs.shape[0]):
+        alike = signs[mode, j] != 0 and signs[other, j] == -signs[mode, j]
+        for i in range(signs.shape[1]):
+            alike = alike and (i == j or signs[other, i] == signs[mode, i])
+        if alike:
+            return other
+    return mode
+
+
+@part
+def leaves(W, layout, j, side, tol, longest, noise):
+    """Whether a motion from an interface goes to one side at once, by its drift.
+
+    Where the rates are continuous it does so in no other mode, as `choose_mode`
+    would find by looking at them all.
+    """
+    n_states, n_forcing, n_interfaces, _, order = layout
+    first_h = n_states + n_forcing
+    length = min(longest, step_length(W, first_h + n_interfaces, order, tol))
+    if not length > 0.0:
+        return False
+    drift = W[(first_h + j) * (order + 1) + 1]
+    noise[j] = max(noise[j], 32.0 * EPSILON * abs(drift) * length)
+    return drift * side * BEGINNING * length > noise[j]
+
+
+@part
 def agreement(b, order, noise, side):
     """How the motion away from an interface agrees with one side of it.
 

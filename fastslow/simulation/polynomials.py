@@ -208,7 +208,7 @@ def first_root(b, first, last, noise, stack):
 def refine(b, first, last, low, high):
     """The root of a sign change on [low, high] to rounding: Newton, kept inside the bracket."""
     at_low = horner(b, first, last, low)
-    s = 0.5 * (low + high)
+    s, moved = 0.5 * (low + high), 0.0
     for _ in range(100):
         # value and derivative at once, because each waits for its own last product
         value, rate = b[last], 0.0
@@ -224,10 +224,12 @@ def refine(b, first, last, low, high):
         new = s - value / rate if rate != 0.0 else low - 1.0
         if not (low < new < high):
             new = 0.5 * (low + high)
-        if new == s or abs(new - s) <= 1e-16 * abs(new):
-            s = new
+        # the next correction is about K moved**2, as this one was K times the last squared
+        move = abs(new - s)
+        near = move <= 1e-16 * abs(new) or move * move * move <= 1e-17 * abs(new) * moved * moved
+        s, moved = new, move
+        if near:
             break
-        s = new
     return s
 
 
