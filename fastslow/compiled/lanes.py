@@ -98,6 +98,8 @@ class Lanes:
         return Lanes(self.trace, None, self._parts(mine) + other._parts(its))
 
     def __add__(self, other: Any) -> Lanes:
+        if other is self:
+            return added(2.0 * self)
         return self if _is(other, 0) else self._plus(other, 1, 1)
 
     __radd__ = __add__
@@ -113,7 +115,8 @@ class Lanes:
             return 0.0
         if _is(other, 1):
             return self
-        return Lanes(self.trace, None, ((1, self, self.trace.lanes(other)),))
+        other = self.trace.lanes(other)
+        return Lanes(self.trace, None, ((1, self, other),))
 
     __rmul__ = __mul__
 
