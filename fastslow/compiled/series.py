@@ -104,7 +104,7 @@ class CompiledSeries:
 
 
 @dataclass(frozen=True)
-class _Mode:
+class Mode:
     """One smooth motion: where it holds, its rates, its slow quantities and sliding drifts."""
 
     name: str
@@ -115,13 +115,13 @@ class _Mode:
 
 
 @dataclass(frozen=True)
-class _Equations:
+class Equations:
     """Everything that the generated source depends on."""
 
     states: tuple[sp.Symbol, ...]
     quantities: tuple[sp.Symbol, ...]
     interfaces: tuple[sp.Expr, ...]
-    modes: tuple[_Mode, ...]
+    modes: tuple[Mode, ...]
     order: int
 
     @property
@@ -132,7 +132,7 @@ class _Equations:
             used |= set().union(*(e.free_symbols for e in (*mode.rates, *mode.laws)))
         return tuple(sorted(s.name for s in used - self.moving))
 
-    def renamed(self) -> _Equations:
+    def renamed(self) -> Equations:
         """The same with symbols that are valid in any source: y0, w0, p0, …."""
         groups = {"y": self.states, "w": self.quantities, "p": map(real, self.parameters)}
         new = {s: real(f"{g}{i}") for g, symbols in groups.items() for i, s in enumerate(symbols)}
@@ -146,7 +146,7 @@ class _Equations:
             )
             for mode in self.modes
         )
-        return _Equations(
+        return Equations(
             tuple(new[s] for s in self.states),
             tuple(new[s] for s in self.quantities),
             rename(self.interfaces),
@@ -168,7 +168,7 @@ class _Equations:
         return tuple(sorted(set().union(*(without_recurrence(e, self.moving) for e in used))))
 
 
-_compiled: dict[_Equations, CompiledSeries] = {}
+_compiled: dict[Equations, CompiledSeries] = {}
 
 
 def compile_series(model: Model, order: int) -> CompiledSeries:
@@ -187,7 +187,7 @@ def compile_series(model: Model, order: int) -> CompiledSeries:
     ModelError
         If a function in the equations cannot be compiled.
     """
-    equations = _equations(model, order)
+    equations = equations_of(model, order)
     if equations not in _compiled:
         sliding = tuple(_sliding_modes(equations, model))
         whole = replace(equations, modes=equations.modes + sliding)
@@ -199,10 +199,11 @@ def compile_series(model: Model, order: int) -> CompiledSeries:
     return _compiled[equations]
 
 
-def _equations(model: Model, order: int) -> _Equations:
+def equations_of(model: Model, order: int) -> Equations:
+    """What the generated source of a model depends on, its regions alone as modes."""
     names = (*model.states, *model.slow_states)
     modes = tuple(
-        _Mode(
+        Mode(
             region.name,
             tuple(region.signs.values()),
             tuple(region.rates[n] for n in names),
@@ -210,7 +211,7 @@ def _equations(model: Model, order: int) -> _Equations:
         )
         for region in model.regions.values()
     )
-    return _Equations(
+    return Equations(
         tuple(map(real, names)),
         tuple(map(real, model.forcing)),
         tuple(i.function for i in model.interfaces.values()),
@@ -219,7 +220,7 @@ def _equations(model: Model, order: int) -> _Equations:
     )
 
 
-def _sliding_modes(equations: _Equations, model: Model) -> Iterator[_Mode]:
+def _sliding_modes(equations: Equations, model: Model) -> Iterator[Mode]:
     """Filippov's sliding motion along each discontinuity, for each pair of regions at it.
 
     With the drifts a, b of h in the regions h > 0 and h < 0 the motion is
@@ -246,10 +247,10 @@ def _sliding_modes(equations: _Equations, model: Model) -> Iterator[_Mode]:
                 for f, g in zip(above.rates, below.rates, strict=True)
             )
             signs = (*above.signs[:j], 0, *above.signs[j + 1 :])
-            yield _Mode(f"{above.name}|{below.name}", signs, rates, above.laws, (a, b))
+            yield Mode(f"{above.name}|{below.name}", signs, rates, above.laws, (a, b))
 
 
-def _drift(equations: _Equations, function: sp.Expr, mode: _Mode) -> sp.Expr:
+def _drift(equations: Equations, function: sp.Expr, mode: Mode) -> sp.Expr:
     """Rate of change of an interface function along a mode."""
     rates = dict(zip(equations.states, mode.rates, strict=True))
     rates.update(
@@ -264,7 +265,7 @@ def _short(expression: sp.Expr) -> sp.Expr:
     return sp.cancel(expression) if sp.count_ops(expression) <= 150 else expression
 
 
-def _compile(equations: _Equations, continuous: NDArray[np.bool_]) -> CompiledSeries:
+def _compile(equations: Equations, continuous: NDArray[np.bool_]) -> CompiledSeries:
     parameters = equations.parameters
     source, n_rows = _source(equations.renamed(), len(parameters))
     module = load_generated(source, "series")
@@ -285,14 +286,14 @@ def _compile(equations: _Equations, continuous: NDArray[np.bool_]) -> CompiledSe
     )
 
 
-def _source(equations: _Equations, n_parameters: int) -> tuple[str, int]:
+def _source(equations: Equations, n_parameters: int) -> tuple[str, int]:
     """Source of the generated module, and the number of rows it fills."""
     lines = [f"    p{i} = parameters[{i}]" for i in range(n_parameters)]
     n_rows = 0
     bodies: list[list[str]] = []
     alone = bool(equations.without_recurrence)
     for mode in equations.modes:
-        body, rows = _values_source(equations, mode) if alone else _mode_source(equations, mode)
+        body, rows = _values_source(equations, mode) if alone else mode_source(equations, mode)
         bodies.append(body)
         n_rows = max(n_rows, rows)
     bodies += [_gradient_source(equations, h) for h in equations.interfaces]
@@ -314,7 +315,8 @@ def _source(equations: _Equations, n_parameters: int) -> tuple[str, int]:
     return header + text, n_rows
 
 
-def _mode_source(equations: _Equations, mode: _Mode) -> tuple[list[str], int]:
+def mode_source(equations: Equations, mode: Mode) -> tuple[list[str], int]:
+    """Source lines that fill the series of one mode, and the number of its rows."""
     m, q, p = (len(g) for g in (equations.states, equations.quantities, equations.interfaces))
     targets = [*mode.laws, *equations.interfaces, *mode.drifts]
     symbols = {s: i for i, s in enumerate(equations.states)}
@@ -346,7 +348,7 @@ def _mode_source(equations: _Equations, mode: _Mode) -> tuple[list[str], int]:
     return body, work.next
 
 
-def _values_source(equations: _Equations, mode: _Mode) -> tuple[list[str], int]:
+def _values_source(equations: Equations, mode: Mode) -> tuple[list[str], int]:
     """What a mode fills without recurrences: values, and rates of states and interfaces."""
     columns, m, q = equations.order + 1, len(equations.states), len(equations.quantities)
     outputs = {i * columns + 1: rate for i, rate in enumerate(mode.rates)}
@@ -371,7 +373,7 @@ def _values_source(equations: _Equations, mode: _Mode) -> tuple[list[str], int]:
     return [*body, f"W[{equations.order}] = math.nan"], n_rows + 2
 
 
-def _gradient_source(equations: _Equations, function: sp.Expr) -> list[str]:
+def _gradient_source(equations: Equations, function: sp.Expr) -> list[str]:
     m = len(equations.states)
     symbols = (TIME, *equations.states, *equations.quantities)
     body = [f"{s.name} = inputs[{i}]" for i, s in enumerate(symbols) if s in function.free_symbols]

@@ -6,18 +6,44 @@ import numpy as np
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
-from fastslow.simulation.collocation import memory_size
 from fastslow.simulation.events import find_event, holds, put_on
 from fastslow.simulation.extremes import widen_extremes
 from fastslow.simulation.modes import (
     MANY_MODES,
     NOT_DEFINED,
+    across,
     choose_mode,
     expand,
     interface_noise,
+    leaves,
 )
-from fastslow.simulation.polynomials import ZERO, horner
-from fastslow.simulation.settled import DAMPING, IMPLICIT, PAYS, long_step, settled
+from fastslow.simulation.polynomials import ZERO, horner, sample
+from fastslow.simulation.rooms import (
+    CALM,
+    CARRIED,
+    COUNTED,
+    CROSSINGS,
+    CROWDED,
+    LAST_EVENT,
+    LATE,
+    MODE,
+    PAUSE,
+    SAMPLES,
+    STEPS,
+    USUAL,
+    grown,
+    put_at_start,
+    room_for,
+)
+from fastslow.simulation.settled import (
+    DAMPING,
+    IMPLICIT,
+    LONGEST_WAIT,
+    PAYS,
+    WAIT,
+    long_step,
+    settled,
+)
 
 #: How the loop ended.
 REACHED_END = 0
@@ -29,45 +55,14 @@ NOT_UNIQUE = 5
 NO_WAY_ON = 6
 ACCUMULATION = 7
 
+#: It did not end: a plain step was taken in a region, and others may take the next.
+HANDED_OVER = -1
+
 #: Crossings in a row, none farther from the last than rounding of time, that end a run.
 CROWD = 40
 
 #: A crossing is near-tangential when moving h by this part of its scale would undo it.
 TANGENTIAL = 1e-6
-
-
-@part
-def grown(array):
-    """A copy with room for twice as many rows."""
-    larger = np.empty((2 * array.shape[0] + 16, array.shape[1]))
-    for i in range(array.shape[0]):
-        for j in range(array.shape[1]):
-            larger[i, j] = array[i, j]
-    return larger
-
-
-@part
-def sample(W, columns, rows, s, out, first):
-    """Evaluate rows of a step at the offsets s, into the columns of ``out`` from the first."""
-    n = s.shape[0]
-    for i in range(rows):
-        top = i * columns + columns - 1
-        # four at a time, because each waits for its own last product
-        for c in range(0, n - 3, 4):
-            s0, s1, s2, s3 = s[c], s[c + 1], s[c + 2], s[c + 3]
-            v0 = v1 = v2 = v3 = W[top]
-            for k in range(1, columns):
-                coefficient = W[top - k]
-                v0 = v0 * s0 + coefficient
-                v1 = v1 * s1 + coefficient
-                v2 = v2 * s2 + coefficient
-                v3 = v3 * s3 + coefficient
-            out[i, first + c] = v0
-            out[i, first + c + 1] = v1
-            out[i, first + c + 2] = v2
-            out[i, first + c + 3] = v3
-        for c in range(n - n % 4, n):
-            out[i, first + c] = horner(W, top - columns + 1, top, s[c])
 
 
 @part
@@ -91,7 +86,77 @@ def drive(
     hits,
     seen,
 ):
-    """Follow one trajectory from start to end.
+    """Follow one trajectory from start to end; for the arguments see `advance`.
+
+    Returns
+    -------
+    code, mode : int
+        How it ended, and in which mode.
+    end : ndarray, shape (1 + n_states,)
+        Time and state reached.
+    n_steps : int
+    listed : tuple of ndarray
+        Steps, series and crossings as from `advance`.
+    n_samples : int
+        How many samples were reached.
+    """
+    place = np.empty(1 + layout[0] + layout[1])
+    carried, counted = np.empty(CARRIED), np.empty(COUNTED, dtype=np.int64)
+    put_at_start(place, carried, counted, span[0], start)
+    code, listed = advance(
+        address,
+        layout,
+        sizes,
+        signs,
+        continuous,
+        parameters,
+        span,
+        tol,
+        times,
+        samples,
+        since,
+        dense,
+        limits,
+        store,
+        extremes,
+        hits,
+        seen,
+        room_for(layout, sizes, times.shape[0]),
+        place,
+        carried,
+        counted,
+        ZERO,
+    )
+    end = place[: 1 + layout[0]].copy()
+    return (code, counted[MODE], end, counted[STEPS], listed, counted[SAMPLES])
+
+
+@part
+def advance(
+    address,
+    layout,
+    sizes,
+    signs,
+    continuous,
+    parameters,
+    span,
+    tol,
+    times,
+    samples,
+    since,
+    dense,
+    limits,
+    store,
+    extremes,
+    hits,
+    seen,
+    room,
+    inputs,
+    carried,
+    counted,
+    handed,
+):
+    """Follow one trajectory to its end, or until others may take its next step.
 
     Every step and every crossing is put into a table, or, where there are
     arrays for it, they are summed up as the run goes. Which of the two is
@@ -108,7 +173,7 @@ def drive(
         number of fast states, or 0 for no implicit steps).
     signs : int64 array, shape (n_modes, n_interfaces)
     continuous : bool array, shape (n_interfaces,)
-    parameters, start : float64 arrays
+    parameters : float64 array
     span : tuple of float
         Start and end of time.
     tol : float
@@ -130,86 +195,89 @@ def drive(
         Crossings upwards and downwards, counted here.
     seen : float64 array, shape (n_modes,), or None
         When each mode was last left, set here.
+    room : tuple of arrays
+        From `room_for`.
+    inputs : float64 array, shape (1 + n_states + n_forcing,)
+        Time and state, changed here.
+    carried : float64 array, shape (CARRIED,)
+    counted : int64 array, shape (COUNTED,)
+        What is carried from step to step, as `put_at_start` sets it; changed here.
+    handed : int
+        After a plain step in one of so many first modes the run is handed over.
 
     Returns
     -------
-    code, mode : int
-        How it ended, and in which mode.
-    end : ndarray, shape (1 + n_states,)
-        Time and state reached.
-    n_steps : int
-    steps : ndarray, shape (n_steps, 3)
-        Time, length and mode of every step; no rows where they are summed up.
-    store : ndarray
-        Coefficients of states and slow quantities, step by step, when ``dense``.
-    crossings : ndarray, shape (n_crossings, 6 + n_states)
-        Time, interface, direction, mode before, mode after, near-tangential, state.
-    n_samples : int
-        How many samples were reached.
+    code : int
+        How it ended, or `HANDED_OVER`.
+    listed : tuple of ndarray
+        Time, length and mode of every step, shape (n_steps, 3), no rows where
+        they are summed up; coefficients of states and slow quantities, step by
+        step, when ``dense``; and time, interface, direction, mode before, mode
+        after, near-tangential and state of every crossing, shape (n_crossings,
+        6 + n_states).
     """
     n_states, n_forcing, n_interfaces, n_modes, order = layout
-    n_rows, stack_rows, n_fast = sizes
     columns = order + 1
     kept = n_states + n_forcing
     stride = kept * columns
-    size = n_rows * columns
-    t, late, stop = span[0], 0.0, span[1]
-    whole = stop - t
-    inputs = np.empty(1 + kept)
-    inputs[0] = t
-    for i in range(n_states):
-        inputs[1 + i] = start[i]
-    work, W = np.empty(size), np.empty(size)
-    right, poly = np.empty(size if n_fast > 0 else 0), np.empty(size if n_fast > 0 else 0)
-    matrices = np.empty((2, n_states, n_states + 1))
-    vectors = np.empty((5, max(1 + kept, columns)))
-    b, d = np.empty(columns), np.empty(columns)
-    stack = np.empty((stack_rows, columns + 3))
-    memory = np.zeros(memory_size(n_states, order))
-    gradient = np.empty(2 + n_states)
-    noise = np.zeros(n_interfaces)
-    on = np.zeros(n_interfaces, dtype=np.bool_)
-    hit = np.zeros(n_interfaces, dtype=np.bool_)
-    rests = np.zeros(n_interfaces, dtype=np.bool_)
-    side = np.zeros(n_interfaces, dtype=np.int64)
+    t, late, stop = inputs[0], carried[LATE], span[1]
+    whole = stop - span[0]
+    work, W, b, d, stack, gradient, noise, on, hit, rests, side, offsets = room[:12]
+    right, poly, matrices, vectors, memory = room[12:]
+    memory[:] = 0.0
+    n_fast = sizes[2]
+    for j in range(n_interfaces):
+        on[j] = hit[j] = rests[j] = False
     steps = np.empty((64 if extremes is None else 0, 4))
     crossings = np.empty((16 if extremes is None else 0, 6 + n_states))
-    offsets = np.empty(times.shape[0])
-    n_steps = n_crossings = n_samples = crowd = ZERO
-    mode = interface = np.int64(-1)
-    depth, floor, last_event, usual, longest = 1.0, 0.0, -np.inf, 0.0, 0.0
-    code = REACHED_END
-    choosing, touched = True, False
+    n_steps, n_crossings = counted[STEPS], counted[CROSSINGS]
+    n_samples, crowd = counted[SAMPLES], counted[CROWDED]
+    mode, interface = counted[MODE], ZERO - 1
+    usual, last_event, depth, floor = carried[USUAL], carried[LAST_EVENT], 1.0, 0.0
     # implicit steps: when to try again, how long to wait after a failure, how many, how long
-    calm, pause, in_a_row, wanted = ZERO + 4, ZERO + 4, ZERO, 0.0
+    calm, pause, in_a_row = counted[CALM], counted[PAUSE], ZERO
+    wanted = longest = 0.0
+    code = REACHED_END
+    choosing, touched, ahead = mode < 0, False, False
     while True:
         if choosing:
-            call_address(address, max(mode, 0), inputs, parameters, work)
+            # most often one interface is crossed where the rates are continuous
+            before = mode
+            mode = across(signs, before, interface) if interface >= 0 and not touched else before
+            call_address(address, max(mode, 0), inputs, parameters, W)
             for i in range(n_states, kept):
-                inputs[1 + i] = work[i * columns]
+                inputs[1 + i] = W[i * columns]
+            others = ZERO
             for j in range(n_interfaces):
                 noise[j] = interface_noise(address, n_modes, j, inputs, parameters, gradient)
                 if j == interface:
                     noise[j] = max(noise[j], floor)
                 on[j] = hit[j] or abs(gradient[0]) <= noise[j]
                 side[j] = 1 if gradient[0] > 0.0 else -1
-            before = mode
-            mode = choose_mode(
-                address,
-                layout,
-                signs,
-                continuous,
-                inputs,
-                parameters,
-                tol,
-                whole,
-                on,
-                side,
-                before,
-                work,
-                b,
-                noise,
+                others += on[j] and j != interface
+            ahead = (
+                mode != before
+                and others == 0
+                and continuous[interface]
+                and leaves(W, layout, interface, signs[mode, interface], tol, whole, noise)
             )
+            if not ahead:
+                mode = choose_mode(
+                    address,
+                    layout,
+                    signs,
+                    continuous,
+                    inputs,
+                    parameters,
+                    tol,
+                    whole,
+                    on,
+                    side,
+                    before,
+                    work,
+                    b,
+                    noise,
+                )
             if mode < 0:
                 code = NO_WAY_ON
                 if mode == MANY_MODES:
@@ -240,7 +308,7 @@ def drive(
                 code = TOO_MANY_CROSSINGS
                 break
             choosing = touched = False
-            calm = pause = ZERO + 4
+            calm = pause = ZERO + WAIT
             in_a_row = ZERO
         remaining = (stop - t) - late
         if not remaining > 0.0:
@@ -252,7 +320,10 @@ def drive(
             # an implicit step has left the first coefficients of the series at its end
             W, right = right, W
         else:
-            longest = expand(address, layout, mode, inputs, parameters, tol, remaining, W, memory)
+            longest = expand(
+                address, layout, mode, inputs, parameters, tol, remaining, W, memory, ahead
+            )
+            ahead = False
             if not longest > 0.0:
                 code = NOT_FINITE
                 break
@@ -290,15 +361,15 @@ def drive(
             )
             long = taken > 0.0
             if long:
-                wanted, pause, in_a_row = growth * taken, ZERO + 4, in_a_row + 1
+                wanted, pause, in_a_row = growth * taken, ZERO + WAIT, in_a_row + 1
                 W, poly = poly, W
                 s, h, interface, final = 2.0, taken, ZERO - 1, taken >= remaining
             else:
                 if in_a_row > 0:
                     longest = expand(
-                        address, layout, mode, inputs, parameters, tol, remaining, W, memory
+                        address, layout, mode, inputs, parameters, tol, remaining, W, memory, False
                     )
-                pause = min(2 * pause, 64)
+                pause = min(2 * pause, LONGEST_WAIT)
                 calm, in_a_row = pause, ZERO
         if not long:
             final = longest >= remaining
@@ -392,9 +463,11 @@ def drive(
             if crowd == CROWD:
                 code = ACCUMULATION
                 break
-    end = np.empty(1 + n_states)
-    end[0] = t
-    for i in range(n_states):
-        end[1 + i] = inputs[1 + i]
-    listed = (steps[:n_steps], store, crossings[:n_crossings])
-    return (code, mode, end, n_steps, listed, n_samples)
+        elif mode < handed and not choosing and not final and in_a_row == 0:
+            code = HANDED_OVER
+            break
+    carried[LATE], carried[USUAL], carried[LAST_EVENT] = late, usual, last_event
+    counted[STEPS], counted[CROSSINGS] = n_steps, n_crossings
+    counted[SAMPLES], counted[CROWDED], counted[MODE] = n_samples, crowd, mode
+    counted[CALM], counted[PAUSE] = calm, pause
+    return code, (steps[:n_steps], store, crossings[:n_crossings])

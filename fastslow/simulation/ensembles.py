@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.compiled.generic import load_loop
-from fastslow.compiled.parts import part
+from fastslow.compiled.lane_steps import CompiledSteps, compile_steps
 from fastslow.compiled.series import CompiledSeries
 from fastslow.model.model import Model
 from fastslow.results.ensembles import Ensemble, regimes
 from fastslow.results.named import Named
 from fastslow.simulation.arguments import tolerance, whole_number
-from fastslow.simulation.driver import drive
 from fastslow.simulation.grouping import alike
 from fastslow.simulation.many_arguments import (
     periods_of,
@@ -32,15 +31,19 @@ from fastslow.simulation.trajectories import (
     default_order,
     gap_of,
     layout_of,
+    once_a_model,
     series_of,
     sizes_of,
 )
 
 Floats = NDArray[np.float64]
 
+steps_of = once_a_model(compile_steps)
+
 _ARGUMENTS = (
     "bounds",
     "address",
+    "lanes",
     "layout",
     "sizes",
     "signs",
@@ -60,63 +63,10 @@ _ARGUMENTS = (
     "codes",
 )
 
+_LANES = ("fastslow.compiled.lanes", "fastslow.compiled.lane_steps")
+
 #: Trajectories that a thread takes at a time, at most.
-_CHUNK = 64
-
-
-@part
-def drive_many(
-    bounds,
-    address,
-    layout,
-    sizes,
-    signs,
-    continuous,
-    tol,
-    limits,
-    parameters,
-    starts,
-    spans,
-    since,
-    times,
-    samples,
-    extremes,
-    hits,
-    seen,
-    ends,
-    codes,
-):
-    """Follow the trajectories from one number to another, each by itself.
-
-    The arguments are those of `drive` with one row for each trajectory
-    (``times`` may have one row for all); ``ends`` is filled with time and
-    state reached, ``codes`` with how it ended, in which mode, after how many steps.
-    """
-    store = np.empty(0)
-    for i in range(bounds[0], bounds[1]):
-        code, mode, end, n_steps, _, _ = drive(
-            address,
-            layout,
-            sizes,
-            signs,
-            continuous,
-            parameters[i],
-            starts[i],
-            (spans[i, 0], spans[i, 1]),
-            tol,
-            times[min(i, times.shape[0] - 1)],
-            samples[i],
-            since[i],
-            False,
-            limits,
-            store,
-            extremes[i],
-            hits[i],
-            seen[i],
-        )
-        for k in range(end.shape[0]):
-            ends[i, k] = end[k]
-        codes[i, 0], codes[i, 1], codes[i, 2] = code, mode, n_steps
+_CHUNK = 512
 
 
 def simulate_many(
@@ -132,7 +82,7 @@ def simulate_many(
     tol: float = 1e-9,
     samples: int | Sequence[float] | Floats | None = None,
     order: int | None = None,
-    implicit: bool = True,
+    implicit: bool = False,
     gap: str | None = None,
     max_steps: int = 1_000_000,
     max_crossings: int = 1_000_000,
@@ -172,7 +122,10 @@ def simulate_many(
     order : int, optional
         Order of the series, 4 to 40; by default that of `simulate`.
     implicit : bool
-        Whether an implicit method may take long steps through settled phases.
+        Whether an implicit method may take long steps through settled phases, one
+        trajectory at a time. Plain steps taken together are so cheap that this pays
+        only where the fast motion is some thirty times faster than the slow one lets
+        the steps be, as in stiff contacts.
     gap : str, optional
         The region that counts as the gap for `Ensemble.regime`.
     max_steps, max_crossings : int
@@ -218,9 +171,12 @@ def simulate_many(
     own = periods_of(model, period, count, swept)
     spans, since = spans_of(t, periods, start, settle, own)
     times = times_of(samples, spans, since)
-    groups = [(one, chosen, series_of(one, order)) for one, chosen in alike(model, swept, count)]
-    gaps = [gap_of(one, gap) for one, _, _ in groups]
-    modes = tuple(dict.fromkeys(name for *_, compiled in groups for name in compiled.modes))
+    groups = [
+        (one, chosen, series_of(one, order), steps_of(one, order))
+        for one, chosen in alike(model, swept, count)
+    ]
+    gaps = [gap_of(one, gap) for one, *_ in groups]
+    modes = tuple(dict.fromkeys(name for *_, compiled, _ in groups for name in compiled.modes))
     interfaces = tuple(dict.fromkeys(name for one, *_ in groups for name in one.interfaces))
     n = starts.shape[1]
     columns = n + len(model.forcing)
@@ -231,10 +187,11 @@ def simulate_many(
     regime = np.zeros(count, dtype="U16")
     sampled = np.empty((count, columns if times.size else 0, times.shape[1]))
     with _bar(count, progress) as bar:
-        for (one, chosen, compiled), between in zip(groups, gaps, strict=True):
+        for (one, chosen, compiled, lanes), between in zip(groups, gaps, strict=True):
             values = _parameter_table(compiled, one, swept, chosen)
             run = _run(
                 compiled,
+                lanes,
                 (tol, limits, threads),
                 sizes_of(model, compiled, implicit),
                 (values, starts[chosen], spans[chosen], since[chosen]),
@@ -272,7 +229,7 @@ def simulate_many(
         codes[:, 0],
         codes[:, 1],
         (times if len(times) > 1 else times[0], sampled) if samples is not None else None,
-        "; ".join(dict.fromkeys(compiled.method for *_, compiled in groups)),
+        "; ".join(dict.fromkeys(compiled.method for *_, compiled, _ in groups)),
         partial(outcome_of, modes=modes, limits=limits),
     )
 
@@ -289,6 +246,7 @@ def _parameter_table(
 
 def _run(
     compiled: CompiledSeries,
+    lanes: CompiledSteps,
     settings: tuple[float, tuple[int, int], int],
     sizes: tuple[int, int, int],
     rows: tuple[Floats, Floats, Floats, Floats],
@@ -312,6 +270,7 @@ def _run(
     loop = partial(
         _many_loop(),
         address=compiled.address,
+        lanes=(lanes.address, lanes.regions),
         layout=layout_of(compiled),
         sizes=sizes,
         signs=compiled.signs,
@@ -358,4 +317,4 @@ def _bar(count: int, shown: bool) -> Any:
 
 def _many_loop() -> Callable[..., Any]:
     """The compiled loop over trajectories."""
-    return load_loop("fastslow.simulation.ensembles", "drive_many", _ARGUMENTS, SOURCES)
+    return load_loop("fastslow.simulation.lanes", "drive_many", _ARGUMENTS, (*SOURCES, *_LANES))

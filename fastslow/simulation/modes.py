@@ -57,7 +57,7 @@ def step_length(W, n_rows, order, tol):
 
 
 @part
-def expand(address, layout, mode, inputs, parameters, tol, room, W, memory):
+def expand(address, layout, mode, inputs, parameters, tol, room, W, memory, known):
     """Fill ``W`` with polynomials of time from a point on.
 
     The Taylor series where there is one; else, where its coefficients are not
@@ -75,6 +75,8 @@ def expand(address, layout, mode, inputs, parameters, tol, room, W, memory):
     memory : float64 array
         What is carried from one step of a run to the next: `memory_size` numbers, zeros at
         its beginning, or none for a single step. The first is 1 after a collocation.
+    known : bool
+        Whether the series is there already.
 
     Returns
     -------
@@ -83,7 +85,8 @@ def expand(address, layout, mode, inputs, parameters, tol, room, W, memory):
     """
     n_states, n_forcing, n_interfaces, _, order = layout
     drift = n_states + n_forcing + n_interfaces
-    call_address(address, mode, inputs, parameters, W)
+    if not known:
+        call_address(address, mode, inputs, parameters, W)
     length = step_length(W, drift, order, tol)
     if memory.shape[0] > 0:
         memory[0] = 0.0
@@ -110,6 +113,35 @@ def interface_noise(address, n_modes, j, inputs, parameters, gradient):
     """Size of h that is rounding error, from the moduli of its terms; fills the gradient."""
     call_address(address, n_modes + j, inputs, parameters, gradient)
     return 8.0 * EPSILON * gradient[1]
+
+
+@part
+def across(signs, mode, j):
+    """The mode on the other side of one interface, the same mode where there is none."""
+    for other in range(signs.shape[0]):
+        alike = signs[mode, j] != 0 and signs[other, j] == -signs[mode, j]
+        for i in range(signs.shape[1]):
+            alike = alike and (i == j or signs[other, i] == signs[mode, i])
+        if alike:
+            return other
+    return mode
+
+
+@part
+def leaves(W, layout, j, side, tol, longest, noise):
+    """Whether a motion from an interface goes to one side at once, by its drift.
+
+    Where the rates are continuous it does so in no other mode, as `choose_mode`
+    would find by looking at them all.
+    """
+    n_states, n_forcing, n_interfaces, _, order = layout
+    first_h = n_states + n_forcing
+    length = min(longest, step_length(W, first_h + n_interfaces, order, tol))
+    if not length > 0.0:
+        return False
+    drift = W[(first_h + j) * (order + 1) + 1]
+    noise[j] = max(noise[j], 32.0 * EPSILON * abs(drift) * length)
+    return drift * side * BEGINNING * length > noise[j]
 
 
 @part
@@ -195,7 +227,9 @@ def choose_mode(
                     possible = False
             if not possible:
                 continue
-            length = expand(address, layout, mode, inputs, parameters, tol, longest, W, memory)
+            length = expand(
+                address, layout, mode, inputs, parameters, tol, longest, W, memory, False
+            )
             if not length > 0.0:
                 broken = True
                 continue

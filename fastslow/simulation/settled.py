@@ -36,6 +36,9 @@ DEGREE = P + Q + 1
 PAYS = 3.0
 DAMPING = 6
 
+#: Steps of the series after a crossing before the first is tried; failures double it.
+WAIT, LONGEST_WAIT = 4, 64
+
 #: What marks such a step in the table of a run's steps.
 IMPLICIT = 2
 

@@ -55,6 +55,7 @@ SOURCES = (
     "fastslow.simulation.extremes",
     "fastslow.simulation.modes",
     "fastslow.simulation.polynomials",
+    "fastslow.simulation.rooms",
     "fastslow.simulation.settled",
     "fastslow.compiled.parts",
     "fastslow.compiled.pointers",
@@ -68,7 +69,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def _once_a_model(
+def once_a_model(
     function: Callable[Concatenate[Model, P], R],
 ) -> Callable[Concatenate[Model, P], R]:
     """Keep what was derived from a model for as long as the model lives."""
@@ -84,9 +85,9 @@ def _once_a_model(
     return remembered
 
 
-gap_of = _once_a_model(gap_regions)
-series_of = _once_a_model(compile_series)
-period_of = _once_a_model(Model.period)
+gap_of = once_a_model(gap_regions)
+series_of = once_a_model(compile_series)
+period_of = once_a_model(Model.period)
 
 
 def simulate(
