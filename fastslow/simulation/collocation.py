@@ -89,8 +89,7 @@ def _tables() -> tuple[Array, ...]:
 _C, _F, _TO_C, _TO_F, _AT_F, _ERRORS, _WORST = _tables()
 
 
-@part
-def memory_size(n_states, order):
+def memory_size(n_states: int, order: int) -> int:
     """Numbers to carry: whether the last step was such a one, its place, lengths and rates."""
     return 5 + n_states * min(order, HIGHEST)
 

@@ -20,8 +20,6 @@ from fastslow.simulation.modes import (
 from fastslow.simulation.polynomials import ZERO, horner, sample
 from fastslow.simulation.rooms import (
     CALM,
-    CARRIED,
-    COUNTED,
     CROSSINGS,
     CROWDED,
     LAST_EVENT,
@@ -32,8 +30,6 @@ from fastslow.simulation.rooms import (
     STEPS,
     USUAL,
     grown,
-    put_at_start,
-    room_for,
 )
 from fastslow.simulation.settled import (
     DAMPING,
@@ -73,78 +69,11 @@ def drive(
     signs,
     continuous,
     parameters,
-    start,
     span,
     tol,
     times,
     samples,
     since,
-    dense,
-    limits,
-    store,
-    extremes,
-    hits,
-    seen,
-):
-    """Follow one trajectory from start to end; for the arguments see `advance`.
-
-    Returns
-    -------
-    code, mode : int
-        How it ended, and in which mode.
-    end : ndarray, shape (1 + n_states,)
-        Time and state reached.
-    n_steps : int
-    listed : tuple of ndarray
-        Steps, series and crossings as from `advance`.
-    n_samples : int
-        How many samples were reached.
-    """
-    place = np.empty(1 + layout[0] + layout[1])
-    carried, counted = np.empty(CARRIED), np.empty(COUNTED, dtype=np.int64)
-    put_at_start(place, carried, counted, span[0], start)
-    code, listed = advance(
-        address,
-        layout,
-        sizes,
-        signs,
-        continuous,
-        parameters,
-        span,
-        tol,
-        times,
-        samples,
-        since,
-        dense,
-        limits,
-        store,
-        extremes,
-        hits,
-        seen,
-        room_for(layout, sizes, times.shape[0]),
-        place,
-        carried,
-        counted,
-        ZERO,
-    )
-    end = place[: 1 + layout[0]].copy()
-    return (code, counted[MODE], end, counted[STEPS], listed, counted[SAMPLES])
-
-
-@part
-def advance(
-    address,
-    layout,
-    sizes,
-    signs,
-    continuous,
-    parameters,
-    span,
-    tol,
-    times,
-    samples,
-    since,
-    dense,
     limits,
     store,
     extremes,
@@ -159,8 +88,7 @@ def advance(
     """Follow one trajectory to its end, or until others may take its next step.
 
     Every step and every crossing is put into a table, or, where there are
-    arrays for it, they are summed up as the run goes. Which of the two is
-    settled when this is compiled: without arrays their place holds None.
+    arrays for it, they are summed up as the run goes.
 
     Parameters
     ----------
@@ -183,25 +111,25 @@ def advance(
         The first rows at those times, as far as they are reached; filled here.
     since : float
         Time from which extremes and hits count.
-    dense : bool
-        Whether the series of every step is kept.
     limits : tuple of int
         Largest numbers of steps and crossings.
     store : float64 array
-        Room for the series, replaced by a larger one where it does not suffice.
-    extremes : float64 array, shape (2, n_states), or None
-        Smallest and largest value of every state, widened here.
-    hits : int64 array, shape (n_interfaces, 2), or None
-        Crossings upwards and downwards, counted here.
-    seen : float64 array, shape (n_modes,), or None
-        When each mode was last left, set here.
+        Room for the series of every step, replaced by a larger one where it does
+        not suffice; empty where they are not to be kept.
+    extremes : float64 array, shape (2, n_states)
+        Smallest and largest value of every state, widened here; without rows
+        where steps and crossings are to be listed.
+    hits : int64 array, shape (n_interfaces, 2)
+        Crossings upwards and downwards, counted here unless they are listed.
+    seen : float64 array, shape (n_modes,)
+        When each mode was last left, set here unless steps are listed.
     room : tuple of arrays
         From `room_for`.
     inputs : float64 array, shape (1 + n_states + n_forcing,)
         Time and state, changed here.
     carried : float64 array, shape (CARRIED,)
     counted : int64 array, shape (COUNTED,)
-        What is carried from step to step, as `put_at_start` sets it; changed here.
+        What is carried from step to step, at first that of `beginnings`; changed here.
     handed : int
         After a plain step in one of so many first modes the run is handed over.
 
@@ -212,7 +140,7 @@ def advance(
     listed : tuple of ndarray
         Time, length and mode of every step, shape (n_steps, 3), no rows where
         they are summed up; coefficients of states and slow quantities, step by
-        step, when ``dense``; and time, interface, direction, mode before, mode
+        step, where they are kept; and time, interface, direction, mode before, mode
         after, near-tangential and state of every crossing, shape (n_crossings,
         6 + n_states).
     """
@@ -228,8 +156,9 @@ def advance(
     n_fast = sizes[2]
     for j in range(n_interfaces):
         on[j] = hit[j] = rests[j] = False
-    steps = np.empty((64 if extremes is None else 0, 4))
-    crossings = np.empty((16 if extremes is None else 0, 6 + n_states))
+    listing, dense = extremes.shape[0] == 0, store.shape[0] > 0
+    steps = np.empty((64 if listing else 0, 4))
+    crossings = np.empty((16 if listing else 0, 6 + n_states))
     n_steps, n_crossings = counted[STEPS], counted[CROSSINGS]
     n_samples, crowd = counted[SAMPLES], counted[CROWDED]
     mode, interface = counted[MODE], ZERO - 1
@@ -290,7 +219,7 @@ def advance(
                 changed = before >= 0 and signs[before, j] != signs[mode, j]
                 if changed or (touched and mode == before and j == interface):
                     turn = signs[mode, j] - signs[before, j]
-                    if extremes is None:
+                    if listing:
                         if n_crossings == crossings.shape[0]:
                             crossings = grown(crossings)
                         crossings[n_crossings, 0] = t
@@ -420,7 +349,7 @@ def advance(
         else:
             t = begin + h
         if taken > 0.0:
-            if extremes is None:
+            if listing:
                 if n_steps == steps.shape[0]:
                     steps = grown(steps)
                 steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, taken, mode

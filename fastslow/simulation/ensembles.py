@@ -18,6 +18,7 @@ from fastslow.results.ensembles import Ensemble, regimes
 from fastslow.results.named import Named
 from fastslow.simulation.arguments import tolerance, whole_number
 from fastslow.simulation.grouping import alike
+from fastslow.simulation.lanes import lanes_for
 from fastslow.simulation.many_arguments import (
     periods_of,
     spans_of,
@@ -26,6 +27,7 @@ from fastslow.simulation.many_arguments import (
     times_of,
 )
 from fastslow.simulation.outcomes import outcome_of
+from fastslow.simulation.rooms import MODE, STEPS, beginnings, room_for
 from fastslow.simulation.trajectories import (
     SOURCES,
     default_order,
@@ -51,7 +53,6 @@ _ARGUMENTS = (
     "tol",
     "limits",
     "parameters",
-    "starts",
     "spans",
     "since",
     "times",
@@ -59,8 +60,11 @@ _ARGUMENTS = (
     "extremes",
     "hits",
     "seen",
-    "ends",
+    "places",
+    "carried",
+    "counted",
     "codes",
+    "room",
 )
 
 _LANES = ("fastslow.compiled.lanes", "fastslow.compiled.lane_steps")
@@ -256,7 +260,7 @@ def _run(
 ) -> tuple[Any, ...]:
     """Extremes, hits, times seen, ends, codes and samples of trajectories with one series."""
     tol, limits, threads = settings
-    _, starts, spans, since = rows
+    values, starts, spans, since = rows
     count, n = starts.shape
     counted = (since <= spans[:, 0])[:, None]
     extremes = np.stack(
@@ -264,41 +268,51 @@ def _run(
     )
     hits = np.zeros((count, compiled.n_interfaces, 2), dtype=np.int64)
     seen = np.full((count, len(compiled.modes)), -np.inf)
-    ends = np.empty((count, 1 + n))
-    codes = np.empty((count, 3), dtype=np.int64)
+    places, carried, whole = beginnings(spans[:, 0], starts, compiled.n_forcing)
+    codes = np.empty(count, dtype=np.int64)
     samples = np.full((count, n_columns, times.shape[1]), np.nan)
-    loop = partial(
-        _many_loop(),
-        address=compiled.address,
-        lanes=(lanes.address, lanes.regions),
-        layout=layout_of(compiled),
-        sizes=sizes,
-        signs=compiled.signs,
-        continuous=compiled.continuous,
-        tol=tol,
-        limits=limits,
-        parameters=rows[0],
-        starts=starts,
-        spans=spans,
-        since=since,
-        times=times,
-        samples=samples,
-        extremes=extremes,
-        hits=hits,
-        seen=seen,
-        ends=ends,
-        codes=codes,
-    )
+    layout = layout_of(compiled)
+    many = _many_loop()
+
+    def follow(chunk: tuple[int, int]) -> None:
+        many(
+            chunk,
+            compiled.address,
+            (lanes.address, lanes.regions),
+            layout,
+            sizes,
+            compiled.signs,
+            compiled.continuous,
+            tol,
+            limits,
+            values,
+            spans,
+            since,
+            times,
+            samples,
+            extremes,
+            hits,
+            seen,
+            places,
+            carried,
+            whole,
+            codes,
+            (
+                lanes_for(layout, lanes.regions, values.shape[1], count),
+                room_for(layout, sizes, times.shape[1]),
+            ),
+        )
+
     size = min(_CHUNK, max(1, count // (4 * threads)))
     chunks = [(i, min(i + size, count)) for i in range(0, count, size)]
     if min(threads, len(chunks)) == 1:
         for chunk in chunks:
-            loop(chunk)
+            follow(chunk)
             report(chunk[1] - chunk[0])
     else:
         pool = ThreadPoolExecutor(min(threads, len(chunks)))
         try:
-            waiting = {pool.submit(loop, chunk): chunk for chunk in chunks}
+            waiting = {pool.submit(follow, chunk): chunk for chunk in chunks}
             for done in as_completed(waiting):
                 done.result()
                 first, last = waiting[done]
@@ -306,7 +320,8 @@ def _run(
         finally:
             pool.shutdown(cancel_futures=True)
     extremes[np.isinf(extremes)] = np.nan
-    return extremes, hits, seen, ends, codes, samples
+    endings = np.column_stack([codes, whole[:, MODE], whole[:, STEPS]])
+    return extremes, hits, seen, places[:, : 1 + n], endings, samples
 
 
 def _bar(count: int, shown: bool) -> Any:

@@ -7,31 +7,39 @@ lanes is taken in lanes, beside copies of another one where there are too few.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fastslow.compiled import lane_steps as step
 from fastslow.compiled.lanes import WIDTH
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
-from fastslow.simulation.driver import HANDED_OVER, advance
+from fastslow.simulation.driver import HANDED_OVER, drive
 from fastslow.simulation.extremes import widen_extremes
 from fastslow.simulation.polynomials import ZERO, sample
-from fastslow.simulation.rooms import (
-    CALM,
-    CARRIED,
-    COUNTED,
-    LATE,
-    MODE,
-    SAMPLES,
-    STEPS,
-    USUAL,
-    put_at_start,
-    room_for,
-)
+from fastslow.simulation.rooms import CALM, LATE, MODE, SAMPLES, STEPS, USUAL
 
 #: Trajectories under way at a time, so that some region has one for every lane.
 UNDER_WAY = 8 * WIDTH
+
+
+def lanes_for(
+    layout: tuple[int, int, int, int, int], regions: int, n_values: int, count: int
+) -> tuple[NDArray[Any], ...]:
+    """Work space of `drive_many`: what is in the lanes, and who waits for what."""
+    n, n_forcing, _, _, order = layout
+    under_way = min(UNDER_WAY, count)
+    return (
+        np.zeros((1 + n + step.ROWS + 2 * n, WIDTH)),
+        np.zeros((n_values + 1, WIDTH)),
+        np.empty(((n + n_forcing) * (order + 1), WIDTH)),
+        np.empty(WIDTH, dtype=np.int64),
+        np.empty((regions, under_way), dtype=np.int64),
+        np.empty(regions, dtype=np.int64),
+        np.empty(under_way, dtype=np.int64),
+    )
 
 
 @part
@@ -46,7 +54,6 @@ def drive_many(
     tol,
     limits,
     parameters,
-    starts,
     spans,
     since,
     times,
@@ -54,51 +61,37 @@ def drive_many(
     extremes,
     hits,
     seen,
-    ends,
+    places,
+    carried,
+    counted,
     codes,
+    room,
 ):
-    """Follow the trajectories from one number to another.
+    """Follow the trajectories from one number to another to their ends.
 
-    The arguments are those of `advance` with one row for each trajectory
+    The arguments are those of `drive` with one row for each trajectory
     (``times`` may have one row for all); ``lanes`` holds the address of the plain
-    steps and the number of their regions; ``ends`` is filled with time and state
-    reached, ``codes`` with how it ended, in which mode, after how many steps.
+    steps and the number of their regions, ``codes`` is filled with how each
+    ended, and ``room`` is that of `lanes_for` and that of a single run.
     """
-    n_states, n_forcing, _, _, order = layout
-    columns, kept = order + 1, n_states + n_forcing
+    n_states = layout[0]
     steps, regions = lanes
-    n_values = parameters.shape[1]
-    under_way = min(UNDER_WAY, bounds[1] - bounds[0])
-    places = np.empty((under_way, 1 + kept))
-    carried = np.empty((under_way, CARRIED))
-    counted = np.empty((under_way, COUNTED), dtype=np.int64)
-    which = np.empty(under_way, dtype=np.int64)
-    room = room_for(layout, sizes, times.shape[1])
-    rows = np.zeros((1 + n_states + step.ROWS + 2 * n_states, WIDTH))
-    given = np.empty((n_values + 1, WIDTH))
-    series = np.empty((kept * columns, WIDTH))
-    held = np.full(WIDTH, -1, dtype=np.int64)
-    given[n_values] = math.log2(tol)
-    # stacks of those that wait for a lane in each region, and for a step by themselves
-    ready, n_ready = (
-        np.empty((max(regions, 1), under_way), dtype=np.int64),
-        np.zeros(max(regions, 1), np.int64),
-    )
-    alone, n_alone = np.arange(under_way), under_way
-    store = np.empty(0)
-    count = mode = ZERO
-    following = bounds[0]
-    for slot in range(under_way):
-        which[slot] = following
-        put_at_start(
-            places[slot], carried[slot], counted[slot], spans[following, 0], starts[following]
-        )
+    rows, given, series, held, ready, n_ready, alone = room[0]
+    store, following = np.empty(0), bounds[0]
+    n_alone = count = mode = ZERO
+    for region in range(regions):
+        n_ready[region] = 0
+    for lane in range(WIDTH):
+        held[lane] = -1
+        given[parameters.shape[1], lane] = math.log2(tol)
+    while n_alone < min(alone.shape[0], bounds[1] - bounds[0]):
+        alone[n_alone] = following
+        n_alone += 1
         following += 1
     while True:
         while n_alone > 0:
-            slot = alone[n_alone - 1]
-            i = which[slot]
-            code, _ = advance(
+            i = alone[n_alone - 1]
+            codes[i], _ = drive(
                 address,
                 layout,
                 sizes,
@@ -110,39 +103,26 @@ def drive_many(
                 times[min(i, times.shape[0] - 1)],
                 samples[i],
                 since[i],
-                False,
                 limits,
                 store,
                 extremes[i],
                 hits[i],
                 seen[i],
-                room,
-                places[slot],
-                carried[slot],
-                counted[slot],
+                room[1],
+                places[i],
+                carried[i],
+                counted[i],
                 regions,
             )
-            if code == HANDED_OVER:
-                region = counted[slot, MODE]
-                ready[region, n_ready[region]] = slot
-                n_ready[region] += 1
-                n_alone -= 1
-                continue
-            for k in range(1 + n_states):
-                ends[i, k] = places[slot, k]
-            codes[i, 0], codes[i, 1], codes[i, 2] = code, counted[slot, MODE], counted[slot, STEPS]
-            if following < bounds[1]:
-                which[slot] = following
-                put_at_start(
-                    places[slot],
-                    carried[slot],
-                    counted[slot],
-                    spans[following, 0],
-                    starts[following],
-                )
+            if codes[i] != HANDED_OVER and following < bounds[1]:
+                alone[n_alone - 1] = following
                 following += 1
-            else:
-                n_alone -= 1
+                continue
+            n_alone -= 1
+            if codes[i] == HANDED_OVER:
+                region = counted[i, MODE]
+                ready[region, n_ready[region]] = i
+                n_ready[region] += 1
         fullest = mode
         for region in range(regions):
             if n_ready[region] > n_ready[fullest]:
@@ -150,14 +130,11 @@ def drive_many(
         if count == 0 or count + n_ready[mode] < min(n_ready[fullest], WIDTH):
             # another region fills more lanes
             for lane in range(WIDTH):
-                slot = held[lane]
-                if slot >= 0:
-                    i = which[slot]
-                    put_down(
-                        rows, lane, limits[0], since[i], places[slot], carried[slot],
-                        counted[slot], extremes[i], seen[i],
-                    )  # fmt: skip
-                    ready[mode, n_ready[mode]] = slot
+                i = held[lane]
+                if i >= 0:
+                    put_down(rows, lane, limits, since[i], places[i], carried[i], counted[i],
+                             extremes[i], seen[i])  # fmt: skip
+                    ready[mode, n_ready[mode]] = i
                     n_ready[mode] += 1
                     held[lane] = -1
             count, mode = ZERO, fullest
@@ -167,49 +144,43 @@ def drive_many(
             if held[lane] < 0 and n_ready[mode] > 0:
                 n_ready[mode] -= 1
                 count += 1
-                slot = ready[mode, n_ready[mode]]
-                i = which[slot]
-                held[lane] = slot
+                i = held[lane] = ready[mode, n_ready[mode]]
                 take_up(
-                    rows, lane, limits[0], sizes[2] > 0, since[i], places[slot], carried[slot],
-                    counted[slot], extremes[i], spans[i, 1], times[min(i, times.shape[0] - 1)],
+                    rows, lane, limits, sizes[2] > 0, since[i], places[i], carried[i], counted[i],
+                    extremes[i], spans[i, 1], times[min(i, times.shape[0] - 1)],
                 )  # fmt: skip
-                for k in range(n_values):
+                for k in range(parameters.shape[1]):
                     given[k, lane] = parameters[i, k]
         if count < WIDTH:
             copy_into_the_rest(held, rows, given)
         call_address(steps, mode, rows, given, series)
         for lane in range(WIDTH):
-            slot = held[lane]
-            if slot < 0:
+            i = held[lane]
+            if i < 0:
                 continue
-            i = which[slot]
             outcome = rows[1 + n_states + step.OUTCOME, lane]
             if outcome == step.REPORTED:
-                report(
-                    rows, lane, series, layout, since[i], counted[slot],
-                    times[min(i, times.shape[0] - 1)], samples[i], extremes[i], room,
-                )  # fmt: skip
+                report(rows, lane, series, layout, since[i], counted[i],
+                       times[min(i, times.shape[0] - 1)], samples[i], extremes[i],
+                       room[1])  # fmt: skip
             elif outcome == step.NOT_TAKEN:
-                put_down(
-                    rows, lane, limits[0], since[i], places[slot], carried[slot],
-                    counted[slot], extremes[i], seen[i],
-                )  # fmt: skip
+                put_down(rows, lane, limits, since[i], places[i], carried[i], counted[i],
+                         extremes[i], seen[i])  # fmt: skip
                 held[lane] = -1
                 count -= 1
-                alone[n_alone] = slot
+                alone[n_alone] = i
                 n_alone += 1
 
 
 @part
-def take_up(rows, lane, max_steps, settling, since, place, carried, counted, extremes, stop, times):
+def take_up(rows, lane, limits, settling, since, place, carried, counted, extremes, stop, times):
     """Give a trajectory a lane."""
     n = extremes.shape[1]
     for k in range(1 + n):
         rows[k, lane] = place[k]
     rows[1 + n + step.LATE, lane] = carried[LATE]
     rows[1 + n + step.USUAL, lane] = carried[USUAL]
-    rows[1 + n + step.ALLOWED, lane] = max_steps - counted[STEPS]
+    rows[1 + n + step.ALLOWED, lane] = limits[0] - counted[STEPS]
     rows[1 + n + step.CALM, lane] = counted[CALM] if settling else np.inf
     rows[1 + n + step.NEXT, lane] = next_time(times, counted[SAMPLES])
     counting = place[0] >= since
@@ -220,10 +191,10 @@ def take_up(rows, lane, max_steps, settling, since, place, carried, counted, ext
 
 
 @part
-def put_down(rows, lane, max_steps, since, place, carried, counted, extremes, seen):
+def put_down(rows, lane, limits, since, place, carried, counted, extremes, seen):
     """Take a trajectory from its lane."""
     n = extremes.shape[1]
-    steps = max_steps - np.int64(rows[1 + n + step.ALLOWED, lane])
+    steps = limits[0] - np.int64(rows[1 + n + step.ALLOWED, lane])
     if steps > counted[STEPS]:
         seen[counted[MODE]] = rows[0, lane]
         if rows[1 + n + step.CALM, lane] < np.inf:
@@ -255,7 +226,7 @@ def copy_into_the_rest(held, rows, given):
 @part
 def report(rows, lane, series, layout, since, counted, times, samples, extremes, room):
     """Add the samples and the extremes within the last step of a lane."""
-    n, _, _, _, order = layout
+    n, order = layout[0], layout[4]
     _, W, b, d, stack = room[:5]
     offsets = room[11]
     began, length = rows[1 + n + step.BEGAN, lane], rows[1 + n + step.LENGTH, lane]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from fastslow.compiled.parts import part
 from fastslow.simulation.collocation import memory_size
@@ -11,31 +14,45 @@ from fastslow.simulation.settled import WAIT
 #: Numbers carried from step to step: by how much the time is late, the usual length of a
 #: step, the time of the last event.
 LATE, USUAL, LAST_EVENT = 0, 1, 2
-CARRIED = 3
 
 #: Whole numbers carried: steps, crossings and samples so far, crossings crowded
 #: together, the mode, -1 before the first was chosen, steps until an implicit one is
 #: tried, and how many to wait for should it fail.
 STEPS, CROSSINGS, SAMPLES, CROWDED, MODE, CALM, PAUSE = 0, 1, 2, 3, 4, 5, 6
-COUNTED = 7
 
 
-@part
-def put_at_start(place, carried, counted, time, state):
-    """Put a run at its beginning: time and state, and what is carried from step to step."""
-    place[0] = time
-    for i in range(state.shape[0]):
-        place[1 + i] = state[i]
-    carried[LATE], carried[USUAL], carried[LAST_EVENT] = 0.0, 0.0, -np.inf
-    for i in range(COUNTED):
-        counted[i] = 0
-    counted[MODE] = -1
-    counted[CALM] = counted[PAUSE] = WAIT
+def beginnings(
+    times: NDArray[np.float64], states: NDArray[np.float64], n_forcing: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """What `drive` carries from step to step, of several runs at their beginnings.
+
+    Parameters
+    ----------
+    times : ndarray, shape (m,)
+    states : ndarray, shape (m, n)
+    n_forcing : int
+
+    Returns
+    -------
+    places : ndarray, shape (m, 1 + n + n_forcing)
+        Times, states, and room for the slow quantities.
+    carried : ndarray, shape (m, 3)
+    counted : ndarray of int64, shape (m, 7)
+    """
+    m = len(times)
+    places = np.column_stack([times, states, np.zeros((m, n_forcing))])
+    carried = np.zeros((m, 3))
+    carried[:, LAST_EVENT] = -np.inf
+    counted = np.zeros((m, 7), dtype=np.int64)
+    counted[:, MODE] = -1
+    counted[:, [CALM, PAUSE]] = WAIT
+    return places, carried, counted
 
 
-@part
-def room_for(layout, sizes, n_times):
-    """Work space of a run; nothing in it outlasts a step but what the next one is told."""
+def room_for(
+    layout: tuple[int, int, int, int, int], sizes: tuple[int, int, int], n_times: int
+) -> tuple[NDArray[Any], ...]:
+    """Work space of `drive`, for one run after the other."""
     n_states, n_forcing, n_interfaces, _, order = layout
     columns = order + 1
     settling = sizes[0] * columns if sizes[2] > 0 else 0

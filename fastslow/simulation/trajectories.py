@@ -26,6 +26,7 @@ from fastslow.simulation.arguments import (
     whole_number,
 )
 from fastslow.simulation.outcomes import outcome_of
+from fastslow.simulation.rooms import MODE, SAMPLES, STEPS, beginnings, room_for
 from fastslow.simulation.settled import DEGREE, IMPLICIT, SETTLED_ORDER
 
 _ARGUMENTS = (
@@ -35,18 +36,21 @@ _ARGUMENTS = (
     "signs",
     "continuous",
     "parameters",
-    "start",
     "span",
     "tol",
     "times",
     "samples",
     "since",
-    "dense",
     "limits",
     "store",
     "extremes",
     "hits",
     "seen",
+    "room",
+    "inputs",
+    "carried",
+    "counted",
+    "handed",
 )
 SOURCES = (
     "fastslow.simulation.collocation",
@@ -60,6 +64,9 @@ SOURCES = (
     "fastslow.compiled.parts",
     "fastslow.compiled.pointers",
 )
+
+#: No extremes, hits and times of modes: steps and crossings are listed instead.
+_LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
 
 #: Depth of the work space of the event search.
 STACK_ROWS = 46
@@ -189,26 +196,33 @@ def simulate(
     kept = compiled.n_states + compiled.n_forcing
     rows = compiled.n_states if dense else kept
     sampled = np.empty((rows, len(times)))
-    code, mode, end, n_steps, (steps, store, crossings), reached = drive_loop()(
+    layout, sizes = layout_of(compiled), sizes_of(model, compiled, implicit)
+    (place,), (carried,), (counted,) = beginnings(
+        np.array([span[0]]), begin[None], compiled.n_forcing
+    )
+    code, (steps, store, crossings) = drive_loop()(
         compiled.address,
-        layout_of(compiled),
-        sizes_of(model, compiled, implicit),
+        layout,
+        sizes,
         compiled.signs,
         compiled.continuous,
         compiled.parameter_array(model),
-        begin,
         span,
         tol,
         times,
         sampled,
         span[0],
-        bool(dense),
         limits,
-        _room.store,
-        None,
-        None,
-        None,
+        _room.store if dense else np.empty(0),
+        *_LISTED,
+        room_for(layout, sizes, len(times)),
+        place,
+        carried,
+        counted,
+        0,
     )
+    end, reached = place[: 1 + compiled.n_states].copy(), counted[SAMPLES]
+    n_steps, mode = int(counted[STEPS]), int(counted[MODE])
     return Trajectory(
         (*model.states, *model.slow_states),
         tuple(model.forcing),
