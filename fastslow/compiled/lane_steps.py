@@ -28,13 +28,13 @@ from fastslow.compiled.pointers import SIGNATURE
 
 
 '''
-_ENTRY = '''take = plain_steps(({regions}), {signs}, {sizes})
+_ENTRY = """take = plain_steps(({regions}), {signs}, {sizes})
 
 
 @cfunc(SIGNATURE, cache=True, error_model="numpy")
 def steps(mode, inputs, parameters, W):
     take(mode, inputs, parameters, W)
-'''
+"""
 
 _SOURCES = (
     "fastslow.compiled.lane_functions",
@@ -263,9 +263,7 @@ def _nothing_happens(
         return [away, single]
 
     away, single = judged(_Bounds(h, _by_moduli))
-    return trace.unless(
-        away & single, [away, single], lambda: judged(_Bounds(h, _by_bernstein))
-    )
+    return trace.unless(away & single, [away, single], lambda: judged(_Bounds(h, _by_bernstein)))
 
 
 class _Bounds:
