@@ -86,7 +86,7 @@ class Lanes:
     @property
     def steady(self) -> bool:
         """Whether it depends on steady numbers alone, so that it is computed once for all steps."""
-        return self._steady and self.value is not None
+        return self.value is not None and self._steady
 
     def _parts(self, sign: int) -> tuple[Any, ...]:
         if self._value is not None:

