@@ -248,7 +248,7 @@ class Trace:
     def one_by_one(self, function: Callable[..., float], *arguments: Any) -> Lanes:
         """A function of single numbers, compiled by Numba and called for every lane."""
         from numba import types
-        from numba.core.typing import signature
+        from numba.core.typing.templates import signature
 
         numbers, builder, steady = self._place(arguments)
         kind = signature(types.float64, *[types.float64] * len(numbers))
