@@ -65,7 +65,7 @@ class Ensemble:
     sampled : tuple of ndarray, optional
         Times (N,) or (m, N) and columns (m, n + n_forcing, N), NaN after the end of a trajectory.
     method : str
-        How the steps were made.
+        How the steps were made; where a series is singular, collocation takes its place.
     describe : callable
         Words for one outcome, from its code, mode, time with state, number of
         steps and largest number in the state at the start.

@@ -63,6 +63,7 @@ SOURCES = (
     "fastslow.simulation.settled",
     "fastslow.compiled.parts",
     "fastslow.compiled.pointers",
+    "fastslow.compiled.series",
 )
 
 #: No extremes, hits and times of modes: steps and crossings are listed instead.
