@@ -133,6 +133,7 @@ def continue_equilibria(
         _text(model),
         _corrector(field),
         _too_many(settings) if full else _continuum(name, missed) if missed else SEARCHED,
+        {quantity: str(law) for quantity, law in model.path.items()},
     )
 
 

@@ -289,6 +289,11 @@ class Model:
         return tuple(n for n in sorted(set(self.structure.names.values())) if n not in self.regions)
 
     @property
+    def path(self) -> Named[sp.Expr]:
+        """Of a model frozen along a path: slow quantities as functions of the path's parameters."""
+        return Named("slow quantity", self.structure.path)
+
+    @property
     def values(self) -> dict[sp.Symbol, float]:
         """Parameter values by (real) symbol, for substitution."""
         return {real(name): value for name, value in self.parameters.items()}

@@ -48,6 +48,8 @@ class Diagram:
         The model as text.
     outcome : Outcome
         How the search for branches ended.
+    path : mapping
+        Of a model frozen along a path, each slow quantity as text in the parameter.
     """
 
     states: tuple[str, ...]
@@ -62,6 +64,7 @@ class Diagram:
     equations: str
     corrector: Corrector | None = field(default=None, repr=False)
     outcome: Outcome = SEARCHED
+    path: Mapping[str, str] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "corrector": None}

@@ -56,7 +56,7 @@ def test_what_the_runs_show(everything_drawn):
     assert regimes == {"load_amplitude_10": "meshed upper"}
     assert rows["load_amplitude_10"].stated == "bilateral"
     assert rows["load_amplitude_100"].stated == rows["gap_width_0.5"].stated == "unilateral"
-    assert rows["load_amplitude_10"].passages == 0
+    assert rows["load_amplitude_10"].transits == 0
     assert math.isnan(rows["load_amplitude_10"].largest_delay)
 
 
@@ -110,7 +110,7 @@ def test_wider_gaps_delay_more(gaps):
     delays = [np.nanmax(np.abs(case.lay.delays)) for case in gaps]
     assert delays == sorted(delays)
     assert all(len(case.lay.transitions) == 6 for case in gaps)
-    assert {t.kind for case in gaps for t in case.lay.transitions} == {"crossing"}
+    assert {t.kind for case in gaps for t in case.lay.transitions} == {"transit"}
 
 
 def test_the_natural_frequency_falls_with_the_stiffness():

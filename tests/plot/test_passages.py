@@ -20,8 +20,8 @@ def test_overlay_is_drawn_above_the_branches(gear_lay):
 def test_a_jump_is_told_apart_from_a_passage_of_the_gap(gear_lay, folded_lay):
     (passage,) = fs.plot.overlay(gear_lay).transitions
     (jump,) = fs.plot.overlay(folded_lay).transitions
-    assert passage.get_label() == "passage of BE"
-    assert jump.get_label() == "jump at LP"
+    assert passage.get_label() == "transit of the gap"
+    assert jump.get_label() == "jump at a fold"
     assert passage.get_marker() != jump.get_marker()
     assert len(jump.get_xdata()) == len(folded_lay.transitions)
 
@@ -36,7 +36,7 @@ def test_crossings_lie_on_the_trajectory(gear_lay):
 def test_each_thing_once_in_the_legend(folded_lay):
     texts = [t.get_text() for t in fs.plot.overlay(folded_lay).legend.get_texts()]
     assert len(texts) == len(set(texts))
-    assert {"stable", "unstable", "LP fold", "trajectory", "jump at LP"} <= set(texts)
+    assert {"stable", "unstable", "LP fold", "trajectory", "jump at a fold"} <= set(texts)
 
 
 def test_another_state(gear_lay):
