@@ -45,7 +45,7 @@ def bursting_of(bursts: Sequence[Burst], transitions: Sequence[Transition]) -> B
     cycles = [b for b in bursts if b.end is not None]
     if cycles:
         return _on_cycles(cycles)
-    between = [t for t in transitions if t.kind in ("jump", "transit", "change", "grazing", "Hopf")]
+    between = [t for t in transitions if t.kind in ("jump", "transit", "grazing", "Hopf")]
     between = [t for t in between if t.from_sheet != t.to_sheet and t.to_sheet]
     if len({t.from_sheet for t in between}) < 2:
         return None
@@ -57,9 +57,7 @@ def bursting_of(bursts: Sequence[Burst], transitions: Sequence[Transition]) -> B
     symmetric = "symmetric " if mirrored else ""
     evidence = [f"{_at(t)}, from {t.from_sheet} to {t.to_sheet}" for t in between[-2:]]
     if mirrored:
-        evidence.append(
-            "the two points have the same eigenvalues: a symmetry maps one to the other"
-        )
+        evidence.append("both points have the same eigenvalues and normal form: a symmetric pair")
     if all(t.kind == "transit" for t in between):
         evidence.append("the equilibria change steeply at the gap, without a bifurcation")
         name = "fast-slow oscillation across the gap, without bifurcation"
@@ -124,11 +122,15 @@ def _at(t: Transition) -> str:
 
 
 def _mirrored(one: SpecialPoint | None, other: SpecialPoint | None) -> bool:
-    """Whether two points are images of each other: equal eigenvalues at different places."""
+    """Whether two points have the same eigenvalues and normal form, as under a symmetry."""
     if one is None or other is None or one.code != other.code or one.label == other.label:
         return False
     first, second = np.sort_complex(one.eigenvalues), np.sort_complex(other.eigenvalues)
     if not (np.isfinite(first).all() and np.isfinite(second).all()):
         return False
-    size = max(float(np.abs(first).max()), float(np.abs(second).max()), 1e-300)
-    return bool(np.abs(first - second).max() <= 1e-6 * size)
+    numbers = [
+        (abs(q.coefficient or 0.0), q.lyapunov or 0.0, q.frequency or 0.0) for q in (one, other)
+    ]
+    apart = max(np.abs(first - second).max(), *np.abs(np.subtract(numbers[0], numbers[1])))
+    size = max(np.abs(first).max(), *np.abs(numbers[0]))
+    return bool(apart <= 1e-6 * size)

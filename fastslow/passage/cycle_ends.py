@@ -10,6 +10,7 @@ import numpy as np
 from fastslow.passage.excursions import Excursion
 from fastslow.passage.sheets import ends_of
 from fastslow.passage.transitions import Passage
+from fastslow.results.crossings import Crossing
 from fastslow.results.points import SpecialPoint
 from fastslow.results.transitions import SPIKING, Transition
 
@@ -30,7 +31,8 @@ class CycleEnd:
     Parameters
     ----------
     name : str
-        ``"Hopf"``, ``"homoclinic (candidate)"``, ``"fold cycle (candidate)"`` or ``"cycle"``.
+        ``"Hopf"``, ``"homoclinic (candidate)"``, ``"grazing (candidate)"``,
+        ``"fold cycle (candidate)"`` or ``"cycle"``.
     special : SpecialPoint or None
         The Hopf point, where there is one.
     evidence : str
@@ -46,7 +48,8 @@ def cycle_end(p: Passage, e: Excursion) -> CycleEnd:
 
     A Hopf point ends it where the sheet landed on begins there and the amplitude
     shrinks; else it is a bifurcation of the cycle itself, which equilibria do not
-    show: its period grows towards a saddle (homoclinic) or does not (fold of cycles).
+    show: its period grows towards a saddle (homoclinic), it reaches an interface
+    (grazing), or neither (fold of cycles).
     Both are candidates as long as the cycle is not traced.
     """
     assert e.new is not None
@@ -75,9 +78,23 @@ def cycle_end(p: Passage, e: Excursion) -> CycleEnd:
         words.append(f"a saddle passed at {distance:.2g} of the extent")
     if growth > SLOWED and size >= SHRUNK and distance is not None and distance < MET * p.m.radius:
         return CycleEnd("homoclinic (candidate)", None, "; ".join(words))
-    if not growth > SLOWED and size >= SHRUNK and np.isfinite(growth):
-        return CycleEnd("fold cycle (candidate)", None, "; ".join(words))
+    steady = not growth > SLOWED and size >= SHRUNK and np.isfinite(growth)
+    reached = _first_reached(p, e)
+    if reached is not None:
+        words.append(f"{reached.interface} is reached for the first time at t = {reached.time:.6g}")
+    if steady:
+        cause = "fold cycle" if reached is None else "grazing"
+        return CycleEnd(f"{cause} (candidate)", None, "; ".join(words))
     return CycleEnd("cycle", None, "; ".join(words))
+
+
+def _first_reached(p: Passage, e: Excursion) -> Crossing | None:
+    """A crossing in the last oscillation of an interface that no earlier one met."""
+    start, _ = e.rows(p.m)
+    crossings = [c for c in p.slow.run.crossings if p.m.time[start] <= c.time]
+    before = {c.interface for c in crossings if c.time < e.turns[-2]}
+    last = (c for c in crossings if e.turns[-2] <= c.time <= e.turns[-1])
+    return next((c for c in last if c.interface not in before), None)
 
 
 def _saddle(p: Passage, e: Excursion, value: float) -> float | None:

@@ -125,7 +125,9 @@ def _excursion(m: Measured, old: Stay | None, new: Stay | None, swing: Oscillati
     )
 
 
-def phase_of(m: Measured, e: Excursion, start: float, end: float, sheet: str) -> Phase:
+def phase_of(
+    m: Measured, e: Excursion, start: float, end: float, sheet: str, transit: bool
+) -> Phase:
     """The phase between leaving and landing.
 
     Parameters
@@ -136,11 +138,13 @@ def phase_of(m: Measured, e: Excursion, start: float, end: float, sheet: str) ->
         Its times.
     sheet : str
         Where it lands, "" for nowhere.
+    transit : bool
+        Whether it crosses a gap.
     """
     first, _ = e.rows(m)
     if first < len(m.time) and not m.within[first]:
         return Phase(start, end, "outside")
-    if e.spiking:
+    if e.spiking and (e.cycle or e.old is not None):
         return Phase(
             start,
             end,
@@ -153,4 +157,4 @@ def phase_of(m: Measured, e: Excursion, start: float, end: float, sheet: str) ->
         )
     if e.old is None or e.new is None:
         return Phase(start, end, "transient", spikes=len(e.turns))
-    return Phase(start, end, "jump", (sheet,), len(e.turns))
+    return Phase(start, end, "transit" if transit else "jump", (sheet,), len(e.turns))

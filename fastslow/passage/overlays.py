@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 #: A turn of the slow quantity by less than this part of its range is none.
 WIGGLE = 0.02
 
+#: A sheet stands still that changes by less than this part of the extent over the slow range.
+FLAT = 1e-9
+
 #: The slow quantity stands still where it drifts slower than this part of its fastest.
 STILL = 1e-3
 
@@ -90,7 +93,8 @@ def overlay(
     sheets, courses = courses_of(diagram)
     m = measured(slow, courses, diagram.over, radius)
     stays = stays_of(m)
-    drift = np.gradient(m.slow, m.time) if len(m.time) > 1 else np.zeros(len(m.time))
+    moves = np.ptp(m.slow) > 1e-9 * float(np.abs(m.slow).max())
+    drift = np.gradient(m.slow, m.time) if moves else np.zeros(len(m.time))
     p = Passage(diagram, slow, m, sheets, _followed(m, stays), drift)
     swing = oscillation_of(m, state_number)
     phases: list[Phase] = []
@@ -120,7 +124,7 @@ def overlay(
         run,
         m.time,
         m.slow,
-        m.scaled * m.extent,
+        np.column_stack([run[name] for name in diagram.states]),
         m.extent,
         radius,
         sheets,
@@ -184,7 +188,8 @@ def _between(p: Passage, e: Excursion, transitions: list[Transition], bursts: li
         begin = first.leave.time
     if e.new is not None:
         end = p.landed(e.new, begin).time
-    phase = phase_of(p.m, e, begin, end, sheet)
+    transit = first is not None and first.kind == "transit"
+    phase = phase_of(p.m, e, begin, end, sheet, transit)
     closing = None
     if e.cycle and e.new is not None and not outside:
         closing = cycle_end(p, e)
@@ -226,7 +231,9 @@ def _distances(p: Passage, followed: NDArray[np.intp]) -> tuple[Array, Array, Ar
             behind = -ahead / p.drift[on]
             relaxation[on] = np.where(rate > 0, 1.0 / rate, np.nan)
         moving = np.abs(p.drift[on]) > STILL * fastest
-        lag[on] = np.where(moving & np.isfinite(behind) & (steep > 0), behind, np.nan)
+        lag[on] = np.where(
+            moving & np.isfinite(behind) & (np.sqrt(steep) * m.span > FLAT), behind, np.nan
+        )
     return distance, lag, relaxation
 
 

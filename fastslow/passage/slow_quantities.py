@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,10 @@ class SlowQuantity:
         Values of what else stands in the laws.
     table : ndarray, shape (N,)
         The parameter at the samples of the run.
+    spacing : float
+        How finely the path was tried.
+    bounds : tuple of float
+        The range of the diagram.
     """
 
     run: Trajectory
@@ -47,6 +51,8 @@ class SlowQuantity:
     laws: Mapping[str, str]
     constants: Mapping[str, float]
     table: Array
+    spacing: float = 0.0
+    bounds: tuple[float, float] = (-np.inf, np.inf)
 
     @property
     def dense(self) -> bool:
@@ -76,18 +82,49 @@ class SlowQuantity:
         return np.array([np.broadcast_to(law, value.shape) for law in laws])
 
     def _solved(self, start: Array, wanted: Array) -> Array:
-        """Gauss-Newton for the point of the path nearest to the wanted quantities."""
-        value = start.copy()
+        """The point of the path nearest to the wanted quantities, beside a start.
+
+        In the range of the diagram where there is one: a path that turns at an end of it
+        goes through the same places beyond.
+        """
+        inside = self._searched(start, wanted, self.bounds)
+        reach = np.maximum(np.ptp(wanted, axis=1), 1e-3 * np.abs(wanted).max(axis=1))[:, None]
+        off = np.abs(self._values(inside) - wanted) > 0.1 * ON_PATH * reach
+        return np.where(off.any(axis=0), self._searched(start, wanted, None), inside)
+
+    def _searched(self, start: Array, wanted: Array, bounds: tuple[float, float] | None) -> Array:
+        """The nearest point of the path beside a start, within bounds.
+
+        A search in ever shorter steps, since Newton's leaps away where the path
+        turns, and then Newton to rounding.
+        """
         unit = np.maximum(np.ptp(wanted, axis=1), 1e-12 * np.abs(wanted).max(axis=1))
         unit = np.where(unit > 0, unit, 1.0)[:, None]
-        step = 1e-6 * max(float(np.ptp(self.table)) if len(self.table) else 0.0, 1e-3)
-        for _ in range(8):
-            rest = (wanted - self._values(value)) / unit
+        low, high = bounds or (-np.inf, np.inf)
+        value = np.clip(start, low, high)
+        rest = (wanted - self._values(value)) / unit
+        reach = self.spacing
+        for _ in range(14):
+            for side in (-1.0, -0.5, 0.5, 1.0):
+                tried = np.clip(value + side * reach, low, high)
+                value, rest = self._better(value, rest, tried, wanted, unit)
+            reach *= 0.4
+        step = 1e-4 * self.spacing
+        for _ in range(6):
             slope = (self._values(value + step) - self._values(value - step)) / (2 * step * unit)
             square = (slope**2).sum(axis=0)
             moved = (slope * rest).sum(axis=0) / np.where(square > 0, square, np.inf)
-            value = value + np.clip(np.nan_to_num(moved), -1e4 * step, 1e4 * step)
+            tried = np.clip(value + np.nan_to_num(moved), low, high)
+            value, rest = self._better(value, rest, tried, wanted, unit)
         return value
+
+    def _better(
+        self, value: Array, rest: Array, tried: Array, wanted: Array, unit: Array
+    ) -> tuple[Array, Array]:
+        """Values and what is left there, or others where less is left."""
+        left = (wanted - self._values(tried)) / unit
+        better = (left**2).sum(axis=0) < (rest**2).sum(axis=0)
+        return np.where(better, tried, value), np.where(better, left, rest)
 
 
 def slow_quantity(diagram: Diagram, run: Trajectory) -> SlowQuantity:
@@ -110,27 +147,31 @@ def slow_quantity(diagram: Diagram, run: Trajectory) -> SlowQuantity:
     laws = {q: t for q, t in diagram.path.items() if name in names_in(t, known)}
     if not laws:
         raise unknown_name("slow quantity of the trajectory", name, quantities)
-    # a quantity that is the parameter itself gives it without solving
     wanted = np.array([run[q] for q in laws])
-    empty = SlowQuantity(run, diagram.states, name, laws, constants, np.zeros(0))
     low, high = diagram.over
     grid = np.linspace(low - 0.5 * (high - low), high + 0.5 * (high - low), TRIED)
-    start = _nearest(grid, empty._values(grid), wanted, name)
-    path = SlowQuantity(run, diagram.states, name, laws, constants, start)
-    solved = path._solved(start, wanted)
+    spacing = float(grid[1] - grid[0])
+    empty = SlowQuantity(
+        run, diagram.states, name, laws, constants, np.zeros(0), spacing, diagram.over
+    )
+    start = _nearest(grid, empty._values(grid), wanted, diagram)
+    solved = empty._solved(start, wanted)
     reach = np.maximum(np.ptp(wanted, axis=1), 1e-3 * np.abs(wanted).max(axis=1))
-    off = np.abs(path._values(solved) - wanted).max(axis=1) / np.where(reach > 0, reach, 1.0)
+    off = np.abs(empty._values(solved) - wanted).max(axis=1) / np.where(reach > 0, reach, 1.0)
     if not off.max() <= ON_PATH:
         worst = list(laws)[int(np.argmax(np.nan_to_num(off, nan=np.inf)))]
         raise ArgumentError(
             f"the trajectory leaves the path {worst} = {laws[worst]}, along which the model was "
             f"frozen, by {off.max():.2g} of the range of {worst}"
         )
-    return SlowQuantity(run, diagram.states, name, laws, constants, solved)
+    return replace(empty, table=solved)
 
 
-def _nearest(grid: Array, curve: Array, wanted: Array, name: str) -> Array:
-    """The value whose place on the path is nearest at each sample, followed in time."""
+def _nearest(grid: Array, curve: Array, wanted: Array, diagram: Diagram) -> Array:
+    """The value whose place on the path is nearest at each sample, followed in time.
+
+    Values in the range of the diagram come first: beyond it a path may come back to itself.
+    """
     unit = np.maximum(np.ptp(curve, axis=1), 1e-300)[:, None]
     curve, wanted = curve / unit, wanted / unit
     usable = np.isfinite(curve).all(axis=0)
@@ -138,18 +179,21 @@ def _nearest(grid: Array, curve: Array, wanted: Array, name: str) -> Array:
     spacing = np.zeros(len(grid))
     gaps = np.linalg.norm(np.diff(curve, axis=1), axis=0)
     spacing[:-1], spacing[1:] = gaps, np.maximum(spacing[1:], gaps)
+    inside = (grid >= diagram.over[0]) & (grid <= diagram.over[1])
     found = np.empty(wanted.shape[1])
     twofold = 0
     last = None
     for k, place in enumerate(wanted.T):
         apart = np.linalg.norm(curve - place[:, None], axis=0)
         near = np.flatnonzero(apart <= apart.min() + 2 * spacing)
+        near = near[inside[near]] if inside[near].any() else near
         twofold += len(near) > 1 and np.diff(near).max() > 8
-        last = int(np.argmin(apart) if last is None else near[np.argmin(np.abs(near - last))])
+        order = apart[near] if last is None else np.abs(near - last)
+        last = int(near[np.argmin(order)])
         found[k] = grid[last]
     if twofold > 0.5 * len(found):
         raise ArgumentError(
-            f"the path passes every place twice, so that the trajectory does not give {name}; "
-            f"freeze along a path on which one slow quantity grows with {name}"
+            f"the path passes every place twice, so that the trajectory does not give "
+            f"{diagram.parameter}; freeze along a path on which one slow quantity grows with it"
         )
     return found

@@ -111,12 +111,12 @@ def measured(
         places[:, k] = course.state(slow.table)
         if present[:, k].any():
             extent = np.maximum(extent, np.ptp(places[present[:, k], k], axis=0))
+    fastest = float(np.median([c.fastest() for c in courses] or [0.0]))
     size = np.abs(state).max(axis=0)
     # what moves by rounding only has no extent
     extent = np.where(extent > 1e-9 * size, extent, np.where(size > 0, size, 1.0))
-    fastest = [c.fastest() for c in courses]
-    for rate, of in _velocities(slow, state):
-        extent[rate] = max(extent[rate], extent[of] * float(np.median(fastest or [0.0])))
+    for rate, of in _velocities(slow):
+        extent[rate] = max(extent[rate], extent[of] * fastest)
     span = max(float(np.ptp(slow.table)), 1e-3 * (over[1] - over[0]))
     curves = tuple(_resampled(course.curve() / np.append(extent, span)) for course in courses)
     return Measured(
@@ -134,7 +134,7 @@ def measured(
     )
 
 
-def _velocities(slow: SlowQuantity, state: Array) -> list[tuple[int, int]]:
+def _velocities(slow: SlowQuantity) -> list[tuple[int, int]]:
     """Pairs (i, j) of fast states where state i is the time derivative of state j.
 
     A sheet that drifts carries a velocity with it, which is no distance from the sheet:

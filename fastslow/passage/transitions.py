@@ -134,7 +134,8 @@ class Passage:
     def delay(self, sheet: StableSheet, point: SpecialPoint | None, value: float) -> float:
         if point is None:
             return float("nan")
-        return self.outward(sheet, point) * (value - point[self.diagram.parameter])
+        delay = self.outward(sheet, point) * (value - point[self.diagram.parameter])
+        return delay if abs(delay) > 1e-13 * self.m.span else 0.0
 
     def slope(self, point: SpecialPoint | None, until: float) -> float:
         """|dw/dt| where the slow quantity last passed a special point before a time, or then."""

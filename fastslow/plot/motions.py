@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.text import Annotation
+from matplotlib.patches import Rectangle
+from matplotlib.text import Annotation, Text
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.plot.arrows import draw_arrows, length_along
 from fastslow.plot.bands import Bands, Values, draw_bands
+from fastslow.plot.phases import draw_phases
 from fastslow.plot.style import MM, MOTION, VERMILION, Drawing, axes_for, typeset
 from fastslow.results.trajectories import Trajectory
+from fastslow.results.transitions import Phase
 
 Array = NDArray[np.float64]
 
@@ -40,6 +44,10 @@ class MotionDrawing(Drawing):
         Sense of direction.
     bands : tuple of Bands
         Interfaces and regions.
+    phases : tuple of Rectangle
+        The strip of phases above a time series.
+    words : tuple of Text
+        What is written in it.
     """
 
     x: str
@@ -48,6 +56,8 @@ class MotionDrawing(Drawing):
     crossings: Line2D | None
     arrows: tuple[Annotation, ...]
     bands: tuple[Bands, ...]
+    phases: tuple[Rectangle, ...] = ()
+    words: tuple[Text, ...] = ()
 
 
 def time_series(
@@ -57,6 +67,7 @@ def time_series(
     ax: Axes | None = None,
     crossings: bool = True,
     interfaces: Values | None = None,
+    phases: Sequence[Phase] = (),
     color: str = MOTION,
     **style: Any,
 ) -> MotionDrawing:
@@ -74,6 +85,8 @@ def time_series(
     interfaces : mapping, optional
         Interface to (state, value), as a diagram's ``interface_values``: these
         are drawn, with the regions between them.
+    phases : sequence of Phase
+        Of an overlay, ``lay.phases``: a strip above shows and names them.
     color : str
         Colour of the trajectory.
     **style
@@ -96,8 +109,9 @@ def time_series(
     ax.set_xlabel(typeset("t"))
     ax.set_ylabel(typeset(name))
     ax.set_xlim(float(run.t[0]), float(run.t[-1]))
+    strip = draw_phases(ax, phases) if phases else ((), ())
     bands = _bands(ax, run, (None, name), interfaces)
-    return MotionDrawing(ax, "t", name, lines, dots, (), bands)
+    return MotionDrawing(ax, "t", name, lines, dots, (), bands, *strip)
 
 
 def phase_portrait(

@@ -67,6 +67,16 @@ TRANSITIONS: dict[str, tuple[str, str, str]] = {
     "change": ("s", GREY, "other change"),
 }
 
+#: Look of a phase of the motion by kind.
+PHASES: dict[str, dict[str, Any]] = {
+    "quiescent": {"facecolor": "#C9DDEB"},
+    "spiking": {"facecolor": "#F3C98B"},
+    "jump": {"facecolor": VERMILION},
+    "transit": {"facecolor": PURPLE},
+    "transient": {"facecolor": "#DDDDDD"},
+    "outside": {"facecolor": "white", "hatch": "/////", "edgecolor": GREY},
+}
+
 #: Light fills of the regions, in turn.
 BANDS = ("#E4F1FA", "#FFFFFF", "#FBF0DC")
 

@@ -98,16 +98,16 @@ def evaluated(expression: object, values: Mapping[str, Any]) -> Array:
         return np.asarray(_value(parsed(text, values), values), dtype=float)
 
 
-def names_in(expression: object, valid: Mapping[str, Any]) -> tuple[str, ...]:
-    """The names that an expression uses, in order of appearance.
+def names_in(expression: object, valid: Mapping[str, Any]) -> frozenset[str]:
+    """The names that an expression uses.
 
     Examples
     --------
-    >>> names_in("v + sin(x)", {"x": 0, "v": 0})
-    ('v', 'x')
+    >>> sorted(names_in("v + sin(x)", {"x": 0, "v": 0}))
+    ['v', 'x']
     """
-    found = [n.id for n in ast.walk(parsed(expression, valid)) if isinstance(n, ast.Name)]
-    return tuple(dict.fromkeys(name for name in found if name in valid))
+    found = (n.id for n in ast.walk(parsed(expression, valid)) if isinstance(n, ast.Name))
+    return frozenset(name for name in found if name in valid)
 
 
 def _check(node: ast.expr, valid: Mapping[str, Any], text: str) -> None:

@@ -171,8 +171,9 @@ class Phase:
     start, end : float
     kind : str
         ``"quiescent"`` (follows a sheet), ``"spiking"`` (two oscillations or more away from
-        the sheets), ``"jump"`` (from one sheet to the next), ``"transient"`` (at the start or
-        the end of the run, near no sheet) or ``"outside"`` (the diagram does not go so far).
+        the sheets), ``"jump"`` (from one sheet to the next), ``"transit"`` (the same across a
+        gap), ``"transient"`` (at the start or the end of the run, near no sheet) or
+        ``"outside"`` (the diagram does not go so far).
     sheets : tuple of str
         Labels of the sheets followed, in order; for spiking that settles on a sheet, that one.
     spikes : int
