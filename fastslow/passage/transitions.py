@@ -61,11 +61,13 @@ class Passage:
         over : callable
             (slow (N,), state (N, n)) -> bool (N,).
         """
-        for _ in range(10):
+        while stop - start > 4.0 * np.finfo(float).eps * max(abs(start), abs(stop)):
             times = np.linspace(start, stop, 33)
             holds = np.asarray(over(*self.slow.at(times)), dtype=bool)
             holds[0], holds[-1] = False, True
             k = int(np.argmax(holds))
+            if not times[k] - times[k - 1] < stop - start:
+                break
             start, stop = float(times[k - 1]), float(times[k])
         return stop
 

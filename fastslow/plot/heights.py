@@ -41,7 +41,9 @@ def expression_of(diagram: Diagram, name: object) -> str:
     """
     text = diagram.states[0] if name is None else str(name)
     known = dict.fromkeys((*diagram.states, diagram.parameter, *diagram.parameters), 0.0)
-    if text not in diagram.states and not names_in(text, known) & set(diagram.states):
+    if text in diagram.states:
+        return text
+    if text.isidentifier() or not names_in(text, known) & set(diagram.states):
         raise unknown_name("state", text, diagram.states)
     return text
 

@@ -15,7 +15,7 @@ from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
-from fastslow.plot.arrows import draw_arrows, draw_heads, points
+from fastslow.plot.arrows import draw_heads, points
 from fastslow.plot.branches import DiagramDrawing, draw_branches
 from fastslow.plot.heights import expression_of
 from fastslow.plot.labels import key, place, settle
@@ -183,8 +183,9 @@ def draw_passage(
     dots = None
     met = lay.run.crossings
     if crossings and met:
-        times = np.array([c.time for c in met])
-        dots = draw_dots(ax, *_at(lay, name, times, np.array([c.state for c in met])))
+        times, state = np.array([c.time for c in met]), np.array([c.state for c in met])
+        slow = np.interp(times, lay.time, lay.slow)
+        dots = draw_dots(ax, slow, _heights(lay, name, times, slow, lay.run.states, state))
     changes = _transitions(ax, lay, name)
     turns = _turning(ax, lay, name) if turning else None
     # after the trajectory, so that the bands take its limits in
@@ -198,29 +199,25 @@ def draw_passage(
         elif any(phase.kind == "spiking" for phase in lay.phases):
             # spikes would cover it
             line.set_zorder(3.5)
-    travel = np.r_[0.0, np.cumsum(np.abs(np.diff(points(lines[-1])[:, 0])))]
-    heads = draw_arrows(lines[-1], travel, ARROWS)
-    jumps = draw_heads(lines[-1], _middles(lay, values, len(points(lines[-1]))))
-    return OverlayDrawing(ax, name, below, lines, dots, changes, turns, (*heads, *jumps), None)
+    heads = draw_heads(lines[-1], _heads(lay, values, points(lines[-1])[:, 0]))
+    return OverlayDrawing(ax, name, below, lines, dots, changes, turns, heads, None)
 
 
-def _at(lay: Overlay, name: str, times: Array, state: Array) -> tuple[Array, Array]:
-    """The slow quantity and an expression at times between samples, states given (N, n_run)."""
-    slow = np.interp(times, lay.time, lay.slow)
+def _heights(
+    lay: Overlay, expression: str, times: Array, slow: Array, names: Sequence[str], state: Array
+) -> Array:
+    """An expression at times between samples, where some states are known, shape (N, states)."""
     columns = {n: np.interp(times, lay.time, lay.run[n]) for n in lay.run.columns}
-    columns |= {n: state[:, k] for k, n in enumerate(lay.run.states[: state.shape[1]])}
+    columns |= {name: state[:, k] for k, name in enumerate(names)}
     known = {**lay.run.parameters, **lay.diagram.parameters, **columns, lay.parameter: slow}
-    return slow, np.broadcast_to(evaluated(name, known), slow.shape)
+    return np.broadcast_to(evaluated(expression, known), times.shape)
 
 
-def _heights(lay: Overlay, name: str, moments: Sequence[Any]) -> Array:
-    """An expression at moments that know their fast state."""
-    states = {n: np.array([m.state[k] for m in moments]) for k, n in enumerate(lay.diagram.states)}
-    value = np.array([m.value for m in moments])
-    times = np.array([m.time for m in moments])
-    columns = {n: np.interp(times, lay.time, lay.run[n]) for n in lay.run.columns}
-    known = {**lay.run.parameters, **lay.diagram.parameters, **columns, **states}
-    return np.broadcast_to(evaluated(name, {**known, lay.parameter: value}), value.shape)
+def _at_moments(lay: Overlay, expression: str, moments: Sequence[Any]) -> tuple[Array, Array]:
+    """The slow quantity and an expression at moments that know their fast states."""
+    times, slow = (np.array([getattr(m, n) for m in moments]) for n in ("time", "value"))
+    state = np.array([m.state for m in moments])
+    return slow, _heights(lay, expression, times, slow, lay.diagram.states, state)
 
 
 def _transitions(ax: Axes, lay: Overlay, name: str) -> tuple[Line2D, ...]:
@@ -230,8 +227,7 @@ def _transitions(ax: Axes, lay: Overlay, name: str) -> tuple[Line2D, ...]:
         if met:
             filled = marker in "*PX"
             drawn += ax.plot(
-                [t.value for t in met],
-                _heights(lay, name, met),
+                *_at_moments(lay, name, met),
                 linestyle="none",
                 marker=marker,
                 markersize=7.0 if marker == "*" else 5.5,
@@ -249,8 +245,7 @@ def _turning(ax: Axes, lay: Overlay, name: str) -> Line2D | None:
     if not lay.turning:
         return None
     (line,) = ax.plot(
-        [m.value for m in lay.turning],
-        _heights(lay, name, lay.turning),
+        *_at_moments(lay, name, lay.turning),
         linestyle="none",
         marker="|",
         markersize=9.0,
@@ -262,22 +257,27 @@ def _turning(ax: Axes, lay: Overlay, name: str) -> Line2D | None:
     return line
 
 
-def _middles(lay: Overlay, values: Array, drawn: int) -> list[int]:
-    """Samples, counted from the first of the last ``drawn``, halfway through each jump there."""
-    rows: list[int] = []
+def _heads(lay: Overlay, values: Array, drawn: Array) -> list[int]:
+    """Where arrow heads sit, as points of the last period: along the sheets, and halfway in jumps.
+
+    Parameters
+    ----------
+    lay : Overlay
+    values : ndarray, shape (N,)
+        What the vertical axis shows.
+    drawn : ndarray, shape (M,)
+        The slow quantity of the last period, the last M samples.
+    """
+    travel = np.r_[0.0, np.cumsum(np.abs(np.diff(drawn)))]
+    rows = np.searchsorted(travel, np.array(ARROWS) * travel[-1]).tolist() if travel[-1] else []
+    earlier = len(lay.time) - len(drawn)
     for t in lay.transitions:
-        if (
-            t.land is None
-            or t.kind in ("crossing", "end of spiking")
-            or t.land.time <= t.leave.time
-        ):
+        if t.land is None or t.kind in ("crossing", "end of spiking"):
             continue
-        start, stop = np.searchsorted(lay.time, (t.leave.time, t.land.time))
-        inside = values[start:stop]
-        if len(inside) < 3:
-            continue
-        middle = 0.5 * (inside[0] + inside[-1])
-        row = int(start) + int(np.argmin(np.abs(inside - middle))) - (len(lay.time) - drawn)
-        if row >= 0:
-            rows.append(row)
+        start, stop = np.searchsorted(lay.time, (t.leave.time, t.land.time)) - earlier
+        inside = values[earlier:][max(start, 0) : max(stop, 0)]
+        if start >= 0 and len(inside) > 2:
+            middle = 0.5 * (inside[0] + inside[-1])
+            rows = [row for row in rows if not start <= row <= stop]
+            rows.append(int(start) + int(np.argmin(np.abs(inside - middle))))
     return rows

@@ -107,8 +107,10 @@ def draw_space(
         (ax.set_ylabel, written(x)),
         (ax.set_zlabel, written(y)),
     ):
-        set_label(text, fontsize=TEXT, labelpad=-6)
+        set_label(text, fontsize=TEXT, labelpad=-4)
     ax.tick_params(labelsize=SMALL, pad=-3)
+    ax.tick_params(axis="z", pad=1)
+    ax.locator_params(nbins=5)
     key = None
     if legend:
         shown: dict[str, Line2D] = {str(h.get_label()): h for h in [*branches, *markers, line]}
