@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.plot.arrows import draw_arrows, length_along
 from fastslow.plot.bands import Bands, Values, draw_bands
-from fastslow.plot.phases import draw_phases
+from fastslow.plot.labels import settle
+from fastslow.plot.phases import draw_phases, fit_words
 from fastslow.plot.style import MM, MOTION, VERMILION, Drawing, axes_for, typeset
 from fastslow.results.trajectories import Trajectory
 from fastslow.results.transitions import Phase
@@ -86,7 +87,7 @@ def time_series(
         Interface to (state, value), as a diagram's ``interface_values``: these
         are drawn, with the regions between them.
     phases : sequence of Phase
-        Of an overlay, ``lay.phases``: a strip above shows and names them.
+        Of an overlay, ``lay.phases``: a strip above shows them, and names those with room.
     color : str
         Colour of the trajectory.
     **style
@@ -102,7 +103,7 @@ def time_series(
         If ``x`` is no state or slow quantity of the trajectory.
     """
     name = quantity(run, x, 0)
-    ax = axes_for(ax, height=50 * MM)
+    own, ax = ax is None, axes_for(ax, height=50 * MM)
     look = {"color": color, "label": "trajectory", **LINE, **style}
     lines = tuple(ax.plot(run.t, run[name], **look))
     dots = _dots(ax, run, "t", name) if crossings else None
@@ -111,6 +112,9 @@ def time_series(
     ax.set_xlim(float(run.t[0]), float(run.t[-1]))
     strip = draw_phases(ax, phases) if phases else ((), ())
     bands = _bands(ax, run, (None, name), interfaces)
+    if own and phases:
+        settle(ax)
+        fit_words(*strip)
     return MotionDrawing(ax, "t", name, lines, dots, (), bands, *strip)
 
 

@@ -13,6 +13,7 @@ from fastslow.errors import unknown_name
 from fastslow.plot.labels import legend_below, place, settle
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.passages import OverlayDrawing, draw_passage
+from fastslow.plot.phases import fit_words
 from fastslow.plot.style import FULL, MM, PHASES, TEXT, dressed, new_figure, save
 from fastslow.results.overlays import Overlay
 
@@ -111,6 +112,7 @@ def panel(
     columns = 2 if narrow else 4 if len(handles) <= 8 else 5
     legend = legend_below(laid.ax, handles, columns)
     settle(laid.ax)
+    fit_words(series.phases, series.words)
     place(axes[0], bands=series.bands)
     place(axes[1], bands=portrait.bands)
     place(axes[2], laid.diagram.labels, bands=[laid.diagram.bands])

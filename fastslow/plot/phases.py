@@ -8,20 +8,17 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
-from fastslow.plot.labels import settle
 from fastslow.plot.style import BLACK, PHASES, root
 from fastslow.results.transitions import Phase
 
 #: Height of the strip and size of its words, in points.
-HEIGHT, WORDS = 9.0, 6.0
+HEIGHT, WORDS = 10.0, 6.0
 
 
 def draw_phases(
     ax: Axes, phases: Sequence[Phase]
 ) -> tuple[tuple[Rectangle, ...], tuple[Text, ...]]:
-    """Draw phases as a strip along the upper edge of a time series, and name those with room.
-
-    A quiescent phase bears the sheets that it follows, a spiking one its number of spikes.
+    """Draw phases as a strip along the upper edge of a time series.
 
     Parameters
     ----------
@@ -32,9 +29,11 @@ def draw_phases(
     Returns
     -------
     tuple of Rectangle
+        One for each phase.
     tuple of Text
+        What each is called: the sheets that a quiescent phase follows, the number of
+        spikes. `fit_words` hides those without room.
     """
-    settle(ax)
     whole = ax.get_window_extent().height * 72.0 / root(ax).dpi
     height = min(HEIGHT / whole, 0.5)
     low, high = ax.get_ylim()
@@ -53,29 +52,27 @@ def draw_phases(
         )
         ax.add_patch(box)
         boxes.append(box)
-        text = _text(phase)
-        if text:
-            words.append(
-                ax.text(
-                    0.5 * (phase.start + phase.end),
-                    1.0 - 0.5 * height,
-                    text,
-                    transform=frame,
-                    ha="center",
-                    va="center",
-                    fontsize=WORDS,
-                    color=BLACK,
-                    zorder=4.9,
-                    clip_on=True,
-                )
+        words.append(
+            ax.text(
+                0.5 * (phase.start + phase.end),
+                1.0 - 0.5 * height,
+                _text(phase),
+                transform=frame,
+                ha="center",
+                va="center",
+                fontsize=WORDS,
+                color=BLACK,
+                zorder=4.9,
+                clip_on=True,
             )
-            words[-1].set_gid(str(len(boxes) - 1))
-    settle(ax)
-    for word in words:
-        room = boxes[int(word.get_gid() or 0)].get_window_extent()
-        if word.get_window_extent().width > room.width:
-            word.set_visible(False)
+        )
     return tuple(boxes), tuple(words)
+
+
+def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text]) -> None:
+    """Hide the words that are wider than their boxes, in axes with their final places."""
+    for box, word in zip(boxes, words, strict=True):
+        word.set_visible(word.get_window_extent().width <= box.get_window_extent().width)
 
 
 def _text(phase: Phase) -> str:
