@@ -58,7 +58,7 @@ def load_loop(
 
 
 def digest_of(modules: Sequence[str]) -> str:
-    """A digest of the sources of modules."""
+    """Digest of the sources of modules."""
     digest = hashlib.sha256()
     for name in modules:
         spec = importlib.util.find_spec(name)

@@ -10,11 +10,14 @@ the step before, and takes the place of the series: rows of coefficients in time
 from __future__ import annotations
 
 import numpy as np
+from numba import types
+from numba.np.numpy_support import carray
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from fastslow.compiled.late import late_function
 from fastslow.compiled.parts import part
-from fastslow.compiled.pointers import call_address
+from fastslow.compiled.pointers import DOUBLES, call_address
 from fastslow.compiled.series import COLLOCATION
 from fastslow.simulation.polynomials import EPSILON
 
@@ -119,7 +122,6 @@ def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
     if finite != 0.0:
         return np.nan
     point, out = np.empty(inputs.shape[0]), np.zeros(W.shape[0])
-    h = room
     if memory.shape[0] > 0 and memory[1] > 0.0:
         h = min(room, memory[1])
     else:
@@ -378,3 +380,58 @@ def to_powers(data, points, count, work):
         # multiply what stands above by s - points[k]
         for j in range(k, count - 1):
             work[j] -= points[k] * work[j + 1]
+
+
+@part
+def step_by_collocation(
+    address,
+    n_states,
+    n_forcing,
+    n_interfaces,
+    n_modes,
+    order,
+    mode,
+    inputs,
+    parameters,
+    tol,
+    room,
+    W,
+    size,
+    memory,
+    carried,
+):
+    """`collocate` with pointers for arrays."""
+    return collocate(
+        address,
+        (n_states, n_forcing, n_interfaces, n_modes, order),
+        mode,
+        carray(inputs, 1 + n_states + n_forcing),
+        carray(parameters, 1),
+        tol,
+        room,
+        carray(W, size),
+        carray(memory, carried),
+    )
+
+
+#: Type of `step_by_collocation`.
+SIGNATURE = types.float64(
+    *[types.int64] * 7,
+    *[DOUBLES] * 2,
+    *[types.float64] * 2,
+    *[DOUBLES, types.int64] * 2,
+)
+
+#: Few runs need it: it is compiled when the first of them does.
+late_collocation = late_function(
+    "fastslow.simulation.collocation",
+    "step_by_collocation",
+    "SIGNATURE",
+    SIGNATURE,
+    (
+        "fastslow.simulation.polynomials",
+        "fastslow.compiled.parts",
+        "fastslow.compiled.pointers",
+        "fastslow.compiled.series",
+    ),
+)

@@ -8,7 +8,7 @@ import numpy as np
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
-from fastslow.simulation.collocation import collocate
+from fastslow.simulation.collocation import late_collocation
 from fastslow.simulation.polynomials import EPSILON, ONE, ZERO, first_nonzero, first_strong
 
 #: The part of a step over which the beginning of a motion is judged: over a whole one that
@@ -83,7 +83,7 @@ def expand(address, layout, mode, inputs, parameters, tol, room, W, memory, know
     float
         How far the polynomials hold, NaN where the rates are not finite.
     """
-    n_states, n_forcing, n_interfaces, _, order = layout
+    n_states, n_forcing, n_interfaces, n_modes, order = layout
     drift = n_states + n_forcing + n_interfaces
     if not known:
         call_address(address, mode, inputs, parameters, W)
@@ -92,7 +92,23 @@ def expand(address, layout, mode, inputs, parameters, tol, room, W, memory, know
         memory[0] = 0.0
     if length > 0.0:
         return length
-    return collocate(address, layout, mode, inputs, parameters, tol, room, W, memory)
+    return late_collocation(
+        address,
+        n_states,
+        n_forcing,
+        n_interfaces,
+        n_modes,
+        order,
+        mode,
+        inputs.ctypes,
+        parameters.ctypes,
+        tol,
+        room,
+        W.ctypes,
+        W.shape[0],
+        memory.ctypes,
+        memory.shape[0],
+    )
 
 
 @part
