@@ -28,7 +28,7 @@ def entry({arguments}):
     return called({arguments})
 '''
 
-_C_TYPES = {types.int64: ctypes.c_int64, types.float64: ctypes.c_double}
+_C_TYPES: dict[Any, Any] = {types.int64: ctypes.c_int64, types.float64: ctypes.c_double}
 
 _callbacks: list[Any] = []
 
@@ -56,7 +56,7 @@ def late_function(
     -------
     numba.types.ExternalFunction
     """
-    arguments: list[Any] = [_C_TYPES.get(argument, ctypes.c_void_p) for argument in kind.args]
+    arguments = [_C_TYPES.get(argument, ctypes.c_void_p) for argument in kind.args]
     prototype = ctypes.CFUNCTYPE(_C_TYPES[kind.return_type], *arguments)
 
     @cache

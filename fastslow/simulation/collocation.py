@@ -12,84 +12,28 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 from numba.np.numpy_support import carray
-from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from fastslow.compiled.late import late_function
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import DOUBLES, call_address
-from fastslow.compiled.series import COLLOCATION
+from fastslow.simulation.lobatto import (
+    AT_F,
+    HIGHEST,
+    INTEGRALS,
+    LOWEST,
+    TO_C,
+    TO_F,
+    WORST,
+    C,
+    F,
+)
 from fastslow.simulation.polynomials import EPSILON
-
-Array = NDArray[np.float64]
-
-#: Lowest and highest degree.
-LOWEST, HIGHEST = 4, COLLOCATION
 
 #: Most iterations of one attempt, and most attempts for one step.
 ITERATIONS, ATTEMPTS = 40, 100
 
 #: How much of the tolerance the estimate may reach, and the iteration may leave.
 SHARE, LEFT = 0.5, 0.02
-
-
-def lobatto_points(n: int) -> Array:
-    """The n points of Lobatto on [0, 1]: the ends and the turning points of Legendre's polynomial.
-
-    Examples
-    --------
-    >>> lobatto_points(3)
-    array([0. , 0.5, 1. ])
-    """
-    roots = np.sort(legendre.legroots(legendre.legder([0.0] * (n - 1) + [1.0])))
-    inside = 0.5 + (roots - roots[::-1]) / 4.0
-    return np.array([0.0, *inside, 1.0])
-
-
-def _in_order(points: Array) -> Array:
-    """Points in an order that is stable for divided differences (Leja), the first one first."""
-    left, chosen = list(points[1:]), [points[0]]
-    while left:
-        chosen.append(max(left, key=lambda x: abs(np.prod([x - c for c in chosen]))))
-        left.remove(chosen[-1])
-    return np.array(chosen)
-
-
-def _matrix(points: Array, at: Array, integrals: bool) -> Array:
-    """Values at some places, or integrals from 0 to there, of the polynomials through points."""
-    n = len(points)
-    wanted = legendre.legvander(2.0 * at - 1.0, n)
-    if integrals:
-        # (2 k + 1) P_k is the derivative of P_{k+1} - P_{k-1}, which vanishes at the left end
-        whole = (wanted[:, 2:] - wanted[:, :-2]) / (4.0 * np.arange(1, n) + 2.0)
-        wanted = np.column_stack([at, whole])
-    basis = legendre.legvander(2.0 * points - 1.0, n - 1)
-    wanted = wanted[:, :n]
-    return np.asarray(np.linalg.solve(basis.T, wanted.T).T)
-
-
-def _tables() -> tuple[Array, ...]:
-    """Points and matrices of every degree, one row of each array for a degree."""
-    size, count = HIGHEST + 1, HIGHEST - LOWEST + 1
-    points, finer = np.zeros((count, size)), np.zeros((count, size))
-    to_points, to_finer, slopes, errors = (np.zeros((count, size, size)) for _ in range(4))
-    between = np.zeros(count)
-    for row, n in enumerate(range(LOWEST, HIGHEST + 1)):
-        c, f = _in_order(lobatto_points(n)), _in_order(lobatto_points(n + 1))
-        points[row, :n], finer[row, : n + 1] = c, f
-        to_points[row, :n, :n] = _matrix(c, c, True)
-        to_finer[row, : n + 1, :n] = _matrix(c, f, True)
-        slopes[row, : n + 1, :n] = _matrix(c, f, False)
-        errors[row, : n + 1, : n + 1] = _matrix(f, f, True)
-        fine = np.linspace(0.0, 1.0, 2001)
-        between[row] = fine[np.abs(np.prod(fine[:, None] - f, axis=1)).argmax()]
-    return points, finer, to_points, to_finer, slopes, errors, between
-
-
-#: The points c_j, and those f_j at which a step is checked; the integrals of the polynomials
-#: through rates at c from 0 to c and to f, their values at f; the integrals of those through
-#: values at f; and where polynomials through values at f are worst.
-_C, _F, _TO_C, _TO_F, _AT_F, _ERRORS, _WORST = _tables()
 
 
 def memory_size(n_states: int, order: int) -> int:
@@ -172,14 +116,14 @@ def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
     work = np.empty(n + 1)
     for i in range(n_rates):
         row = columns * (i if i < n_states else i + n_forcing)
-        to_powers(rates[i], _C[table], n, work)
+        to_powers(rates[i], C[table], n, work)
         power = 1.0
         for k in range(n):
             W[row + k + 1] = work[k] * power / (k + 1)
             power /= h
     for i in range(n_forcing + 2):
         row = columns * (n_states + i if i < n_forcing else drift + i - n_forcing)
-        to_powers(values[i], _F[table], n + 1, work)
+        to_powers(values[i], F[table], n + 1, work)
         power = 1.0
         for k in range(n + 1):
             W[row + k] = work[k] * power
@@ -230,7 +174,7 @@ def predict(memory, t, mode, h, n, n_states, rates):
         if known and i < n_states:
             here = 0.0
             for j in range(n):
-                s = offset + _C[table, j] * h
+                s = offset + C[table, j] * h
                 value = 0.0
                 for k in range(n - 1, -1, -1):
                     value = value * s + memory[5 + i * n + k]
@@ -260,7 +204,7 @@ def iterate(address, layout, mode, inputs, parameters, tol, h, start, scale, rat
             for i in range(n_states):
                 total = 0.0
                 for k in range(n):
-                    total += _TO_C[table, j, k] * rates[i, k]
+                    total += TO_C[table, j, k] * rates[i, k]
                 value = start[i] + h * total
                 if count > 0:
                     change = max(change, abs(value - states[j, i]) * scale[i])
@@ -272,7 +216,7 @@ def iterate(address, layout, mode, inputs, parameters, tol, h, start, scale, rat
                 return 1 if change <= 64.0 * EPSILON else 0
             last = change
         for j in range(1, n):
-            point[0] = inputs[0] + _C[table, j] * h
+            point[0] = inputs[0] + C[table, j] * h
             for i in range(n_states):
                 point[1 + i] = states[j, i]
             call_address(address, mode, point, parameters, out)
@@ -312,7 +256,7 @@ def check(
     drift = n_states + n_forcing + n_interfaces
     error = finite = 0.0
     for j in range(n + 2):
-        s = _F[table, j] if j <= n else _WORST[table]
+        s = F[table, j] if j <= n else WORST[table]
         if j > n and n_forcing == 0:
             break
         point[0] = inputs[0] + s * h
@@ -320,7 +264,7 @@ def check(
             total = 0.0
             if j <= n:
                 for k in range(n):
-                    total += _TO_F[table, j, k] * rates[i, k]
+                    total += TO_F[table, j, k] * rates[i, k]
             point[1 + i] = start[i] + h * total
         call_address(address, mode, point, parameters, out)
         for k in range(n_forcing + 2):
@@ -333,18 +277,18 @@ def check(
             row = columns * (i if i < n_states else i + n_forcing)
             slope = 0.0
             for k in range(n):
-                slope += _AT_F[table, j, k] * rates[i, k]
+                slope += AT_F[table, j, k] * rates[i, k]
             defect[i, j] = out[row + 1] - slope
             finite += 0.0 * defect[i, j]
     for i in range(rates.shape[0]):
         for j in range(1, n + 1):
             total = 0.0
             for k in range(n + 1):
-                total += _ERRORS[table, j, k] * defect[i, k]
+                total += INTEGRALS[table, j, k] * defect[i, k]
             error = max(error, abs(h * total) * scale[i])
     for k in range(n_forcing):
         # slow quantities depend on time alone: the states at that place play no part
-        between = newton(values[k], _F[table], n + 1, _WORST[table])
+        between = newton(values[k], F[table], n + 1, WORST[table])
         difference = abs(between - values[k, n + 1])
         error = max(error, difference / (1.0 + abs(values[k, 0])))
     return error if finite == 0.0 else np.nan
@@ -429,6 +373,7 @@ late_collocation = late_function(
     "SIGNATURE",
     SIGNATURE,
     (
+        "fastslow.simulation.lobatto",
         "fastslow.simulation.polynomials",
         "fastslow.compiled.parts",
         "fastslow.compiled.pointers",

@@ -57,6 +57,7 @@ SOURCES = (
     "fastslow.simulation.driver",
     "fastslow.simulation.events",
     "fastslow.simulation.extremes",
+    "fastslow.simulation.lobatto",
     "fastslow.simulation.matrices",
     "fastslow.simulation.modes",
     "fastslow.simulation.polynomials",
