@@ -83,15 +83,20 @@ def expand(address, layout, mode, inputs, parameters, tol, room, W, memory, know
     float
         How far the polynomials hold, NaN where the rates are not finite.
     """
-    n_states, n_forcing, n_interfaces, n_modes, order = layout
-    drift = n_states + n_forcing + n_interfaces
     if not known:
         call_address(address, mode, inputs, parameters, W)
-    length = step_length(W, drift, order, tol)
+    length = step_length(W, layout[0] + layout[1] + layout[2], layout[4], tol)
     if memory.shape[0] > 0:
         memory[0] = 0.0
     if length > 0.0:
         return length
+    return instead(address, layout, mode, inputs, parameters, tol, room, W, memory)
+
+
+@part
+def instead(address, layout, mode, inputs, parameters, tol, room, W, memory):
+    """Call `late_collocation`: apart, so that the common case stays short."""
+    n_states, n_forcing, n_interfaces, n_modes, order = layout
     return late_collocation(
         address,
         n_states,
