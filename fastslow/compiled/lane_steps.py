@@ -16,13 +16,13 @@ from typing import Any
 from fastslow.compiled.generic import digest_of
 from fastslow.compiled.lane_functions import Mathematics, exp2, log2
 from fastslow.compiled.lanes import Lanes, Mask, Trace, Workspace, added, polynomial
-from fastslow.compiled.series import equations_of, mode_source
+from fastslow.compiled.series import Equations, equations_of, mode_source
 from fastslow.compiled.store import load_generated
 from fastslow.model.model import Model
 
 _HEADER = '''"""Plain steps of order {order} for {count} regions of {states} states.
 
-Sources {digest}.
+Traced by sources with the digest {digest}.
 """
 from numba import cfunc
 
@@ -57,6 +57,10 @@ ROWS = 9
 #: How a step went: it was not taken; it was; or it was, and its series is wanted.
 NOT_TAKEN, TAKEN, REPORTED = 0.0, 1.0, 2.0
 
+#: Larger models are not compiled: rows of all regions times the square of the order. The
+#: instructions are that many, and take half a minute per 100,000 to compile.
+_LARGEST = 50_000
+
 #: Smallest coefficient that limits a step.
 _SMALLEST = 1e-250
 
@@ -76,14 +80,15 @@ class CompiledSteps:
         the tolerance; ``W`` is filled with the coefficients of states and slow
         quantities where a step is `REPORTED`.
     regions : int
-        How many, the first modes of the series.
+        How many, the first modes of the series; none for a model that is too large.
     """
 
     address: int
     regions: int
 
 
-#: Of a model whose steps are not taken in lanes: without a series, or with special functions.
+#: Of a model whose steps are not taken in lanes: without a series, with special
+#: functions, or too large.
 NO_STEPS = CompiledSteps(0, 0)
 
 _compiled: dict[Any, CompiledSteps] = {}
@@ -99,28 +104,34 @@ def compile_steps(model: Model, order: int) -> CompiledSteps:
         Order of the series.
     """
     equations = equations_of(model, order)
+    if equations not in _compiled:
+        _compiled[equations] = _compile(equations)
+    return _compiled[equations]
+
+
+def _compile(equations: Equations) -> CompiledSteps:
     if equations.without_recurrence:
         return NO_STEPS
-    if equations not in _compiled:
-        n = len(equations.parameters)
-        new = equations.renamed()
-        text = _HEADER.format(
-            order=order, count=len(new.modes), states=len(new.states), digest=digest_of(_SOURCES)
-        )
-        for number, mode in enumerate(new.modes):
-            text += f"def region_{number}(inputs, parameters, W, math):\n"
-            lines = [f"n = {order}", *(f"p{i} = parameters[{i}]" for i in range(n))]
-            text += "".join(f"    {line}\n" for line in lines + mode_source(new, mode)[0]) + "\n\n"
-        if "special." in text:
-            return _compiled.setdefault(equations, NO_STEPS)
-        text += _ENTRY.format(
-            regions="".join(f"region_{i}, " for i in range(len(new.modes))),
-            signs=tuple(mode.signs for mode in new.modes),
-            sizes=(len(new.states), len(new.quantities), n, order),
-        )
-        address = load_generated(text, "steps").steps.address
-        _compiled[equations] = CompiledSteps(address, len(new.modes))
-    return _compiled[equations]
+    n, order = len(equations.parameters), equations.order
+    new = equations.renamed()
+    sources = [mode_source(new, mode) for mode in new.modes]
+    if sum(rows for _, rows in sources) * order**2 > _LARGEST:
+        return NO_STEPS
+    text = _HEADER.format(
+        order=order, count=len(sources), states=len(new.states), digest=digest_of(_SOURCES)
+    )
+    for number, (body, _) in enumerate(sources):
+        text += f"def region_{number}(inputs, parameters, W, math):\n"
+        lines = [f"n = {order}", *(f"p{i} = parameters[{i}]" for i in range(n)), *body]
+        text += "".join(f"    {line}\n" for line in lines) + "\n\n"
+    if "special." in text:
+        return NO_STEPS
+    text += _ENTRY.format(
+        regions="".join(f"region_{i}, " for i in range(len(sources))),
+        signs=tuple(mode.signs for mode in new.modes),
+        sizes=(len(new.states), len(new.quantities), n, order),
+    )
+    return CompiledSteps(load_generated(text, "steps").steps.address, len(sources))
 
 
 def plain_steps(

@@ -248,10 +248,9 @@ class Trace:
     def one_by_one(self, function: Callable[..., float], *arguments: Any) -> Lanes:
         """A function of single numbers, compiled by Numba and called for every lane."""
         from numba import types
-        from numba.core.typing.templates import signature
 
         numbers, builder, steady = self._place(arguments)
-        kind = signature(types.float64, *[types.float64] * len(numbers))
+        kind = types.float64(*[types.float64] * len(numbers))
         value = ir.Constant(_VECTOR, ir.Undefined)
         for lane in range(WIDTH):
             place = ir.Constant(ir.IntType(32), lane)

@@ -36,8 +36,8 @@ def lanes_for(
         np.zeros((n_values + 1, WIDTH)),
         np.empty(((n + n_forcing) * (order + 1), WIDTH)),
         np.empty(WIDTH, dtype=np.int64),
-        np.empty((regions, under_way), dtype=np.int64),
-        np.empty(regions, dtype=np.int64),
+        np.empty((max(1, regions), under_way), dtype=np.int64),
+        np.empty(max(1, regions), dtype=np.int64),
         np.empty(under_way, dtype=np.int64),
     )
 
@@ -79,7 +79,7 @@ def drive_many(
     rows, given, series, held, ready, n_ready, alone = room[0]
     store, following = np.empty(0), bounds[0]
     n_alone = count = mode = ZERO
-    for region in range(regions):
+    for region in range(n_ready.shape[0]):
         n_ready[region] = 0
     for lane in range(WIDTH):
         held[lane] = -1
@@ -132,8 +132,7 @@ def drive_many(
             for lane in range(WIDTH):
                 i = held[lane]
                 if i >= 0:
-                    put_down(rows, lane, limits, since[i], places[i], carried[i], counted[i],
-                             extremes[i], seen[i])  # fmt: skip
+                    put_down(rows, lane, i, limits, since, places, carried, counted, extremes, seen)
                     ready[mode, n_ready[mode]] = i
                     n_ready[mode] += 1
                     held[lane] = -1
@@ -146,9 +145,10 @@ def drive_many(
                 count += 1
                 i = held[lane] = ready[mode, n_ready[mode]]
                 take_up(
-                    rows, lane, limits, sizes[2] > 0, since[i], places[i], carried[i], counted[i],
-                    extremes[i], spans[i, 1], times[min(i, times.shape[0] - 1)],
-                )  # fmt: skip
+                    rows, lane, i, limits, since, spans, times, places, carried, counted, extremes
+                )
+                if sizes[2] == 0:
+                    rows[1 + n_states + step.CALM, lane] = np.inf
                 for k in range(parameters.shape[1]):
                     given[k, lane] = parameters[i, k]
         if count < WIDTH:
@@ -160,12 +160,11 @@ def drive_many(
                 continue
             outcome = rows[1 + n_states + step.OUTCOME, lane]
             if outcome == step.REPORTED:
-                report(rows, lane, series, layout, since[i], counted[i],
-                       times[min(i, times.shape[0] - 1)], samples[i], extremes[i],
-                       room[1])  # fmt: skip
+                report(
+                    rows, lane, i, series, layout, since, times, counted, samples, extremes, room[1]
+                )
             elif outcome == step.NOT_TAKEN:
-                put_down(rows, lane, limits, since[i], places[i], carried[i], counted[i],
-                         extremes[i], seen[i])  # fmt: skip
+                put_down(rows, lane, i, limits, since, places, carried, counted, extremes, seen)
                 held[lane] = -1
                 count -= 1
                 alone[n_alone] = i
@@ -173,40 +172,41 @@ def drive_many(
 
 
 @part
-def take_up(rows, lane, limits, settling, since, place, carried, counted, extremes, stop, times):
+def take_up(rows, lane, i, limits, since, spans, times, places, carried, counted, extremes):
     """Give a trajectory a lane."""
-    n = extremes.shape[1]
+    n = extremes.shape[2]
     for k in range(1 + n):
-        rows[k, lane] = place[k]
-    rows[1 + n + step.LATE, lane] = carried[LATE]
-    rows[1 + n + step.USUAL, lane] = carried[USUAL]
-    rows[1 + n + step.ALLOWED, lane] = limits[0] - counted[STEPS]
-    rows[1 + n + step.CALM, lane] = counted[CALM] if settling else np.inf
-    rows[1 + n + step.NEXT, lane] = next_time(times, counted[SAMPLES])
-    counting = place[0] >= since
-    rows[1 + n + step.LIMIT, lane] = stop if counting else min(since, stop)
+        rows[k, lane] = places[i, k]
+    rows[1 + n + step.LATE, lane] = carried[i, LATE]
+    rows[1 + n + step.USUAL, lane] = carried[i, USUAL]
+    rows[1 + n + step.ALLOWED, lane] = limits[0] - counted[i, STEPS]
+    rows[1 + n + step.CALM, lane] = counted[i, CALM]
+    rows[1 + n + step.NEXT, lane] = next_time(times, i, counted[i, SAMPLES])
+    # no extremes are widened before they count, and no step goes from there to where they do
+    counting = places[i, 0] >= since[i]
+    rows[1 + n + step.LIMIT, lane] = spans[i, 1] if counting else min(since[i], spans[i, 1])
     for k in range(n):
-        rows[1 + n + step.ROWS + k, lane] = extremes[0, k] if counting else -np.inf
-        rows[1 + n + step.ROWS + n + k, lane] = extremes[1, k] if counting else np.inf
+        rows[1 + n + step.ROWS + k, lane] = extremes[i, 0, k] if counting else -np.inf
+        rows[1 + n + step.ROWS + n + k, lane] = extremes[i, 1, k] if counting else np.inf
 
 
 @part
-def put_down(rows, lane, limits, since, place, carried, counted, extremes, seen):
+def put_down(rows, lane, i, limits, since, places, carried, counted, extremes, seen):
     """Take a trajectory from its lane."""
-    n = extremes.shape[1]
+    n = extremes.shape[2]
     steps = limits[0] - np.int64(rows[1 + n + step.ALLOWED, lane])
-    if steps > counted[STEPS]:
-        seen[counted[MODE]] = rows[0, lane]
+    if steps > counted[i, STEPS]:
+        seen[i, counted[i, MODE]] = rows[0, lane]
+        counted[i, STEPS] = steps
         if rows[1 + n + step.CALM, lane] < np.inf:
-            counted[CALM] = np.int64(rows[1 + n + step.CALM, lane])
-        counted[STEPS] = steps
-    if place[0] >= since:
+            counted[i, CALM] = np.int64(rows[1 + n + step.CALM, lane])
+    if places[i, 0] >= since[i]:
         for k in range(n):
-            extremes[0, k] = rows[1 + n + step.ROWS + k, lane]
-            extremes[1, k] = rows[1 + n + step.ROWS + n + k, lane]
+            extremes[i, 0, k] = rows[1 + n + step.ROWS + k, lane]
+            extremes[i, 1, k] = rows[1 + n + step.ROWS + n + k, lane]
     for k in range(1 + n):
-        place[k] = rows[k, lane]
-    carried[USUAL] = rows[1 + n + step.USUAL, lane]
+        places[i, k] = rows[k, lane]
+    carried[i, USUAL] = rows[1 + n + step.USUAL, lane]
 
 
 @part
@@ -224,7 +224,7 @@ def copy_into_the_rest(held, rows, given):
 
 
 @part
-def report(rows, lane, series, layout, since, counted, times, samples, extremes, room):
+def report(rows, lane, i, series, layout, since, times, counted, samples, extremes, room):
     """Add the samples and the extremes within the last step of a lane."""
     n, order = layout[0], layout[4]
     _, W, b, d, stack = room[:5]
@@ -232,25 +232,25 @@ def report(rows, lane, series, layout, since, counted, times, samples, extremes,
     began, length = rows[1 + n + step.BEGAN, lane], rows[1 + n + step.LENGTH, lane]
     for k in range(series.shape[0]):
         W[k] = series[k, lane]
-    if began >= since:
+    if began >= since[i]:
         for k in range(n):
-            extremes[0, k] = rows[1 + n + step.ROWS + k, lane]
-            extremes[1, k] = rows[1 + n + step.ROWS + n + k, lane]
-        widen_extremes(W, n, order, 0.0, length, extremes, b, d, stack)
+            extremes[i, 0, k] = rows[1 + n + step.ROWS + k, lane]
+            extremes[i, 1, k] = rows[1 + n + step.ROWS + n + k, lane]
+        widen_extremes(W, n, order, 0.0, length, extremes[i], b, d, stack)
         for k in range(n):
-            rows[1 + n + step.ROWS + k, lane] = extremes[0, k]
-            rows[1 + n + step.ROWS + n + k, lane] = extremes[1, k]
-    first = last = counted[SAMPLES]
-    while last < times.shape[0] and times[last] <= rows[0, lane]:
-        offsets[last] = (times[last] - began) - rows[1 + n + step.LATE, lane]
+            rows[1 + n + step.ROWS + k, lane] = extremes[i, 0, k]
+            rows[1 + n + step.ROWS + n + k, lane] = extremes[i, 1, k]
+    first = last = counted[i, SAMPLES]
+    while next_time(times, i, last) <= rows[0, lane]:
+        offsets[last] = (next_time(times, i, last) - began) - rows[1 + n + step.LATE, lane]
         last += 1
     if last > first:
-        sample(W, order + 1, samples.shape[0], offsets[first:last], samples, first)
-    counted[SAMPLES] = last
-    rows[1 + n + step.NEXT, lane] = next_time(times, last)
+        sample(W, order + 1, samples.shape[1], offsets[first:last], samples[i], first)
+    counted[i, SAMPLES] = last
+    rows[1 + n + step.NEXT, lane] = next_time(times, i, last)
 
 
 @part
-def next_time(times, k):
-    """The time of a sample, infinite after the last."""
-    return times[k] if k < times.shape[0] else np.inf
+def next_time(times, i, k):
+    """When a sample of a trajectory is due, infinite after the last."""
+    return times[min(i, times.shape[0] - 1), k] if k < times.shape[1] else np.inf

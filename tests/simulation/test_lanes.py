@@ -8,6 +8,7 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fastslow.compiled import lane_steps
 from fastslow.compiled.lanes import WIDTH
 from fastslow.model.model import Model
 from fastslow.results.ensembles import Ensemble
@@ -225,3 +226,15 @@ def test_an_end_at_once(gear):
     assert many.success.all()
     assert many.final == pytest.approx(np.array([[0, 0], [0.4, 1]]), abs=1e-290)
     assert math.isclose(many.reached[0], 1e-300)
+
+
+def test_a_model_too_large_for_lanes_is_that_of_simulate(gear, table, monkeypatch):
+    monkeypatch.setattr(lane_steps, "_LARGEST", 0)
+    monkeypatch.setattr(lane_steps, "_compiled", {})
+    monkeypatch.setattr(ensembles, "steps_of", lane_steps.compile_steps)
+    many = many_gears(gear, table, slice(0, 9))
+    for i in range(9):
+        one = gear.with_parameters(**{name: table[name][i] for name in ("D", "C", "omega")})
+        run = simulate(one, table["states"][i], t=(0, 60))
+        assert np.array_equal(many.final[i], run.end[1:])
+        assert many.n_steps[i] == len(run.steps)
