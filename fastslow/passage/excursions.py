@@ -125,9 +125,7 @@ def _excursion(m: Measured, old: Stay | None, new: Stay | None, swing: Oscillati
     )
 
 
-def phase_of(
-    m: Measured, e: Excursion, start: float, end: float, sheet: str, transit: bool
-) -> Phase:
+def phase_of(m: Measured, e: Excursion, start: float, end: float, sheet: str, away: str) -> Phase:
     """The phase between leaving and landing.
 
     Parameters
@@ -138,8 +136,8 @@ def phase_of(
         Its times.
     sheet : str
         Where it lands, "" for nowhere.
-    transit : bool
-        Whether it crosses a gap.
+    away : str
+        The kind where there is no spiking.
     """
     first, _ = e.rows(m)
     if first < len(m.time) and not m.within[first]:
@@ -157,4 +155,4 @@ def phase_of(
         )
     if e.old is None or e.new is None:
         return Phase(start, end, "transient", spikes=len(e.turns))
-    return Phase(start, end, "transit" if transit else "jump", (sheet,), len(e.turns))
+    return Phase(start, end, away, (sheet,), len(e.turns))

@@ -33,7 +33,7 @@ WIGGLE = 0.02
 #: A sheet stands still that changes by less than this part of the extent over the slow range.
 FLAT = 1e-9
 
-#: The slow quantity stands still where it drifts slower than this part of its fastest.
+#: The slow quantity stands still where it drifts slower than this part of its mean speed.
 STILL = 1e-3
 
 
@@ -93,9 +93,7 @@ def overlay(
     sheets, courses = courses_of(diagram)
     m = measured(slow, courses, diagram.over, radius)
     stays = stays_of(m)
-    moves = np.ptp(m.slow) > 1e-9 * float(np.abs(m.slow).max())
-    drift = np.gradient(m.slow, m.time) if moves else np.zeros(len(m.time))
-    p = Passage(diagram, slow, m, sheets, _followed(m, stays), drift)
+    p = Passage(diagram, slow, m, sheets, _followed(m, stays), _drift(m))
     swing = oscillation_of(m, state_number)
     phases: list[Phase] = []
     transitions: list[Transition] = []
@@ -161,6 +159,16 @@ def _checked(diagram: Diagram, run: Trajectory, radius: float, observed: object)
     return diagram.states.index(name)
 
 
+def _drift(m: Measured) -> Array:
+    """Rate of the slow quantity, zero where it moves by rounding only."""
+    # where a state grows without bound, samples may share their time
+    apart = np.r_[True, np.diff(m.time) > 0]
+    time, slow = m.time[apart], m.slow[apart]
+    if len(time) < 2 or np.ptp(slow) <= 1e-9 * float(np.abs(slow).max()):
+        return np.zeros(len(m.time))
+    return np.interp(m.time, time, np.gradient(slow, time))
+
+
 def _followed(m: Measured, stays: list[Stay]) -> NDArray[np.intp]:
     """The sheet at every sample of a stay, past its end still that sheet; −1 elsewhere."""
     followed = np.full(len(m.time), -1, dtype=np.intp)
@@ -188,8 +196,12 @@ def _between(p: Passage, e: Excursion, transitions: list[Transition], bursts: li
         begin = first.leave.time
     if e.new is not None:
         end = p.landed(e.new, begin).time
-    transit = first is not None and first.kind == "transit"
-    phase = phase_of(p.m, e, begin, end, sheet, transit)
+    away = "jump"
+    if first is not None and first.kind == "transit":
+        away = "transit"
+    elif first is not None and first.from_sheet == first.to_sheet:
+        away = "excursion"
+    phase = phase_of(p.m, e, begin, end, sheet, away)
     closing = None
     if e.cycle and e.new is not None and not outside:
         closing = cycle_end(p, e)
@@ -218,7 +230,7 @@ def _distances(p: Passage, followed: NDArray[np.intp]) -> tuple[Array, Array, Ar
     nearest = np.where(m.present.T, apart, np.inf)
     distance = nearest.min(axis=0, initial=np.inf)
     lag, relaxation = np.full((2, len(m.time)), np.nan)
-    fastest = float(np.abs(p.drift).max(initial=0.0))
+    mean = float(np.abs(np.diff(m.slow)).sum()) / (float(m.time[-1] - m.time[0]) or 1.0)
     for number, course in enumerate(m.courses):
         on = np.isin(followed, course.sheets)
         distance[on] = apart[number, on]
@@ -230,7 +242,7 @@ def _distances(p: Passage, followed: NDArray[np.intp]) -> tuple[Array, Array, Ar
             ahead = ((m.scaled[on] - m.places[on, number]) * slope).sum(axis=1) / steep
             behind = -ahead / p.drift[on]
             relaxation[on] = np.where(rate > 0, 1.0 / rate, np.nan)
-        moving = np.abs(p.drift[on]) > STILL * fastest
+        moving = np.abs(p.drift[on]) > STILL * mean
         lag[on] = np.where(
             moving & np.isfinite(behind) & (np.sqrt(steep) * m.span > FLAT), behind, np.nan
         )

@@ -16,6 +16,9 @@ Mask = NDArray[np.bool_]
 #: A new sheet is followed once this part of the way to it from the old one is done.
 WAY = 2.0 / 3.0
 
+#: A state's extent is between these parts of what the branches span.
+LEAST, MOST = 1e-3, 20.0
+
 #: Points that a course is drawn by when distances from it are measured.
 POINTS = 257
 
@@ -115,6 +118,7 @@ def measured(
     size = np.abs(state).max(axis=0)
     # what moves by rounding only has no extent
     extent = np.where(extent > 1e-9 * size, extent, np.where(size > 0, size, 1.0))
+    extent = _bounded(extent, courses)
     for rate, of in _velocities(slow):
         extent[rate] = max(extent[rate], extent[of] * fastest)
     span = max(float(np.ptp(slow.table)), 1e-3 * (over[1] - over[0]))
@@ -132,6 +136,19 @@ def measured(
         span,
         radius,
     )
+
+
+def _bounded(extent: Array, courses: tuple[Course, ...]) -> Array:
+    """Extents within reach of what the branches span, where they span anything.
+
+    A run that hardly moves, or that grows without bound, is no measure for its own distances.
+    """
+    if not courses:
+        return extent
+    rows = np.concatenate([c.curve()[:, :-1] for c in courses])
+    span = np.ptp(rows, axis=0)
+    low, high = LEAST * span, MOST * span
+    return np.where(span > 0, np.clip(extent, low, high), extent)
 
 
 def _velocities(slow: SlowQuantity) -> list[tuple[int, int]]:

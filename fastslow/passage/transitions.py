@@ -276,7 +276,8 @@ def leaving(p: Passage, excursion: Excursion) -> Transition:
     if kind == "transit":
         leave, land = _across(p, left, entered, here.time) or (leave, land)
     if excursion.turns and not excursion.cycle:
-        note = f"{len(excursion.turns)} oscillations on landing"
+        count = len(excursion.turns)
+        note = f"{count} oscillation{'s' if count > 1 else ''} on landing"
     value = here.value
     return Transition(
         here.time, value, here.state, left.label, to_sheet, special,

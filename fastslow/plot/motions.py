@@ -109,7 +109,8 @@ def time_series(
     dots = _dots(ax, run, "t", name) if crossings else None
     ax.set_xlabel(typeset("t"))
     ax.set_ylabel(typeset(name))
-    ax.set_xlim(float(run.t[0]), float(run.t[-1]))
+    if run.t[-1] > run.t[0]:
+        ax.set_xlim(float(run.t[0]), float(run.t[-1]))
     strip = draw_phases(ax, phases) if phases else ((), ())
     bands = _bands(ax, run, (None, name), interfaces)
     if own and phases:

@@ -73,6 +73,7 @@ PHASES: dict[str, dict[str, Any]] = {
     "spiking": {"facecolor": "#F3C98B"},
     "jump": {"facecolor": VERMILION},
     "transit": {"facecolor": PURPLE},
+    "excursion": {"facecolor": ORANGE},
     "transient": {"facecolor": "#DDDDDD"},
     "outside": {"facecolor": "white", "hatch": "/////", "edgecolor": GREY},
 }

@@ -37,7 +37,8 @@ class Overlay:
         The fast states at those times.
     extent : ndarray, shape (n,)
         Unit of each state in distances: its extent in the run or on the sheets that the run
-        can follow, whichever is larger; of a velocity at least that of its state times |λ|.
+        can follow, whichever is larger, if that is within reason of what the branches span;
+        of a velocity at least that of its state times |λ|.
     radius : float
         What counts as near, in those units.
     sheets : tuple of StableSheet

@@ -172,8 +172,8 @@ class Phase:
     kind : str
         ``"quiescent"`` (follows a sheet), ``"spiking"`` (two oscillations or more away from
         the sheets), ``"jump"`` (from one sheet to the next), ``"transit"`` (the same across a
-        gap), ``"transient"`` (at the start or the end of the run, near no sheet) or
-        ``"outside"`` (the diagram does not go so far).
+        gap), ``"excursion"`` (from a sheet and back to it), ``"transient"`` (at the start or
+        the end of the run, near no sheet) or ``"outside"`` (the diagram does not go so far).
     sheets : tuple of str
         Labels of the sheets followed, in order; for spiking that settles on a sheet, that one.
     spikes : int

@@ -204,3 +204,25 @@ def test_a_run_that_ends_in_a_jump(cusp, diagram, lay):
     assert leaving.special.label == first.special.label
     assert "end of run" in short.summary()
     covers(short)
+
+
+def test_one_sample(cusp, diagram):
+    run = fs.simulate(cusp, [-1.0], t=(0, 1), dense=False, samples=[0.5])
+    lay = fs.overlay(diagram, run)
+    assert (lay.phases, lay.transitions) == ((), ())
+    assert lay.followed.tolist() == [-1]
+    assert "0 transitions over t = 0.5 to 0.5" in lay.summary()
+    assert fs.plot.overlay(lay).handles
+
+
+def test_a_run_that_grows_without_bound():
+    """x' = w + x²: past the fold at w = 0 there is nothing to land on."""
+    model = fs.Model({x: w + x**2}, forcing={w: t / 50 - 1})
+    run = fs.simulate(model, [-1.0], t=(0, 100))
+    assert not run.outcome
+    lay = fs.overlay(fs.continue_equilibria(model.frozen(), "w", over=(-1.2, 1.2)), run)
+    (leaving,) = lay.transitions
+    assert (leaving.kind, leaving.to_sheet, leaving.land) == ("jump", "", None)
+    assert 0 < leaving.delay < 2.338 * (1 / 50) ** (2 / 3)
+    assert np.isfinite(lay.lag[lay.slow < -0.1]).all()
+    covers(lay)

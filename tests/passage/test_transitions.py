@@ -85,6 +85,22 @@ def test_the_gap_is_crossed_as_the_crossings_say(gear):
     assert {q.kind for q in lay.phases} == {"transient", "quiescent", "transit"}
 
 
+def test_a_gap_entered_and_left_on_the_same_side(gear):
+    """The load falls below zero for too short a time: the far side is not reached."""
+    light = gear.with_parameters(B=0.5, C=0.6, D=0.5, omega=0.2)
+    lay = laid(light, "w", (-2, 2), [0.51, 0], periods=2)
+    assert lay.run.regime == "unilateral upper"
+    for t_ in lay.transitions:
+        assert (t_.kind, t_.from_sheet, t_.to_sheet) == ("excursion", "S1", "S1")
+        assert t_.special.code == "BE"
+        assert t_.note == "past the end of the sheet and back"
+        assert 0 < t_.delay < 0.1
+        inside = lay.run(np.linspace(t_.leave.time, t_.time + 1, 9))[0]
+        assert np.all(np.abs(inside) < 0.5)
+    assert [p.kind for p in lay.phases[:3]] == ["quiescent", "excursion", "quiescent"]
+    assert lay.bursting is None
+
+
 def test_negative_stiffness_jumps_late_at_its_folds(folded_gear):
     """A < −D²: the delay falls as the 2/3 power of ε, here between two speeds."""
     delays = []
