@@ -188,7 +188,8 @@ def regimes(
     seen: NDArray[np.float64],
     end: NDArray[np.float64],
     period: NDArray[np.float64],
-    gap: tuple[int, int, int],
+    modes: tuple[str, ...],
+    gap: tuple[str, str, str],
 ) -> NDArray[np.str_]:
     """The regime of each trajectory from the times at which each mode was last left.
 
@@ -197,8 +198,15 @@ def regimes(
     seen : ndarray, shape (m, n_modes)
         Minus infinity for a mode never entered.
     end, period : ndarray, shape (m,)
-    gap : tuple of int
-        Modes below, inside and above the gap.
+    modes : tuple of str
+        Regions and sliding motions; sliding along an edge of the gap touches its side.
+    gap : tuple of str
+        Regions below, inside and above the gap.
     """
-    touched = seen[:, gap] > (end - period)[:, None]
-    return np.array(REGIMES)[touched @ np.array([1, 2, 4])]
+    lower, inside, upper = gap
+    bits = np.zeros(len(modes), dtype=np.int64)
+    for column, mode in enumerate(modes):
+        sides = mode.split("|")
+        bits[column] = (lower in sides) + 2 * (mode == inside) + 4 * (upper in sides)
+    touched = np.where(seen > (end - period)[:, None], bits, 0)
+    return np.array(REGIMES)[np.bitwise_or.reduce(touched, axis=1)]

@@ -210,9 +210,8 @@ def simulate_many(
             names = [*map(modes.index, compiled.modes), -1]
             codes[chosen, 1] = np.array(names)[codes[chosen, 1]]
             if between is not None:
-                lower, inside, upper = map(compiled.modes.index, between)
                 regime[chosen] = regimes(
-                    run[2], ends[chosen, 0], own[chosen], (lower, inside, upper)
+                    run[2], ends[chosen, 0], own[chosen], compiled.modes, between
                 )
     return Ensemble(
         (*model.states, *model.slow_states),
