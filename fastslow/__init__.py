@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from fastslow.errors import (
         ArgumentError,
         FastSlowError,
+        FileError,
+        MissingPackageError,
         ModelError,
         UnknownNameError,
     )
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from fastslow.results.branches import Branch
     from fastslow.results.diagrams import Diagram
     from fastslow.results.ensembles import Ensemble
+    from fastslow.results.files import load
     from fastslow.results.overlays import Overlay
     from fastslow.results.point_branches import PointBranch
     from fastslow.results.points import Equilibrium, SpecialPoint
@@ -55,6 +58,8 @@ _HOME = {
     "Ensemble": "results.ensembles",
     "Equilibrium": "results.points",
     "FastSlowError": "errors",
+    "FileError": "errors",
+    "MissingPackageError": "errors",
     "Model": "model.model",
     "ModelError": "errors",
     "Overlay": "results.overlays",
@@ -73,6 +78,7 @@ _HOME = {
     "disagreements": "symbolic.scaling",
     "equilibria": "diagrams.solving",
     "export": "symbolic.sources",
+    "load": "results.files",
     "nondimensionalise": "symbolic.scaling",
     "overlay": "passage.overlays",
     "plot": "",
@@ -93,6 +99,8 @@ __all__ = [
     "Ensemble",
     "Equilibrium",
     "FastSlowError",
+    "FileError",
+    "MissingPackageError",
     "Model",
     "ModelError",
     "Overlay",
@@ -112,6 +120,7 @@ __all__ = [
     "disagreements",
     "equilibria",
     "export",
+    "load",
     "nondimensionalise",
     "overlay",
     "plot",

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.branches import Branch
-from fastslow.results.diagrams import Diagram, hermite
+from fastslow.results.diagrams import Diagram
+from fastslow.results.interpolation import hermite
 from fastslow.results.overlays import Overlay, StableSheet, Transition
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectories import Trajectory
