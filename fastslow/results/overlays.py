@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.results import formulas
 from fastslow.results.diagrams import Diagram
 from fastslow.results.points import SpecialPoint
+from fastslow.results.result import Result
+from fastslow.results.tables import Table
 from fastslow.results.trajectories import Trajectory
 
 
@@ -72,7 +78,7 @@ class Transition:
 
 
 @dataclass(frozen=True, eq=False)
-class Overlay:
+class Overlay(Table, Result):
     """A trajectory laid over the equilibrium diagram of its frozen model.
 
     Parameters
@@ -101,6 +107,36 @@ class Overlay:
     sheets: tuple[StableSheet, ...]
     followed: NDArray[np.intp]
     transitions: tuple[Transition, ...]
+
+    _row = "t"
+    _places = ("t",)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __getitem__(self, name: object) -> NDArray[np.float64]:
+        """A state, the slow quantity, t, the distance, or an expression in them, shape (N,)."""
+        columns: dict[str, Callable[[], NDArray[np.float64]]] = {
+            "t": lambda: self.time,
+            self.parameter: lambda: self.slow,
+            "distance": lambda: self.distance,
+            **{key: partial(self._state, k) for k, key in enumerate(self.diagram.states)},
+        }
+        return formulas.column(name, columns, self.diagram.parameters, len(self))
+
+    def _state(self, k: int) -> NDArray[np.float64]:
+        return self.state[:, k]
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Time t, the slow quantity, states, the distance, and the label of the sheet followed."""
+        labels = np.array([*(sheet.label for sheet in self.sheets), ""])
+        return {
+            "t": self.time,
+            self.parameter: self.slow,
+            **{name: self.state[:, k] for k, name in enumerate(self.diagram.states)},
+            "distance": self.distance,
+            "sheet": labels[self.followed],
+        }
 
     @property
     def parameter(self) -> str:

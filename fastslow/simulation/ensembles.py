@@ -26,7 +26,6 @@ from fastslow.simulation.many_arguments import (
     threads_of,
     times_of,
 )
-from fastslow.simulation.outcomes import outcome_of
 from fastslow.simulation.trajectories import (
     SOURCES,
     default_order,
@@ -272,7 +271,10 @@ def simulate_many(
         codes[:, 0],
         codes[:, 1],
         (times if len(times) > 1 else times[0], sampled) if samples is not None else None,
-        partial(outcome_of, modes=modes, limits=limits),
+        limits,
+        {n: v for n, v in model.parameters.items() if n not in swept},
+        model.equations,
+        {"tol": tol, "order": order, "implicit": implicit},
     )
 
 
