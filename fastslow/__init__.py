@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     )
     from fastslow.model.model import Model
     from fastslow.passage.overlays import overlay
+    from fastslow.results.auto_files import read_auto
     from fastslow.results.branches import Branch
     from fastslow.results.diagrams import Diagram
     from fastslow.results.ensembles import Ensemble
@@ -82,6 +83,7 @@ _HOME = {
     "nondimensionalise": "symbolic.scaling",
     "overlay": "passage.overlays",
     "plot": "",
+    "read_auto": "results.auto_files",
     "reduce_to": "symbolic.reduction",
     "simulate": "simulation.trajectories",
     "simulate_many": "simulation.ensembles",
@@ -124,6 +126,7 @@ __all__ = [
     "nondimensionalise",
     "overlay",
     "plot",
+    "read_auto",
     "reduce_to",
     "simulate",
     "simulate_many",

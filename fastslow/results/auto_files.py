@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import FileError, unknown_name
-from fastslow.results.auto_text import Section, Solution, sections_of, solutions_of
+from fastslow.results.auto_text import AutoCurve, parameters_of, sections_of
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import Diagram
 from fastslow.results.outcome import Outcome
@@ -49,7 +49,7 @@ def read_auto(
     path : str or path
         Such as ``b.fhn`` or ``fort.7``.
     solutions : str or path, optional
-        Such as ``s.fhn`` or ``fort.8``, for tangents and the other parameters;
+        Such as ``s.fhn`` or ``fort.8``, for the values of the other parameters;
         by default the one beside it, when there is one.
     names : mapping, optional
         Own names for AUTO's, e.g. ``{"PAR(1)": "w", "U(1)": "x"}``.
@@ -83,7 +83,7 @@ def read_auto(
     if not sections:
         raise FileError(f"{source} holds no curve; expected a diagram file of AUTO-07p")
     beside = Path(solutions) if solutions is not None else _beside(source)
-    known = {} if beside is None else solutions_of(beside)
+    known = {} if beside is None else parameters_of(beside)
     equilibria = [s for s in sections if _left_out(s) is None]
     if not equilibria:
         raise FileError(f"{source} holds no curve of equilibria: {_left_out(sections[0])}")
@@ -96,11 +96,11 @@ def read_auto(
     first = next((known[n] for s in kept for n in s.labels.tolist() if n in known), None)
     constants = {} if first is None else called.values(first, chosen)
     counts: dict[str, int] = {}
-    branches = tuple(_branch(s, called, chosen, constants, known, counts) for s in kept)
-    reasons = [
-        _left_out(s) or f"over {called.own(s.columns[0])}" for s in sections if s not in kept
-    ]
-    text = f"read {len(kept)} curves of equilibria from {source.name}, a file of AUTO-07p"
+    branches = tuple(_branch(s, called, chosen, constants, counts) for s in kept)
+    rest = [s for s in sections if s not in kept]
+    reasons = [_left_out(s) or f"curves over {called.own(s.columns[0])}" for s in rest]
+    count = f"{len(kept)} curve{'s' * (len(kept) > 1)}"
+    text = f"read {count} of equilibria from {source.name}, a file of AUTO-07p"
     if reasons:
         text += f"; left out: {', '.join(dict.fromkeys(reasons))}"
     values = np.concatenate([b.parameter for b in branches])
@@ -128,7 +128,7 @@ def _beside(path: Path) -> Path | None:
     return other if other is not None and other.exists() else None
 
 
-def _left_out(section: Section) -> str | None:
+def _left_out(section: AutoCurve) -> str | None:
     """Why a curve is none of equilibria over one parameter."""
     problem, switch = section.constants.get("IPS", 1), section.constants.get("ISW", 1)
     if problem not in EQUILIBRIA:
@@ -141,7 +141,7 @@ def _left_out(section: Section) -> str | None:
 class _Names:
     """AUTO's names, and the user's own for them."""
 
-    section: Section
+    section: AutoCurve
     changes: Mapping[str, str]
 
     def __post_init__(self) -> None:
@@ -166,37 +166,31 @@ class _Names:
     def own(self, name: str) -> str:
         return self.changes.get(name, name)
 
-    def values(self, solution: Solution, parameter: str) -> dict[str, float]:
+    def values(self, numbers: Array, parameter: str) -> dict[str, float]:
         """Every parameter but the one that varies."""
-        pairs = zip(self._parameters, solution.parameters.tolist(), strict=False)
+        pairs = zip(self._parameters, numbers.tolist(), strict=False)
         return {self.own(n): v for n, v in pairs if self.own(n) != parameter}
 
 
 def _branch(
-    section: Section,
+    section: AutoCurve,
     called: _Names,
     parameter: str,
     constants: Mapping[str, float],
-    known: Mapping[int, Solution],
     counts: dict[str, int],
 ) -> Branch:
     states = tuple(called.own(name) for name in called.states)
     n = len(states)
     points = np.column_stack([section.numbers[:, 2 : 2 + n], section.numbers[:, 0]])
     tangent = _tangents(points)
-    for row, label in enumerate(section.labels.tolist()):
-        # the solutions file may be of another run: its points tell
-        if label in known and np.allclose(known[label].state[:n], points[row, :n], atol=1e-8):
-            slope = known[label].slope[[*range(n), -1]]
-            size = np.linalg.norm(slope)
-            if size > 0:
-                tangent[row] = slope / (np.sign(slope @ tangent[row]) or 1.0) / size
     stability = np.where(section.points < 0, "stable", "unstable")
     special, rows = [], []
     for row, (kind, label) in enumerate(zip(section.types, section.labels, strict=True)):
         code = CODES.get(int(np.sign(kind)) * (abs(int(kind)) % 10))
         if code is None or label == 0:
             continue
+        if code in ("LP", "HB", "BP"):
+            stability[row] = "neutral"
         counts[code] = counts.get(code, 0) + 1
         special.append(
             SpecialPoint(
@@ -247,8 +241,7 @@ def _tangents(points: Array) -> Array:
     place = np.cumsum(np.append(0.0, length))[distinct]
     slopes = np.zeros_like(points)
     if len(place) > 1:
-        order = 2 if len(place) > 2 else 1
-        found = np.gradient(points[distinct], place, axis=0, edge_order=order)
+        found = np.gradient(points[distinct], place, axis=0, edge_order=2 if len(place) > 2 else 1)
         slopes = found[np.cumsum(distinct) - 1]
     else:
         slopes[:, -1] = 1.0

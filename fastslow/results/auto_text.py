@@ -28,7 +28,7 @@ LEADING = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class AutoCurve:
     """One curve of a diagram file.
 
     Parameters
@@ -52,23 +52,6 @@ class Section:
     labels: NDArray[np.int64]
     numbers: Array
     line: int
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """One labelled equilibrium of a solutions file.
-
-    Parameters
-    ----------
-    state : ndarray, shape (n,)
-    slope : ndarray, shape (n + 1,)
-        Of states and first free parameter along the curve.
-    parameters : ndarray
-    """
-
-    state: Array
-    slope: Array
-    parameters: Array
 
 
 @dataclass
@@ -95,7 +78,7 @@ def lines_of(path: Path) -> list[str]:
         raise FileError(f"{path} cannot be read: {error.strerror or error}") from error
 
 
-def sections_of(path: Path) -> list[Section]:
+def sections_of(path: Path) -> list[AutoCurve]:
     """Every curve of a diagram file, in order.
 
     Raises
@@ -104,7 +87,7 @@ def sections_of(path: Path) -> list[Section]:
         For a file that is none, with the line.
     """
     now = _Reading()
-    found: list[Section] = []
+    found: list[AutoCurve] = []
     for number, line in enumerate(lines_of(path), start=1):
         words = line.split()
         if not words:
@@ -139,7 +122,7 @@ def _header(now: _Reading, line: str) -> None:
             return
 
 
-def _finished(path: Path, now: _Reading) -> Iterator[Section]:
+def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
     """The section whose rows were gathered, if there were any."""
     if not now.rows:
         return
@@ -163,7 +146,7 @@ def _finished(path: Path, now: _Reading) -> Iterator[Section]:
         values.append([real(word, path) for word in row])
     table = np.array(values)
     whole = table[:, :LEADING].astype(np.int64)
-    yield Section(
+    yield AutoCurve(
         dict(now.constants), columns, whole[:, 1], whole[:, 2], whole[:, 3], table[:, LEADING:],
         now.line,
     )  # fmt: skip
@@ -196,8 +179,10 @@ def real(word: str, path: Path) -> float:
         ) from None
 
 
-def solutions_of(path: Path) -> dict[int, Solution]:
-    """The labelled equilibria of a solutions file by label; periodic solutions are passed over.
+def parameters_of(path: Path) -> dict[int, Array]:
+    """All parameters of the labelled equilibria of a solutions file, by label.
+
+    Periodic solutions are passed over.
 
     Raises
     ------
@@ -205,7 +190,7 @@ def solutions_of(path: Path) -> dict[int, Solution]:
         For a file that is none, or cut short.
     """
     lines = lines_of(path)
-    found: dict[int, Solution] = {}
+    found: dict[int, Array] = {}
     at = 0
     while at < len(lines):
         words = lines[at].split()
@@ -214,30 +199,16 @@ def solutions_of(path: Path) -> dict[int, Solution]:
             continue
         try:
             head = [int(word) for word in words]
-            label, parts, width, rows, count = head[3], head[6], head[7], head[8], head[11]
+            label, parts, rows, count = head[3], head[6], head[8], head[11]
         except (ValueError, IndexError):
             raise FileError(
                 f"{path}, line {at + 1}: expected the header of a solution of AUTO-07p"
             ) from None
-        block = lines[at + 1 : at + 1 + rows]
-        if len(block) < rows:
+        block = [word for line in lines[at + 1 : at + 1 + rows] for word in line.split()]
+        if at + rows >= len(lines) or len(block) < count:
             raise FileError(f"{path} is cut short: the solution with label {label} is not whole")
         at += 1 + rows
         if parts == 1:
-            found[label] = _solution(path, block, width - 1, head[4], count)
+            # the parameters stand last
+            found[label] = np.array([real(word, path) for word in block[len(block) - count :]])
     return found
-
-
-def _solution(path: Path, block: list[str], n: int, free: int, count: int) -> Solution:
-    """State, free parameters, their slopes, slopes of the state, and all parameters, in order."""
-    words = [word for line in block for word in line.split()]
-    begin = 1 + n + free
-    if len(words) < begin + free + n + count:
-        raise FileError(f"{path} is cut short: a solution has only {len(words)} numbers")
-    values = np.array([real(word, path) for word in words])
-    slope = values[begin : begin + free + n]
-    return Solution(
-        values[1 : 1 + n],
-        np.append(slope[free:], slope[0]),
-        values[begin + free + n : begin + free + n + count],
-    )
