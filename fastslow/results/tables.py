@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -32,16 +33,16 @@ def extra(name: str) -> Any:
         ) from None
 
 
-class Table:
+class Table(ABC):
     """A result that reads as columns of equal length."""
 
     #: What one row is, and the columns that say where it is.
     _row: ClassVar[str] = "row"
     _places: tuple[str, ...] = ()
 
+    @abstractmethod
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Every column as a plain array, by name, all of one length."""
-        raise NotImplementedError
 
     def to_frame(self) -> pandas.DataFrame:
         """The columns of `to_dict` as a pandas data frame (extra ``data``).

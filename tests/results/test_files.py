@@ -7,25 +7,20 @@ import os
 import subprocess
 import sys
 import zipfile
-from collections.abc import Mapping
 
 import h5netcdf
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-from hypothesis.extra import numpy as arrays_of
 
 import fastslow as fs
 from fastslow.results import files
 from fastslow.results.branches import Branch
-from fastslow.results.encoding import classes, decoded, encoded
-from fastslow.results.named import Named
+from fastslow.results.encoding import classes
 from fastslow.results.outcome import Outcome
-from fastslow.results.points import Equilibria, SpecialPoints
+from fastslow.results.points import SpecialPoints
 from fastslow.results.result import Result
-from fastslow.results.storage import read_archive, read_netcdf, write_archive, write_netcdf
+from fastslow.results.storage import write_archive
 
 FORMATS = [".npz", ".nc"]
 
@@ -72,32 +67,6 @@ def names_in(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def same(one, other):
-    """Whether two values are the same, bit for bit, but for what lives in a process only."""
-    if isinstance(one, np.ndarray):
-        alike = one.dtype == other.dtype and one.shape == other.shape
-        return (
-            alike and np.ascontiguousarray(one).tobytes() == np.ascontiguousarray(other).tobytes()
-        )
-    if isinstance(one, float):
-        return isinstance(other, float) and np.float64(one).tobytes() == np.float64(other).tobytes()
-    if isinstance(one, complex):
-        return same(one.real, other.real) and same(one.imag, other.imag)
-    if type(one) is not type(other):
-        return False
-    if isinstance(one, Mapping):
-        return list(one) == list(other) and all(same(one[k], other[k]) for k in one)
-    if isinstance(one, list | tuple):
-        return len(one) == len(other) and all(map(same, list(one), list(other)))
-    if dataclasses.is_dataclass(one):
-        return all(
-            same(getattr(one, entry.name), getattr(other, entry.name))
-            for entry in dataclasses.fields(one)
-            if not entry.metadata.get("live")
-        )
-    return one == other
-
-
 KINDS = [
     "diagram", "branch", "points", "point", "equilibrium", "run", "samples", "overlay", "ensemble",
     "short", "sweep", "section", "spectrum", "steady", "contacts",
@@ -106,7 +75,7 @@ KINDS = [
 
 @pytest.mark.parametrize("ending", FORMATS)
 @pytest.mark.parametrize("kind", KINDS)
-def test_round_trip(results, tmp_path, kind, ending):
+def test_round_trip(results, same, tmp_path, kind, ending):
     result = results[kind]
     path = tmp_path / f"result{ending}"
     result.save(path)
@@ -117,7 +86,7 @@ def test_round_trip(results, tmp_path, kind, ending):
 
 
 @pytest.mark.parametrize("ending", FORMATS)
-def test_round_trip_of_a_curve(curve, tmp_path, ending):
+def test_round_trip_of_a_curve(curve, same, tmp_path, ending):
     curve.save(tmp_path / f"curve{ending}")
     again = fs.load(tmp_path / f"curve{ending}")
     assert same(curve, again)
@@ -339,62 +308,7 @@ def test_permissions_are_those_of_any_new_file(results, tmp_path):
     assert (tmp_path / "a.npz").stat().st_mode == (tmp_path / "b").stat().st_mode
 
 
-numbers = st.floats(allow_nan=True, allow_infinity=True) | st.just(-0.0)
-texts = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=5)
-tables = st.one_of(
-    *(
-        arrays_of.arrays(
-            kind, arrays_of.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=6)
-        )
-        for kind in (np.float64, np.complex128, np.int64, np.bool_, np.int8, np.float32)
-    ),
-    arrays_of.arrays("<U5", arrays_of.array_shapes(min_side=0, max_side=4), elements=texts),
-)
-plain = st.one_of(
-    st.none(), st.booleans(), st.integers(), numbers, texts, st.complex_numbers(), tables
-)
-trees = st.recursive(
-    plain,
-    lambda inner: st.one_of(
-        st.lists(inner, max_size=3),
-        st.lists(inner, max_size=3).map(tuple),
-        st.dictionaries(texts, inner, max_size=3),
-        st.dictionaries(texts, inner, max_size=3).map(lambda d: Named("parameter", d)),
-        st.lists(inner, max_size=2).map(lambda items: Equilibria(items, "complete")),
-        st.lists(inner, max_size=2).map(SpecialPoints),
-        st.builds(Outcome, texts, texts, st.booleans()),
-    ),
-    max_leaves=8,
-)
-
-
-@given(trees)
-@settings(suppress_health_check=[HealthCheck.too_slow])
-def test_anything_of_plain_data_comes_back_bit_for_bit(tree):
-    arrays = {}
-    text = json.dumps(encoded(tree, "", arrays), allow_nan=False)
-    again = decoded(json.loads(text), lambda name, kind: arrays[name])
-    assert same(tree, again)
-
-
-@given(trees)
-@settings(
-    max_examples=60,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
-)
-@pytest.mark.parametrize(
-    ("write", "load"), [(write_archive, read_archive), (write_netcdf, read_netcdf)]
-)
-def test_files_keep_every_bit(tmp_path, write, load, tree):
-    holder = {"kept": tree}
-    arrays = {}
-    text = json.dumps(encoded(holder, "x", arrays), allow_nan=False)
-    write(tmp_path / "file", text, arrays)
-    again = load(tmp_path / "file", lambda text, array: decoded(json.loads(text), array))
-    assert same(holder, again)
-
-
-def test_payloads_of_nan_are_kept(tmp_path):
+def test_payloads_of_nan_are_kept(same, tmp_path):
     odd = np.array([0x7FF8000000000001, 0xFFF8000000000000], dtype=np.uint64).view(np.float64)
     odd = np.append(odd, [math.nan, -0.0, math.inf, 5e-324])
     branch = Branch(

@@ -9,50 +9,13 @@ from hypothesis import strategies as st
 import fastslow as fs
 from fastslow.results import levels
 from fastslow.results.levels import pieces_of
-from fastslow.results.outcome import Outcome
-from fastslow.results.points import SpecialPoint, SpecialPoints
+from fastslow.results.points import SpecialPoints
 
-END = Outcome("end of range", "reached the end of the range.", True)
 FOLD = 1 / np.sqrt(3)
 
 
-def point(code, label, x, row_parameter):
-    return SpecialPoint(
-        code, label, ("x",), np.array([x]), {"p": row_parameter, "q": 2.0}, ("S1",),
-        np.zeros(1, dtype=complex), np.array([1.0, 0.0]), 0.0, True,
-    )  # fmt: skip
-
-
-def cubic(count=61, width=1.5):
-    """The equilibria of x' = p + x − x³ with both folds on rows of their own."""
-    x = np.union1d(np.linspace(-width, width, count), [-FOLD, FOLD])
-    eigenvalues = 1 - 3 * x**2
-    eigenvalues[np.isclose(np.abs(x), FOLD, atol=1e-12, rtol=0)] = 0.0
-    slope = 3 * x**2 - 1
-    rows = [int(np.argmin(np.abs(x - at))) for at in (-FOLD, FOLD)]
-    parameter = x**3 - x
-    special = [
-        point("EP", "EP1", x[0], parameter[0]),
-        *(point("LP", f"LP{k + 1}", x[r], parameter[r]) for k, r in enumerate(rows)),
-        point("EP", "EP2", x[-1], parameter[-1]),
-    ]
-    return fs.Branch(
-        ("x",),
-        "p",
-        x[:, None],
-        parameter,
-        np.column_stack([np.ones_like(x), slope]) / np.hypot(1, slope)[:, None],
-        eigenvalues[:, None].astype(complex),
-        np.full(len(x), "S1"),
-        SpecialPoints(special),
-        (0, *rows, len(x) - 1),
-        (END, END),
-        parameters={"q": 2.0},
-    )
-
-
 @pytest.fixture(scope="module")
-def branch():
+def branch(cubic):
     return cubic()
 
 
@@ -174,7 +137,7 @@ def test_values_are_found_as_by_looking_at_every_row(steps, where, half):
     assert (level, sorted(passed)) == plain(parameter, value)
 
 
-def test_a_value_costs_a_search_on_the_pieces_that_hold_it(monkeypatch):
+def test_a_value_costs_a_search_on_the_pieces_that_hold_it(cubic, monkeypatch):
     branch = cubic(1_000_001)
     searches = []
     search = np.searchsorted
@@ -209,8 +172,7 @@ def test_rows_of_a_branch(branch):
 
 
 @given(start=st.integers(0, 62), length=st.integers(1, 63))
-def test_slices_keep_their_special_points(start, length):
-    branch = cubic()
+def test_slices_keep_their_special_points(branch, start, length):
     part = branch[start : start + length]
     stop = min(start + length, len(branch))
     assert np.array_equal(part["x"], branch["x"][start:stop])
@@ -325,57 +287,6 @@ def test_nearest_on_a_vertical_segment(gear):
     assert found.interpolated
 
 
-def line(slope, offset, count=7):
-    p = np.linspace(-2, 2, count)
-    x = slope * p + offset
-    tangent = np.tile(np.array([slope, 1.0]) / np.hypot(slope, 1), (count, 1))
-    nothing = np.zeros((count, 1), dtype=complex)
-    return fs.Branch(
-        ("x",), "p", x[:, None], p, tangent, nothing, np.full(count, "S1"), SpecialPoints(), (),
-        (END, END),
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize(("slope", "offset"), [(1.0, 0.013), (-2.0, 0.4), (0.1, 0.2), (0.0, -0.9)])
-def test_where_curves_meet(branch, slope, offset):
-    # x = s p + c on p = x³ − x: s x³ − (1 + s) x + c = 0
-    roots = np.roots([slope, 0, -(1 + slope), offset]) if slope else np.array([offset])
-    real = np.sort(roots.real[(np.abs(roots.imag) < 1e-9) & (np.abs(roots.real) <= 1.5)])
-    met = branch.intersections(line(slope, offset), "p", "x")
-    # cubics over steps of 0.05 are exact here up to the parametrisation
-    assert met[:, 1] == pytest.approx(real, abs=2e-6)
-    assert met[:, 0] == pytest.approx(real**3 - real, abs=5e-6)
-    other = line(slope, offset).intersections(branch, "p", "x")
-    assert np.sort(other[:, 1]) == pytest.approx(real, abs=2e-6)
-
-
-def test_curves_that_do_not_meet(branch):
-    assert branch.intersections(line(0.0, 3.0), "p", "x").shape == (0, 2)
-    assert line(1.0, 0.0).intersections(line(1.0, 0.0), "p", "x").shape == (0, 2)
-    assert line(1.0, 0.0, 2)[:1].intersections(branch, "p", "x").shape == (0, 2)
-    with pytest.raises(fs.ArgumentError, match="expected another curve"):
-        branch.intersections(branch, "p", "x")
-    with pytest.raises(fs.ArgumentError, match="two different columns"):
-        branch.intersections(line(1, 0), "p", "p")
-    with pytest.raises(fs.UnknownNameError, match="unknown column 'y'"):
-        branch.intersections(line(1, 0), "p", "y")
-
-
-@given(seed=st.integers(0, 10**6), sizes=st.tuples(st.integers(2, 20), st.integers(2, 20)))
-def test_meetings_are_found_as_by_trying_every_pair(seed, sizes):
-    from fastslow.results.meetings import _met, _overlapping
-
-    random = np.random.default_rng(seed)
-    one, other = (random.normal(size=(n, 2)).cumsum(axis=0) for n in sizes)
-    i, j = (k.reshape(-1) for k in np.indices((sizes[0] - 1, sizes[1] - 1)))
-    _, meet = _met(one, other, i, j)
-    near_i, near_j = _overlapping(one, other)
-    _, found = _met(one, other, near_i, near_j)
-    assert set(zip(near_i[found], near_j[found], strict=True)) == set(
-        zip(i[meet], j[meet], strict=True)
-    )
-
-
 def test_branches_of_a_diagram(pitchfork):
     assert len(pitchfork) == len(pitchfork.branches) == len(list(pitchfork))
     assert pitchfork[0] is pitchfork.branches[0]
@@ -385,8 +296,7 @@ def test_branches_of_a_diagram(pitchfork):
         pitchfork[9]
 
 
-def test_sheets_of_a_long_branch_are_those_of_every_row():
-    branch = cubic()
+def test_sheets_of_a_long_branch_are_those_of_every_row(branch):
     assert [(s.start, s.stop) for s in branch.sheets()] == [
         (0, branch.special_rows[1] + 1),
         (branch.special_rows[1], branch.special_rows[2] + 1),
