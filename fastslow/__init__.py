@@ -25,16 +25,24 @@ if TYPE_CHECKING:
         UnknownNameError,
     )
     from fastslow.model.model import Model
+    from fastslow.passage.delay_laws import predict_delay
+    from fastslow.passage.hopf_delays import hopf_exit
     from fastslow.passage.overlays import overlay
+    from fastslow.passage.regimes import regime_map
+    from fastslow.passage.scaling_runs import delay_scaling
+    from fastslow.passage.slow_loads import slow_load_criterion, slow_load_gap
     from fastslow.results.auto_files import read_auto
     from fastslow.results.branches import Branch
+    from fastslow.results.delay_scalings import DelayScaling
     from fastslow.results.diagrams import Diagram
     from fastslow.results.ensembles import Ensemble
     from fastslow.results.files import load
     from fastslow.results.overlays import Overlay
     from fastslow.results.point_branches import PointBranch
     from fastslow.results.points import Equilibrium, SpecialPoint
+    from fastslow.results.refined_maps import RefinedMap
     from fastslow.results.sections import Section
+    from fastslow.results.slow_loads import SlowLoad
     from fastslow.results.spectra import Spectrum
     from fastslow.results.steady import SteadyState
     from fastslow.results.sweeps import Sweep
@@ -42,6 +50,7 @@ if TYPE_CHECKING:
     from fastslow.simulation.ensembles import simulate_many
     from fastslow.simulation.sweeping import bifurcation_sweep
     from fastslow.simulation.trajectories import simulate
+    from fastslow.sweeps.refinement import refined_map
     from fastslow.symbolic.derivation import Derivation, derive
     from fastslow.symbolic.reduction import reduce_to
     from fastslow.symbolic.scaling import disagreements, nondimensionalise
@@ -54,6 +63,7 @@ _HOME = {
     "ArgumentError": "errors",
     "Branch": "results.branches",
     "Continuation": "continuation.settings",
+    "DelayScaling": "results.delay_scalings",
     "Derivation": "symbolic.derivation",
     "Diagram": "results.diagrams",
     "Ensemble": "results.ensembles",
@@ -65,7 +75,9 @@ _HOME = {
     "ModelError": "errors",
     "Overlay": "results.overlays",
     "PointBranch": "results.point_branches",
+    "RefinedMap": "results.refined_maps",
     "Section": "results.sections",
+    "SlowLoad": "results.slow_loads",
     "SpecialPoint": "results.points",
     "Spectrum": "results.spectra",
     "SteadyState": "results.steady",
@@ -75,18 +87,25 @@ _HOME = {
     "bifurcation_sweep": "simulation.sweeping",
     "continue_equilibria": "diagrams.tracing",
     "continue_points": "diagrams.point_curves",
+    "delay_scaling": "passage.scaling_runs",
     "derive": "symbolic.derivation",
     "disagreements": "symbolic.scaling",
     "equilibria": "diagrams.solving",
     "export": "symbolic.sources",
+    "hopf_exit": "passage.hopf_delays",
     "load": "results.files",
     "nondimensionalise": "symbolic.scaling",
     "overlay": "passage.overlays",
     "plot": "",
+    "predict_delay": "passage.delay_laws",
     "read_auto": "results.auto_files",
     "reduce_to": "symbolic.reduction",
+    "refined_map": "sweeps.refinement",
+    "regime_map": "passage.regimes",
     "simulate": "simulation.trajectories",
     "simulate_many": "simulation.ensembles",
+    "slow_load_criterion": "passage.slow_loads",
+    "slow_load_gap": "passage.slow_loads",
     "systems": "",
     "tangencies": "diagrams.tangency_points",
     "warm": "warming",
@@ -96,6 +115,7 @@ __all__ = [
     "ArgumentError",
     "Branch",
     "Continuation",
+    "DelayScaling",
     "Derivation",
     "Diagram",
     "Ensemble",
@@ -107,7 +127,9 @@ __all__ = [
     "ModelError",
     "Overlay",
     "PointBranch",
+    "RefinedMap",
     "Section",
+    "SlowLoad",
     "SpecialPoint",
     "Spectrum",
     "SteadyState",
@@ -118,18 +140,25 @@ __all__ = [
     "bifurcation_sweep",
     "continue_equilibria",
     "continue_points",
+    "delay_scaling",
     "derive",
     "disagreements",
     "equilibria",
     "export",
+    "hopf_exit",
     "load",
     "nondimensionalise",
     "overlay",
     "plot",
+    "predict_delay",
     "read_auto",
     "reduce_to",
+    "refined_map",
+    "regime_map",
     "simulate",
     "simulate_many",
+    "slow_load_criterion",
+    "slow_load_gap",
     "systems",
     "tangencies",
     "warm",

@@ -134,6 +134,7 @@ def continue_equilibria(
         _text(model),
         corrector,
         _too_many(settings) if full else _continuum(name, missed) if missed else SEARCHED,
+        {quantity: str(law) for quantity, law in model.path.items()},
         asdict(settings),
     )
 

@@ -208,6 +208,61 @@ class Model:
             path[str(key)] = law.xreplace({s: real(s.name) for s in law.free_symbols})
         return self._from(*self.structure.frozen(path, self.parameters))
 
+    def ramped(self, name: object, rate: float, start: float = 0.0) -> Model:
+        """The model with one parameter drifting at a constant rate: start + rate·t.
+
+        Both numbers become parameters, named after it, so that a range of rates
+        needs no new equations: ``ramp.with_parameters(w_rate=1e-4)``.
+
+        Parameters
+        ----------
+        name : str or Symbol
+            A parameter, or a slow quantity of a frozen model.
+        rate : float
+            In units of the parameter by time.
+        start : float
+            The value at t = 0.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no parameter of the model.
+        ModelError
+            For a slow quantity that has a law, a number that is not finite, or a
+            model that already has parameters of the new names.
+
+        Examples
+        --------
+        >>> x, w, t = sp.symbols("x w t")
+        >>> fast = Model({x: w - x}, forcing={w: sp.sin(t)}).frozen()
+        >>> print(fast.ramped(w, 0.5, start=-1).forcing["w"])
+        t*w_rate + w_start
+        """
+        key = str(name)
+        if key in (*self.forcing, *self.slow_states):
+            raise ModelError(f"'{key}' already varies in time; ramp it in model.frozen() instead")
+        freed = self.freed(key)
+        first, speed = f"{key}_start", f"{key}_rate"
+        numbers = {
+            first: number(f"parameter {first}", start),
+            speed: number(f"parameter {speed}", rate),
+        }
+        taken = [
+            n
+            for n in numbers
+            if n in (*freed.states, *freed.slow_states, *freed.forcing, *freed.parameters)
+        ]
+        if taken:
+            raise ModelError(
+                f"a ramp of {key} needs the name {taken[0]}, which the model already uses"
+            )
+        structure = replace(
+            freed.structure,
+            forcing={**freed.structure.forcing, key: real(first) + real(speed) * TIME},
+            free=tuple(n for n in freed.free if n != key),
+        )
+        return self._from(structure, {**freed.parameters, **numbers})
+
     def period(self) -> float | None:
         """Smallest common period of everything that depends on time, None if there is none.
 
@@ -232,6 +287,11 @@ class Model:
         ((), ('S2',))
         """
         return tuple(n for n in sorted(set(self.structure.names.values())) if n not in self.regions)
+
+    @property
+    def path(self) -> Named[sp.Expr]:
+        """Of a model frozen along a path: slow quantities as functions of the path's parameters."""
+        return Named("slow quantity", self.structure.path)
 
     @property
     def values(self) -> dict[sp.Symbol, float]:

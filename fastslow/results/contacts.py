@@ -108,13 +108,15 @@ def regime_of(run: Trajectory) -> str | None:
         return None
     begin = run.span[1] - run.period
     seen = {s.region for s in run.segments if s.end > begin}
-    lower, inside, upper = (name in seen for name in run.gap)
-    if lower and upper:
+    lower, inside, upper = run.gap
+    # sliding along an interface is rest against that side
+    below, above = (any(side in name.split("|") for name in seen) for side in (lower, upper))
+    if below and above:
         return "bilateral"
-    if lower or upper:
-        side = "upper" if upper else "lower"
-        return f"unilateral {side}" if inside else f"meshed {side}"
-    return "free" if inside else None
+    if below or above:
+        side = "upper" if above else "lower"
+        return f"unilateral {side}" if inside in seen else f"meshed {side}"
+    return "free" if inside in seen else None
 
 
 def _counts(run: Trajectory, window: tuple[float, float]) -> NDArray[np.int64]:

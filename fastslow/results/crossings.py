@@ -48,6 +48,22 @@ class Crossing:
         )
 
 
+def crossings_of(run: Trajectory) -> tuple[Crossing, ...]:
+    """Every crossing in order of time."""
+    return tuple(
+        Crossing(
+            float(entry[0]),
+            entry[6:].copy(),
+            run.interfaces[int(entry[1])],
+            int(entry[2]),
+            run.modes[int(entry[3])],
+            run.modes[int(entry[4])],
+            bool(entry[5]),
+        )
+        for entry in run.crossing_table
+    )
+
+
 @dataclass(frozen=True)
 class Segment:
     """A stretch of time within one region (or of sliding between two)."""

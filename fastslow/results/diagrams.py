@@ -57,6 +57,8 @@ class Diagram(Table, Result):
         Solves for an equilibrium read between rows; not kept in a file.
     outcome : Outcome
         How the search for branches ended.
+    path : mapping
+        Of a model frozen along a path, each slow quantity as text in the parameter.
     settings : mapping
         How the branches were traced.
 
@@ -83,6 +85,7 @@ class Diagram(Table, Result):
     equations: str
     corrector: Corrector | None = field(default=None, repr=False, metadata=LIVE)
     outcome: Outcome = SEARCHED
+    path: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:

@@ -67,6 +67,8 @@ class Ensemble(Table, Result):
         How each ended, and in which of the modes.
     sampled : tuple of ndarray, optional
         Times (N,) or (m, N) and columns (m, n + n_forcing, N), NaN after the end of a trajectory.
+    method : str
+        How the steps were made; where a series is singular, collocation takes its place.
     limits : tuple of int
         Most steps and most crossings of one trajectory.
     constants : mapping
@@ -108,6 +110,7 @@ class Ensemble(Table, Result):
     codes: NDArray[np.int64]
     last_mode: NDArray[np.int64]
     sampled: tuple[NDArray[np.float64], NDArray[np.float64]] | None
+    method: str
     limits: tuple[int, int]
     constants: Mapping[str, float] = field(default_factory=dict)
     equations: str = ""
@@ -198,6 +201,7 @@ class Ensemble(Table, Result):
         if len(kinds):
             lines.append("  " + ", ".join(f"{k}: {n}" for k, n in zip(kinds, counts, strict=True)))
         done = int(np.count_nonzero(self.success))
+        lines.append(f"  {self.method}")
         lines.append(f"  {done} of {count} reached the end of time")
         if done < count:
             worst = int(np.flatnonzero(~self.success)[0])

@@ -18,7 +18,7 @@ from fastslow.results.contacts import (
     regime_of,
     residence_in,
 )
-from fastslow.results.crossings import Crossing, Segment, regions_at, segments_of
+from fastslow.results.crossings import Crossing, Segment, crossings_of, regions_at, segments_of
 from fastslow.results.dense import columns_at, refined_table
 from fastslow.results.markup import trajectory_html
 from fastslow.results.outcome import Outcome
@@ -50,8 +50,11 @@ class Trajectory(Recurrence, Table, Result):
         Why the run ended.
     end : ndarray, shape (1 + n,)
         Time and state reached.
-    steps : ndarray, shape (n_steps, 3)
-        Time, length and mode of every step.
+    method : str
+        How the steps were made.
+    steps : ndarray, shape (n_steps, 4)
+        Time, length and mode of every step, and what took the place of a
+        series: 0 nothing, 1 collocation, 2 an implicit method.
     modes : tuple of str
         What the modes in ``steps`` and ``crossing_table`` are: regions, then sliding motions.
     crossing_table : ndarray, shape (n_crossings, 6 + n)
@@ -90,6 +93,7 @@ class Trajectory(Recurrence, Table, Result):
     outcome: Outcome
     span: tuple[float, float]
     end: NDArray[np.float64]
+    method: str
     steps: NDArray[np.float64]
     modes: tuple[str, ...]
     crossing_table: NDArray[np.float64]
@@ -153,18 +157,7 @@ class Trajectory(Recurrence, Table, Result):
     @cached_property
     def crossings(self) -> tuple[Crossing, ...]:
         """Every crossing in order of time."""
-        return tuple(
-            Crossing(
-                float(entry[0]),
-                entry[6:].copy(),
-                self.interfaces[int(entry[1])],
-                int(entry[2]),
-                self.modes[int(entry[3])],
-                self.modes[int(entry[4])],
-                bool(entry[5]),
-            )
-            for entry in self.crossing_table
-        )
+        return crossings_of(self)
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
@@ -182,7 +175,7 @@ class Trajectory(Recurrence, Table, Result):
 
         ``"bilateral"``, ``"unilateral upper"``, ``"unilateral lower"``,
         ``"meshed upper"``, ``"meshed lower"`` or ``"free"``; None for models
-        without a gap or without a period.
+        without gap or period. Sliding along an edge touches it; rounding decides grazes.
         """
         return regime_of(self)
 
@@ -253,6 +246,7 @@ class Trajectory(Recurrence, Table, Result):
             f"Trajectory of {', '.join(self.columns)} for t from {low:.6g} to {high:.6g}",
             f"  {len(self.steps)} steps, {len(self.crossing_table)} crossings, "
             f"{len(self.segments)} segments" + (f", regime {self.regime}" if self.regime else ""),
+            f"  {self.method}",
             f"  {self.outcome}",
         ]
         return "\n".join(lines)

@@ -189,9 +189,15 @@ def gap_regions(model: Model, gap: str | None) -> tuple[str, str, str] | None:
 
 
 def _parallel(model: Model) -> bool:
+    """Whether the two interfaces differ by a constant, apart from a factor."""
     one, other = (i.function for i in model.interfaces.values())
     moving = set(model.structure.moving)
-    return any(not sp.expand(one + s * other).free_symbols & moving for s in (1, -1))
+    shared = [s for s in model.structure.moving if s in one.free_symbols & other.free_symbols]
+    if not shared:
+        return False
+    factor = sp.cancel(other.diff(shared[0]) / one.diff(shared[0]))
+    rest = sp.expand(factor * one - other)
+    return not (factor.free_symbols | rest.free_symbols) & moving
 
 
 def _growth(model: Model, function: sp.Expr) -> int:

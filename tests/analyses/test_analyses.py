@@ -9,7 +9,14 @@ import pytest
 from matplotlib.image import imread
 
 from analyses import __main__ as everything
-from analyses import dead_zone, gap_width, load_amplitude, negative_stiffness, stiffness
+from analyses import (
+    dead_zone,
+    gap_width,
+    load_amplitude,
+    negative_stiffness,
+    regime_maps,
+    stiffness,
+)
 from analyses.passages import OMEGA, laid
 
 
@@ -32,7 +39,7 @@ def folded():
 
 def test_every_figure_is_written(everything_drawn):
     folder, rows = everything_drawn
-    for name in ("dead_zone", *rows):
+    for name in ("dead_zone", *rows, *(plane.name for plane in regime_maps.PLANES)):
         for suffix in ("png", "pdf"):
             assert (folder / f"{name}.{suffix}").stat().st_size > 5000
     with (folder / "summary.csv").open(encoding="utf-8") as file:
@@ -49,7 +56,7 @@ def test_what_the_runs_show(everything_drawn):
     assert regimes == {"load_amplitude_10": "meshed upper"}
     assert rows["load_amplitude_10"].stated == "bilateral"
     assert rows["load_amplitude_100"].stated == rows["gap_width_0.5"].stated == "unilateral"
-    assert rows["load_amplitude_10"].passages == 0
+    assert rows["load_amplitude_10"].transits == 0
     assert math.isnan(rows["load_amplitude_10"].largest_delay)
 
 
@@ -58,6 +65,27 @@ def test_the_table_has_a_line_for_each_case(everything_drawn):
     lines = everything.table(list(rows.values())).splitlines()
     assert len(lines) == 2 + len(rows)
     assert lines[0].split()[:7] == ["case", "A", "B", "C", "D", "BE", "LP"]
+
+
+def test_the_regime_maps_agree_with_slow_load_theory(everything_drawn):
+    folder, _ = everything_drawn
+    with (folder / "regime_maps.csv").open(encoding="utf-8") as file:
+        lines = list(csv.DictReader(file))
+    width, frequency = ({k: float(v) for k, v in row.items() if k != "map"} for row in lines)
+    assert [row["map"] for row in lines] == ["regimes_width", "regimes_frequency"]
+    for row in (width, frequency):
+        assert row["bilateral"] + row["unilateral"] + row["meshed"] == pytest.approx(1, abs=1e-12)
+        # solved in the gap it is right wherever it was tried, to the accuracy of the edges
+        assert row["agreement_exact"] == 1
+        assert row["distance_exact"] < 2e-5
+        assert row["corners"] < 0.5 * row["pixels"]
+    assert width["agreement"] == 1
+    assert 0.99 < frequency["agreement"] < 1
+    assert frequency["distance"] == pytest.approx(0.0027, abs=1e-4)
+    # bilateral at D = 0.25 and unilateral at 0.5 only where the load barely changes sign
+    assert width["change_from"] == pytest.approx(1.010829, abs=4e-6)
+    assert width["change_to"] == pytest.approx(1.017209, abs=4e-6)
+    assert math.isnan(frequency["change_from"])
 
 
 def test_dead_zone():
@@ -82,7 +110,7 @@ def test_wider_gaps_delay_more(gaps):
     delays = [np.nanmax(np.abs(case.lay.delays)) for case in gaps]
     assert delays == sorted(delays)
     assert all(len(case.lay.transitions) == 6 for case in gaps)
-    assert {t.kind for case in gaps for t in case.lay.transitions} == {"crossing"}
+    assert {t.kind for case in gaps for t in case.lay.transitions} == {"transit"}
 
 
 def test_the_natural_frequency_falls_with_the_stiffness():

@@ -50,6 +50,8 @@ def results(gear):
         "spectrum": run.spectrum("x"),
         "steady": run.steady(),
         "contacts": run.contacts(),
+        "map": fs.refined_map(lambda a, b: a * b < 1, {"a": (0, 2), "b": (0, 2)}, levels=3),
+        "load": fs.slow_load_criterion(gear, {"D": [0.5, 0.6], "C": 2.5}),
     }
 
 
@@ -70,6 +72,7 @@ def names_in(folder):
 KINDS = [
     "diagram", "branch", "points", "point", "equilibrium", "run", "samples", "overlay", "ensemble",
     "short", "sweep", "section", "spectrum", "steady", "contacts",
+    "map", "load",
 ]  # fmt: skip
 
 
@@ -91,6 +94,16 @@ def test_round_trip_of_a_curve(curve, same, tmp_path, ending):
     again = fs.load(tmp_path / f"curve{ending}")
     assert same(curve, again)
     assert again.special("CP")[0].source is None
+
+
+def test_round_trip_of_a_delay(same, tmp_path):
+    model = fs.systems.cusp().frozen()
+    fold = fs.continue_equilibria(model, "p", over=(-1, 1)).folds[0]
+    delay = fs.predict_delay(fold, 1e-3)
+    delay.save(tmp_path / "delay.npz")
+    again = fs.load(tmp_path / "delay.npz")
+    assert same(delay, again)
+    assert again.delay == delay.delay
 
 
 def test_every_public_result_can_be_saved():

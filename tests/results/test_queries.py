@@ -324,5 +324,5 @@ def test_runs_answer_expressions(gear):
     assert set(section["x"]) == {0.25}
     assert np.array_equal(section["v**2"], section["v"] ** 2)
     for result in (run, lay, section):
-        with pytest.raises(fs.UnknownNameError, match="unknown column 'zz'"):
+        with pytest.raises(fs.UnknownNameError, match=r"unknown .* 'zz'"):
             result["zz"]

@@ -1,0 +1,180 @@
+"""Delays over rates, measured and predicted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError
+from fastslow.plot.labels import legend_below, legend_inside, settle
+from fastslow.plot.style import BLUE, GREY, MM, SMALL, VERMILION, Drawing, axes_for, typeset
+from fastslow.results.delay_scalings import DelayScaling
+
+Array = NDArray[np.float64]
+
+#: Exponents that have a short name.
+FRACTIONS = {2.0 / 3.0: "2/3", 0.5: "1/2", 1.0: "1"}
+
+#: Width of the slope triangle in parts of the range, its distance below, and of its text in points.
+WIDTH, BELOW, TEXT_OFF = 0.26, 0.10, 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class DelayDrawing(Drawing):
+    """Drawn delays.
+
+    Parameters
+    ----------
+    ax : Axes
+    measured : Line2D
+    predicted : Line2D
+        The law at the same rates.
+    leading : Line2D or None
+        Its leading power alone.
+    triangle : Line2D or None
+        With the slope of the leading power; none where the law is no power.
+    texts : tuple of Text
+        Of the triangle.
+    legend : Legend or None
+    """
+
+    measured: Line2D
+    predicted: Line2D
+    leading: Line2D | None
+    triangle: Line2D | None
+    texts: tuple[Text, ...]
+    legend: Legend | None
+
+
+def delay_scaling(
+    scaling: DelayScaling, *, ax: Axes | None = None, legend: bool = True
+) -> DelayDrawing:
+    """Draw delays over the rate of drift, both logarithmic, beside the law.
+
+    Parameters
+    ----------
+    scaling : DelayScaling
+    ax : Axes, optional
+        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+    legend : bool
+        Whether to explain the lines, with the fitted exponent.
+
+    Returns
+    -------
+    DelayDrawing
+
+    Raises
+    ------
+    ArgumentError
+        If no run reached its event.
+    """
+    good = np.isfinite(scaling.delay) & (scaling.delay > 0)
+    if not good.any():
+        raise ArgumentError("no run of this scaling has a delay to draw; see its outcomes")
+    own = ax is None
+    ax = axes_for(ax, height=66 * MM)
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    eps = scaling.eps
+    words = "measured"
+    if math.isfinite(scaling.exponent):
+        power = rf"$\varepsilon^{{{scaling.exponent:.3f}\pm{scaling.uncertainty:.3f}}}$"
+        words += f", {power}" if not scaling.offset else f", less {scaling.offset:.3g} ε: {power}"
+    leading = _leading(ax, scaling)
+    (predicted,) = ax.plot(
+        eps, scaling.predicted, color=VERMILION, linewidth=1.2, label=_law_words(scaling)
+    )
+    (measured,) = ax.plot(
+        eps[good],
+        scaling.delay[good],
+        linestyle="none",
+        marker="o",
+        markersize=4.0,
+        markerfacecolor="none",
+        markeredgecolor=BLUE,
+        markeredgewidth=0.9,
+        label=words,
+        zorder=4,
+    )
+    ax.set_xlabel(rf"rate of drift $\varepsilon$ of {typeset(scaling.parameter)}")
+    ax.set_ylabel(f"delay past {scaling.point.label} in {typeset(scaling.parameter)}")
+    triangle, texts = _triangle(ax, scaling, good)
+    drawn = [measured, predicted, *([leading] if leading else [])]
+    shown = None
+    if legend:
+        shown = legend_below(ax, drawn, 1) if own else legend_inside(ax, drawn)
+    return DelayDrawing(ax, measured, predicted, leading, triangle, texts, shown)
+
+
+def _law_words(scaling: DelayScaling) -> str:
+    if math.isfinite(scaling.law_exponent):
+        return "predicted"
+    return r"predicted, $\varepsilon\,\ln(1/\varepsilon)$"
+
+
+def _leading(ax: Axes, scaling: DelayScaling) -> Line2D | None:
+    """The leading power alone, where it is not all of the law."""
+    first = float(scaling.predicted_coefficients[0])
+    if not (math.isfinite(scaling.law_exponent) and len(scaling.terms) > 1):
+        return None
+    (line,) = ax.plot(
+        scaling.eps,
+        first * scaling.eps**scaling.law_exponent,
+        color=GREY,
+        linewidth=0.9,
+        linestyle=(0, (3.5, 1.8)),
+        label=rf"its leading term, ${first:.4g}\,\varepsilon^{{{_written(scaling)}}}$",
+    )
+    return line
+
+
+def _written(scaling: DelayScaling) -> str:
+    return FRACTIONS.get(scaling.law_exponent, f"{scaling.law_exponent:.3g}")
+
+
+def _triangle(
+    ax: Axes, scaling: DelayScaling, good: NDArray[np.bool_]
+) -> tuple[Line2D | None, tuple[Text, ...]]:
+    """A triangle below the points with the slope of the law."""
+    power = scaling.law_exponent
+    if not math.isfinite(power) or good.sum() < 2:
+        return None, ()
+    x, y = np.log10(scaling.eps[good]), np.log10(scaling.delay[good])
+    width = WIDTH * float(np.ptp(x))
+    left = float(x.min()) + 0.5 * float(np.ptp(x))
+    right = left + width
+    settle(ax)
+    low, high = np.log10(ax.get_ylim())
+    order = np.argsort(x)
+    base = float(np.interp(left, x[order], y[order])) - BELOW * (high - low)
+    corners = np.array([[left, base], [right, base], [right, base + power * width], [left, base]])
+    (line,) = ax.plot(*10.0**corners.T, color=GREY, linewidth=0.8)
+    texts = [
+        ax.annotate(
+            words,
+            tuple(10.0 ** np.array(at)),
+            xytext=off,
+            textcoords="offset points",
+            ha=ha,
+            va=va,
+            fontsize=SMALL,
+        )
+        for words, at, off, ha, va in (
+            ("1", (0.5 * (left + right), base), (0.0, -TEXT_OFF), "center", "top"),
+            (
+                _written(scaling),
+                (right, base + 0.5 * power * width),
+                (TEXT_OFF, 0.0),
+                "left",
+                "center",
+            ),
+        )
+    ]
+    return line, tuple(texts)

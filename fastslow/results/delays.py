@@ -1,0 +1,195 @@
+"""What the laws of slow passage predict at special points."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+from fastslow.results.points import SpecialPoint
+from fastslow.results.result import Result
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Delay(Result, ABC):
+    """How far past a special point a drifting parameter is when something happens.
+
+    Parameters
+    ----------
+    point : SpecialPoint
+    parameter : str
+        The parameter that drifts.
+    rate : float
+        Its constant rate, in its unit by time.
+    delay : float
+        How far past the point, along the drift, in units of the parameter; nan
+        where the law has no answer, and ``validity`` says why.
+    validity : str
+        How good the prediction is, and what it leaves out.
+    """
+
+    point: SpecialPoint
+    parameter: str
+    rate: float
+    delay: float
+    validity: str
+
+    @property
+    def value(self) -> float:
+        """The parameter there."""
+        return self.point[self.parameter] + (self.delay if self.rate > 0 else -self.delay)
+
+    @property
+    def time(self) -> float:
+        """Time from the special point to there."""
+        return self.delay / abs(self.rate)
+
+    @property
+    @abstractmethod
+    def law(self) -> str:
+        """The law in words."""
+
+    def __repr__(self) -> str:
+        name = self.parameter
+        return (
+            f"{type(self).__name__}: {self.law}, {name} at {self.point.label} drifting by "
+            f"{self.rate:.3g}\n  delay {self.delay:.6g}, to {name} = {self.value:.6g}, "
+            f"in t = {self.time:.6g}\n  {self.validity}"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class FoldDelay(Delay):
+    """Delay of the jump at a smooth fold, from y' = a y² + b μ + c y³ + g μ y, μ the parameter.
+
+    delay = α |rate|^(2/3) + β |rate| ln |rate| + γ |rate| with (α, β, γ) = ``coefficients``.
+
+    Parameters
+    ----------
+    quadratic, slope, cubic, mixed : float
+        a, b, c and g of the motion along the null vector of length one.
+    coefficients : tuple of float
+        α = Ω₀ |ab|^(−1/3), β = c/(3a²), and γ, which depends on the level (nan without one).
+    level : mapping, optional
+        The state and its value at which the jump counts as done; without it a
+        jump to infinity of the quadratic normal form.
+    """
+
+    quadratic: float
+    slope: float
+    cubic: float
+    mixed: float
+    coefficients: tuple[float, float, float]
+    level: dict[str, float] | None = None
+
+    @property
+    def leading(self) -> float:
+        """The first term alone, α |rate|^(2/3)."""
+        return float(self.coefficients[0] * abs(self.rate) ** (2.0 / 3.0))
+
+    @property
+    def law(self) -> str:
+        return "smooth fold, Ω₀ (rate²/|ab|)^(1/3)"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class BoundaryDelay(Delay):
+    """Passage of a boundary equilibrium: the lag of persistence, the delay of a non-smooth fold.
+
+    Parameters
+    ----------
+    lag : float
+        How far past the point the interface is crossed, in units of the parameter.
+    stable : float
+        Largest real part of the eigenvalues before the interface.
+    unstable : float
+        Largest real part of the eigenvalues behind it.
+    level : mapping, optional
+        The state and its value at which the jump counts as done.
+    """
+
+    lag: float
+    stable: float
+    unstable: float
+    level: dict[str, float] | None = None
+
+    @property
+    def subtype(self) -> str:
+        """``"persistence"`` or ``"non-smooth fold"``."""
+        return str(self.point.subtype)
+
+    @property
+    def law(self) -> str:
+        if self.subtype == "persistence":
+            return "persistence, a lag of the order of the rate and no delay"
+        return "non-smooth fold, of the order of rate ln(1/rate)"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class GapTransit(Delay):
+    """Crossing of a region whose equilibria form a continuum, such as the gap of a backlash.
+
+    ``delay`` is that at the far interface.
+
+    Parameters
+    ----------
+    lag : float
+        How far past the point the near interface is crossed, in units of the parameter.
+    length : float
+        Of the continuum, between the interfaces, in the norm of the states.
+    slope : float
+        b in ξ' = b μ, the drift along the continuum.
+    relaxation : float
+        τ, the time by which the other motions in the region hold the crossing up.
+    interfaces : tuple of str
+        The near one and the far one.
+    """
+
+    lag: float
+    length: float
+    slope: float
+    relaxation: float
+    interfaces: tuple[str, str]
+
+    @property
+    def transit(self) -> float:
+        """By how much the parameter changes between the two interfaces."""
+        return self.delay - self.lag
+
+    @property
+    def transit_time(self) -> float:
+        """Time between the two interfaces."""
+        return self.transit / abs(self.rate)
+
+    @property
+    def asymptotic(self) -> float:
+        """The law for slow drift, √(2 length |rate/b|) + τ |rate|."""
+        speed = abs(self.rate)
+        return float((2.0 * self.length * speed / abs(self.slope)) ** 0.5 + self.relaxation * speed)
+
+    @property
+    def law(self) -> str:
+        return "gap, √(2 length |rate/b|) + τ |rate|"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class HopfExit(Delay):
+    """Delayed loss of stability at a Hopf point: where growth has made up for the decay before.
+
+    Parameters
+    ----------
+    entry : float
+        The parameter where the trajectory comes to its sheet.
+    decay : float
+        ∫ |Re λ| dp / |rate| from the entry to the Hopf point: the amplitude
+        falls to exp(−decay).
+    gain : float
+        Amplitude at the exit by amplitude at the entry.
+    """
+
+    entry: float
+    decay: float
+    gain: float = 1.0
+
+    @property
+    def law(self) -> str:
+        return f"entry at {self.entry:.6g} and exit of a Hopf point, ∫ Re λ = 0"

@@ -1,0 +1,1 @@
+"""Many points of a parameter plane, of which only those are computed that matter."""

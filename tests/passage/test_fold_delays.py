@@ -1,0 +1,168 @@
+"""The law of delay at a smooth fold, against mpmath and the Airy solution."""
+
+import math
+import pickle
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import fastslow as fs
+from fastslow.passage.fold_delays import MATCHING, OMEGA_0, airy_passage, fold_delay, fold_form_of
+from fastslow.passage.sites import site_of
+
+x, y, p, q = sp.symbols("x y p q")
+
+
+def test_the_constants_to_sixteen_digits():
+    with mpmath.workdps(25):
+        omega = -mpmath.airyaizero(1)
+        square = mpmath.airyai(-omega, derivative=1) ** 2
+
+        def entropy(s):
+            a = mpmath.airyai(-s)
+            return a**2 * mpmath.log(a) if a > 0 else mpmath.mpf(0)
+
+        cuts = [-25, -12, -6, -3, -1, 0, 1, 2, omega - mpmath.mpf("0.01"), omega]
+        matching = (mpmath.quad(entropy, cuts) / square) - (mpmath.log(square) + 1) / 2
+        assert float(omega) == OMEGA_0
+        assert float(matching) == pytest.approx(MATCHING, abs=1e-15)
+
+
+@pytest.mark.parametrize("eta", [-300.0, -1.0, 0.0, 0.5, 7.0, 1e4])
+def test_the_airy_passage_solves_the_riccati_equation(eta):
+    s = mpmath.mpf(airy_passage(eta))
+    slope = mpmath.airyai(-s, derivative=1) / mpmath.airyai(-s)
+    assert float(slope) == pytest.approx(eta, rel=1e-10, abs=1e-13)
+    assert s < OMEGA_0
+    assert airy_passage(math.inf) == OMEGA_0
+
+
+def test_coefficients_of_the_cusp_in_closed_form(cusp_fold):
+    """At x = −1/√3: a = √3, b = 1, c = −1, g = 0, and the whole term of order rate."""
+    for exit_at in (-0.2, 0.5, 0.9):
+        law = fold_delay(cusp_fold, 1e-5, level={"x": exit_at})
+        assert (law.quadratic, law.slope) == pytest.approx((math.sqrt(3), 1.0), abs=1e-14)
+        assert (law.cubic, law.mixed) == pytest.approx((-1.0, 0.0), abs=1e-14)
+        assert law.coefficients[0] == pytest.approx(OMEGA_0 * 3 ** (-1 / 6), abs=1e-14)
+        assert law.coefficients[1] == pytest.approx(-1 / 9, abs=1e-14)
+        # y' = a y² + c y³ is the whole of the jump: its time in closed form
+        d, size = -1 / 3, math.sqrt(3) * (exit_at + 1 / math.sqrt(3))
+        jump = -1 / size - d * math.log(size / (1 + d * size))
+        constant = d * math.log(3) / 6 - d * MATCHING + jump
+        assert law.coefficients[2] == pytest.approx(constant, abs=3e-6)
+        assert "to the order of the rate" in law.validity
+
+
+def test_the_quadratic_fold_is_the_airy_solution():
+    """x' = p + x² has the solution −ε^(1/3) A'/A, so that delays are known at every level."""
+    fold = fs.continue_equilibria(fs.Model({x: p + x**2}, parameters={p: -1}), "p", (-1, 1)).folds[
+        0
+    ]
+    for level in (-0.001, 0.0, 0.01, 0.5, 20.0):
+        for eps in (1e-3, 1e-6):
+            law = fold_delay(fold, eps, level={"x": level})
+            s = airy_passage(level / eps ** (1 / 3))
+            assert law.delay == pytest.approx(eps ** (2 / 3) * s, rel=1e-9)
+            assert law.value == law.delay
+            assert law.time == pytest.approx(law.delay / eps, rel=1e-15)
+    free = fold_delay(fold, 1e-3)
+    assert free.delay == free.leading == pytest.approx(OMEGA_0 * 1e-2, rel=1e-14)
+    assert math.isnan(free.coefficients[2])
+
+
+@settings(max_examples=15)
+@given(st.floats(0.2, 5.0), st.floats(1e-9, 1e-2))
+def test_the_leading_term_scales(cusp_fold, factor, eps):
+    """Twice the rate, 2^(2/3) times the delay; time runs backwards for the mirrored fold."""
+    one, other = (fold_delay(cusp_fold, e).leading for e in (eps, factor * eps))
+    assert other / one == pytest.approx(factor ** (2 / 3), rel=1e-12)
+
+
+@pytest.fixture(scope="module")
+def sheared():
+    """The cusp beside a state that follows it, in coordinates that mix both."""
+    rest = x - y
+    return fs.Model({x: p + rest - rest**3 + rest - 2 * y, y: rest - 2 * y}, parameters={p: -1})
+
+
+def test_the_law_does_not_depend_on_coordinates(sheared, cusp_fold):
+    diagram = fs.continue_equilibria(sheared, "p", over=(-1, 1))
+    fold = next(f for f in diagram.folds if f["y"] < 0)
+    law, plain = fold_delay(fold, 1e-6), fold_delay(cusp_fold, 1e-6)
+    assert law.coefficients[:2] == pytest.approx(plain.coefficients[:2], rel=1e-10)
+    # y = (x − y)/2 on the slow sheet; in the jump it follows late
+    with_level = fold_delay(fold, 1e-6, level={"y": 0.25})
+    late = fold_delay(cusp_fold, 1e-6, level={"x": 0.5})
+    assert with_level.delay > late.delay
+    assert with_level.delay == pytest.approx(late.delay, rel=0.02)
+
+
+def test_a_parameter_that_also_bends_the_fold():
+    """x' = p (1 + k x) + x²: the mixed coefficient is k."""
+    k = sp.Symbol("k")
+    model = fs.Model({x: p * (1 + k * x) + x**2}, parameters={p: -1, k: 0.7})
+    fold = fs.continue_equilibria(model, "p", over=(-1, 1)).folds[0]
+    form = fold_form_of(site_of(fold, "p", None))
+    assert (form.a, form.b, form.c, form.g) == pytest.approx((1, 1, 0, 0.7), abs=1e-13)
+    assert form.slowest == math.inf
+    law = fold_delay(fold, 1e-6, level={"x": 10.0})
+    assert law.coefficients[2] == pytest.approx(-0.35 - 0.1, abs=3e-6)
+
+
+def test_a_point_from_a_file_needs_its_model(cusp, cusp_fold):
+    stored = pickle.loads(pickle.dumps(cusp_fold))
+    with pytest.raises(fs.ArgumentError, match="carries no model"):
+        fold_delay(stored, 1e-3)
+    whole = fs.systems.cusp()
+    for model in (cusp, whole):
+        law = fold_delay(stored, 1e-3, model=model, parameter="p")
+        assert law.delay == fold_delay(cusp_fold, 1e-3).delay
+
+
+def test_wrong_arguments(cusp_fold, corner):
+    with pytest.raises(fs.ArgumentError, match=r"with p falling no stable sheet .* rate > 0"):
+        fold_delay(cusp_fold, -1e-3)
+    for rate in (0, math.nan, "fast"):
+        with pytest.raises(fs.ArgumentError, match="expected a finite rate of drift"):
+            fold_delay(cusp_fold, rate)
+    for level in (1.0, {}, {"x": 1, "y": 2}):
+        with pytest.raises(fs.ArgumentError, match="expected one state and its value"):
+            fold_delay(cusp_fold, 1e-3, level=level)
+    with pytest.raises(fs.ArgumentError, match="expected a finite value"):
+        fold_delay(cusp_fold, 1e-3, level={"x": math.inf})
+    with pytest.raises(fs.UnknownNameError, match="unknown state of the level 'z'"):
+        fold_delay(cusp_fold, 1e-3, level={"z": 1})
+    with pytest.raises(fs.UnknownNameError, match="unknown parameter 'r'"):
+        fold_delay(cusp_fold, 1e-3, parameter="r")
+    point = fs.continue_equilibria(corner, "p", over=(-1, 1)).boundary_equilibria[0]
+    with pytest.raises(fs.ArgumentError, match=r"at a point LP \(fold\); received BE1, a boundary"):
+        fold_delay(point, 1e-3)
+
+
+def test_a_level_that_no_jump_reaches(cusp_fold):
+    law = fold_delay(cusp_fold, 1e-4, level={"x": 5.0})
+    assert law.delay == law.leading
+    assert "no jump of the frozen model to x = 5 was found" in law.validity
+
+
+def test_degenerate_folds(cusp_fold):
+    """A cusp, a fold that the parameter does not unfold, an unstable one, a double zero."""
+    at_cusp = replace(cusp_fold, state=np.zeros(1), parameters={"p": 0.0, "q": 0.0})
+    with pytest.raises(fs.ArgumentError, match=r"quadratic coefficient vanishes \(a cusp\)"):
+        fold_delay(at_cusp, 1e-3)
+    k = sp.Symbol("k")
+    model = fs.Model({x: p + x**2, y: q + k * y}, parameters={p: -1, q: 0, k: -1})
+    fold = fs.continue_equilibria(model, "p", over=(-1, 1)).folds[0]
+    with pytest.raises(fs.ArgumentError, match="is not unfolded by q"):
+        fold_delay(fold, 1e-3, parameter="q")
+    with pytest.raises(fs.ArgumentError, match="another eigenvalue has real part 1"):
+        fold_delay(replace(fold, parameters={**fold.parameters, "k": 1.0}), 1e-3)
+    takens = fs.Model({x: y, y: p + x**2 + k * y}, parameters={p: -1, k: -1})
+    fold = fs.continue_equilibria(takens, "p", over=(-1, 1)).folds[0]
+    with pytest.raises(fs.ArgumentError, match="double zero eigenvalue"):
+        fold_delay(replace(fold, parameters={**fold.parameters, "k": 0.0}), 1e-3)

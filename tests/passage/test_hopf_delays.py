@@ -1,0 +1,152 @@
+"""Entry and exit of a slow passage through a Hopf point."""
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+import fastslow as fs
+
+RADIUS, EPS = 1e-3, 0.05
+
+
+@pytest.fixture(scope="module")
+def turned(turning):
+    return fs.continue_equilibria(turning, "p", over=(-2, 2))
+
+
+@pytest.fixture(scope="module")
+def ramped(turning):
+    """Entered at p = −1 with |z| = 0.001; the smallest amplitude is 4.5e-8."""
+    ramp = turning.ramped("p", EPS, start=-1.0)
+    return fs.simulate(ramp, [RADIUS, 0.0], t=(0, 2.6 / EPS), tol=1e-16)
+
+
+def bernoulli(p):
+    """|z|² at p in closed form: u = |z|⁻² obeys u' = −2 p u + 2."""
+    growth = (p**2 - 1) / EPS
+    tail, _ = quad(lambda s: math.exp((s**2 - 1) / EPS), -1, p, epsabs=0, epsrel=1e-12)
+    return math.exp(growth) / (RADIUS**-2 + 2 * tail / EPS)
+
+
+def test_the_exit_mirrors_the_entry(turned, ramped):
+    """Measured, in closed form, and as predicted: p = 1 but for the cubic term."""
+    law = fs.hopf_exit(turned, turned.special("HB")[0], entry=-1, rate=EPS)
+    assert law.value == pytest.approx(1.0, abs=1e-12)
+    assert law.decay == pytest.approx(1 / (2 * EPS), rel=1e-12)
+    out = ramped.section("x**2 + y**2", RADIUS**2, direction=1)
+    known = brentq(lambda p: bernoulli(p) - RADIUS**2, 0.5, 1.5, xtol=1e-14)
+    assert out["p"][-1] == pytest.approx(known, abs=1e-9)
+    assert known == pytest.approx(law.value, abs=1e-6)
+
+
+def test_a_gain_of_amplitude(turned, ramped):
+    """|z| ten times as large: p² = 1 + 2ε ln 10."""
+    law = fs.hopf_exit(turned, turned.special("HB")[0], entry=-1, rate=EPS, gain=10)
+    assert law.value == pytest.approx(math.sqrt(1 + 2 * EPS * math.log(10)), abs=1e-12)
+    out = ramped.section("x**2 + y**2", 1e2 * RADIUS**2, direction=1)
+    assert out["p"][-1] == pytest.approx(law.value, abs=1e-5)
+
+
+def test_rounding_decides(turned):
+    law = fs.hopf_exit(turned, turned.special("HB")[0], entry=-1, rate=0.01)
+    assert law.decay == pytest.approx(50, rel=1e-12)
+    assert "rounding decides" in law.validity
+    assert "exp(−50)" in law.validity
+
+
+def test_growth_that_does_not_suffice(turned):
+    law = fs.hopf_exit(turned, turned.special("HB")[0], entry=-2, rate=0.2, gain=1.1)
+    assert math.isnan(law.delay)
+    assert law.validity.startswith("none: the branch ends")
+
+
+def test_a_diagram_from_a_file_interpolates(turned):
+    stored = pickle.loads(pickle.dumps(turned))
+    law = fs.hopf_exit(stored, turned.special("HB")[0], entry=-1, rate=EPS)
+    assert law.value == pytest.approx(1.0, abs=1e-12)
+    assert "interpolated" in law.validity
+
+
+def test_wrong_arguments(turned, cusp_fold):
+    hopf = turned.special("HB")[0]
+    with pytest.raises(fs.ArgumentError, match="before HB1 is not stable in this direction"):
+        fs.hopf_exit(turned, hopf, entry=1, rate=-EPS)
+    with pytest.raises(fs.ArgumentError, match=r"entry = 1; expected .* from -2 to 0"):
+        fs.hopf_exit(turned, hopf, entry=1, rate=EPS)
+    with pytest.raises(fs.ArgumentError, match="expected a positive ratio"):
+        fs.hopf_exit(turned, hopf, entry=-1, rate=EPS, gain=0)
+    with pytest.raises(fs.ArgumentError, match="at a point HB"):
+        fs.hopf_exit(turned, cusp_fold, entry=-1, rate=EPS)
+    other = fs.continue_equilibria(fs.systems.van_der_pol().frozen(), "w", over=(-2, 2))
+    with pytest.raises(fs.ArgumentError, match="is not a point of this diagram"):
+        fs.hopf_exit(turned, other.special("HB")[0], entry=-1, rate=EPS)
+    with pytest.raises(fs.ArgumentError, match="see hopf_exit"):
+        fs.predict_delay(hopf, EPS)
+
+
+EDGE = 0.05
+
+
+@pytest.fixture(scope="module")
+def neuron():
+    fast = fs.systems.fitzhugh_nagumo().frozen()
+    return fast, fs.continue_equilibria(fast, "I", over=(-0.5, 2))
+
+
+def test_the_integral_on_fitzhugh_nagumo(neuron):
+    """∫ Re λ dI from the closed form of the trace, while the pair is complex: Re λ = trace/2."""
+    _, diagram = neuron
+    hopf = diagram.special("HB")[0]
+    law = fs.hopf_exit(diagram, hopf, entry=hopf["I"] - EDGE, rate=0.001)
+
+    def real_part(current):
+        # v − v³/3 − (v + a)/b + I = 0
+        roots = np.roots([-1 / 3, 0, 1 - 1 / 0.8, current - 0.7 / 0.8])
+        (v,) = roots[np.abs(roots.imag) < 1e-12].real
+        return 0.5 * (1 - v**2 - 0.08 * 0.8)
+
+    decay, _ = quad(real_part, hopf["I"] - EDGE, hopf["I"], epsabs=1e-14)
+    assert law.decay == pytest.approx(-decay / 0.001, rel=1e-9)
+    left, _ = quad(real_part, hopf["I"] - EDGE, law.value, epsabs=1e-14)
+    assert left == pytest.approx(0.0, abs=1e-11)
+
+
+def part_at(fast, diagram, law):
+    """Where the difference of two runs from both sides of the sheet is as large as at the entry.
+
+    For the linear motion r'' − T r' + Δ r = 0 beside the sheet, T the trace, the
+    amplitude that WKB conserves is √Ω |(r, (r' − T r/2)/Ω)|, Ω² = Δ − T²/4.
+    """
+    entry, rate = law.entry, law.rate
+    (rest,) = diagram.at(I=entry)
+    slopes = np.array([[1 - rest["v"] ** 2, -1], [0.08, -0.064]])
+    start = rest.state - np.linalg.solve(slopes, np.linalg.solve(slopes, [1, 0])) * rate
+    span = (0, (law.value - entry) / rate)
+    times = np.linspace(*span, 20_001)
+    ramp = fast.ramped("I", rate, start=entry)
+    push = np.array([1e-6, 0])
+    one, other = (fs.simulate(ramp, start + s * push, t=span, tol=1e-16)(times) for s in (1, -1))
+    v, r = one - other
+    bend = 1 - one[0] ** 2
+    trace, slope = bend - 0.064, 0.08 * (v - 0.8 * r)
+    turning = np.sqrt(0.08 - 0.064 * bend - trace**2 / 4)
+    size = np.sqrt(turning) * np.hypot(r, (slope - trace * r / 2) / turning)
+    back = np.flatnonzero((size >= size[0]) & (times > EDGE / rate))[0]
+    return entry + rate * times[back]
+
+
+def test_two_runs_of_fitzhugh_nagumo_part_at_the_exit(neuron):
+    """What the law leaves out, the lag behind the sheet, is of the order of the rate."""
+    fast, diagram = neuron
+    hopf = diagram.special("HB")[0]
+    late = []
+    for rate in (2e-4, 1e-4):
+        law = fs.hopf_exit(diagram, hopf, entry=hopf["I"] - EDGE, rate=rate)
+        assert 2 < law.decay < 30
+        late.append(part_at(fast, diagram, law) - law.value)
+    assert abs(late[0]) < 0.01
+    assert late[1] / late[0] == pytest.approx(0.5, abs=0.05)
