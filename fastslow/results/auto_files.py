@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import FileError, unknown_name
-from fastslow.results.auto_text import AutoCurve, parameters_of, sections_of
+from fastslow.results.auto_text import AutoCurve, eigenvalues_of, parameters_of, sections_of
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import Diagram
 from fastslow.results.outcome import Outcome
@@ -32,6 +32,7 @@ REGION = "S1"
 def read_auto(
     path: str | os.PathLike[str],
     solutions: str | os.PathLike[str] | None = None,
+    diagnostics: str | os.PathLike[str] | None = None,
     *,
     names: Mapping[str, str] | None = None,
     parameter: str | None = None,
@@ -40,8 +41,9 @@ def read_auto(
 
     The special points LP, HB, BP, UZ and EP keep their codes; a curve that ended
     without convergence (MX) has an outcome that says so. Stability is as AUTO
-    found it; eigenvalues are not in these files and are NaN. Values between the
-    points are interpolated, and say so. Curves of periodic solutions, and curves
+    found it; eigenvalues, to five digits, are in the file of diagnostics (NaN
+    without it), and an overlay needs them. Values between the points are
+    interpolated, and say so. Curves of periodic solutions, and curves
     in two parameters, are left out, which the diagram's outcome tells.
 
     Parameters
@@ -51,6 +53,9 @@ def read_auto(
     solutions : str or path, optional
         Such as ``s.fhn`` or ``fort.8``, for the values of the other parameters;
         by default the one beside it, when there is one.
+    diagnostics : str or path, optional
+        Such as ``d.fhn`` or ``fort.9``, for the eigenvalues; by default the one
+        beside it, when there is one.
     names : mapping, optional
         Own names for AUTO's, e.g. ``{"PAR(1)": "w", "U(1)": "x"}``.
     parameter : str, optional
@@ -82,7 +87,7 @@ def read_auto(
     sections = sections_of(source)
     if not sections:
         raise FileError(f"{source} holds no curve; expected a diagram file of AUTO-07p")
-    beside = Path(solutions) if solutions is not None else _beside(source)
+    beside = _beside(source, solutions, "s", "fort.8")
     known = {} if beside is None else parameters_of(beside)
     equilibria = [s for s in sections if _left_out(s) is None]
     if not equilibria:
@@ -96,7 +101,16 @@ def read_auto(
     first = next((known[n] for s in kept for n in s.labels.tolist() if n in known), None)
     constants = {} if first is None else called.values(first, chosen)
     counts: dict[str, int] = {}
-    branches = tuple(_branch(s, called, chosen, constants, counts) for s in kept)
+    shown = _beside(source, diagnostics, "d", "fort.9")
+    n = len(called.states)
+    spectra = [np.full((len(s.points), n), np.nan + 0j) for s in sections]
+    if shown is not None:
+        spectra = eigenvalues_of(shown, sections, n)
+    branches = tuple(
+        _branch(s, called, chosen, constants, values, counts)
+        for s, values in zip(sections, spectra, strict=True)
+        if s in kept
+    )
     rest = [s for s in sections if s not in kept]
     reasons = [_left_out(s) or f"curves over {called.own(s.columns[0])}" for s in rest]
     count = f"{len(kept)} curve{'s' * (len(kept) > 1)}"
@@ -119,13 +133,16 @@ def read_auto(
     )
 
 
-def _beside(path: Path) -> Path | None:
-    """The solutions file that goes with a diagram file."""
-    name = {"fort.7": "fort.8"}.get(path.name)
-    if path.name.startswith("b."):
-        name = f"s{path.name[1:]}"
-    other = path.with_name(name) if name else None
-    return other if other is not None and other.exists() else None
+def _beside(
+    path: Path, given: str | os.PathLike[str] | None, letter: str, plain: str
+) -> Path | None:
+    """The file given, or the one that goes with a diagram file, if there is one."""
+    if given is not None:
+        return Path(given)
+    name = f"{letter}{path.name[1:]}" if path.name.startswith("b.") else plain
+    other = path.with_name(name)
+    named = path.name.startswith("b.") or path.name == "fort.7"
+    return other if named and other.exists() else None
 
 
 def _left_out(section: AutoCurve) -> str | None:
@@ -177,6 +194,7 @@ def _branch(
     called: _Names,
     parameter: str,
     constants: Mapping[str, float],
+    eigenvalues: NDArray[np.complex128],
     counts: dict[str, int],
 ) -> Branch:
     states = tuple(called.own(name) for name in called.states)
@@ -200,7 +218,7 @@ def _branch(
                 points[row, :n].copy(),
                 {**constants, parameter: float(points[row, n])},
                 (REGION,),
-                np.full(n, np.nan + 0j),
+                eigenvalues[row].copy(),
                 tangent[row].copy(),
                 float("nan"),
                 kind != -9,
@@ -214,7 +232,7 @@ def _branch(
         points[:, :n].copy(),
         points[:, n].copy(),
         tangent,
-        np.full((len(points), n), np.nan + 0j),
+        eigenvalues,
         np.full(len(points), REGION),
         SpecialPoints(special),
         tuple(rows),

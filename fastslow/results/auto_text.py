@@ -1,4 +1,4 @@
-"""The text of files of AUTO-07p: bifurcation diagrams (b., fort.7) and solutions (s., fort.8).
+"""The text of files of AUTO-07p: diagrams (b., fort.7), solutions (s.), diagnostics (d.).
 
 The layout is that of the manual (Doedel and Oldeman 2012, AUTO-07P: continuation and
 bifurcation software for ordinary differential equations, chapter 4).
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -38,7 +38,7 @@ class AutoCurve:
         and ``"unames"``.
     columns : tuple of str
         Names of the numbers.
-    points, types, labels : ndarray of int, shape (N,)
+    branches, points, types, labels : ndarray of int, shape (N,)
         Of a stable point the number is negative.
     numbers : ndarray, shape (N, len(columns))
     line : int
@@ -47,6 +47,7 @@ class AutoCurve:
 
     constants: Mapping[str, Any]
     columns: tuple[str, ...]
+    branches: NDArray[np.int64]
     points: NDArray[np.int64]
     types: NDArray[np.int64]
     labels: NDArray[np.int64]
@@ -147,7 +148,7 @@ def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
     table = np.array(values)
     whole = table[:, :LEADING].astype(np.int64)
     yield AutoCurve(
-        dict(now.constants), columns, whole[:, 1], whole[:, 2], whole[:, 3], table[:, LEADING:],
+        dict(now.constants), columns, whole[:, 0], whole[:, 1], whole[:, 2], whole[:, 3], table[:, LEADING:],
         now.line,
     )  # fmt: skip
     now.rows, now.line = [], 0
@@ -212,3 +213,46 @@ def parameters_of(path: Path) -> dict[int, Array]:
             # the parameters stand last
             found[label] = np.array([real(word, path) for word in block[len(block) - count :]])
     return found
+
+
+#: A line of diagnostics with an eigenvalue: its number and its two parts.
+_EIGENVALUE = re.compile(r"\s*-?\d+\s+-?\d+\s+Eigenvalue\s+(\d+):\s+(\S+)\s+(\S+)")
+
+#: A line of diagnostics that repeats a row of the diagram: branch and point.
+_ROW = re.compile(r"\s*(-?\d+)\s+(-?\d+)\s+(?:[A-Z]{2}\s+)?\d+(?:\s+-?\d\.\d+\S*){3}")
+
+
+def eigenvalues_of(path: Path, curves: Sequence[AutoCurve], n: int) -> list[NDArray[np.complex128]]:
+    """Eigenvalues at the points of curves, from the file of diagnostics of the same run.
+
+    Both files go through the curves in the same order; a row of the diagram follows
+    the eigenvalues found at it, the last ones for a point that was looked for.
+
+    Returns
+    -------
+    list of ndarray, shape (N, n) for each curve
+        NaN where the file shows none.
+    """
+    rows: list[tuple[int, int, list[complex]]] = []
+    shown: list[complex] = []
+    for line in lines_of(path):
+        one, row = _EIGENVALUE.match(line), _ROW.match(line)
+        if one is not None:
+            if int(one[1]) == 1:
+                shown = []
+            shown.append(complex(real(one[2], path), real(one[3], path)))
+        elif row is not None:
+            rows.append((abs(int(row[1])), abs(int(row[2])), shown))
+            shown = []
+    tables = []
+    at = 0
+    for curve in curves:
+        table = np.full((len(curve.points), n), np.nan + 0j)
+        for k, place in enumerate(zip(abs(curve.branches), abs(curve.points), strict=True)):
+            there = next((j for j in range(at, len(rows)) if rows[j][:2] == place), None)
+            if there is not None:
+                at = there + 1
+                if len(rows[there][2]) == n:
+                    table[k] = rows[there][2]
+        tables.append(table)
+    return tables

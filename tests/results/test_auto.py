@@ -66,7 +66,17 @@ def test_against_this_package(fhn):
         read, solved = fhn.at(w=value), own.at(w=value)
         assert [p.stability for p in read] == [p.stability for p in solved]
         assert [p["x"] for p in read] == pytest.approx([p["x"] for p in solved], abs=2e-5)
-        assert all(p.interpolated and p.type == "unknown" for p in read)
+        assert [p.type for p in read] == [p.type for p in solved]
+        assert all(p.interpolated for p in read)
+
+
+def test_eigenvalues(fhn):
+    x = fhn["x"]
+    jacobians = np.array([[[1 - v**2, -1], [0.1, -0.2]] for v in x])
+    exact = np.linalg.eigvals(jacobians).astype(complex)
+    apart = np.sort_complex(fhn[0].eigenvalues) - np.sort_complex(exact)
+    # printed with six digits
+    assert np.abs(apart).max() < 1e-5
 
 
 def test_it_lies_under_a_trajectory_and_is_drawn(fhn):
@@ -96,6 +106,9 @@ def test_without_solutions(tmp_path):
     alone = shutil.copy(DATA / "b.fhn", tmp_path / "b.alone")
     diagram = fs.read_auto(alone)
     assert diagram.parameters == {}
+    assert np.isnan(diagram[0].eigenvalues).all()
+    assert [p.stable for p in diagram.at(w=0.3)] == [True, False, True]
+    assert {p.type for p in diagram.at(w=0.3)} == {"unknown"}
     given = fs.read_auto(alone, DATA / "s.fhn")
     assert given.parameters == {"e": 0.1, "a": 0.7, "b": 2.0}
 

@@ -76,7 +76,7 @@ def test_what_stands_in_them(results, diagram, run):
     assert many["hits x - D upwards"].tolist() == results["ensemble"].hits[:, 0, 0].tolist()
     assert results["ensemble"].to_xarray().attrs["D"] == 0.25
     sheets = results["overlay"].to_dict()["sheet"]
-    assert set(sheets) <= {s.label for s in results["overlay"].sheets}
+    assert set(sheets) <= {"", *(s.label for s in results["overlay"].sheets)}
     points = diagram.special.to_frame()
     assert points["label"].tolist() == [p.label for p in diagram.special]
     assert points["A"].unique().tolist() == [-0.6]
