@@ -148,9 +148,15 @@ def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
     table = np.array(values)
     whole = table[:, :LEADING].astype(np.int64)
     yield AutoCurve(
-        dict(now.constants), columns, whole[:, 0], whole[:, 1], whole[:, 2], whole[:, 3], table[:, LEADING:],
+        dict(now.constants),
+        columns,
+        whole[:, 0],
+        whole[:, 1],
+        whole[:, 2],
+        whole[:, 3],
+        table[:, LEADING:],
         now.line,
-    )  # fmt: skip
+    )
     now.rows, now.line = [], 0
 
 
