@@ -322,6 +322,21 @@ class Model:
                         return False
         return True
 
+    @property
+    def equations(self) -> str:
+        """The equations as they were written, as text; parameters stand by name.
+
+        Examples
+        --------
+        >>> x, w, k, t = sp.symbols("x w k t")
+        >>> print(Model({x: w - k * x}, forcing={w: sp.sin(t)}, parameters={k: 2}).equations)
+        x' = -k*x + w
+        w = sin(t)
+        """
+        from fastslow.model.typesetting import equations_text
+
+        return equations_text(tuple(self.rates.items()), tuple(self.forcing.items()))
+
     def to_latex(self) -> str:
         """The equations of every region as LaTeX, for a document with amsmath."""
         from fastslow.model.typesetting import model_latex

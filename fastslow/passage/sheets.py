@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.results.branches import Branch, Sheet
-from fastslow.results.diagrams import Diagram, hermite
+from fastslow.results.diagrams import Diagram
+from fastslow.results.interpolation import hermite
 from fastslow.results.points import SpecialPoint
 from fastslow.results.transitions import StableSheet
 

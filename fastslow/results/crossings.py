@@ -88,3 +88,12 @@ def segments_of(run: Trajectory) -> tuple[Segment, ...]:
         Segment(float(times[i]), float(times[i + 1]), run.modes[mode[first]])
         for i, first in enumerate(starts)
     )
+
+
+def regions_at(run: Trajectory, times: NDArray[np.float64]) -> NDArray[np.str_]:
+    """The region at each of some times; at a crossing the one that is entered."""
+    if not len(run.steps):
+        return np.full(len(times), "")
+    row = np.searchsorted(run.steps[:, 0], times, side="right") - 1
+    mode = run.steps[np.maximum(row, 0), 2].astype(int)
+    return np.array(run.modes)[mode]

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from fastslow.results.delays import Delay
 from fastslow.results.outcome import Outcome
 from fastslow.results.points import SpecialPoint
+from fastslow.results.result import Result
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DelayScaling:
+class DelayScaling(Result):
     """Delays past one special point at m rates, as simulated and as predicted.
 
     Parameters

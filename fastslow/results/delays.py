@@ -6,10 +6,11 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 from fastslow.results.points import SpecialPoint
+from fastslow.results.result import Result
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Delay(ABC):
+class Delay(Result, ABC):
     """How far past a special point a drifting parameter is when something happens.
 
     Parameters

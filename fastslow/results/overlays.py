@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from fastslow.results.diagrams import Diagram
 from fastslow.results.formulas import evaluated
 from fastslow.results.outcome import Outcome
+from fastslow.results.result import Result
+from fastslow.results.tables import Table
 from fastslow.results.trajectories import Trajectory
 from fastslow.results.transitions import Bursting, Moment, Phase, StableSheet, Transition
 
@@ -23,7 +26,7 @@ SHOWN = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Overlay:
+class Overlay(Table, Result):
     """A trajectory laid over the equilibrium diagram of its frozen model.
 
     Parameters
@@ -85,6 +88,24 @@ class Overlay:
     turning: tuple[Moment, ...]
     outcome: Outcome = MEASURED
 
+    _row = "t"
+    _places = ("t",)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Time t, the slow quantity, states, distance, lag, and the label of the sheet followed."""
+        labels = np.array([*(sheet.label for sheet in self.sheets), ""])
+        return {
+            "t": self.time,
+            self.parameter: self.slow,
+            **{name: self.state[:, k] for k, name in enumerate(self.diagram.states)},
+            "distance": self.distance,
+            "lag": self.lag,
+            "sheet": labels[self.followed],
+        }
+
     @property
     def parameter(self) -> str:
         """The slow quantity, the parameter of the diagram."""
@@ -96,7 +117,9 @@ class Overlay:
         return np.array([t.delay for t in self.transitions])
 
     def __getitem__(self, expression: object) -> NDArray[np.float64]:
-        """A state, the slow quantity, or an expression in them and in parameters, shape (N,).
+        """A state, slow quantity, t, distance, lag, or an expression in them, shape (N,).
+
+        Parameters may stand in it too.
 
         Raises
         ------
@@ -106,6 +129,9 @@ class Overlay:
             For what is no expression.
         """
         known = {
+            "t": self.time,
+            "distance": self.distance,
+            "lag": self.lag,
             **self.run.parameters,
             **self.diagram.parameters,
             **{name: self.run[name] for name in self.run.columns},

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,6 @@ from fastslow.simulation.many_arguments import (
     threads_of,
     times_of,
 )
-from fastslow.simulation.outcomes import outcome_of
 from fastslow.simulation.rooms import MODE, STEPS, beginnings, room_for
 from fastslow.simulation.trajectories import (
     SOURCES,
@@ -233,7 +231,10 @@ def simulate_many(
         codes[:, 1],
         (times if len(times) > 1 else times[0], sampled) if samples is not None else None,
         "; ".join(dict.fromkeys(compiled.method for *_, compiled, _ in groups)),
-        partial(outcome_of, modes=modes, limits=limits),
+        limits,
+        {n: v for n, v in model.parameters.items() if n not in swept},
+        model.equations,
+        {"tol": tol, "order": order, "implicit": implicit},
     )
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fastslow.compiled.generic import load_loop
 from fastslow.compiled.series import CompiledSeries, compile_series
 from fastslow.model.model import Model
+from fastslow.results.endings import outcome_of
 from fastslow.results.trajectories import Trajectory
 from fastslow.simulation.arguments import (
     gap_regions,
@@ -25,7 +26,6 @@ from fastslow.simulation.arguments import (
     tolerance,
     whole_number,
 )
-from fastslow.simulation.outcomes import outcome_of
 from fastslow.simulation.rooms import MODE, SAMPLES, STEPS, beginnings, room_for
 from fastslow.simulation.settled import DEGREE, IMPLICIT, SETTLED_ORDER
 
@@ -243,6 +243,14 @@ def simulate(
         crossings,
         _kept(store, len(steps), kept, compiled.order + 1) if dense else None,
         (times[:reached], sampled[:, :reached]) if samples is not None else None,
+        equations=model.equations,
+        settings={
+            "tol": tol,
+            "order": order,
+            "implicit": implicit,
+            "max_steps": limits[0],
+            "max_crossings": limits[1],
+        },
     )
 
 
