@@ -290,7 +290,14 @@ class Model:
 
     @property
     def path(self) -> Named[sp.Expr]:
-        """Of a model frozen along a path: slow quantities as functions of the path's parameters."""
+        """Of a model frozen along a path: slow quantities as functions of the path's parameters.
+
+        Examples
+        --------
+        >>> x, u, g, t = sp.symbols("x u g t")
+        >>> Model({x: u - x}, forcing={u: sp.cos(t) ** 2}).frozen(slow={u: g**2}).path
+        {u: g**2}
+        """
         return Named("slow quantity", self.structure.path)
 
     @property

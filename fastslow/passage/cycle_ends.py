@@ -75,7 +75,7 @@ def cycle_end(p: Passage, e: Excursion) -> CycleEnd:
         words.append(f"nearest special point {closest.label}, {away:.3g} away")
     distance = _saddle(p, e, last.value)
     if distance is not None:
-        words.append(f"a saddle passed at {distance:.2g} of the extent")
+        words.append(f"the last oscillation passes a saddle at {distance:.2g} of the extent")
     if growth > SLOWED and size >= SHRUNK and distance is not None and distance < MET * p.m.radius:
         return CycleEnd("homoclinic (candidate)", None, "; ".join(words))
     steady = not growth > SLOWED and size >= SHRUNK and np.isfinite(growth)

@@ -90,8 +90,8 @@ def refined(time: Array, values: Array, rows: NDArray[np.intp]) -> Array:
     """
     rows = np.clip(rows, 1, len(time) - 2)
     t, v = (np.array([a[rows + k] for k in (-1, 0, 1)]) for a in (time, values))
-    first, second = (v[1] - v[0]) / (t[1] - t[0]), (v[2] - v[1]) / (t[2] - t[1])
-    bend = (second - first) / (t[2] - t[0])
     with np.errstate(divide="ignore", invalid="ignore"):
+        first, second = (v[1] - v[0]) / (t[1] - t[0]), (v[2] - v[1]) / (t[2] - t[1])
+        bend = (second - first) / (t[2] - t[0])
         top = 0.5 * (t[0] + t[1]) - first / (2 * bend)
     return np.asarray(np.where(np.isfinite(top), np.clip(top, t[0], t[2]), t[1]))

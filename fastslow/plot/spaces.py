@@ -8,8 +8,6 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
-from mpl_toolkits.mplot3d import Axes3D
-from mpl_toolkits.mplot3d.art3d import Line3D
 
 from fastslow.plot.branches import runs
 from fastslow.plot.heights import along, at_point, written
@@ -36,23 +34,24 @@ class SpaceDrawing(Drawing):
 
     Parameters
     ----------
-    ax : Axes3D
+    ax : Axes
+        With the projection "3d".
     x, y : str
         What stands over the slow quantity, along the second and the vertical axis.
-    branches : tuple of Line3D
+    branches : tuple of Line2D
         One for each run of constant stability.
-    markers : tuple of Line3D
+    markers : tuple of Line2D
         One for each code of special points.
-    line : Line3D
+    line : Line2D
         The trajectory.
     legend : Legend or None
     """
 
     x: str
     y: str
-    branches: tuple[Line3D, ...]
-    markers: tuple[Line3D, ...]
-    line: Line3D
+    branches: tuple[Line2D, ...]
+    markers: tuple[Line2D, ...]
+    line: Line2D
     legend: Legend | None
 
 
@@ -70,7 +69,19 @@ def draw_space(
     own = ax is None
     if ax is None:
         ax = new_figure(COLUMN, 84 * MM).add_subplot(projection="3d")
-    assert isinstance(ax, Axes3D)
+    return _drawn(lay, x, y, ax, own, label, legend, style)
+
+
+def _drawn(
+    lay: Overlay,
+    x: str,
+    y: str,
+    ax: Any,  # axes in space, which Matplotlib does not type
+    own: bool,
+    label: bool,
+    legend: bool,
+    style: dict[str, Any],
+) -> SpaceDrawing:
     diagram = lay.diagram
     branches: list[Any] = []
     for branch in diagram.branches:

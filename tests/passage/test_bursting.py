@@ -55,7 +55,7 @@ def test_the_end_of_spiking_is_no_bifurcation_of_equilibria(hindmarsh_rose):
     assert str(lay.bursting) == "fold/homoclinic (candidate) bursting"
     evidence = " ".join(lay.bursting.evidence)
     assert "a bifurcation of the cycle, not of equilibria" in evidence
-    assert "a saddle passed at" in evidence
+    assert "passes a saddle at" in evidence
     for phase in [p for p in lay.phases if p.kind == "spiking"][1:-1]:
         # towards a saddle the period grows, the amplitude does not
         assert np.all(np.diff(phase.intervals) > 0)
