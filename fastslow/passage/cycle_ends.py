@@ -89,11 +89,13 @@ def cycle_end(p: Passage, e: Excursion) -> CycleEnd:
 
 
 def _first_reached(p: Passage, e: Excursion) -> Crossing | None:
-    """A crossing in the last oscillation of an interface that no earlier one met."""
+    """A crossing at the end of the last oscillations of an interface that no earlier one met."""
     start, _ = e.rows(p.m)
     crossings = [c for c in p.slow.run.crossings if p.m.time[start] <= c.time]
     before = {c.interface for c in crossings if c.time < e.turns[-2]}
-    last = (c for c in crossings if e.turns[-2] <= c.time <= e.turns[-1])
+    # the one after the last spike is where the cycle is left
+    end = 2.0 * e.turns[-1] - e.turns[-2]
+    last = (c for c in crossings if e.turns[-2] <= c.time <= end)
     return next((c for c in last if c.interface not in before), None)
 
 
