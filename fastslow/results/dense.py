@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 #: A plotted curve may leave the solution by this part of the range of each column.
 FLATNESS = 2e-4
 
-#: Most points that one step is divided into for plotting.
-MOST_POINTS = 48
+#: Most points that one step is divided into for plotting, and least ones for an implicit
+#: step, which may go a good part of a slow period.
+MOST_POINTS, LEAST_POINTS = 48, 16
 
 
 def columns_at(run: Trajectory, times: ArrayLike) -> NDArray[np.float64]:
@@ -62,7 +63,8 @@ def refined_table(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.floa
     reach = np.ptp(run.series[:, :, 0], axis=0)
     reach = np.where(reach > 0, reach, np.abs(bend).max(axis=0) + np.finfo(float).tiny)
     pieces = np.sqrt((bend / (8 * FLATNESS * reach)).max(axis=1))
-    pieces = np.clip(np.nan_to_num(np.ceil(pieces), nan=1.0), 1, MOST_POINTS).astype(int)
+    least = np.where(run.steps[:, 3] == 2, LEAST_POINTS, 1)
+    pieces = np.clip(np.nan_to_num(np.ceil(pieces), nan=1.0), least, MOST_POINTS).astype(int)
     row = np.repeat(np.arange(len(length)), pieces)
     first = np.repeat(np.cumsum(pieces) - pieces, pieces)
     offset = (np.arange(len(row)) - first) * (length / pieces)[row]

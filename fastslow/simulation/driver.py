@@ -8,6 +8,15 @@ from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
 from fastslow.simulation.events import find_event, holds, put_on
 from fastslow.simulation.extremes import widen_extremes
+from fastslow.simulation.implicit_steps import (
+    DAMPING,
+    IMPLICIT,
+    LONGEST_WAIT,
+    PAYS,
+    WAIT,
+    long_step,
+    settled,
+)
 from fastslow.simulation.modes import (
     MANY_MODES,
     NOT_DEFINED,
@@ -30,15 +39,6 @@ from fastslow.simulation.rooms import (
     STEPS,
     USUAL,
     grown,
-)
-from fastslow.simulation.settled import (
-    DAMPING,
-    IMPLICIT,
-    LONGEST_WAIT,
-    PAYS,
-    WAIT,
-    long_step,
-    settled,
 )
 
 #: How the loop ended.
@@ -279,6 +279,7 @@ def drive(
                 W,
                 right,
                 poly,
+                work,
                 matrices,
                 vectors,
                 on,

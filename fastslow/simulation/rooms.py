@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fastslow.compiled.parts import part
 from fastslow.simulation.collocation import memory_size
-from fastslow.simulation.settled import WAIT
+from fastslow.simulation.implicit_steps import WAIT
 
 #: Numbers carried from step to step: by how much the time is late, the usual length of a
 #: step, the time of the last event.

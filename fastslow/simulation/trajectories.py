@@ -26,8 +26,8 @@ from fastslow.simulation.arguments import (
     tolerance,
     whole_number,
 )
+from fastslow.simulation.implicit_steps import DEGREE, IMPLICIT, SETTLED_ORDER
 from fastslow.simulation.rooms import MODE, SAMPLES, STEPS, beginnings, room_for
-from fastslow.simulation.settled import DEGREE, IMPLICIT, SETTLED_ORDER
 
 _ARGUMENTS = (
     "address",
@@ -62,7 +62,7 @@ SOURCES = (
     "fastslow.simulation.modes",
     "fastslow.simulation.polynomials",
     "fastslow.simulation.rooms",
-    "fastslow.simulation.settled",
+    "fastslow.simulation.implicit_steps",
     "fastslow.compiled.parts",
     "fastslow.compiled.pointers",
     "fastslow.compiled.series",

@@ -103,6 +103,7 @@ def long_step(
     W,
     right,
     poly,
+    work,
     matrices,
     vectors,
     on,
@@ -125,6 +126,8 @@ def long_step(
     W, right, poly : float64 arrays
         The series at the beginning, of which the first coefficients are used;
         filled: the short series at the end, and the polynomials of the step.
+    work : float64 array
+        As large; work space.
     matrices : float64 array, shape (2, n_states, n_states + 1)
     vectors : float64 array, shape (5, 1 + n_states + n_forcing or 1 + order, the larger)
         Work space.
@@ -167,6 +170,7 @@ def long_step(
                 stack, gradient,
             )  # fmt: skip
             if j < 0:
+                keep_forcing(address, layout, mode, inputs, parameters, tol, h, poly, work)
                 return h, min(4.0, 0.8 * max(error, 1e-9) ** (-1.0 / (P + Q)))
             # the series goes through events; end a little before this one
             h *= 0.9 * s
@@ -276,6 +280,23 @@ def implicit_step(
         for k in range(P + Q + 2, columns):
             poly[row + k] = 0.0
     return error / tol if error < np.inf else np.inf
+
+
+@part
+def keep_forcing(address, layout, mode, inputs, parameters, tol, h, poly, work):
+    """Let the slow quantities keep their own series where it holds throughout a step.
+
+    They do not depend on the states, so that only the states need be implicit.
+    """
+    n, n_forcing, _, _, order = layout
+    if n_forcing == 0:
+        return
+    call_address(address, mode, inputs, parameters, work)
+    for row in range(n * (order + 1), (n + n_forcing) * (order + 1), order + 1):
+        left = max(abs(work[row + order]) * h, abs(work[row + order - 1])) * h ** (order - 1)
+        if left <= 1e-6 * tol * (1.0 + abs(work[row])):
+            for k in range(order + 1):
+                poly[row + k] = work[row + k]
 
 
 @part
