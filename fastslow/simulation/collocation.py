@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import types
+from numba.extending import register_jitable
 from numba.np.numpy_support import carray
 
 from fastslow.compiled.late import late_function
@@ -36,6 +37,7 @@ ITERATIONS, ATTEMPTS = 40, 100
 SHARE, LEFT = 0.5, 0.02
 
 
+@register_jitable  # type: ignore[untyped-decorator]
 def memory_size(n_states: int, order: int) -> int:
     """Numbers to carry: whether the last step was such a one, its place, lengths and rates."""
     return 5 + n_states * min(order, HIGHEST)

@@ -17,7 +17,7 @@ from fastslow.results.ensembles import Ensemble, regimes
 from fastslow.results.named import Named
 from fastslow.simulation.arguments import tolerance, whole_number
 from fastslow.simulation.grouping import alike
-from fastslow.simulation.lanes import lanes_for
+from fastslow.simulation.lanes import pool_for
 from fastslow.simulation.many_arguments import (
     periods_of,
     spans_of,
@@ -25,7 +25,7 @@ from fastslow.simulation.many_arguments import (
     threads_of,
     times_of,
 )
-from fastslow.simulation.rooms import MODE, STEPS, beginnings, room_for
+from fastslow.simulation.rooms import MODE, STEPS, beginnings
 from fastslow.simulation.trajectories import (
     SOURCES,
     default_order,
@@ -62,7 +62,7 @@ _ARGUMENTS = (
     "carried",
     "counted",
     "codes",
-    "room",
+    "pool",
 )
 
 _LANES = ("fastslow.compiled.lanes", "fastslow.compiled.lane_steps")
@@ -93,8 +93,10 @@ def simulate_many(
 ) -> Ensemble:
     """Follow many trajectories, and keep of each what sums it up.
 
-    Every trajectory is computed as `simulate` does, by itself: it is the same
-    to the last bit whatever the others, their order and the number of threads.
+    Plain steps are taken for several trajectories at once, by vector
+    instructions; crossings and all that is not plain one by one, as `simulate`
+    takes them. A trajectory is the same to the last bit whatever the others,
+    their order and the number of threads, and that of `simulate` to the tolerance.
     One that cannot go on stops nothing; `Ensemble.outcomes` says why it ended.
 
     Parameters
@@ -297,10 +299,7 @@ def _run(
             carried,
             whole,
             codes,
-            (
-                lanes_for(layout, lanes.regions, values.shape[1], count),
-                room_for(layout, sizes, times.shape[1]),
-            ),
+            pool_for(layout, lanes.regions, values.shape[1], count),
         )
 
     size = min(_CHUNK, max(1, count // (4 * threads)))

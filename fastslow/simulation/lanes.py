@@ -19,13 +19,16 @@ from fastslow.compiled.pointers import call_address
 from fastslow.simulation.driver import HANDED_OVER, drive
 from fastslow.simulation.extremes import widen_extremes
 from fastslow.simulation.polynomials import ZERO, sample
-from fastslow.simulation.rooms import CALM, LATE, MODE, SAMPLES, STEPS, USUAL
+from fastslow.simulation.rooms import CALM, LATE, MODE, SAMPLES, STEPS, USUAL, room_for
+
+# made where it is used: arguments on the stack are slow to hand on
+own_room = part(room_for)
 
 #: Trajectories under way at a time, so that some region has one for every lane.
 UNDER_WAY = 8 * WIDTH
 
 
-def lanes_for(
+def pool_for(
     layout: tuple[int, int, int, int, int], regions: int, n_values: int, count: int
 ) -> tuple[NDArray[Any], ...]:
     """Work space of `drive_many`: what is in the lanes, and who waits for what."""
@@ -65,18 +68,19 @@ def drive_many(
     carried,
     counted,
     codes,
-    room,
+    pool,
 ):
     """Follow the trajectories from one number to another to their ends.
 
     The arguments are those of `drive` with one row for each trajectory
     (``times`` may have one row for all); ``lanes`` holds the address of the plain
     steps and the number of their regions, ``codes`` is filled with how each
-    ended, and ``room`` is that of `lanes_for` and that of a single run.
+    ended, ``pool`` comes from `pool_for`.
     """
     n_states = layout[0]
     steps, regions = lanes
-    rows, given, series, held, ready, n_ready, alone = room[0]
+    rows, given, series, held, ready, n_ready, alone = pool
+    room = own_room(layout, sizes, times.shape[1])
     store, following = np.empty(0), bounds[0]
     n_alone = count = mode = ZERO
     for region in range(n_ready.shape[0]):
@@ -108,7 +112,7 @@ def drive_many(
                 extremes[i],
                 hits[i],
                 seen[i],
-                room[1],
+                room,
                 places[i],
                 carried[i],
                 counted[i],
@@ -161,7 +165,7 @@ def drive_many(
             outcome = rows[1 + n_states + step.OUTCOME, lane]
             if outcome == step.REPORTED:
                 report(
-                    rows, lane, i, series, layout, since, times, counted, samples, extremes, room[1]
+                    rows, lane, i, series, layout, since, times, counted, samples, extremes, room
                 )
             elif outcome == step.NOT_TAKEN:
                 put_down(rows, lane, i, limits, since, places, carried, counted, extremes, seen)
