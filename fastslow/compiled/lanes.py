@@ -283,13 +283,17 @@ class Trace:
         return total
 
     def unless(self, clear: Mask, masks: Sequence[Mask], closer: Callable[[], Any]) -> list[Mask]:
-        """The masks, or what a closer look says where one lane at least is not clear."""
+        """The masks, and where one lane at least is not clear what a closer look adds to them.
+
+        A lane that is clear must have all of them already, so that it does not
+        matter to it whether others are looked at.
+        """
         builder = self.builder
         first = builder.block
         look, together = (builder.append_basic_block(name) for name in ("closer", "together"))
         builder.cbranch(clear.everywhere(), together, look)
         builder.position_at_end(look)
-        seen = list(closer())
+        seen = [mask | more for mask, more in zip(masks, closer(), strict=True)]
         last = builder.block
         builder.branch(together)
         builder.position_at_end(together)

@@ -127,8 +127,8 @@ def drive(
         From `room_for`.
     inputs : float64 array, shape (1 + n_states + n_forcing,)
         Time and state, changed here.
-    carried : float64 array, shape (CARRIED,)
-    counted : int64 array, shape (COUNTED,)
+    carried : float64 array, shape (3,)
+    counted : int64 array, shape (5,)
         What is carried from step to step, at first that of `beginnings`; changed here.
     handed : int
         After a plain step in one of so many first modes the run is handed over.

@@ -143,17 +143,16 @@ def test_masks():
     assert compiled(between, 2)(x, 1.0).tolist() == [2, 0, 0, 1, 1, 2, 0]
 
 
-def test_a_closer_look_is_taken_where_one_lane_is_not_clear():
+def test_a_closer_look_adds_where_one_lane_is_not_clear():
     def looked(trace, x):
-        clear = x < 10.0
-        (result,) = trace.unless(clear, [x > 100.0], lambda: [x > 5.0])
+        near = x < 5.0
+        (result,) = trace.unless(near, [near], lambda: [x > 7.0])
         return result.choose(1.0, 0.0)
 
     look = compiled(looked)
-    few = np.arange(WIDTH, dtype=float)
-    assert look(few).tolist() == [0] * WIDTH
-    few[0] = 11.0
-    assert look(few).tolist() == [1.0, *(few[1:] > 5)]
+    for first in (0.0, 5.0, 8.0):
+        lanes = np.array([first, *np.linspace(0, 4, WIDTH - 1)])
+        assert look(lanes).tolist() == [first != 5.0, *[True] * (WIDTH - 1)]
 
 
 def test_what_is_steady_is_computed_before():
