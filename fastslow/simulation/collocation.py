@@ -37,7 +37,7 @@ ITERATIONS, ATTEMPTS = 40, 100
 SHARE, LEFT = 0.5, 0.02
 
 
-@register_jitable  # type: ignore[untyped-decorator]
+@register_jitable
 def memory_size(n_states: int, order: int) -> int:
     """Numbers to carry: whether the last step was such a one, its place, lengths and rates."""
     return 5 + n_states * min(order, HIGHEST)
