@@ -14,6 +14,7 @@ from fastslow.passage.excursions import (
     oscillation_of,
     phase_of,
 )
+from fastslow.passage.predictions import with_laws
 from fastslow.passage.sheets import courses_of
 from fastslow.passage.slow_quantities import SlowQuantity, slow_quantity
 from fastslow.passage.spikes import refined, turns_of
@@ -131,7 +132,7 @@ def overlay(
         lag,
         relaxation,
         tuple(q for q in phases if q.end > q.start),
-        tuple(transitions),
+        tuple(with_laws(p, transitions)),
         bursting_of(bursts, transitions),
         _turning(p),
         _outcome(diagram, run, slow),

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.results.delays import Delay, GapTransit
 from fastslow.results.points import SpecialPoint
 
 #: Stands for a sheet where the fast motion follows none.
@@ -103,6 +104,9 @@ class Transition:
         in units of each state's extent: well below 1 a sheet is followed.
     note : str
         Further evidence in words.
+    law : Delay, optional
+        What the law of delay predicts for a drift at ``slope``: for a jump at the same
+        state as here, for a transit between the same interfaces.
     """
 
     time: float
@@ -118,6 +122,14 @@ class Transition:
     slope: float = float("nan")
     steepness: float = float("nan")
     note: str = ""
+    law: Delay | None = None
+
+    @property
+    def predicted(self) -> float:
+        """The delay that the law predicts, of a transit its width; nan without a law."""
+        if self.law is None:
+            return float("nan")
+        return self.law.transit if isinstance(self.law, GapTransit) else self.law.delay
 
     @property
     def duration(self) -> float:
@@ -142,7 +154,8 @@ class Transition:
             label = self.special.label + (f" ({words})" if words else "")
             parts[0] += f" at {label}, {name} = {self.special[name]:.6g}"
             if np.isfinite(self.delay):
-                parts.append(f"delay {self.delay:.3g}")
+                law = f" (law: {self.predicted:.3g})" if self._compared() else ""
+                parts.append(f"delay {self.delay:.3g}{law}")
         elif self.kind not in ("steep", "end of spiking"):
             parts.append("no special point ends the sheet left")
         if self.kind == "steep":
@@ -155,11 +168,20 @@ class Transition:
                 f"not a bifurcation: {self.duration:.4g} long, {self.width:.4g} wide in {name}, "
                 f"where |d{name}/dt| = {self.slope:.4g}"
             )
+            if isinstance(self.law, GapTransit):
+                parts[-1] += (
+                    f" (law: {self.law.transit_time:.4g} long, {self.law.transit:.4g} wide; "
+                    f"slowly {self.law.asymptotic:.4g})"
+                )
         elif self.land is not None and self.land.time > self.time:
             parts.append(f"lands at {name} = {self.land.value:.6g}, t = {self.land.time:.6g}")
         if self.note and self.kind != "end of spiking":
             parts.append(self.note)
         return change + "; ".join(parts)
+
+    def _compared(self) -> bool:
+        """Whether the law speaks of the delay."""
+        return bool(np.isfinite(self.predicted)) and not isinstance(self.law, GapTransit)
 
 
 @dataclass(frozen=True)
