@@ -21,6 +21,7 @@ from analyses.cases import FASTEST, SHOWN, gear
 from analyses.claims import Claim, Finding
 from fastslow.model.structure import real
 from fastslow.plot.style import (
+    BLACK,
     BLUE,
     FULL,
     GREY,
@@ -238,31 +239,24 @@ def main(folder: Path) -> Route:
     middle.plot(found.time, milli * found.printed, color=VERMILION, linewidth=0.8)
     middle.plot(found.time, milli * found.twist, color=BLUE, linewidth=1.2)
     middle.set_ylabel(r"$\theta$ (mrad)")
-    last = int(0.43 * len(found.time))
-    for words, values, colour in (
-        ("printed", found.printed, VERMILION),
-        ("consistent", found.twist, BLUE),
-    ):
-        middle.annotate(
+    middle.set_ylim(-24, 34)
+    notes = [(middle, 0.96, "consistent (6) and (5)", BLUE), (middle, 0.87, "printed", VERMILION)]
+    for other, colour in ((found.dimensionless, GREY), (found.twist, BLUE)):
+        apart = np.abs(found.inertias - other) / found.scale
+        right.semilogy(found.time, np.maximum(apart, 1e-18), color=colour, linewidth=0.6)
+    right.axhline(AGREEMENT, color=BLACK, linewidth=1.0, linestyle=(0, (4, 2)))
+    right.set_ylim(1e-18, 1e-6)
+    right.set_ylabel(r"distance from (2) in $\theta_\mathrm{s}$")
+    notes += [(right, 0.96, "dimensionless (6)", GREY), (right, 0.87, "twist alone (5)", BLUE)]
+    for ax, height, words, colour in notes:
+        ax.annotate(
             words,
-            (found.time[last], milli * values[last]),
-            xytext=(0, 4),
-            textcoords="offset points",
+            (0.04, height),
+            xycoords="axes fraction",
             color=colour,
             fontsize=SMALL,
-            ha="center",
+            va="top",
         )
-    for other, colour, words in (
-        (found.twist, BLUE, "twist alone (5)"),
-        (found.dimensionless, GREY, "dimensionless (6)"),
-    ):
-        apart = np.abs(found.inertias - other) / found.scale
-        right.semilogy(found.time, np.maximum(apart, 1e-17), color=colour, linewidth=0.7)
-        right.plot([], [], color=colour, linewidth=1.2, label=words)
-    right.axhline(AGREEMENT, color=VERMILION, linewidth=1.0, linestyle=(0, (4, 2)))
-    right.set_ylim(1e-17, 1e-7)
-    right.set_ylabel(r"distance from (2) in $\theta_\mathrm{s}$")
-    right.legend(fontsize=SMALL, frameon=False, loc="lower right")
     for letter, ax in zip("abc", (left, middle, right), strict=True):
         ax.set_title(f"({letter})", loc="left", fontsize=TEXT)
         ax.set_xlabel(r"$t_0$ (s)")
