@@ -15,7 +15,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
@@ -23,7 +25,6 @@ import fastslow as fs
 from analyses.cases import (
     FASTEST,
     GAP,
-    NARROW,
     SHOWN,
     STIFFNESSES,
     TORQUES,
@@ -33,6 +34,8 @@ from analyses.cases import (
 from analyses.passages import OMEGA
 from analyses.regime_maps import critical_ratio
 from fastslow.plot.style import FULL, MM, SMALL, TEXT, VERMILION, dressed, new_figure, save
+from fastslow.results.refined_maps import MapComparison
+from fastslow.systems.gears import SCALINGS
 
 Floats = NDArray[np.float64]
 Values = dict[str, Floats]
@@ -138,8 +141,8 @@ def simulated(plane: CaseMap, scaling: str) -> fs.RefinedMap:
     return fs.refined_map(regimes, plane.over, cells=(8, 7), levels=levels, tol=2e-3)
 
 
-def criterion(plane: CaseMap, scaling: str) -> fs.SlowLoad | Any:
-    """Agreement of the slow-load criterion with the map, as a part of its area."""
+def criterion(plane: CaseMap, scaling: str) -> MapComparison:
+    """What the slow-load criterion, solved in the gap, says at the points of a map."""
     model = gear(scaling)
 
     def predicted(first: Floats, second: Floats) -> list[str]:
@@ -187,10 +190,12 @@ def draw(plane: CaseMap, folder: Path) -> None:
     """Draw a plane under both scalings, with the cases and the criterion."""
     sheet = new_figure(FULL, 78 * MM)
     axes = [dressed(ax) for ax in sheet.subplots(1, 2)]
-    for ax, letter, scaling in zip(axes, "ab", ("consistent", "printed"), strict=True):
+    unnamed: dict[Any, PolyCollection] = {}
+    for ax, letter, scaling in zip(axes, "ab", SCALINGS, strict=True):
         found = simulated(plane, scaling)
         curve = {"slow-load criterion": _curve(plane, scaling)}
-        fs.plot.regime_map(found, ax=ax, curves=curve, marks=plane.marks, legend=False)
+        drawn = fs.plot.regime_map(found, ax=ax, curves=curve, marks=plane.marks, legend=False)
+        unnamed |= {word: drawn.fills[word] for word in found.labels if word not in drawn.names}
         _dress(ax, plane)
         ax.set_title(f"({letter}) {scaling} scaling", loc="left", fontsize=TEXT)
         if plane.name == "map_frequency_width":
@@ -207,10 +212,17 @@ def draw(plane: CaseMap, folder: Path) -> None:
     dashed = Line2D([], [], color=VERMILION, linestyle=(0, (4, 2)), label="slow-load criterion")
     line = Line2D([], [], color="black", linewidth=0.8, label="boundary by simulation")
     dot = Line2D([], [], color="black", marker="o", linestyle="none", markersize=4, label="cases")
+    areas = [
+        Patch(facecolor=area.get_facecolor()[0], hatch=area.get_hatch(), label=str(word))
+        for word, area in unnamed.items()
+    ]
     sheet.legend(
-        handles=[line, dashed, dot], loc="outside lower center", ncols=3, fontsize=SMALL,
+        handles=[line, dashed, dot, *areas],
+        loc="outside lower center",
+        ncols=4,
+        fontsize=SMALL,
         frameon=False,
-    )  # fmt: skip
+    )
     for suffix in ("png", "pdf"):
         save(sheet, folder / f"{plane.name}.{suffix}", SHOWN)
 
@@ -219,6 +231,3 @@ def main(folder: Path) -> None:
     """Draw the maps into a folder."""
     for plane in MAPS:
         draw(plane, folder)
-
-
-__all__ = ["MAPS", "NARROW", "CaseMap", "criterion", "draw", "main", "simulated"]
