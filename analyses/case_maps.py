@@ -33,6 +33,7 @@ from analyses.cases import (
 )
 from analyses.passages import OMEGA
 from analyses.regime_maps import critical_ratio
+from fastslow.plot.maps import FILLS
 from fastslow.plot.style import FULL, MM, SMALL, TEXT, VERMILION, dressed, new_figure, save
 from fastslow.results.refined_maps import MapComparison
 from fastslow.systems.gears import SCALINGS
@@ -195,7 +196,7 @@ def draw(plane: CaseMap, folder: Path) -> None:
         found = simulated(plane, scaling)
         curve = {"slow-load criterion": _curve(plane, scaling)}
         drawn = fs.plot.regime_map(found, ax=ax, curves=curve, marks=plane.marks, legend=False)
-        unnamed |= {word: drawn.fills[word] for word in found.labels if word not in drawn.names}
+        unnamed |= {w: drawn.fills[w] for w in found.labels if w not in drawn.names}
         _dress(ax, plane)
         ax.set_title(f"({letter}) {scaling} scaling", loc="left", fontsize=TEXT)
         if plane.name == "map_frequency_width":
@@ -213,7 +214,7 @@ def draw(plane: CaseMap, folder: Path) -> None:
     line = Line2D([], [], color="black", linewidth=0.8, label="boundary by simulation")
     dot = Line2D([], [], color="black", marker="o", linestyle="none", markersize=4, label="cases")
     areas = [
-        Patch(facecolor=area.get_facecolor()[0], hatch=area.get_hatch(), label=str(word))
+        Patch(facecolor=FILLS[word], hatch=area.get_hatch(), label=str(word))
         for word, area in unnamed.items()
     ]
     sheet.legend(

@@ -17,7 +17,7 @@ from fastslow.systems.gears import Scaling, gear_scales
 #: Gap of figure 5; the source leaves it out.
 GAP = 0.25
 
-#: Values of figures 3, 4 and 5, in this order: half-width of the gap; stiffness, N m/rad; torque, N m.
+#: What figures 3, 4 and 5 vary: half-width of the gap; stiffness, N m/rad; torque, N m.
 WIDTHS = (0.1, 0.25, 0.5)
 STIFFNESSES = (1000, 3000, 7000)
 TORQUES = (10, 50, 100)
@@ -35,7 +35,7 @@ FASTEST = gear_scales().time
 def gear(scaling: str, omega: float = OMEGA, **values: float) -> fs.Model:
     """The dimensionless gear from physical values, with a dimensionless load frequency."""
     chosen: Scaling = "printed" if scaling == "printed" else "consistent"
-    physical = fs.systems.harmonic_gear_physical(chosen, **values)  # type: ignore[arg-type]
+    physical = fs.systems.harmonic_gear_physical(chosen, **values)
     return physical.with_parameters(omega=omega)
 
 

@@ -1,4 +1,4 @@
-"""What the source states, what is computed for it, and the verdict: one record for each sentence."""
+"""What the source states, what is computed for it, and the verdict, as one record."""
 
 from __future__ import annotations
 

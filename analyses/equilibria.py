@@ -71,11 +71,15 @@ def node_load(A: float, D: float) -> float:
     return float((x * x + A) * (x - D))
 
 
+#: Steps fine enough to show where two eigenvalues meet.
+FINE = fs.Continuation(step=0.004, largest_step=0.004)
+
+
 @cache
 def soft_diagram() -> fs.Diagram:
     """Of the gear with A = 0.1 at D = 0.25."""
     model = gear("consistent").with_parameters(A=SOFT, D=GAP)
-    return fs.continue_equilibria(model.frozen(), "w", over=(-0.1, 0.3))
+    return fs.continue_equilibria(model.frozen(), "w", over=(-0.1, 0.3), settings=FINE)
 
 
 def _one_curve(scaling: str) -> Finding:
@@ -132,12 +136,13 @@ def _nodes(scaling: str) -> Finding:
     )
 
 
+@cache
 def claims() -> tuple[Claim, ...]:
     """What the frozen gear of every case is."""
     return (
         Claim(
             "B2",
-            "The frozen gear has one curve of equilibria without a fold: a steep change at the gap, "
+            "The frozen gear has one curve of equilibria without a fold: steep at the gap, "
             "no S-shape.",
             "Diagrams of the nine cases of figures 3 to 5, with all special points; the Clarke "
             "path at the corners.",
@@ -220,10 +225,13 @@ def draw_eigenvalues(folder: Path) -> None:
                 color=GREEN,
                 fontsize=SMALL,
             )
-        for height, words, colour in ((0.93, "Re λ", BLUE), (0.84, "Im λ", VERMILION)):
+        for height, words, colour in (
+            (0.93, "real parts", BLUE),
+            (0.84, "imaginary parts", VERMILION),
+        ):
             ax.annotate(
-                words, (0.03, height), xycoords="axes fraction", color=colour, fontsize=SMALL,
-                va="top",
+                words, (0.5, height), xycoords="axes fraction", color=colour, fontsize=SMALL,
+                va="top", ha="center",
             )  # fmt: skip
         ax.set_xlim(along.min(), along.max())
         ax.set_xlabel("$x$ of the equilibrium")

@@ -188,6 +188,7 @@ def _in_size(scaling: str) -> Finding:
     )
 
 
+@cache
 def claims() -> tuple[Claim, ...]:
     """Figure 3 and section 3.1."""
     runs = (
@@ -214,8 +215,8 @@ def claims() -> tuple[Claim, ...]:
         (
             "8",
             'With larger gaps the teeth "will always be in the form of unilateral impact".',
-            "Five widths from 0.5 up to 1.5 times the widest gap that the load crosses, and the criterion for "
-            "that gap.",
+            "Five widths from 0.5 up to 1.5 times the widest gap that the load crosses, by the "
+            "criterion for that gap.",
             _stays,
             ("map_width_load", "map_frequency_width"),
         ),

@@ -175,6 +175,7 @@ def _speed(scaling: str) -> Finding:
     )
 
 
+@cache
 def claims() -> tuple[Claim, ...]:
     """Figure 5 and section 3.3."""
     runs = (

@@ -45,10 +45,13 @@ def case() -> Case:
 
 
 @cache
-def fold_curve() -> fs.PointBranch:
-    """The fold at x < −D over load and stiffness, up to where it meets the interface."""
-    fold = case().diagram.folds[0]
-    return fs.continue_points(fold, ("w", "A"), over={"w": (-0.3, 0.3), "A": (-1.0, 0.1)})
+def fold_curves() -> tuple[fs.PointBranch, ...]:
+    """The folds over load and stiffness, up to where they meet the interfaces."""
+    over = {"w": (-0.3, 0.3), "A": (-1.0, 0.1)}
+    return tuple(
+        fs.continue_points(fold, ("w", "A"), over=over, virtual=False)
+        for fold in case().diagram.folds
+    )
 
 
 def fold_load(A: Floats) -> Floats:
@@ -65,7 +68,7 @@ def relaxation() -> fs.RefinedMap:
 
 
 def onset() -> tuple[float, float]:
-    """Smallest and largest ratio of the amplitude at which oscillations begin to the fold's load."""
+    """Amplitude at which oscillations begin, in loads of the fold: least and most."""
     lines = relaxation().boundary("bilateral", "meshed upper")
     points = np.concatenate([line.points for line in lines])
     far = points[points[:, 0] < STIFFNESS]
@@ -73,17 +76,16 @@ def onset() -> tuple[float, float]:
     return float(ratios.min()), float(ratios.max())
 
 
+@cache
 def claims() -> tuple[Claim, ...]:
     """Where the S-shape and the relaxation oscillations of this genre begin."""
-    (meet,) = fold_curve().special("BF")
-    lines = fold_curve()
-    real = lines["w"] > 0
-    apart = float(np.abs(lines["w"] - fold_load(lines["A"]))[real & (lines["A"] < -(GAP**2))].max())
+    meets = [point for curve in fold_curves() for point in curve.special("BF")]
+    apart = max(
+        float(np.abs(np.abs(curve["w"]) - fold_load(curve["A"])).max()) for curve in fold_curves()
+    )
     least, most = onset()
     jumps = [t for t in case().lay.transitions if t.kind == "jump"]
-    stiff = [
-        -(GAP**2) / gear(scaling).parameters["A"] * 3000.0 for scaling in SCALINGS
-    ]
+    stiff = [-(GAP**2) / gear(scaling).parameters["A"] * 3000.0 for scaling in SCALINGS]
     return (
         Claim(
             "B4",
@@ -95,12 +97,12 @@ def claims() -> tuple[Claim, ...]:
                     "either",
                     "beyond the paper",
                     "The fold meets the corner at A = {meet:.6f} = −D², which is k1 = {soft:.3g} "
-                    "(consistent) or {hard:.2g} N m/rad (printed) at D = 0.25; the cases have 1000 "
-                    "or more. It is the closed form within {apart:.0e}. For A < −0.6 the gear jumps "
-                    "from side to side when the load swings {least:.2f} to {most:.2f} times as far "
-                    "as the fold; in the case drawn {jumps:.0f} times in three periods.",
+                    "(consistent) or {hard:.2g} N m/rad (printed) at D = 0.25; the cases have "
+                    "1000 or more. It is the closed form within {apart:.0e}. For A < −0.6 the gear "
+                    "jumps from side to side when the load swings {least:.2f} to {most:.2f} times "
+                    "as far as the fold; in the case drawn {jumps:.0f} times in three periods.",
                     {
-                        "meet": meet["A"],
+                        "meet": meets[0]["A"],
                         "soft": stiff[0],
                         "hard": stiff[1],
                         "apart": within(apart),
@@ -119,7 +121,7 @@ def draw_plane(folder: Path) -> None:
     """Draw the folds over load and stiffness, and where relaxation oscillations begin."""
     sheet = new_figure(FULL, 72 * MM)
     left, right = (dressed(ax) for ax in sheet.subplots(1, 2))
-    fs.plot.parameter_plane(fold_curve(), ax=left)
+    fs.plot.parameter_plane(*fold_curves(), ax=left)
     left.set_title("(a)", loc="left", fontsize=TEXT)
     A = np.linspace(*OVER["A"], 200)
     curves = {"load of the fold": (A, fold_load(A))}
@@ -127,9 +129,10 @@ def draw_plane(folder: Path) -> None:
     fs.plot.regime_map(relaxation(), ax=right, curves=curves, marks=marks, legend=False)
     right.annotate(
         "load of the fold",
-        (A[60], float(fold_load(A[60:61])[0])),
-        xytext=(-4, -12),
+        (A[70], float(fold_load(A[70:71])[0])),
+        xytext=(-30, -22),
         textcoords="offset points",
+        arrowprops={"arrowstyle": "-", "linewidth": 0.6},
         fontsize=SMALL,
         ha="right",
     )

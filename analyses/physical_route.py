@@ -141,6 +141,7 @@ def within(difference: float, bound: float = AGREEMENT) -> float:
     return bound if difference <= bound else difference
 
 
+@cache
 def claims() -> tuple[Claim, ...]:
     """The reduction, the scaling, and the two time scales."""
     found, law = route(), gear_scaling()

@@ -120,6 +120,7 @@ def crossing_time(D: float, slope: float) -> float:
     return float(brentq(short, 0.0, 2 + np.sqrt(4 * D / slope), xtol=1e-14))
 
 
+@cache
 def claims() -> tuple[Claim, ...]:
     """The two laws."""
     findings = []
@@ -136,10 +137,10 @@ def claims() -> tuple[Claim, ...]:
             Finding(
                 scaling,
                 "beyond the paper",
-                "The time in the gap, {least:.2f} to {most:.1f}, is that of t²/2 − t + 1 − e^(−t) = "
-                "2D/s within {late:.1%}; √(4D/s) + 1, its limit for a slow load, within {slow:.0%}. "
-                "From k1 = 1000 to 7000 it changes by {stiff:.1%}. The twist is that of the frozen "
-                "gear within {far:.1%}.",
+                "The time in the gap, {least:.2f} to {most:.1f}, is that of t²/2 − t + 1 − e^(−t) "
+                "= 2D/s within {late:.1%}; √(4D/s) + 1, its limit for slow loads, within "
+                "{slow:.0%}. From k1 = 1000 to 7000 it changes by {stiff:.1%}. The twist is that of "
+                "the frozen gear within {far:.1%}.",
                 {
                     "least": float(times.min()),
                     "most": float(times.max()),
@@ -175,8 +176,8 @@ def main(folder: Path) -> None:
                 found = response(name, scaling)
                 ax.plot(found.values, getattr(found, law), color=colour, linewidth=1.0)
                 if not row:
-                    slow = {"linestyle": (0, (4, 2)), "linewidth": 0.8, "color": colour}
-                    ax.plot(found.values, found.transit_slow, **slow)
+                    (slow,) = ax.plot(found.values, found.transit_slow, color=colour)
+                    slow.set(linestyle=(0, (4, 2)), linewidth=0.8)
                 ax.plot(
                     found.values,
                     getattr(found, what),

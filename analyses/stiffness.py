@@ -207,6 +207,7 @@ def _resists(scaling: str) -> Finding:
     )
 
 
+@cache
 def claims() -> tuple[Claim, ...]:
     """Figure 4 and section 3.2."""
     rows = (
@@ -295,5 +296,3 @@ def main(folder: Path) -> None:
     for scaling in SCALINGS:
         draw("stiffness", scaling, folder)
     draw_frequencies(folder)
-
-

@@ -120,9 +120,7 @@ def twist_equation() -> sp.Expr:
     model, ratio = two_inertia_model(), real("N")
     load = {real("w"): model.forcing["w"]}
     rates = {real(name): rate.subs(load) for name, rate in model.rates.items()}
-    return reduce_to(
-        rates, {"theta": outer - inner / ratio, "v": v_outer - v_inner / ratio}
-    )["v"]
+    return reduce_to(rates, {"theta": outer - inner / ratio, "v": v_outer - v_inner / ratio})["v"]
 
 
 def _spring(twist: sp.Expr) -> sp.Expr:
