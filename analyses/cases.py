@@ -22,6 +22,16 @@ WIDTHS = (0.1, 0.25, 0.5)
 STIFFNESSES = (1000, 3000, 7000)
 TORQUES = (10, 50, 100)
 
+#: The regime that the source states for a case.
+STATED = {
+    **{
+        ("gap_width", D): regime
+        for D, regime in zip(WIDTHS, 2 * ["bilateral"] + ["unilateral"], strict=True)
+    },
+    **{("load_amplitude", T): "unilateral" for T in TORQUES},
+    ("load_amplitude", TORQUES[0]): "bilateral",
+}
+
 #: The gap of figure 4.
 NARROW = 0.1
 
@@ -54,7 +64,12 @@ def settings(figure: str, scaling: str) -> list[Setting]:
             for T in TORQUES
         ]
     return [
-        Setting(f"{figure}_{value}_{scaling}", title, gear(scaling, **values))
+        Setting(
+            f"{figure}_{value}_{scaling}",
+            title,
+            gear(scaling, **values),
+            STATED.get((figure, value), ""),
+        )
         for value, title, values in given
     ]
 

@@ -133,5 +133,5 @@ def write_docs(drawn: Path, docs: Path) -> None:
     for name in dict.fromkeys(name for claim in claims for name in claim.figures):
         with Image.open(drawn / f"{name}.png") as image:
             image.thumbnail((1000, 1000))
-            few = image.convert("RGB").quantize(64)
+            few = image.convert("RGB").quantize(200)
             few.save(docs / "figures" / f"{name}.png", optimize=True)

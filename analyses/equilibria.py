@@ -125,7 +125,7 @@ def _nodes(scaling: str) -> Finding:
         scaling,
         "beyond the paper",
         "A node beside the gap needs A < 1/4 − D²: k1 below {k1:.3g} N m/rad at the gap of "
-        "{gap:.4f} rad that D = {D} is. The cases have A from {smallest:.3g} on: no change between "
+        "{gap:.2g} rad that D = {D} is. The cases have A from {smallest:.3g} on: no change between "
         "node and focus but in the gap itself.",
         {
             "k1": (0.25 - GAP**2) / per,
@@ -226,8 +226,8 @@ def draw_eigenvalues(folder: Path) -> None:
                 fontsize=SMALL,
             )
         for height, words, colour in (
-            (0.93, "real parts", BLUE),
-            (0.84, "imaginary parts", VERMILION),
+            (0.93, "real", BLUE),
+            (0.84, "imaginary", VERMILION),
         ):
             ax.annotate(
                 words, (0.5, height), xycoords="axes fraction", color=colour, fontsize=SMALL,

@@ -25,7 +25,7 @@ FIGURES = ("gap_width_consistent", "gap_width_printed")
 #: Frequencies that the source allows, 0.1 to 1 rad/s, and far beyond: ω_o up to 6, and up to 3
 #: for the stiffer gear of the printed scaling.
 ALLOWED = FASTEST * np.geomspace(0.1, 1.0, 10)
-BEYOND = {"consistent": np.arange(0.02, 6.01, 0.02), "printed": np.arange(0.02, 3.01, 0.02)}
+BEYOND = {"consistent": np.arange(0.02, 6.01, 0.02), "printed": np.arange(0.1, 3.01, 0.1)}
 
 
 @cache
@@ -229,7 +229,7 @@ def claims() -> tuple[Claim, ...]:
         ),
         (
             "10",
-            '"The magnitude of the corresponding response change will not be too large."',
+            'With D "the magnitude of the corresponding response change will not be too large".',
             "Peak to peak over the last period; little is less than by a half.",
             _in_size,
             (*FIGURES, "responses"),

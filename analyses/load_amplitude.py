@@ -169,7 +169,7 @@ def _speed(scaling: str) -> Finding:
     return Finding(
         scaling,
         "holds" if speeds == sorted(speeds) else "does not hold",
-        "What the vibration adds to the output speed, peak to peak: {light:.4f}, {middle:.2f} and "
+        "What the vibration adds to the output speed, peak to peak: {light:.2g}, {middle:.2f} and "
         "{heavy:.2f} rad/s; impacts, not the size of the load, make it jump.",
         {"light": speeds[0], "middle": speeds[1], "heavy": speeds[2]},
     )

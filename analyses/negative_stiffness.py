@@ -121,7 +121,8 @@ def draw_plane(folder: Path) -> None:
     """Draw the folds over load and stiffness, and where relaxation oscillations begin."""
     sheet = new_figure(FULL, 72 * MM)
     left, right = (dressed(ax) for ax in sheet.subplots(1, 2))
-    fs.plot.parameter_plane(*fold_curves(), ax=left)
+    fs.plot.parameter_plane(*fold_curves(), ax=left, legend=False)
+    left.annotate("folds", (0.5, 0.35), xycoords="axes fraction", fontsize=SMALL, ha="center")
     left.set_title("(a)", loc="left", fontsize=TEXT)
     A = np.linspace(*OVER["A"], 200)
     curves = {"load of the fold": (A, fold_load(A))}
@@ -130,11 +131,10 @@ def draw_plane(folder: Path) -> None:
     right.annotate(
         "load of the fold",
         (A[70], float(fold_load(A[70:71])[0])),
-        xytext=(-30, -22),
+        xytext=(24, 26),
         textcoords="offset points",
         arrowprops={"arrowstyle": "-", "linewidth": 0.6},
         fontsize=SMALL,
-        ha="right",
     )
     right.set_title("(b)", loc="left", fontsize=TEXT)
     for suffix in ("png", "pdf"):

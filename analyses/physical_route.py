@@ -196,7 +196,7 @@ def claims() -> tuple[Claim, ...]:
         ),
         Claim(
             "4",
-            'Load and natural frequency "involve a magnitude difference": the gear is fast-slow.',
+            'Excitation and natural frequency: this "involves a magnitude difference" (fast-slow).',
             "Natural frequency at the corner, √(A + D² − 1/4), over ω_o at ω = 1 rad/s, D = 0.25.",
             tuple(
                 Finding(
@@ -240,7 +240,7 @@ def main(folder: Path) -> Route:
     middle.plot(found.time, milli * found.printed, color=VERMILION, linewidth=0.8)
     middle.plot(found.time, milli * found.twist, color=BLUE, linewidth=1.2)
     middle.set_ylabel(r"$\theta$ (mrad)")
-    middle.set_ylim(-24, 34)
+    middle.set_ylim(-24, 44)
     notes = [(middle, 0.96, "consistent (6) and (5)", BLUE), (middle, 0.87, "printed", VERMILION)]
     for other, colour in ((found.dimensionless, GREY), (found.twist, BLUE)):
         apart = np.abs(found.inertias - other) / found.scale

@@ -139,8 +139,8 @@ def claims() -> tuple[Claim, ...]:
                 "beyond the paper",
                 "The time in the gap, {least:.2f} to {most:.1f}, is that of t²/2 − t + 1 − e^(−t) "
                 "= 2D/s within {late:.1%}; √(4D/s) + 1, its limit for slow loads, within "
-                "{slow:.0%}. From k1 = 1000 to 7000 it changes by {stiff:.1%}. The twist is that of "
-                "the frozen gear within {far:.1%}.",
+                "{slow:.0%}. From k1 = 1000 to 7000 it changes by {stiff:.1%}. The twist is that "
+                "of the frozen gear within {far:.1%}.",
                 {
                     "least": float(times.min()),
                     "most": float(times.max()),

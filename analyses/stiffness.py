@@ -161,7 +161,7 @@ def _faster(scaling: str) -> Finding:
         "holds only where" if soft.frequency < hard.frequency else "holds",
         "Measured in contact: {soft:.2f}, {middle:.2f} and {hard:.2f}, the smaller k1 the slower, "
         "√(3x² − 2Dx + A − 1/4) within {off:.1%}. The softest gear becomes the fastest only above "
-        "w = {load:.4g}, which takes T_am = {torque:.3g} N m; the largest load here is {top:.3g}.",
+        "w = {load:.4g}, which takes T_am = {torque:.0f} N m; the largest load here is {top:.3g}.",
         {
             "soft": soft.frequency,
             "middle": middle.frequency,
