@@ -203,7 +203,13 @@ def claims() -> tuple[Claim, ...]:
             runs + " Where it holds: a refined map over ω_o and C/B, three runs at each point; "
             "and frequencies far beyond those that the source allows.",
             _unilateral,
-            ("gap_region", "regimes_width", "map_width_load", "map_frequency_width"),
+            (
+                "gap_region",
+                "regimes_width",
+                "regimes_frequency",
+                "map_width_load",
+                "map_frequency_width",
+            ),
         ),
         (
             "7",
