@@ -65,8 +65,8 @@ class Row:
         Boundary equilibria and folds of the diagram.
     crossings : int
         Crossings of interfaces over the whole run.
-    jumps, passages : int
-        Transitions at a fold, and at a boundary equilibrium.
+    jumps, transits : int
+        Transitions at a fold, and across the gap.
     regime : str
         Over the last period.
     stated : str
@@ -84,7 +84,7 @@ class Row:
     LP: int
     crossings: int
     jumps: int
-    passages: int
+    transits: int
     regime: str
     stated: str
     largest_delay: float
@@ -116,7 +116,7 @@ def row(case: Case) -> Row:
         len(case.diagram.folds),
         len(case.run.crossings),
         kinds.count("jump"),
-        kinds.count("crossing"),
+        kinds.count("transit"),
         case.run.regime or "none",
         case.setting.stated,
         float(np.nanmax(delays)) if np.isfinite(delays).any() else float("nan"),

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from fastslow.errors import (
         ArgumentError,
         FastSlowError,
+        FileError,
+        MissingPackageError,
         ModelError,
         UnknownNameError,
     )
@@ -29,10 +31,12 @@ if TYPE_CHECKING:
     from fastslow.passage.regimes import regime_map
     from fastslow.passage.scaling_runs import delay_scaling
     from fastslow.passage.slow_loads import slow_load_criterion, slow_load_gap
+    from fastslow.results.auto_files import read_auto
     from fastslow.results.branches import Branch
     from fastslow.results.delay_scalings import DelayScaling
     from fastslow.results.diagrams import Diagram
     from fastslow.results.ensembles import Ensemble
+    from fastslow.results.files import load
     from fastslow.results.overlays import Overlay
     from fastslow.results.point_branches import PointBranch
     from fastslow.results.points import Equilibrium, SpecialPoint
@@ -65,6 +69,8 @@ _HOME = {
     "Ensemble": "results.ensembles",
     "Equilibrium": "results.points",
     "FastSlowError": "errors",
+    "FileError": "errors",
+    "MissingPackageError": "errors",
     "Model": "model.model",
     "ModelError": "errors",
     "Overlay": "results.overlays",
@@ -87,10 +93,12 @@ _HOME = {
     "equilibria": "diagrams.solving",
     "export": "symbolic.sources",
     "hopf_exit": "passage.hopf_delays",
+    "load": "results.files",
     "nondimensionalise": "symbolic.scaling",
     "overlay": "passage.overlays",
     "plot": "",
     "predict_delay": "passage.delay_laws",
+    "read_auto": "results.auto_files",
     "reduce_to": "symbolic.reduction",
     "refined_map": "sweeps.refinement",
     "regime_map": "passage.regimes",
@@ -113,6 +121,8 @@ __all__ = [
     "Ensemble",
     "Equilibrium",
     "FastSlowError",
+    "FileError",
+    "MissingPackageError",
     "Model",
     "ModelError",
     "Overlay",
@@ -136,10 +146,12 @@ __all__ = [
     "equilibria",
     "export",
     "hopf_exit",
+    "load",
     "nondimensionalise",
     "overlay",
     "plot",
     "predict_delay",
+    "read_auto",
     "reduce_to",
     "refined_map",
     "regime_map",

@@ -25,6 +25,14 @@ class ArgumentError(FastSlowError, ValueError):
     """An argument has the wrong value, shape or range."""
 
 
+class FileError(FastSlowError, OSError):
+    """A file cannot be written or read: it is missing, cut short, foreign or newer."""
+
+
+class MissingPackageError(FastSlowError, ImportError):
+    """A package of an extra is needed that is not installed."""
+
+
 def unknown_name(kind: str, name: object, valid: Iterable[object]) -> UnknownNameError:
     """Build the error for a name that is not valid, with the nearest valid one.
 

@@ -41,6 +41,7 @@ def warm(*models: Model) -> Path:
     x, v, w = sp.symbols("x v w")
     # planar, with an interface, a fold and no polynomial: every common loop has its turn
     common = Model({x: v, v: w - v - sp.sin(x) - sp.Abs(x)}, forcing={w: sp.sin(sp.Symbol("t"))})
+    simulate(Model({x: -sp.gamma(2 + x)}), [0.0], t=(0.0, 1e-6), max_steps=1)
     for model in (common, *models):
         _use(model)
     return cache_directory()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,6 +12,7 @@ import sympy as sp
 from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.pycode import PythonCodePrinter
 
+from fastslow.compiled.functions import refusal, teach_functions
 from fastslow.compiled.store import load_generated
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
@@ -120,12 +120,7 @@ def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -
         lines = [f"{symbol} = {printer.doprint(value)}" for symbol, value in shared]
         lines += [f"out[{k}] = {_float(printer.doprint(v))}" for k, v in enumerate(results)]
     except PrintMethodNotImplementedError:
-        names = {str(f.func) for v in ordered for f in v.atoms(sp.Function)}
-        known = {f for f in names if f in vars(math) or f in ("Abs", "sign")}
-        raise ModelError(
-            f"the rates or their derivatives contain {', '.join(sorted(names - known))}, which "
-            "cannot be compiled; expected elementary functions"
-        ) from None
+        raise refusal(ordered) from None
     return lines
 
 
@@ -148,14 +143,19 @@ class _Printer(PythonCodePrinter):
         return self._print_Rational(expr) if abs(expr) >= 2**53 else str(expr.p)
 
 
+teach_functions(_Printer)
+
+
 def _float(code: str) -> str:
     return f"{code}.0" if code.lstrip("-").isdigit() else code
 
 
 def _source(bodies: Sequence[list[str]], unknowns: int, parameters: int) -> str:
+    uses_special = any("special." in line for body in bodies for line in body)
     lines = [
         "import math",
         "from numba import cfunc",
+        *(["from fastslow.compiled import special"] if uses_special else []),
         "from fastslow.compiled.pointers import SIGNATURE",
         "",
         "@cfunc(SIGNATURE, cache=True, error_model='numpy')",

@@ -50,14 +50,15 @@ def load_loop(
     text = _ENTRY.format(
         module=module,
         function=function,
-        digest=_digest((module, *sources)),
+        digest=digest_of((module, *sources)),
         arguments=", ".join(arguments),
     )
     loaded: Callable[..., Any] = load_generated(text, function).entry
     return loaded
 
 
-def _digest(modules: Sequence[str]) -> str:
+def digest_of(modules: Sequence[str]) -> str:
+    """Digest of the sources of modules."""
     digest = hashlib.sha256()
     for name in modules:
         spec = importlib.util.find_spec(name)

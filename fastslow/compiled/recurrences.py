@@ -17,37 +17,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import sympy as sp
-from sympy.core.function import ArgumentIndexError
+from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.pycode import PythonCodePrinter
 
-from fastslow.errors import ModelError
-
-#: How the value of a function is computed; its higher coefficients follow from its derivative.
-VALUES = {
-    sp.exp: "math.exp({})",
-    sp.log: "math.log({})",
-    sp.sin: "math.sin({})",
-    sp.cos: "math.cos({})",
-    sp.tan: "math.tan({})",
-    sp.cot: "1.0 / math.tan({})",
-    sp.sec: "1.0 / math.cos({})",
-    sp.csc: "1.0 / math.sin({})",
-    sp.asin: "math.asin({})",
-    sp.acos: "math.acos({})",
-    sp.atan: "math.atan({})",
-    sp.atan2: "math.atan2({}, {})",
-    sp.sinh: "math.sinh({})",
-    sp.cosh: "math.cosh({})",
-    sp.tanh: "math.tanh({})",
-    sp.coth: "1.0 / math.tanh({})",
-    sp.sech: "1.0 / math.cosh({})",
-    sp.csch: "1.0 / math.sinh({})",
-    sp.asinh: "math.asinh({})",
-    sp.acosh: "math.acosh({})",
-    sp.atanh: "math.atanh({})",
-    sp.erf: "math.erf({})",
-    sp.erfc: "math.erfc({})",
-}
+from fastslow.compiled.functions import refusal, slope_of, teach_functions, value_code
 
 
 class ScalarPrinter(PythonCodePrinter):
@@ -74,21 +47,17 @@ class ScalarPrinter(PythonCodePrinter):
             return f"math.sqrt({inside})"
         return f"math.pow({inside}, {self._print(power)})"
 
-    def _print_Function(self, expr: sp.Function) -> str:
-        if expr.func not in VALUES:
-            raise ModelError(
-                f"the function {expr.func} in {expr} cannot be compiled; expected one of "
-                + ", ".join(sorted(f.__name__ for f in VALUES))
-            )
-        return f"({VALUES[expr.func].format(*map(self._print, expr.args))})"
 
-
-for _function in VALUES:
-    setattr(ScalarPrinter, f"_print_{_function.__name__}", ScalarPrinter._print_Function)
+teach_functions(ScalarPrinter)
 
 
 def scalar_code(expression: sp.Expr) -> str:
-    """Python source of an expression without time, every number a float.
+    """Python source of an expression of numbers, every number a float.
+
+    Raises
+    ------
+    ModelError
+        For a function that cannot be compiled.
 
     Examples
     --------
@@ -96,7 +65,10 @@ def scalar_code(expression: sp.Expr) -> str:
     >>> scalar_code(A**2 / 3)
     '(0.3333333333333333)*((A) * (A))'
     """
-    return str(ScalarPrinter({"fully_qualified_modules": True}).doprint(expression))
+    try:
+        return str(ScalarPrinter({"fully_qualified_modules": True}).doprint(expression))
+    except PrintMethodNotImplementedError:
+        raise refusal([expression]) from None
 
 
 @dataclass
@@ -308,26 +280,24 @@ class Recurrences:
         return row
 
     def _function(self, expression: sp.Expr) -> int:
-        if expression.func not in VALUES:
-            raise ModelError(
-                f"the function {expression.func} in {expression} has no Taylor recurrence; "
-                "expected one of " + ", ".join(sorted(f.__name__ for f in VALUES))
-            )
-        arguments = [self.row(a) for a in expression.args]
-        value = VALUES[expression.func].format(*(self.at(a, "0") for a in arguments))
+        arguments = {a: self.row(a) for a in expression.args if not self.is_scalar(a)}
+        value = value_code(
+            expression,
+            lambda a: self.at(arguments[a], "0") if a in arguments else self.scalar(a),
+        )
         if isinstance(expression, sp.log):
-            return self._logarithm(expression, arguments[0], value)
+            return self._logarithm(expression, arguments[expression.args[0]], value)
         row = self._place(expression)
-        node = Node(row, value, [], tuple(arguments))
+        node = Node(row, value, [], tuple(arguments.values()))
         self.nodes.append(node)
         lines: list[str] = ["s = 0.0"]
-        for index, (argument, u) in enumerate(zip(expression.args, arguments, strict=True), 1):
-            if self.is_scalar(argument):
+        for index, argument in enumerate(expression.args, 1):
+            if argument not in arguments:
                 continue
-            slope = _slope(expression, index)
+            slope = slope_of(expression, index)
             steady = self._steady_rate(argument)
             g = self.row(slope)
-            U, G = (r * (self.order + 1) for r in (u, g))
+            U, G = (r * (self.order + 1) for r in (arguments[argument], g))
             if steady is not None:
                 lines.append(f"s += {steady} * W[{G} + k - 1]")
             else:
@@ -378,10 +348,3 @@ class Recurrences:
 
 def _inverse(factor: sp.Expr) -> bool:
     return isinstance(factor, sp.Pow) and factor.exp.is_Number and bool(factor.exp.is_negative)
-
-
-def _slope(expression: sp.Expr, index: int) -> sp.Expr:
-    try:
-        return sp.sympify(expression.fdiff(index))
-    except ArgumentIndexError:
-        raise ModelError(f"{expression} has no derivative that could be compiled") from None

@@ -14,17 +14,18 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from fastslow.compiled.functions import without_recurrence
 from fastslow.compiled.recurrences import Recurrences, scalar_code
 from fastslow.compiled.store import load_generated
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
 
-_HEADER = '''"""Taylor coefficients of order {order} for {modes} modes of {states} states."""
+_HEADER = '''"""{what} for {modes} modes of {states} states."""
 import math
 
 from numba import cfunc
 
-from fastslow.compiled.pointers import SIGNATURE
+{special}from fastslow.compiled.pointers import SIGNATURE
 
 
 @cfunc(SIGNATURE, cache=True, error_model="numpy")
@@ -37,6 +38,10 @@ def series(mode, inputs, parameters, W):
 
 #: Order of the short series, which a mode and the number of all modes ask for together.
 SHORT = 4
+
+
+#: Highest degree of the collocation polynomials that take the place of a Taylor series.
+COLLOCATION = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +72,10 @@ class CompiledSeries:
         Region names; sliding between A and B is named ``"A|B"``.
     continuous : ndarray of bool, shape (n_interfaces,)
         Whether the rates are continuous across each interface.
+    values_only : tuple of str
+        Functions without a Taylor recurrence. Where there are any, the compiled function
+        fills the values of all rows and the rates of states and interface functions alone,
+        and its last coefficient is NaN.
     """
 
     address: int
@@ -79,6 +88,15 @@ class CompiledSeries:
     signs: NDArray[np.int64]
     modes: tuple[str, ...]
     continuous: NDArray[np.bool_]
+    values_only: tuple[str, ...] = ()
+
+    @property
+    def method(self) -> str:
+        """How this model is stepped, in words."""
+        if self.values_only:
+            names = ", ".join(self.values_only)
+            return f"collocation of order {self.order} (no Taylor recurrence for {names})"
+        return f"Taylor series of order {self.order}"
 
     def parameter_array(self, model: Model) -> NDArray[np.float64]:
         """Parameter values in the order that the compiled function expects, never empty."""
@@ -86,7 +104,7 @@ class CompiledSeries:
 
 
 @dataclass(frozen=True)
-class _Mode:
+class Mode:
     """One smooth motion: where it holds, its rates, its slow quantities and sliding drifts."""
 
     name: str
@@ -97,13 +115,13 @@ class _Mode:
 
 
 @dataclass(frozen=True)
-class _Equations:
+class Equations:
     """Everything that the generated source depends on."""
 
     states: tuple[sp.Symbol, ...]
     quantities: tuple[sp.Symbol, ...]
     interfaces: tuple[sp.Expr, ...]
-    modes: tuple[_Mode, ...]
+    modes: tuple[Mode, ...]
     order: int
 
     @property
@@ -112,9 +130,9 @@ class _Equations:
         used = set().union(*(h.free_symbols for h in self.interfaces))
         for mode in self.modes:
             used |= set().union(*(e.free_symbols for e in (*mode.rates, *mode.laws)))
-        return tuple(sorted(s.name for s in used - {*self.states, *self.quantities, TIME}))
+        return tuple(sorted(s.name for s in used - self.moving))
 
-    def renamed(self) -> _Equations:
+    def renamed(self) -> Equations:
         """The same with symbols that are valid in any source: y0, w0, p0, …."""
         groups = {"y": self.states, "w": self.quantities, "p": map(real, self.parameters)}
         new = {s: real(f"{g}{i}") for g, symbols in groups.items() for i, s in enumerate(symbols)}
@@ -128,7 +146,7 @@ class _Equations:
             )
             for mode in self.modes
         )
-        return _Equations(
+        return Equations(
             tuple(new[s] for s in self.states),
             tuple(new[s] for s in self.quantities),
             rename(self.interfaces),
@@ -136,38 +154,56 @@ class _Equations:
             self.order,
         )
 
+    @property
+    def moving(self) -> set[sp.Symbol]:
+        """All symbols that change with time."""
+        return {*self.states, *self.quantities, TIME}
 
-_compiled: dict[_Equations, CompiledSeries] = {}
+    @property
+    def without_recurrence(self) -> tuple[str, ...]:
+        """Names of functions for which a Taylor series cannot be generated."""
+        used = [*self.interfaces]
+        for mode in self.modes:
+            used += [*mode.rates, *mode.laws, *mode.drifts]
+        return tuple(sorted(set().union(*(without_recurrence(e, self.moving) for e in used))))
+
+
+_compiled: dict[Equations, CompiledSeries] = {}
 
 
 def compile_series(model: Model, order: int) -> CompiledSeries:
     """Compile the Taylor series of a model, or find it compiled already.
 
+    A model with a function that has no recurrence is compiled to values and rates.
+
     Parameters
     ----------
     model : Model
     order : int
-        Highest coefficient.
+        Highest coefficient, lowered to `COLLOCATION` where no Taylor series exists.
 
     Raises
     ------
     ModelError
-        If a function in the equations has no recurrence.
+        If a function in the equations cannot be compiled.
     """
-    equations = _equations(model, order)
+    equations = equations_of(model, order)
     if equations not in _compiled:
         sliding = tuple(_sliding_modes(equations, model))
         whole = replace(equations, modes=equations.modes + sliding)
+        if whole.without_recurrence:
+            whole = replace(whole, order=min(order, COLLOCATION))
         _compiled[equations] = _compile(
             whole, np.array(list(model.continuous.values()), dtype=bool)
         )
     return _compiled[equations]
 
 
-def _equations(model: Model, order: int) -> _Equations:
+def equations_of(model: Model, order: int) -> Equations:
+    """What the generated source of a model depends on, its regions alone as modes."""
     names = (*model.states, *model.slow_states)
     modes = tuple(
-        _Mode(
+        Mode(
             region.name,
             tuple(region.signs.values()),
             tuple(region.rates[n] for n in names),
@@ -175,7 +211,7 @@ def _equations(model: Model, order: int) -> _Equations:
         )
         for region in model.regions.values()
     )
-    return _Equations(
+    return Equations(
         tuple(map(real, names)),
         tuple(map(real, model.forcing)),
         tuple(i.function for i in model.interfaces.values()),
@@ -184,7 +220,7 @@ def _equations(model: Model, order: int) -> _Equations:
     )
 
 
-def _sliding_modes(equations: _Equations, model: Model) -> Iterator[_Mode]:
+def _sliding_modes(equations: Equations, model: Model) -> Iterator[Mode]:
     """Filippov's sliding motion along each discontinuity, for each pair of regions at it.
 
     With the drifts a, b of h in the regions h > 0 and h < 0 the motion is
@@ -211,10 +247,10 @@ def _sliding_modes(equations: _Equations, model: Model) -> Iterator[_Mode]:
                 for f, g in zip(above.rates, below.rates, strict=True)
             )
             signs = (*above.signs[:j], 0, *above.signs[j + 1 :])
-            yield _Mode(f"{above.name}|{below.name}", signs, rates, above.laws, (a, b))
+            yield Mode(f"{above.name}|{below.name}", signs, rates, above.laws, (a, b))
 
 
-def _drift(equations: _Equations, function: sp.Expr, mode: _Mode) -> sp.Expr:
+def _drift(equations: Equations, function: sp.Expr, mode: Mode) -> sp.Expr:
     """Rate of change of an interface function along a mode."""
     rates = dict(zip(equations.states, mode.rates, strict=True))
     rates.update(
@@ -229,7 +265,7 @@ def _short(expression: sp.Expr) -> sp.Expr:
     return sp.cancel(expression) if sp.count_ops(expression) <= 150 else expression
 
 
-def _compile(equations: _Equations, continuous: NDArray[np.bool_]) -> CompiledSeries:
+def _compile(equations: Equations, continuous: NDArray[np.bool_]) -> CompiledSeries:
     parameters = equations.parameters
     source, n_rows = _source(equations.renamed(), len(parameters))
     module = load_generated(source, "series")
@@ -246,33 +282,41 @@ def _compile(equations: _Equations, continuous: NDArray[np.bool_]) -> CompiledSe
         signs.reshape(len(equations.modes), p),
         tuple(mode.name for mode in equations.modes),
         continuous,
+        equations.without_recurrence,
     )
 
 
-def _source(equations: _Equations, n_parameters: int) -> tuple[str, int]:
+def _source(equations: Equations, n_parameters: int) -> tuple[str, int]:
     """Source of the generated module, and the number of rows it fills."""
     lines = [f"    p{i} = parameters[{i}]" for i in range(n_parameters)]
     n_rows = 0
     bodies: list[list[str]] = []
+    alone = bool(equations.without_recurrence)
     for mode in equations.modes:
-        body, rows = _mode_source(equations, mode)
+        body, rows = _values_source(equations, mode) if alone else mode_source(equations, mode)
         bodies.append(body)
         n_rows = max(n_rows, rows)
     bodies += [_gradient_source(equations, h) for h in equations.interfaces]
     for number, body in enumerate(bodies):
         lines.append(f"    {'if' if number == 0 else 'elif'} mode == {number}:")
         lines += [f"        {line}" for line in body]
+    text = "\n".join(lines) + "\n"
+    what = "Values and rates" if alone else f"Taylor coefficients of order {equations.order}"
+    special = "from fastslow.compiled import special\n" if "special." in text else ""
     header = _HEADER.format(
+        what=what,
+        special=special,
         order=equations.order,
         modes=len(equations.modes),
         states=len(equations.states),
         short=min(SHORT, equations.order),
         short_from=len(bodies),
     )
-    return header + "\n".join(lines) + "\n", n_rows
+    return header + text, n_rows
 
 
-def _mode_source(equations: _Equations, mode: _Mode) -> tuple[list[str], int]:
+def mode_source(equations: Equations, mode: Mode) -> tuple[list[str], int]:
+    """Source lines that fill the series of one mode, and the number of its rows."""
     m, q, p = (len(g) for g in (equations.states, equations.quantities, equations.interfaces))
     targets = [*mode.laws, *equations.interfaces, *mode.drifts]
     symbols = {s: i for i, s in enumerate(equations.states)}
@@ -304,7 +348,32 @@ def _mode_source(equations: _Equations, mode: _Mode) -> tuple[list[str], int]:
     return body, work.next
 
 
-def _gradient_source(equations: _Equations, function: sp.Expr) -> list[str]:
+def _values_source(equations: Equations, mode: Mode) -> tuple[list[str], int]:
+    """What a mode fills without recurrences: values, and rates of states and interfaces."""
+    columns, m, q = equations.order + 1, len(equations.states), len(equations.quantities)
+    outputs = {i * columns + 1: rate for i, rate in enumerate(mode.rates)}
+    for row, h in enumerate(equations.interfaces, start=m + q):
+        outputs[row * columns] = h
+        outputs[row * columns + 1] = _drift(equations, h, mode)
+    n_rows = m + q + len(equations.interfaces)
+    outputs |= {(n_rows + k) * columns: drift for k, drift in enumerate(mode.drifts)}
+    shared, results = sp.cse(
+        list(outputs.values()), symbols=sp.numbered_symbols("s", real=True), list=True
+    )
+    body = ["t = inputs[0]"]
+    for i in range(m):
+        body += [f"y{i} = inputs[{i + 1}]", f"W[{i * columns}] = y{i}"]
+    for k, law in enumerate(mode.laws):
+        body += [f"w{k} = {scalar_code(law)}", f"W[{(m + k) * columns}] = w{k}"]
+    body += [f"{symbol} = {scalar_code(value)}" for symbol, value in shared]
+    body += [
+        f"W[{place}] = {scalar_code(value)}" for place, value in zip(outputs, results, strict=True)
+    ]
+    # what no recurrence gives
+    return [*body, f"W[{equations.order}] = math.nan"], n_rows + 2
+
+
+def _gradient_source(equations: Equations, function: sp.Expr) -> list[str]:
     m = len(equations.states)
     symbols = (TIME, *equations.states, *equations.quantities)
     body = [f"{s.name} = inputs[{i}]" for i, s in enumerate(symbols) if s in function.free_symbols]

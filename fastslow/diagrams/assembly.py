@@ -118,6 +118,7 @@ def branch_of(
         curve.outcomes,
         curve.closed,
         admissible,
+        dict(field.model.parameters),
     )
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from fastslow.compiled.functions import CLOSED, IN_MPMATH, OPEN
 from fastslow.diagrams.fields import FrozenField
 from fastslow.model.structure import real
 
@@ -89,7 +90,10 @@ def derivatives(
             level = deeper
             table |= {k: e for k, e in level.items() if len(k) > 2}
     entries = sorted(table, key=lambda k: (len(k), k))
-    return entries, sp.lambdify((*states, *others), [table[k] for k in entries], "numpy", cse=True)
+    found = [table[k] for k in entries]
+    special = any(e.has(*CLOSED, *OPEN) for e in found)
+    modules = [IN_MPMATH, "mpmath"] if special else "numpy"
+    return entries, sp.lambdify((*states, *others), found, modules, cse=True)
 
 
 def forms_at(field: FrozenField, region: int, u: Array) -> Multilinear:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -292,6 +293,9 @@ def _traced(
         tuple(spots),
         (outcome_of(first, system, rows[0], names), outcome_of(last, system, rows[-1], names)),
         last == curves.CLOSED,
+        dict(field.model.parameters),
+        field.model.equations,
+        asdict(settings),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from typing import Any
 
@@ -24,9 +24,9 @@ from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.branches import Branch
-from fastslow.results.diagrams import SEARCHED, Corrector, Diagram
+from fastslow.results.diagrams import SEARCHED, Diagram
 from fastslow.results.outcome import Outcome
-from fastslow.results.points import Equilibrium, SpecialPoint, SpecialPoints
+from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
 
@@ -120,19 +120,22 @@ def continue_equilibria(
     missed = starts.missed(branches)
     sound = all(o.success for branch in branches for o in branch.outcomes)
     traced = sound and not full and not missed
+    corrector = _corrector(field)
     return Diagram(
         model.states,
         name,
         (lower, upper),
         dict(field.model.parameters),
-        _labelled(branches),
+        tuple(replace(branch, corrector=corrector) for branch in _labelled(branches)),
         "complete" if starts.complete and traced else "found",
         field.interfaces,
         field.regions,
         _interface_values(field),
         _text(model),
-        _corrector(field),
+        corrector,
         _too_many(settings) if full else _continuum(name, missed) if missed else SEARCHED,
+        {quantity: str(law) for quantity, law in model.path.items()},
+        asdict(settings),
     )
 
 

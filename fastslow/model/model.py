@@ -289,6 +289,18 @@ class Model:
         return tuple(n for n in sorted(set(self.structure.names.values())) if n not in self.regions)
 
     @property
+    def path(self) -> Named[sp.Expr]:
+        """Of a model frozen along a path: slow quantities as functions of the path's parameters.
+
+        Examples
+        --------
+        >>> x, u, g, t = sp.symbols("x u g t")
+        >>> Model({x: u - x}, forcing={u: sp.cos(t) ** 2}).frozen(slow={u: g**2}).path
+        {u: g**2}
+        """
+        return Named("slow quantity", self.structure.path)
+
+    @property
     def values(self) -> dict[sp.Symbol, float]:
         """Parameter values by (real) symbol, for substitution."""
         return {real(name): value for name, value in self.parameters.items()}
@@ -316,6 +328,21 @@ class Model:
                     if not vanishes_on(one.rates[state] - other.rates[state], function):
                         return False
         return True
+
+    @property
+    def equations(self) -> str:
+        """The equations as they were written, as text; parameters stand by name.
+
+        Examples
+        --------
+        >>> x, w, k, t = sp.symbols("x w k t")
+        >>> print(Model({x: w - k * x}, forcing={w: sp.sin(t)}, parameters={k: 2}).equations)
+        x' = -k*x + w
+        w = sin(t)
+        """
+        from fastslow.model.typesetting import equations_text
+
+        return equations_text(tuple(self.rates.items()), tuple(self.forcing.items()))
 
     def to_latex(self) -> str:
         """The equations of every region as LaTeX, for a document with amsmath."""

@@ -39,6 +39,7 @@ class Structure:
     given: frozenset[str]
     conditions: dict[str, Boolean]
     names: dict[Cell, str] = field(default_factory=dict)
+    path: dict[str, sp.Expr] = field(default_factory=dict)
 
     @property
     def moving(self) -> tuple[sp.Symbol, ...]:
@@ -162,6 +163,7 @@ class Structure:
             rates=rates,
             forcing={},
             free=free,
+            path={**self.path, **path},
             interfaces=tuple(i for i in interfaces if i.function.free_symbols & set(moving))
             if path
             else interfaces,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import sympy as sp
@@ -10,6 +11,15 @@ from fastslow.model.structure import TIME, real
 
 if TYPE_CHECKING:
     from fastslow.model.model import Model
+
+Law = tuple[str, sp.Expr]
+
+
+@lru_cache(maxsize=64)
+def equations_text(rates: tuple[Law, ...], forcing: tuple[Law, ...]) -> str:
+    """Rates and laws of slow quantities, one a line; written once."""
+    lines = [f"{name}' = {rate}" for name, rate in rates]
+    return "\n".join([*lines, *(f"{name} = {law}" for name, law in forcing)])
 
 
 def model_latex(model: Model) -> str:

@@ -56,7 +56,7 @@ def predict_delay(
     >>> fast = fs.systems.cusp().frozen()
     >>> diagram = fs.continue_equilibria(fast, "p", over=(-1, 1))
     >>> round(predict_delay(diagram.folds[0], 1e-3).leading, 9)
-    0.019469214
+    0.019469027
     """
     if point.code == "LP":
         return fold_delay(point, rate, level=level, parameter=parameter, model=model)

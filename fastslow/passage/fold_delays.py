@@ -122,7 +122,7 @@ def fold_delay(
     >>> fold = fs.continue_equilibria(fast, "p", over=(-1, 1)).folds[0]
     >>> law = fold_delay(fold, 1e-6, level={"x": 0.5})
     >>> round(law.coefficients[0], 8), round(law.coefficients[1], 8), f"{law.delay:.4e}"
-    (1.94692139, -0.11111111, '1.9608e-04')
+    (1.94690271, -0.11111111, '1.9582e-04')
     """
     require_code(point, "LP", "the delay of a fold")
     speed = drift(rate)
@@ -135,6 +135,7 @@ def fold_delay(
     first = OMEGA_0 * product ** (-1.0 / 3.0)
     scale = (product * abs(speed)) ** (1.0 / 3.0)
     delay, third, words = first * abs(speed) ** (2.0 / 3.0), math.nan, _UNBOUNDED
+    error = _smallness(form, d, scale)
     if height is not None:
         eta = _along(form, *height) / scale
         if eta <= 2.0:
@@ -152,13 +153,13 @@ def fold_delay(
                 delay += abs(speed) * (d / 3.0 * math.log(abs(speed)) + third)
                 # what the level sees of the end of the inner solution
                 delay += (airy_passage(eta) + 1.0 / eta - OMEGA_0) * abs(speed) / scale
-                words = "to the order of the rate"
+                words, error = "to the order of the rate", error**2
     return FoldDelay(
         point=point,
         parameter=site.field.parameter,
         rate=speed,
         delay=delay,
-        validity=f"{words}; relative error of the order of {_smallness(form, d, scale):.1g}",
+        validity=f"{words}; relative error of the order of {error:.1g}",
         quadratic=form.a,
         slope=form.b,
         cubic=form.c,
@@ -209,9 +210,8 @@ _UNBOUNDED = "leading order, the order of the rate depends on the level of the j
 
 
 def _smallness(form: FoldForm, d: float, scale: float) -> float:
-    """What the slow part of the passage must be small against, squared for the next order."""
-    ratio = max(abs(d), 1.0 / form.slowest) * scale
-    return float(max(ratio**2, np.finfo(float).eps))
+    """The size of the slow part of the passage, by that at which the normal form holds."""
+    return float(max(max(abs(d), 1.0 / form.slowest) * scale, np.finfo(float).eps))
 
 
 def fold_form_of(site: Site) -> FoldForm:

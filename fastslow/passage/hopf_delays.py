@@ -14,7 +14,8 @@ from fastslow.errors import ArgumentError
 from fastslow.passage.sites import WrongWay, drift, require_code
 from fastslow.results.branches import Branch
 from fastslow.results.delays import HopfExit
-from fastslow.results.diagrams import Diagram, hermite
+from fastslow.results.diagrams import Diagram
+from fastslow.results.interpolation import hermite
 from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]

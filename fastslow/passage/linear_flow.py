@@ -77,6 +77,9 @@ class LinearFlow:
         from scipy.linalg import expm
         from scipy.optimize import brentq
 
+        reached = 1e-12 * float(np.abs(row).max()) * float(np.abs(start[:-1]).max())
+        if abs(float(row @ start)) <= reached:
+            return 0.0, False
         speed = float(np.abs(np.linalg.eigvals(self.jacobian)).max(initial=0.0))
         step = 0.1 / max(speed, 1e-300)
         through = expm(self.matrix * step)

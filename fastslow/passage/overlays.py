@@ -6,36 +6,63 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.results.branches import Branch
-from fastslow.results.diagrams import Diagram, hermite
-from fastslow.results.overlays import Overlay, StableSheet, Transition
-from fastslow.results.points import SpecialPoint
+from fastslow.passage.bursting import Burst, bursting_of
+from fastslow.passage.cycle_ends import cycle_end, ending
+from fastslow.passage.excursions import (
+    Excursion,
+    excursions_of,
+    oscillation_of,
+    phase_of,
+)
+from fastslow.passage.sheets import courses_of
+from fastslow.passage.slow_quantities import SlowQuantity, slow_quantity
+from fastslow.passage.spikes import refined, turns_of
+from fastslow.passage.stays import Measured, Stay, measured, stays_of
+from fastslow.passage.transitions import Passage, leaving, passages_within, steep_parts
+from fastslow.results.diagrams import Diagram
+from fastslow.results.outcome import Outcome
+from fastslow.results.overlays import MEASURED, Overlay
 from fastslow.results.trajectories import Trajectory
+from fastslow.results.transitions import Moment, Phase, Transition
 
 Array = NDArray[np.float64]
 
-#: A new sheet is followed once this part of the way to it from the old one is done.
-WAY = 2.0 / 3.0
+#: A turn of the slow quantity by less than this part of its range is none.
+WIGGLE = 0.02
 
-#: Codes at which a stable sheet can end.
-ENDING = ("LP", "HB", "BP", "BE")
+#: A sheet stands still that changes by less than this part of the extent over the slow range.
+FLAT = 1e-9
+
+#: The slow quantity stands still where it drifts slower than this part of its mean speed.
+STILL = 1e-3
 
 
-def overlay(diagram: Diagram, run: Trajectory) -> Overlay:
+def overlay(
+    diagram: Diagram, run: Trajectory, *, radius: float = 0.1, observed: object = None
+) -> Overlay:
     """Lay a trajectory over the equilibrium diagram of its frozen model.
 
-    At first the followed sheet is the stable one nearest in state. Past its
-    end a sheet is continued by its end state, and another one takes over when
-    two thirds of the way to it are done, measured along the line between the
-    two: what the state has off that line, such as the velocity of the drift,
-    does not count, and the answer does not flicker halfway.
+    A stable sheet is followed from where the motion comes near it and stays for
+    half its relaxation time or more, to where it is no longer near, or has done two
+    thirds of the way to another stable sheet. Near means near the sheet as a curve
+    over the slow quantity, as the eye sees it in the figure, so that to lag behind a
+    steep sheet is not to leave it. Sheets that join at a boundary
+    equilibrium count as one here, so that a persistent equilibrium is followed
+    across; past a Hopf point the branch is still followed while the state stays
+    near it (the delay), past a fold the fold. What happens between two such stays
+    is a jump, or with two oscillations or more a spiking phase.
 
     Parameters
     ----------
     diagram : Diagram
-        Over the slow quantity of the run.
+        Over the slow quantity of the run, or over the parameter of a path along
+        which the model was frozen.
     run : Trajectory
         Of the full model.
+    radius : float
+        What counts as near, with each state in units of its extent.
+    observed : str or Symbol, optional
+        The state whose maxima count as spikes, by default the first.
 
     Returns
     -------
@@ -46,12 +73,73 @@ def overlay(diagram: Diagram, run: Trajectory) -> Overlay:
     UnknownNameError
         If the diagram's parameter is no slow quantity of the run, or a state is missing.
     ArgumentError
-        If the other parameters of the two differ.
+        If the other parameters of the two differ, the run leaves the path along
+        which the model was frozen, the run has no samples, or the radius is not
+        between 0 and 1.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> model = fs.systems.cusp(omega=0.002)
+    >>> diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
+    >>> lay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=2))
+    >>> [(t.kind, t.from_sheet, t.to_sheet) for t in lay.transitions[:2]]
+    [('jump', 'S1.1', 'S1.2'), ('jump', 'S1.2', 'S1.1')]
+    >>> print(lay.bursting)
+    relaxation oscillation (symmetric fold/fold)
     """
-    slow_name = diagram.parameter
-    quantities = (*run.forcing, *(s for s in run.states if s not in diagram.states))
-    if slow_name not in quantities:
-        raise unknown_name("slow quantity of the trajectory", slow_name, quantities)
+    state_number = _checked(diagram, run, radius, observed)
+    slow = slow_quantity(diagram, run)
+    sheets, courses = courses_of(diagram)
+    m = measured(slow, courses, diagram.over, radius)
+    stays = stays_of(m)
+    p = Passage(diagram, slow, m, sheets, _followed(m, stays), _drift(m))
+    swing = oscillation_of(m, state_number)
+    phases: list[Phase] = []
+    transitions: list[Transition] = []
+    bursts: list[Burst] = []
+    excursions = {id(e.old): e for e in excursions_of(m, stays, swing)}
+    if id(None) in excursions:
+        phases.append(_between(p, excursions[id(None)], transitions, bursts))
+    followed = p.followed.copy()
+    for stay in stays:
+        transitions += sorted(
+            [*passages_within(p, stay), *steep_parts(p, stay)], key=lambda t: t.time
+        )
+        start = phases[-1].end if phases else float(m.time[0])
+        after = excursions.get(id(stay))
+        before = len(transitions)
+        nxt = None if after is None else _between(p, after, transitions, bursts)
+        labels = [sheets[k].label for k in p.followed[stay.start : stay.stop]]
+        end = float(m.time[-1]) if nxt is None else nxt.start
+        phases.append(Phase(start, end, "quiescent", tuple(dict.fromkeys(labels))))
+        if nxt is not None:
+            phases.append(nxt)
+            _hand_over(p, after, transitions[before:], followed)
+    distance, lag, relaxation = _distances(p, followed)
+    return Overlay(
+        diagram,
+        run,
+        m.time,
+        m.slow,
+        np.column_stack([run[name] for name in diagram.states]),
+        m.extent,
+        radius,
+        sheets,
+        followed,
+        distance,
+        lag,
+        relaxation,
+        tuple(q for q in phases if q.end > q.start),
+        tuple(transitions),
+        bursting_of(bursts, transitions),
+        _turning(p),
+        _outcome(diagram, run, slow),
+    )
+
+
+def _checked(diagram: Diagram, run: Trajectory, radius: float, observed: object) -> int:
+    """Refuse what does not fit together; the number of the observed state."""
     for name in diagram.states:
         if name not in run.states:
             raise unknown_name("state of the trajectory", name, run.states)
@@ -61,184 +149,133 @@ def overlay(diagram: Diagram, run: Trajectory) -> Overlay:
                 f"the diagram has {name} = {value:g}, the trajectory {run.parameters[name]:g}; "
                 "expected the same parameters"
             )
-    time, slow = run.t, run[slow_name]
-    state = np.column_stack([run[name] for name in diagram.states])
-    sheets = _stable_sheets(diagram)
-    if not sheets:
-        nothing = np.full(len(time), -1)
-        far = np.full(len(time), np.inf)
-        return Overlay(diagram, run, time, slow, state, far, (), nothing, ())
-    extent = _extent(diagram, sheets, state)
-    places, present = _places(diagram, sheets, slow, extent)
-    followed = _followed(state / extent, places, present)
-    transitions = []
-    for row in np.flatnonzero(np.diff(followed)) + 1:
-        left, entered = sheets[followed[row - 1]], sheets[followed[row]]
-        times = np.array([time[row - 1], time[row]])
-        if run.series is not None:
-            times = _narrowed(diagram, run, (left, entered), extent, times)
-            columns = run.dense_columns(times)
-            slow_now = columns[run.columns.index(slow_name)]
-            state_now = columns[[run.columns.index(n) for n in diagram.states], 1]
-        else:
-            slow_now, state_now = slow[row - 1 : row + 1], state[row].copy()
-        transitions.append(
-            _transition(diagram, left, entered, float(times[1]), float(slow_now[1]), state_now)
-        )
-    distance = np.linalg.norm(state / extent - places[np.arange(len(time)), followed], axis=1)
-    return Overlay(diagram, run, time, slow, state, distance, sheets, followed, tuple(transitions))
+    if not 0.0 < radius < 1.0:
+        raise ArgumentError(f"radius = {radius!r}; expected a number between 0 and 1")
+    if not len(run.t):
+        raise ArgumentError("the trajectory has no samples; simulate with dense=True or samples=")
+    name = diagram.states[0] if observed is None else str(observed)
+    if name not in diagram.states:
+        raise unknown_name("state", name, diagram.states)
+    return diagram.states.index(name)
 
 
-def _extent(diagram: Diagram, sheets: tuple[StableSheet, ...], state: Array) -> Array:
-    """Unit of each state: the larger of its extents in the run and on any sheet."""
-    extent = np.ptp(state, axis=0)
-    for sheet in sheets:
-        rows = diagram.branches[sheet.branch].state[sheet.start : sheet.stop]
-        extent = np.maximum(extent, np.ptp(rows, axis=0))
-    extent[extent == 0] = 1.0
-    return extent
+def _drift(m: Measured) -> Array:
+    """Rate of the slow quantity, zero where it moves by rounding only."""
+    # where a state grows without bound, samples may share their time
+    apart = np.r_[True, np.diff(m.time) > 0]
+    time, slow = m.time[apart], m.slow[apart]
+    if len(time) < 2 or np.ptp(slow) <= 1e-9 * float(np.abs(slow).max()):
+        return np.zeros(len(m.time))
+    return np.interp(m.time, time, np.gradient(slow, time))
 
 
-def _narrowed(
-    diagram: Diagram,
-    run: Trajectory,
-    pair: tuple[StableSheet, StableSheet],
-    extent: Array,
-    times: Array,
-) -> Array:
-    """Two times, close to rounding, between which the second sheet takes over."""
-    for _ in range(9):
-        fine = np.linspace(times[0], times[1], 33)
-        columns = run.dense_columns(fine)
-        slow = columns[run.columns.index(diagram.parameter)]
-        state = columns[[run.columns.index(n) for n in diagram.states]].T
-        places, present = _places(diagram, pair, slow, extent)
-        over = present[:, 1] & (_way(state / extent, places[:, 0], places[:, 1]) > WAY)
-        over[0], over[-1] = False, True
-        k = int(np.argmax(over))
-        times = fine[k - 1 : k + 1]
-    return times
-
-
-def _stable_sheets(diagram: Diagram) -> tuple[StableSheet, ...]:
-    """Stable runs of every admissible branch, with the special points that end them."""
-    found: list[tuple[int, int, int, str]] = []
-    for number, branch in enumerate(diagram.branches):
-        if not branch.admissible:
-            continue
-        stable = branch.stable
-        for sheet in branch.sheets():
-            rows = np.arange(sheet.start, sheet.stop)
-            parts = np.split(rows, np.flatnonzero(np.diff(stable[rows].astype(int))) + 1)
-            for part in parts:
-                if stable[part[0]]:
-                    start = max(sheet.start, int(part[0]) - 1)
-                    stop = min(sheet.stop, int(part[-1]) + 2)
-                    found.append((number, start, stop, sheet.region))
-    counts = {r: sum(f[3] == r for f in found) for r in diagram.regions}
-    seen: dict[str, int] = {}
-    sheets = []
-    for number, start, stop, region in found:
-        seen[region] = seen.get(region, 0) + 1
-        label = region if counts[region] == 1 else f"{region}.{seen[region]}"
-        sheets.append(StableSheet(label, number, start, stop, region))
-    return tuple(sheets)
-
-
-def _places(
-    diagram: Diagram, sheets: tuple[StableSheet, ...], slow: Array, extent: Array
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Scaled state of each sheet at each sample (N, sheets, n), and whether it exists there."""
-    places = np.empty((len(slow), len(sheets), len(extent)))
-    present = np.empty((len(slow), len(sheets)), dtype=bool)
-    for k, sheet in enumerate(sheets):
-        branch = diagram.branches[sheet.branch]
-        values = branch.parameter[sheet.start : sheet.stop]
-        low, high = sorted((values[0], values[-1]))
-        present[:, k] = (slow >= low) & (slow <= high)
-        places[:, k] = _on_sheet(branch, sheet, np.clip(slow, low, high)) / extent
-    return places, present
-
-
-def _on_sheet(branch: Branch, sheet: StableSheet, slow: Array) -> Array:
-    """States of a sheet at parameter values inside its range, shape (N, n)."""
-    values = branch.parameter[sheet.start : sheet.stop]
-    rising = values[-1] >= values[0]
-    ordered = values if rising else values[::-1]
-    place = np.clip(np.searchsorted(ordered, slow, side="right") - 1, 0, len(values) - 2)
-    rows = sheet.start + (place if rising else len(values) - 2 - place)
-    return hermite(branch, rows, slow)
-
-
-def _way(scaled: Array, old: Array, new: Array) -> Array:
-    """Which part of the way from the old sheet to the new one a state has done."""
-    chord = new - old
-    length = (chord**2).sum(axis=-1)
-    done = ((scaled - old) * chord).sum(axis=-1)
-    return np.asarray(done / np.where(length > 0, length, np.inf))
-
-
-def _first_of(first: Array, candidate: Array) -> int:
-    """The nearest sheet at the start; of several as near, the one that the motion turns to."""
-    # sheets are interpolated, to about four digits of their distance
-    tied = np.flatnonzero(first <= 1.001 * first.min())
-    if len(tied) > 1:
-        later = candidate[:, tied]
-        present = np.isfinite(later).all(axis=1)
-        later = later[present]
-        split = np.flatnonzero(later.min(axis=1) < 0.5 * later.max(axis=1))
-        if len(split):
-            return int(tied[np.argmin(later[split[0]])])
-    return int(tied[0])
-
-
-def _followed(scaled: Array, places: Array, present: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """The followed sheet at each sample."""
-    apart = np.linalg.norm(scaled[:, None] - places, axis=2)
-    candidate = np.where(present, apart, np.inf)
-    first = candidate[0] if np.isfinite(candidate[0]).any() else apart[0]
-    current = _first_of(first, candidate)
-    followed = np.empty(len(apart), dtype=np.intp)
-    done = 0
-    while done < len(apart):
-        rivals = candidate[done:].copy()
-        rivals[:, current] = np.inf
-        best = np.argmin(rivals, axis=1)
-        ahead = np.arange(done, len(apart))
-        way = _way(scaled[done:], places[done:, current], places[ahead, best])
-        over = np.isfinite(rivals.min(axis=1)) & (way > WAY)
-        change = int(np.argmax(over)) if over.any() else len(over)
-        followed[done : done + change] = current
-        done += change
-        if done < len(apart):
-            current = int(best[change])
+def _followed(m: Measured, stays: list[Stay]) -> NDArray[np.intp]:
+    """The sheet at every sample of a stay, past its end still that sheet; −1 elsewhere."""
+    followed = np.full(len(m.time), -1, dtype=np.intp)
+    for stay in stays:
+        rows = slice(stay.start, stay.stop)
+        course, inside = m.courses[stay.course], m.present[rows, stay.course]
+        last = np.maximum.accumulate(np.where(inside, np.arange(len(inside)), 0))
+        followed[rows] = course.sheet(m.slow[rows])[last]
     return followed
 
 
-def _transition(
-    diagram: Diagram,
-    left: StableSheet,
-    entered: StableSheet,
-    time: float,
-    value: float,
-    state: Array,
-) -> Transition:
-    special = _responsible(diagram, left, value)
-    delay = float("nan")
-    if special is not None:
-        branch = diagram.branches[left.branch]
-        middle = branch.parameter[(left.start + left.stop - 1) // 2]
-        end = special[diagram.parameter]
-        delay = float(np.sign(end - middle) * (value - end))
-    return Transition(time, value, state, left.label, entered.label, special, delay)
+def _between(p: Passage, e: Excursion, transitions: list[Transition], bursts: list[Burst]) -> Phase:
+    """The phase of an excursion; its transitions and bursts are added to the lists."""
+    time = p.m.time
+    sheet = "" if e.new is None else p.sheets[p.followed[e.new.start]].label
+    start, _ = e.rows(p.m)
+    outside = start < len(time) and not p.m.within[start]
+    begin, end = float(time[0]), float(time[-1])
+    first = None
+    if e.old is not None and (outside or start >= len(time)):
+        begin = float(time[min(start, len(time) - 1)])
+    elif e.old is not None:
+        first = leaving(p, e)
+        transitions.append(first)
+        begin = first.leave.time
+    if e.new is not None:
+        end = p.landed(e.new, begin).time
+    away = "jump"
+    if first is not None and first.kind == "transit":
+        away = "transit"
+    elif first is not None and first.from_sheet == first.to_sheet:
+        away = "excursion"
+    phase = phase_of(p.m, e, begin, end, sheet, away)
+    closing = None
+    if e.cycle and e.new is not None and not outside:
+        closing = cycle_end(p, e)
+        transitions.append(ending(p, e, closing))
+    if first is not None and e.new is not None and phase.kind == "spiking":
+        bursts.append(Burst(phase, first, closing))
+    return phase
 
 
-def _responsible(diagram: Diagram, left: StableSheet, value: float) -> SpecialPoint | None:
-    """Of the special points at which a sheet ends, the one nearest to a value."""
-    branch = diagram.branches[left.branch]
-    ends = [
-        point
-        for point, row in zip(branch.special, branch.special_rows, strict=True)
-        if point.code in ENDING and left.start - 1 <= row <= left.stop
-    ]
-    return min(ends, key=lambda p: abs(p[diagram.parameter] - value), default=None)
+def _hand_over(
+    p: Passage, e: Excursion | None, found: list[Transition], followed: NDArray[np.intp]
+) -> None:
+    """In a jump the old sheet is followed up to the transition, then the new one."""
+    if e is None or e.old is None or e.new is None or e.cycle or not found:
+        return
+    start, stop = e.rows(p.m)
+    rows = np.arange(start, stop)
+    old = p.m.time[rows] < found[-1].time
+    followed[rows] = np.where(old, p.followed[start - 1], p.followed[e.new.start])
+
+
+def _distances(p: Passage, followed: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+    """Distance from the followed (else the nearest stable) sheet, lag, and relaxation time."""
+    m = p.m
+    apart = np.array([m.apart(k) for k in range(len(m.courses))]).reshape(-1, len(m.time))
+    nearest = np.where(m.present.T, apart, np.inf)
+    distance = nearest.min(axis=0, initial=np.inf)
+    lag, relaxation = np.full((2, len(m.time)), np.nan)
+    mean = float(np.abs(np.diff(m.slow)).sum()) / (float(m.time[-1] - m.time[0]) or 1.0)
+    for number, course in enumerate(m.courses):
+        on = np.isin(followed, course.sheets)
+        distance[on] = apart[number, on]
+        slow = m.slow[on]
+        slope = course.slope(slow) / m.extent
+        steep = (slope**2).sum(axis=1)
+        rate = -course.relaxation(slow)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ahead = ((m.scaled[on] - m.places[on, number]) * slope).sum(axis=1) / steep
+            behind = -ahead / p.drift[on]
+            relaxation[on] = np.where(rate > 0, 1.0 / rate, np.nan)
+        moving = np.abs(p.drift[on]) > STILL * mean
+        lag[on] = np.where(
+            moving & np.isfinite(behind) & (np.sqrt(steep) * m.span > FLAT), behind, np.nan
+        )
+    return distance, lag, relaxation
+
+
+def _turning(p: Passage) -> tuple[Moment, ...]:
+    slow, time = p.m.slow, p.m.time
+    reach = float(np.ptp(slow))
+    if len(slow) < 3 or reach <= 1e-9 * float(np.abs(slow).max()):
+        return ()
+    turns = turns_of(slow, WIGGLE * reach)
+    return tuple(p.moment(float(t)) for t in refined(time, slow, turns.rows))
+
+
+def _outcome(diagram: Diagram, run: Trajectory, slow: SlowQuantity) -> Outcome:
+    """What the diagram does not cover of a run."""
+    name, (low, high) = diagram.parameter, diagram.over
+    values = slow.table
+    if values.min() < low or values.max() > high:
+        return Outcome(
+            "outside the diagram",
+            f"{name} runs from {values.min():.6g} to {values.max():.6g}, the diagram from "
+            f"{low:.6g} to {high:.6g}: what lies outside is not measured; continue it over "
+            "the whole range.",
+            False,
+        )
+    for held, value in diagram.parameters.items():
+        if held in run.columns and np.abs(run[held] - value).max() > 1e-9 * max(abs(value), 1.0):
+            return Outcome(
+                "another slow quantity",
+                f"the diagram holds {held} = {value:.6g}, in the run it goes from "
+                f"{run[held].min():.6g} to {run[held].max():.6g}.",
+                False,
+            )
+    return MEASURED

@@ -225,10 +225,10 @@ def _stable_rows(
             apart = np.abs(np.append(other.state, other[name]) - here)
             if other.code != site.point.code or np.any(apart > 1e-7 * (1.0 + np.abs(here))):
                 continue
-            first = {"BE": (row, row + 1)}.get(other.code, (row, row))
-            for begin, step in zip(first, (-1, 1), strict=True):
+            # a boundary equilibrium stands twice, in both of its regions
+            for begin, step in ((row, -1), (row + (other.code == "BE"), 1)):
                 rows = _monotone(branch, begin, step, way)
-                if len(rows) > 1 and branch.stable[rows[1:]].all():
+                if len(rows) > 1:
                     return branch, rows
     raise ArgumentError(
         f"the stable sheet before {site.point.label} was not found; expected a point of this model"
@@ -237,13 +237,11 @@ def _stable_rows(
 
 def _monotone(branch: Branch, row: int, step: int, way: float) -> NDArray[np.intp]:
     """Rows of one region from one on, as long as they are stable and lead back before the point."""
-    rows = [row]
+    rows, stable, values = [row], branch.stable, branch.parameter
     following = row + step
-    while 0 <= following < len(branch.parameter):
-        back = way * (branch.parameter[rows[-1]] - branch.parameter[following]) > 0
-        if not (
-            back and branch.stable[following] and branch.region[following] == branch.region[row]
-        ):
+    while 0 <= following < len(values):
+        back = way * (values[rows[-1]] - values[following]) > 0
+        if not (back and stable[following] and branch.region[following] == branch.region[row]):
             break
         rows.append(following)
         following += step

@@ -30,15 +30,22 @@ def draw_arrows(line: Line2D, along: Values, fractions: Sequence[float]) -> tupl
     """
     if len(along) < 2 or not along[-1] > along[0]:
         return ()
+    starts = np.searchsorted(along, along[0] + np.array(fractions) * (along[-1] - along[0]))
+    return draw_heads(line, starts.tolist())
+
+
+def draw_heads(line: Line2D, rows: Sequence[int]) -> tuple[Annotation, ...]:
+    """Put arrow heads on a curve at given points of it; those outside the axes are left out."""
     ax = axes_of(line)
     ax.autoscale_view()
     x, y = points(line).T
+    if len(x) < 2:
+        return ()
     pixels = ax.transData.transform(np.column_stack([x, y]))
     frame = ax.get_window_extent()
     drawn = []
-    for fraction in fractions:
-        start = int(np.searchsorted(along, along[0] + fraction * (along[-1] - along[0])))
-        start = min(start, len(x) - 2)
+    for row in rows:
+        start = min(row, len(x) - 2)
         away = np.hypot(*(pixels[start:] - pixels[start]).T)
         far = np.flatnonzero(away >= SPAN)
         if not far.size or not frame.contains(*pixels[start]):

@@ -13,8 +13,8 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.errors import unknown_name
 from fastslow.plot.bands import Bands, draw_bands
+from fastslow.plot.heights import along, at_point, expression_of, written
 from fastslow.plot.labels import key, place, settle, tag
 from fastslow.plot.style import BRANCH, LINES, MARKERS, Drawing, axes_for, typeset
 from fastslow.results.branches import Branch
@@ -30,7 +30,7 @@ class DiagramDrawing(Drawing):
     ----------
     ax : Axes
     state : str
-        The state on the vertical axis.
+        What the vertical axis shows.
     lines : tuple of Line2D
         One for each run of constant stability.
     markers : tuple of Line2D
@@ -76,8 +76,9 @@ def diagram(
     Parameters
     ----------
     diagram : Diagram
-    x : str or Symbol, optional
-        The state on the vertical axis, by default the first.
+    x : str, Symbol or Expr, optional
+        What the vertical axis shows: a state, by default the first, or an expression
+        in states and parameters.
     ax : Axes, optional
         Axes to draw into; new ones of a column's width (85 mm) otherwise.
     label : bool
@@ -100,9 +101,9 @@ def diagram(
     Raises
     ------
     UnknownNameError
-        If ``x`` is no state of the diagram.
+        If ``x`` is no state of the diagram and no expression in them.
     """
-    state = state_name(diagram.states, x)
+    state = expression_of(diagram, x)
     own, ax = ax is None, axes_for(ax)
     drawn = draw_branches(
         ax,
@@ -136,17 +137,18 @@ def draw_branches(
     lines: list[Line2D] = []
     for branch in diagram.branches:
         if branch.admissible or virtual:
+            heights = along(diagram, branch, state)
             for kind, rows in runs(branch):
                 look = {"color": color, "zorder": 2.0, "label": kind, **LINES[kind], **style}
-                lines += ax.plot(branch.parameter[rows], branch[state][rows], **look)
+                lines += ax.plot(branch.parameter[rows], heights[rows], **look)
     markers, labels = _special_points(ax, diagram, state, virtual, label)
     ax.set_xlabel(typeset(diagram.parameter))
-    ax.set_ylabel(typeset(state))
+    ax.set_ylabel(written(state))
     ax.set_xlim(diagram.over)
     bands = Bands()
     met = [b for b in diagram.branches if b.admissible]
-    if interfaces and met:
-        heights = np.concatenate([b[state] for b in met])
+    if interfaces and met and state in diagram.states:
+        heights = np.concatenate([along(diagram, b, state) for b in met])
         regions = np.concatenate([b.region for b in met])
         bands = draw_bands(ax, state, diagram.interface_values, heights, regions)
     return DiagramDrawing(ax, state, tuple(lines), markers, labels, bands, None)
@@ -166,15 +168,6 @@ def runs(branch: Branch) -> Iterator[tuple[str, slice]]:
             yield str(steps[start]), slice(int(start), int(stop) + 1)
 
 
-def state_name(states: tuple[str, ...], name: object) -> str:
-    """The name of a state, by default of the first."""
-    if name is None:
-        return states[0]
-    if str(name) not in states:
-        raise unknown_name("state", name, states)
-    return str(name)
-
-
 def _special_points(
     ax: Axes, diagram: Diagram, state: str, virtual: bool, label: bool
 ) -> tuple[tuple[Line2D, ...], tuple[Annotation, ...]]:
@@ -186,7 +179,7 @@ def _special_points(
         if not points:
             continue
         marker, colour = MARKERS[code]
-        at = [(p[diagram.parameter], p[state]) for p in points]
+        at = [(p[diagram.parameter], at_point(p, state)) for p in points]
         markers += ax.plot(
             *zip(*at, strict=True),
             linestyle="none",

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.text import Annotation
+from matplotlib.patches import Rectangle
+from matplotlib.text import Annotation, Text
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.plot.arrows import draw_arrows, length_along
 from fastslow.plot.bands import Bands, Values, draw_bands
+from fastslow.plot.labels import settle
+from fastslow.plot.phases import draw_phases, fit_words
 from fastslow.plot.style import MM, MOTION, VERMILION, Drawing, axes_for, typeset
 from fastslow.results.trajectories import Trajectory
+from fastslow.results.transitions import Phase
 
 Array = NDArray[np.float64]
 
@@ -40,6 +45,10 @@ class MotionDrawing(Drawing):
         Sense of direction.
     bands : tuple of Bands
         Interfaces and regions.
+    phases : tuple of Rectangle
+        The strip of phases above a time series.
+    words : tuple of Text
+        What is written in it.
     """
 
     x: str
@@ -48,6 +57,8 @@ class MotionDrawing(Drawing):
     crossings: Line2D | None
     arrows: tuple[Annotation, ...]
     bands: tuple[Bands, ...]
+    phases: tuple[Rectangle, ...] = ()
+    words: tuple[Text, ...] = ()
 
 
 def time_series(
@@ -57,6 +68,7 @@ def time_series(
     ax: Axes | None = None,
     crossings: bool = True,
     interfaces: Values | None = None,
+    phases: Sequence[Phase] = (),
     color: str = MOTION,
     **style: Any,
 ) -> MotionDrawing:
@@ -74,6 +86,8 @@ def time_series(
     interfaces : mapping, optional
         Interface to (state, value), as a diagram's ``interface_values``: these
         are drawn, with the regions between them.
+    phases : sequence of Phase
+        Of an overlay, ``lay.phases``: a strip above shows them, and names those with room.
     color : str
         Colour of the trajectory.
     **style
@@ -89,15 +103,20 @@ def time_series(
         If ``x`` is no state or slow quantity of the trajectory.
     """
     name = quantity(run, x, 0)
-    ax = axes_for(ax, height=50 * MM)
+    own, ax = ax is None, axes_for(ax, height=50 * MM)
     look = {"color": color, "label": "trajectory", **LINE, **style}
     lines = tuple(ax.plot(run.t, run[name], **look))
     dots = _dots(ax, run, "t", name) if crossings else None
     ax.set_xlabel(typeset("t"))
     ax.set_ylabel(typeset(name))
-    ax.set_xlim(float(run.t[0]), float(run.t[-1]))
+    if run.t[-1] > run.t[0]:
+        ax.set_xlim(float(run.t[0]), float(run.t[-1]))
+    strip = draw_phases(ax, phases) if phases else ((), ())
     bands = _bands(ax, run, (None, name), interfaces)
-    return MotionDrawing(ax, "t", name, lines, dots, (), bands)
+    if own and phases:
+        settle(ax)
+        fit_words(*strip)
+    return MotionDrawing(ax, "t", name, lines, dots, (), bands, *strip)
 
 
 def phase_portrait(

@@ -7,13 +7,18 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.patches import Patch
 
-from fastslow.plot.branches import state_name
+from fastslow.errors import unknown_name
 from fastslow.plot.labels import legend_below, place, settle
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.passages import OverlayDrawing, draw_passage
-from fastslow.plot.style import FULL, MM, TEXT, dressed, new_figure, save
+from fastslow.plot.phases import fit_words
+from fastslow.plot.style import FULL, MM, PHASES, TEXT, dressed, new_figure, save
 from fastslow.results.overlays import Overlay
+
+#: Figures narrower than this have their three parts one below the other.
+NARROW = 120 * MM
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +65,10 @@ def panel(
 ) -> PanelDrawing:
     """Draw time series, phase portrait and overlay as one figure, 170 mm wide.
 
+    A strip above the time series shows the phases of the motion: the sheet that is
+    followed, spikes, jumps. In a figure of a column's width the three stand one
+    below the other.
+
     Parameters
     ----------
     lay : Overlay
@@ -79,19 +88,31 @@ def panel(
     UnknownNameError
         If ``state`` is no state of the diagram.
     """
-    name = state_name(lay.diagram.states, state)
-    figure = new_figure(width, 68 * MM)
-    axes = [dressed(ax) for ax in figure.subplots(1, 3, width_ratios=[1.0, 1.0, 1.3])]
+    name = lay.diagram.states[0] if state is None else str(state)
+    if name not in lay.diagram.states:
+        raise unknown_name("state", name, lay.diagram.states)
+    narrow = width < NARROW
+    figure = new_figure(width, (168 if narrow else 68) * MM)
+    if narrow:
+        grid = figure.subplots(3, 1, height_ratios=[1.0, 1.0, 1.3])
+    else:
+        grid = figure.subplots(1, 3, width_ratios=[1.0, 1.0, 1.3])
+    axes = [dressed(ax) for ax in grid]
     for ax, letter in zip(axes, "abc", strict=True):
         ax.set_title(f"({letter})", loc="left", fontsize=TEXT)
     if title:
         figure.suptitle(title, fontsize=TEXT)
     values = lay.diagram.interface_values
-    series = time_series(lay.run, name, ax=axes[0], interfaces=values)
+    series = time_series(lay.run, name, ax=axes[0], interfaces=values, phases=lay.phases)
     portrait = phase_portrait(lay.run, ax=axes[1], interfaces=values)
     laid = draw_passage(axes[2], lay, name)
-    legend = legend_below(laid.ax, laid.handles, 4 if len(laid.handles) <= 8 else 5)
+    kinds = {phase.kind for phase in lay.phases}
+    shown = [Patch(label=f"{kind} phase", **PHASES[kind]) for kind in PHASES if kind in kinds]
+    handles = [*laid.handles, *shown]
+    columns = 2 if narrow else 4 if len(handles) <= 8 else 5
+    legend = legend_below(laid.ax, handles, columns)
     settle(laid.ax)
+    fit_words(series.phases, series.words)
     place(axes[0], bands=series.bands)
     place(axes[1], bands=portrait.bands)
     place(axes[2], laid.diagram.labels, bands=[laid.diagram.bands])

@@ -12,13 +12,20 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
+from numpy.typing import NDArray
 
-from fastslow.plot.arrows import draw_arrows, points
-from fastslow.plot.branches import DiagramDrawing, draw_branches, state_name
+from fastslow.errors import ArgumentError
+from fastslow.plot.arrows import draw_heads, points
+from fastslow.plot.branches import DiagramDrawing, draw_branches
+from fastslow.plot.heights import expression_of
 from fastslow.plot.labels import key, place, settle
-from fastslow.plot.motions import at_crossings, draw_dots, draw_motion
-from fastslow.plot.style import MM, MOTION, TRANSITIONS, Drawing, axes_for
+from fastslow.plot.motions import draw_dots, draw_motion
+from fastslow.plot.spaces import SpaceDrawing, draw_space
+from fastslow.plot.style import MM, MOTION, TRANSITIONS, Drawing, axes_for, typeset
+from fastslow.results.formulas import evaluated
 from fastslow.results.overlays import Overlay
+
+Array = NDArray[np.float64]
 
 #: Shares of the slow quantity's travel over a period at which an arrow head sits: uneven, so that
 #: the way up and the way down of a harmonic load do not meet.
@@ -33,7 +40,7 @@ class OverlayDrawing(Drawing):
     ----------
     ax : Axes
     state : str
-        The state on the vertical axis.
+        What the vertical axis shows.
     diagram : DiagramDrawing
         The branches beneath.
     lines : tuple of Line2D
@@ -42,8 +49,10 @@ class OverlayDrawing(Drawing):
         One dot for each crossing of an interface.
     transitions : tuple of Line2D
         One for each kind of transition.
+    turning : Line2D or None
+        Where the slow quantity turns back.
     arrows : tuple of Annotation
-        Sense of direction.
+        Sense of direction, along the sheets and in the jumps.
     legend : Legend or None
     """
 
@@ -52,48 +61,57 @@ class OverlayDrawing(Drawing):
     lines: tuple[Line2D, ...]
     crossings: Line2D | None
     transitions: tuple[Line2D, ...]
+    turning: Line2D | None
     arrows: tuple[Annotation, ...]
     legend: Legend | None
 
     @property
     def handles(self) -> list[Artist]:
         """What a legend shows: branches, special points, trajectory, crossings, transitions."""
-        dots = () if self.crossings is None else (self.crossings,)
-        return [*self.diagram.handles, *self.lines[::-1], *dots, *self.transitions]
+        extra = [line for line in (self.crossings, self.turning) if line is not None]
+        return [*self.diagram.handles, *self.lines[::-1], *extra, *self.transitions]
 
 
 def overlay(
     lay: Overlay,
-    state: object = None,
+    x: object = None,
+    y: object = None,
     *,
     ax: Axes | None = None,
     label: bool = True,
     legend: bool = True,
     crossings: bool = True,
+    turning: bool = True,
     interfaces: bool = True,
     virtual: bool = False,
     color: str = MOTION,
     **style: Any,
-) -> OverlayDrawing:
+) -> OverlayDrawing | SpaceDrawing:
     """Draw a trajectory over the branches of equilibria that it passes.
 
-    Jumps at a fold, passages of a boundary equilibrium and other changes of
-    the followed sheet have markers of their own, where two thirds of the way
-    to the new sheet are done; dots mark the crossings of interfaces.
+    Every kind of transition has a marker of its own, where it happened: a jump
+    at a fold is not to be taken for a passage of an interface, whose crossings are
+    small dots. Where the slow quantity turns back there is a bar.
 
     Parameters
     ----------
     lay : Overlay
-    state : str or Symbol, optional
-        The state on the vertical axis, by default the first.
+    x : str, Symbol or Expr, optional
+        What the vertical axis shows: a state, by default the first, or an expression in
+        states and parameters such as ``"x**2 + v"``.
+    y : str, Symbol or Expr, optional
+        With this the view is in space, over the plane of the slow quantity and ``x``.
     ax : Axes, optional
-        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+        Axes to draw into (with ``projection="3d"`` for a view in space); new ones of a
+        column's width (85 mm) otherwise.
     label : bool
         Whether to write LP1, BE1, … beside special points.
     legend : bool
         Whether to draw a legend.
     crossings : bool
         Whether to mark the crossings of interfaces.
+    turning : bool
+        Whether to mark where the slow quantity turns back.
     interfaces : bool
         Whether to draw interfaces and regions.
     virtual : bool
@@ -106,13 +124,25 @@ def overlay(
     Returns
     -------
     OverlayDrawing
+        In space a SpaceDrawing.
 
     Raises
     ------
     UnknownNameError
-        If ``state`` is no state of the diagram.
+        For a name in ``x`` or ``y`` that is no state, slow quantity or parameter.
+    ArgumentError
+        For what is no expression, or for a view in space with plane axes.
     """
-    name = state_name(lay.diagram.states, state)
+    name = expression_of(lay.diagram, x)
+    spatial = ax is not None and ax.name == "3d"
+    if y is not None or spatial:
+        if ax is not None and not spatial:
+            raise ArgumentError('a view in space needs axes with projection="3d"')
+        other = y if y is not None else next((s for s in lay.diagram.states if s != name), None)
+        if other is None:
+            raise ArgumentError(f"a view in space needs two states, received {name} alone")
+        up = expression_of(lay.diagram, other)
+        return draw_space(lay, name, up, ax, label=label, legend=legend, color=color, **style)
     own, ax = ax is None, axes_for(ax, height=78 * MM)
     drawn = draw_passage(
         ax,
@@ -120,6 +150,7 @@ def overlay(
         name,
         label=label,
         crossings=crossings,
+        turning=turning,
         interfaces=interfaces,
         virtual=virtual,
         color=color,
@@ -140,18 +171,23 @@ def draw_passage(
     *,
     label: bool = True,
     crossings: bool = True,
+    turning: bool = True,
     interfaces: bool = True,
     virtual: bool = False,
     color: str = MOTION,
     **style: Any,
 ) -> OverlayDrawing:
     """Draw an overlay without a legend, its labels not placed yet; arguments as for `overlay`."""
-    values = lay.state[:, lay.diagram.states.index(name)]
+    values = lay[name]
     lines = draw_motion(ax, lay.time, lay.slow, values, lay.run.period, color, style)
     dots = None
-    if crossings:
-        dots = draw_dots(ax, at_crossings(lay.run, lay.parameter), at_crossings(lay.run, name))
-    changes = _transitions(ax, lay, lay.diagram.states.index(name))
+    met = lay.run.crossings
+    if crossings and met:
+        times, state = np.array([c.time for c in met]), np.array([c.state for c in met])
+        slow = np.interp(times, lay.time, lay.slow)
+        dots = draw_dots(ax, slow, _heights(lay, name, times, slow, lay.run.states, state))
+    changes = _transitions(ax, lay, name)
+    turns = _turning(ax, lay, name) if turning else None
     # after the trajectory, so that the bands take its limits in
     below = draw_branches(
         ax, lay.diagram, name, label=label, virtual=virtual, interfaces=interfaces
@@ -160,26 +196,88 @@ def draw_passage(
         if line.get_label() == "stable":
             # wide enough to be seen beneath a trajectory that follows it
             line.set_linewidth(2.2)
-    travel = np.r_[0.0, np.cumsum(np.abs(np.diff(points(lines[-1])[:, 0])))]
-    heads = draw_arrows(lines[-1], travel, ARROWS)
-    return OverlayDrawing(ax, name, below, lines, dots, changes, heads, None)
+        elif any(phase.kind == "spiking" for phase in lay.phases):
+            # spikes would cover it
+            line.set_zorder(3.5)
+    heads = draw_heads(lines[-1], _heads(lay, values, points(lines[-1])[:, 0]))
+    return OverlayDrawing(ax, name, below, lines, dots, changes, turns, heads, None)
 
 
-def _transitions(ax: Axes, lay: Overlay, index: int) -> tuple[Line2D, ...]:
+def _heights(
+    lay: Overlay, expression: str, times: Array, slow: Array, names: Sequence[str], state: Array
+) -> Array:
+    """An expression at times between samples, where some states are known, shape (N, states)."""
+    columns = {n: np.interp(times, lay.time, lay.run[n]) for n in lay.run.columns}
+    columns |= {name: state[:, k] for k, name in enumerate(names)}
+    known = {**lay.run.parameters, **lay.diagram.parameters, **columns, lay.parameter: slow}
+    return np.broadcast_to(evaluated(expression, known), times.shape)
+
+
+def _at_moments(lay: Overlay, expression: str, moments: Sequence[Any]) -> tuple[Array, Array]:
+    """The slow quantity and an expression at moments that know their fast states."""
+    times, slow = (np.array([getattr(m, n) for m in moments]) for n in ("time", "value"))
+    state = np.array([m.state for m in moments])
+    return slow, _heights(lay, expression, times, slow, lay.diagram.states, state)
+
+
+def _transitions(ax: Axes, lay: Overlay, name: str) -> tuple[Line2D, ...]:
     drawn: list[Line2D] = []
     for kind, (marker, colour, text) in TRANSITIONS.items():
-        met: Sequence[Any] = [t for t in lay.transitions if t.kind == kind]
+        met = [t for t in lay.transitions if t.kind == kind]
         if met:
+            filled = marker in "*PX"
             drawn += ax.plot(
-                [t.value for t in met],
-                [t.state[index] for t in met],
+                *_at_moments(lay, name, met),
                 linestyle="none",
                 marker=marker,
                 markersize=7.0 if marker == "*" else 5.5,
-                markerfacecolor=colour if marker == "*" else "none",
-                markeredgecolor="black" if marker == "*" else colour,
-                markeredgewidth=0.4 if marker == "*" else 1.2,
+                markerfacecolor=colour if filled else "none",
+                markeredgecolor="black" if filled else colour,
+                markeredgewidth=0.4 if filled else 1.2,
                 zorder=5.5,
                 label=text,
             )
     return tuple(drawn)
+
+
+def _turning(ax: Axes, lay: Overlay, name: str) -> Line2D | None:
+    """Bars where the slow quantity turns back."""
+    if not lay.turning:
+        return None
+    (line,) = ax.plot(
+        *_at_moments(lay, name, lay.turning),
+        linestyle="none",
+        marker="|",
+        markersize=9.0,
+        markeredgewidth=1.4,
+        color=MOTION,
+        zorder=4.6,
+        label=f"{typeset(lay.parameter)} turns back",
+    )
+    return line
+
+
+def _heads(lay: Overlay, values: Array, drawn: Array) -> list[int]:
+    """Where arrow heads sit, as points of the last period: along the sheets, and halfway in jumps.
+
+    Parameters
+    ----------
+    lay : Overlay
+    values : ndarray, shape (N,)
+        What the vertical axis shows.
+    drawn : ndarray, shape (M,)
+        The slow quantity of the last period, the last M samples.
+    """
+    travel = np.r_[0.0, np.cumsum(np.abs(np.diff(drawn)))]
+    rows = np.searchsorted(travel, np.array(ARROWS) * travel[-1]).tolist() if travel[-1] else []
+    earlier = len(lay.time) - len(drawn)
+    for t in lay.transitions:
+        if t.land is None or t.kind in ("crossing", "end of spiking"):
+            continue
+        start, stop = np.searchsorted(lay.time, (t.leave.time, t.land.time)) - earlier
+        inside = values[earlier:][max(start, 0) : max(stop, 0)]
+        if start >= 0 and len(inside) > 2:
+            middle = 0.5 * (inside[0] + inside[-1])
+            rows = [row for row in rows if not start <= row <= stop]
+            rows.append(int(start) + int(np.argmin(np.abs(inside - middle))))
+    return rows

@@ -56,9 +56,26 @@ CURVES: dict[str, dict[str, Any]] = {
 
 #: Marker, colour and legend text of a transition by kind.
 TRANSITIONS: dict[str, tuple[str, str, str]] = {
-    "jump": ("*", VERMILION, "jump at LP"),
+    "jump": ("*", VERMILION, "jump at a fold"),
+    "Hopf": ("P", GREEN, "leaves past Hopf"),
     "crossing": ("D", ORANGE, "passage of BE"),
+    "transit": ("D", PURPLE, "transit of the gap"),
+    "steep": ("X", BLACK, "steep slope"),
+    "grazing": ("h", ORANGE, "grazing"),
+    "end of spiking": ("X", VERMILION, "end of spiking"),
+    "excursion": ("p", GREY, "excursion"),
     "change": ("s", GREY, "other change"),
+}
+
+#: Look of a phase of the motion by kind.
+PHASES: dict[str, dict[str, Any]] = {
+    "quiescent": {"facecolor": "#C9DDEB"},
+    "spiking": {"facecolor": "#F3C98B"},
+    "jump": {"facecolor": VERMILION},
+    "transit": {"facecolor": PURPLE},
+    "excursion": {"facecolor": ORANGE},
+    "transient": {"facecolor": "#DDDDDD"},
+    "outside": {"facecolor": "white", "hatch": "/////", "edgecolor": GREY},
 }
 
 #: Light fills of the regions, in turn.

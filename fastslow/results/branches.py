@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import unknown_name
+from fastslow.results import formulas, selecting, stretches
+from fastslow.results.levels import Pieces, asked, chosen, passages, pieces_of, stored
+from fastslow.results.markup import branch_html
+from fastslow.results.meetings import intersections
+from fastslow.results.nearness import nearest_of
 from fastslow.results.outcome import Outcome
-from fastslow.results.points import SpecialPoints, stability_of
+from fastslow.results.point_columns import labels_at
+from fastslow.results.points import Corrector, Equilibrium, SpecialPoints, stability_of
+from fastslow.results.result import LIVE, Result
+from fastslow.results.tables import Table, numbered
 
 
 @dataclass(frozen=True)
@@ -31,12 +41,16 @@ class Sheet:
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class Branch(Table, Result):
     """A curve of equilibria, row by row along its arclength.
 
     At an interface the boundary equilibrium stands twice, once as the last row
     of the region left and once as the first row of the region entered, so that
     every row's eigenvalues belong to its own region.
+
+    ``branch["x"]`` is a column and ``branch["x**2 + v"]`` an expression in states
+    and parameters; ``branch[3]`` and iteration give the equilibria of rows, and
+    ``branch[10:50]`` is the branch of those rows, with its special points.
 
     Parameters
     ----------
@@ -64,6 +78,23 @@ class Branch:
         Whether the last row is the first again (an isolated loop).
     admissible : bool
         False for a branch of virtual equilibria.
+    parameters : mapping
+        The values of all other parameters.
+    known_stability : ndarray of str, shape (N,), optional
+        Stability where the eigenvalues are not known, as in files of AUTO-07p.
+    corrector : callable, optional
+        Solves for an equilibrium read between rows; not kept in a file.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> gear = fs.systems.harmonic_gear(A=-0.6)
+    >>> (branch,) = fs.continue_equilibria(gear.frozen(), "w", over=(-0.5, 0.5)).branches
+    >>> [point.region for point in branch.at(w=0.05, stable=True)]
+    ['S3', 'S1']
+    >>> branch.stable_intervals().round(6)
+    array([[-0.5    ,  0.08944],
+           [-0.08944,  0.5    ]])
     """
 
     states: tuple[str, ...]
@@ -78,10 +109,15 @@ class Branch:
     outcomes: tuple[Outcome, Outcome]
     closed: bool = False
     admissible: bool = True
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    known_stability: NDArray[np.str_] | None = None
+    corrector: Corrector | None = field(default=None, repr=False, metadata=LIVE)
 
     @property
     def stability(self) -> NDArray[np.str_]:
         """``"stable"``, ``"unstable"`` or ``"neutral"``, shape (N,)."""
+        if self.known_stability is not None:
+            return self.known_stability
         return stability_of(self.eigenvalues)
 
     @property
@@ -97,38 +133,222 @@ class Branch:
     def __len__(self) -> int:
         return len(self.parameter)
 
-    def __getitem__(self, name: object) -> NDArray[np.float64]:
-        """Column of a state or of the parameter, shape (N,)."""
-        key = str(name)
-        if key in self.states:
-            return self.state[:, self.states.index(key)]
-        if key == self.parameter_name:
-            return self.parameter
-        raise unknown_name("column", key, [*self.states, self.parameter_name])
+    def __iter__(self) -> Iterator[Equilibrium]:
+        return (stored(self, row, self.parameters) for row in range(len(self)))
+
+    @overload
+    def __getitem__(self, key: slice) -> Branch: ...
+    @overload
+    def __getitem__(self, key: int) -> Equilibrium: ...
+    @overload
+    def __getitem__(self, key: str) -> NDArray[np.float64]: ...
+    def __getitem__(self, key: object) -> Branch | Equilibrium | NDArray[np.float64]:
+        """A column or expression, shape (N,); the equilibrium of a row; the branch of some rows.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no state and no parameter.
+        ArgumentError
+            For text that is no expression, or a slice that holds no row or leaves some out.
+        IndexError
+            For a row that there is not.
+        """
+        if isinstance(key, slice):
+            return selecting.rows_of(self, key)
+        if isinstance(key, int | np.integer):
+            return stored(self, range(len(self))[key], self.parameters)
+        columns = {n: self._state(k) for k, n in enumerate(self.states)}
+        columns[self.parameter_name] = lambda: self.parameter
+        return formulas.column(key, columns, self.parameters, len(self))
+
+    def _state(self, k: int) -> Callable[[], NDArray[np.float64]]:
+        return lambda: self.state[:, k]
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """Runs of rows over which the parameter does not turn."""
+        return pieces_of(self.parameter)
+
+    @cached_property
+    def regions(self) -> tuple[str, ...]:
+        """The regions gone through, each once, in order."""
+        starts = np.flatnonzero(np.append(True, self.region[1:] != self.region[:-1]))
+        return tuple(dict.fromkeys(self.region[starts].tolist()))
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest value of the parameter."""
+        return float(self.pieces.low.min()), float(self.pieces.high.max())
+
+    def at(
+        self, *, stable: bool | None = None, region: str | None = None, **value: float
+    ) -> list[Equilibrium]:
+        """Equilibria at one value of the parameter, one per passage; see `Diagram.at`.
+
+        Parameters
+        ----------
+        stable : bool, optional
+        region : str, optional
+        **value : float
+            The parameter by name, e.g. ``w=1.0``.
+
+        Returns
+        -------
+        list of Equilibrium
+            In order along the branch.
+
+        Raises
+        ------
+        UnknownNameError
+            If the name is not the branch's parameter, or the region not one of its own.
+        ArgumentError
+            If the branch does not reach the value.
+        """
+        where = asked(self.parameter_name, self.range, "branch", value)
+        found = passages(self, where, self.parameters, self.corrector)
+        return chosen(found, stable, region, self.regions)
+
+    def select(
+        self,
+        *,
+        stable: bool | None = None,
+        region: str | None = None,
+        code: str | None = None,
+        between: tuple[float, float] | None = None,
+    ) -> tuple[Branch, ...]:
+        """The parts of the branch whose rows all fulfil the conditions, in order.
+
+        Parameters
+        ----------
+        stable : bool, optional
+            Rows that are stable (or not).
+        region : str, optional
+            Rows of one region.
+        code : str, optional
+            Parts with a special point of this code.
+        between : (float, float), optional
+            Rows with the parameter in this range, ends included.
+
+        Returns
+        -------
+        tuple of Branch
+
+        Raises
+        ------
+        UnknownNameError
+            For a region or code that there is not.
+        ArgumentError
+            For a range that is none.
+        """
+        if region is not None and region not in self.regions:
+            raise unknown_name("region", region, self.regions)
+        return selecting.parts_of(self, stable, region, code, between)
+
+    def stable_intervals(self) -> NDArray[np.float64]:
+        """Intervals of the parameter over which the branch is stable, shape (k, 2).
+
+        One for each stable stretch along the branch, in order; where a special
+        point ends it, the interval ends exactly there.
+        """
+        return stretches.stable_intervals(self)
+
+    def nearest(self, **values: float) -> Equilibrium:
+        """The point of the branch nearest to some values of states and the parameter.
+
+        Distances are measured in units of each column's range. Between rows the
+        point is interpolated, and corrected at its parameter value where the
+        model is attached.
+
+        Parameters
+        ----------
+        **values : float
+            At least one, e.g. ``w=0.1, x=0.3``.
+
+        Returns
+        -------
+        Equilibrium
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no state and not the parameter.
+        ArgumentError
+            For a number that is not finite, or none at all.
+        """
+        return nearest_of([self], self.parameters, values, self.corrector)
+
+    def intersections(self, other: Branch, x: str, y: str) -> NDArray[np.float64]:
+        """Where two branches meet in the plane of two columns, shape (k, 2).
+
+        Both curves are interpolated by cubics with their tangents. In a plane of
+        two of more columns a meeting need not be a common equilibrium.
+
+        Parameters
+        ----------
+        other : Branch
+            Over the same parameter.
+        x, y : str
+            Two of the states and the parameter.
+
+        Returns
+        -------
+        ndarray
+            Values of x and y, in order along this branch. Curves that run
+            along each other meet nowhere.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no column of both.
+        ArgumentError
+            For a branch with itself.
+        """
+        return intersections(self, other, (str(x), str(y)))
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """States and parameter, shape (N, n + 1)."""
+        return np.column_stack([self.state, self.parameter])
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """The columns of `points`."""
+        return (*self.states, self.parameter_name)
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Parameter, states, region, stability, eigenvalues and labels of special points."""
+        return {
+            self.parameter_name: self.parameter,
+            **{name: self.state[:, k] for k, name in enumerate(self.states)},
+            "region": self.region,
+            "stability": self.stability,
+            **numbered("eigenvalue", self.eigenvalues),
+            "label": labels_at(self.special, self.special_rows, len(self)),
+        }
 
     def sheets(self) -> Iterator[Sheet]:
         """Split into runs of one region and strictly monotone parameter.
 
         Vertical segments, where the parameter does not change, are no sheets.
         """
-        step = np.sign(np.diff(self.parameter))
+        change = np.diff(self.parameter)
+        step = np.sign(change)
         span = max(float(np.ptp(self.parameter)), np.finfo(float).tiny)
-        step[np.abs(np.diff(self.parameter)) <= 1e-13 * span] = 0
+        step[np.abs(change) <= 1e-13 * span] = 0
         step[self.region[1:] != self.region[:-1]] = 0
-        start = 0
-        while start < len(step):
-            stop = start + 1
-            if step[start] != 0:
-                while stop < len(step) and step[stop] == step[start]:
-                    stop += 1
+        edges = np.flatnonzero(step[1:] != step[:-1]) + 1
+        for start, stop in zip([0, *edges.tolist()], [*edges.tolist(), len(step)], strict=True):
+            if stop > start and step[start] != 0:
                 yield Sheet(start, stop + 1, str(self.region[start]))
-            start = stop
+
+    def _repr_html_(self) -> str:
+        return branch_html(self)
 
     def __repr__(self) -> str:
-        low, high = float(self.parameter.min()), float(self.parameter.max())
-        regions = list(dict.fromkeys(self.region.tolist()))
+        low, high = self.range
         codes = " ".join(p.label for p in self.special)
         return (
             f"Branch({len(self)} points, {self.parameter_name} from {low:.6g} to {high:.6g}, "
-            f"regions {' → '.join(regions)}; {codes})"
+            f"regions {' → '.join(self.regions)}; {codes})"
         )

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.result import Result
 from fastslow.results.sections import period_of, window_of
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
+class Contacts(Result):
     """Contact statistics of a part of a run.
 
     Parameters

@@ -48,6 +48,22 @@ class Crossing:
         )
 
 
+def crossings_of(run: Trajectory) -> tuple[Crossing, ...]:
+    """Every crossing in order of time."""
+    return tuple(
+        Crossing(
+            float(entry[0]),
+            entry[6:].copy(),
+            run.interfaces[int(entry[1])],
+            int(entry[2]),
+            run.modes[int(entry[3])],
+            run.modes[int(entry[4])],
+            bool(entry[5]),
+        )
+        for entry in run.crossing_table
+    )
+
+
 @dataclass(frozen=True)
 class Segment:
     """A stretch of time within one region (or of sliding between two)."""
@@ -72,3 +88,12 @@ def segments_of(run: Trajectory) -> tuple[Segment, ...]:
         Segment(float(times[i]), float(times[i + 1]), run.modes[mode[first]])
         for i, first in enumerate(starts)
     )
+
+
+def regions_at(run: Trajectory, times: NDArray[np.float64]) -> NDArray[np.str_]:
+    """The region at each of some times; at a crossing the one that is entered."""
+    if not len(run.steps):
+        return np.full(len(times), "")
+    row = np.searchsorted(run.steps[:, 0], times, side="right") - 1
+    mode = run.steps[np.maximum(row, 0), 2].astype(int)
+    return np.array(run.modes)[mode]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from fastslow.results.delays import Delay
 from fastslow.results.outcome import Outcome
 from fastslow.results.points import SpecialPoint
+from fastslow.results.result import Result
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DelayScaling:
+class DelayScaling(Result):
     """Delays past one special point at m rates, as simulated and as predicted.
 
     Parameters
@@ -41,8 +42,9 @@ class DelayScaling:
         Of those terms, fitted with equal relative weights, and by the law where it
         gives them (nan otherwise). The fit is nan with fewer good runs than terms.
     exponent, uncertainty : float
-        Of the power law fitted to all good runs, and the larger of its standard
-        error and the farthest local exponent. Nan where the law is no power.
+        Of the power fitted over these rates, and the larger of its standard error and
+        the distance of the farthest local exponent: how far it is from being one
+        power, not from its limit as eps goes to zero. Nan where the law is no power.
     local_exponents : ndarray, shape (m − 1,)
         d ln(delay − offset·eps) / d ln eps between neighbours.
     law_exponent : float
@@ -51,7 +53,7 @@ class DelayScaling:
         How every run ended.
     """
 
-    point: SpecialPoint = field(repr=False)
+    point: SpecialPoint
     parameter: str
     direction: int
     event: str

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from fastslow.results.points import SpecialPoint
+from fastslow.results.result import Result
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Delay(ABC):
+class Delay(Result, ABC):
     """How far past a special point a drifting parameter is when something happens.
 
     Parameters
@@ -26,7 +27,7 @@ class Delay(ABC):
         How good the prediction is, and what it leaves out.
     """
 
-    point: SpecialPoint = field(repr=False)
+    point: SpecialPoint
     parameter: str
     rate: float
     delay: float

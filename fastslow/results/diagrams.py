@@ -2,29 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results import formulas, stretches
 from fastslow.results.branches import Branch
+from fastslow.results.levels import asked, chosen, passages
+from fastslow.results.markup import diagram_html
+from fastslow.results.nearness import nearest_of
 from fastslow.results.outcome import Outcome
-from fastslow.results.points import Equilibrium, SpecialPoints
-
-#: Solves for the equilibrium of a region near a state: (region, state, value) -> Equilibrium.
-Corrector = Callable[[str, NDArray[np.float64], float], Equilibrium | None]
-
+from fastslow.results.points import Corrector, Equilibrium, SpecialPoints
+from fastslow.results.result import LIVE, Result
+from fastslow.results.selecting import limits_of
+from fastslow.results.tables import Table
 
 #: The usual end of the search for branches.
 SEARCHED = Outcome("searched", "every start was followed.", True)
 
 
 @dataclass(frozen=True, eq=False)
-class Diagram:
+class Diagram(Table, Result):
     """The branches of equilibria of a frozen model over one parameter.
+
+    ``diagram[0]`` and iteration give branches, ``diagram["x"]`` a column of all
+    of them, row by row.
 
     Parameters
     ----------
@@ -46,8 +53,24 @@ class Diagram:
         For every interface that is a plain value of one state, (state, value).
     equations : str
         The model as text.
+    corrector : callable, optional
+        Solves for an equilibrium read between rows; not kept in a file.
     outcome : Outcome
         How the search for branches ended.
+    path : mapping
+        Of a model frozen along a path, each slow quantity as text in the parameter.
+    settings : mapping
+        How the branches were traced.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> gear = fs.systems.harmonic_gear(A=-0.6)
+    >>> diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-0.5, 0.5))
+    >>> diagram.bistable().round(6)
+    array([[-0.08944,  0.08944]])
+    >>> diagram.nearest(w=0.1, x=0.9).region
+    'S1'
     """
 
     states: tuple[str, ...]
@@ -60,11 +83,42 @@ class Diagram:
     regions: tuple[str, ...]
     interface_values: Mapping[str, tuple[str, float]]
     equations: str
-    corrector: Corrector | None = field(default=None, repr=False)
+    corrector: Corrector | None = field(default=None, repr=False, metadata=LIVE)
     outcome: Outcome = SEARCHED
+    path: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, float] = field(default_factory=dict)
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "corrector": None}
+    def __len__(self) -> int:
+        return len(self.branches)
+
+    def __iter__(self) -> Iterator[Branch]:
+        return iter(self.branches)
+
+    @overload
+    def __getitem__(self, key: int) -> Branch: ...
+    @overload
+    def __getitem__(self, key: str) -> NDArray[np.float64]: ...
+    def __getitem__(self, key: object) -> Branch | NDArray[np.float64]:
+        """A branch by number; a column or expression of all branches, row by row.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no state and no parameter.
+        ArgumentError
+            For text that is no expression.
+        IndexError
+            For a branch that there is not.
+        """
+        if isinstance(key, int | np.integer):
+            return self.branches[key]
+        names = (*self.states, self.parameter)
+        columns = {name: partial(self._joined, name) for name in names}
+        count = sum(map(len, self.branches))
+        return formulas.column(key, columns, self.parameters, count)
+
+    def _joined(self, name: str) -> NDArray[np.float64]:
+        return np.concatenate([np.empty(0), *(branch[name] for branch in self.branches)])
 
     @property
     def special(self) -> SpecialPoints:
@@ -109,76 +163,100 @@ class Diagram:
         ArgumentError
             If the value is outside the range of the diagram.
         """
-        if list(value) != [self.parameter]:
-            wrong = next((name for name in value if name != self.parameter), "nothing")
-            raise unknown_name("diagram parameter", wrong, [self.parameter])
-        where = float(value[self.parameter])
-        low, high = self.over
-        if not low <= where <= high:
-            raise ArgumentError(
-                f"{self.parameter} = {where:g} is outside this diagram's range [{low:g}, {high:g}]"
-            )
-        if region is not None and region not in self.regions:
-            raise unknown_name("region", region, self.regions)
-        found = [e for branch in self.branches for e in self._passages(branch, where)]
-        return [
-            e
-            for e in found
-            if (stable is None or e.stable == stable) and (region is None or e.region == region)
+        where = asked(self.parameter, self.over, "diagram", value)
+        found = [
+            point
+            for branch in self.branches
+            for point in passages(branch, where, self.parameters, self.corrector)
         ]
+        return chosen(found, stable, region, self._known_regions)
 
-    def _passages(self, branch: Branch, where: float) -> list[Equilibrium]:
-        values = branch.parameter
-        found: list[Equilibrium] = []
-        near = 1e-12 * max(1.0, abs(where))
-        level = np.flatnonzero(np.abs(values - where) <= near)
-        runs = np.split(level, np.flatnonzero(np.diff(level) > 1) + 1) if level.size else []
-        for run in runs:
-            vertical = np.ptp(branch.state[run], axis=0).max() > 1e-9 if len(run) > 1 else False
-            for row in (run[0], run[-1]) if vertical else run[:1]:
-                found.append(self._stored(branch, int(row), bool(vertical)))
-        inside = (values[:-1] - where) * (values[1:] - where) < 0
-        inside &= (np.abs(values[:-1] - where) > near) & (np.abs(values[1:] - where) > near)
-        for row in np.flatnonzero(inside):
-            found.append(self._between(branch, int(row), where))
-        if branch.closed and runs and runs[0][0] == 0 and runs[-1][-1] == len(values) - 1:
-            found.pop()
-        return found
+    @property
+    def _known_regions(self) -> tuple[str, ...]:
+        # pseudo-equilibria lie in no region of the model
+        return tuple(dict.fromkeys([*self.regions, *(r for b in self.branches for r in b.regions)]))
 
-    def _stored(self, branch: Branch, row: int, continuum: bool) -> Equilibrium:
-        return Equilibrium(
-            self.states,
-            branch.state[row].copy(),
-            {**self.parameters, self.parameter: float(branch.parameter[row])},
-            str(branch.region[row]),
-            branch.admissible,
-            branch.eigenvalues[row].copy(),
-            continuum=continuum,
+    def select(
+        self,
+        *,
+        stable: bool | None = None,
+        region: str | None = None,
+        code: str | None = None,
+        between: tuple[float, float] | None = None,
+    ) -> Diagram:
+        """The diagram of those parts of branches whose rows all fulfil the conditions.
+
+        Parameters
+        ----------
+        stable, region, code, between
+            As for `Branch.select`; ``between`` becomes the range of the diagram.
+
+        Returns
+        -------
+        Diagram
+            Its special points are those on the parts.
+
+        Raises
+        ------
+        UnknownNameError
+            For a region or code that there is not.
+        ArgumentError
+            For a range that is none, or outside that of the diagram.
+        """
+        if region is not None and region not in self._known_regions:
+            raise unknown_name("region", region, self._known_regions)
+        over = self.over
+        if between is not None:
+            low, high = limits_of(between)
+            over = max(low, over[0]), min(high, over[1])
+            if over[0] > over[1]:
+                raise ArgumentError(
+                    f"between=({low:g}, {high:g}) is outside this diagram's range "
+                    f"[{self.over[0]:g}, {self.over[1]:g}]"
+                )
+        branches = tuple(
+            part
+            for branch in self.branches
+            if region is None or region in branch.regions
+            for part in branch.select(stable=stable, region=region, code=code, between=between)
         )
+        return replace(self, branches=branches, over=over)
 
-    def _between(self, branch: Branch, row: int, where: float) -> Equilibrium:
-        state = hermite(branch, np.array([row]), np.array([where]))[0]
-        region = str(branch.region[row])
-        if self.corrector is not None:
-            solved = self.corrector(region, state, where)
-            if solved is not None:
-                return solved
-        low, high = branch.parameter[row], branch.parameter[row + 1]
-        part = (where - low) / (high - low)
-        pair = branch.eigenvalues[row : row + 2]
-        # apart, because a complex number times an infinite one (of sliding) is not a number
-        real, imaginary = (np.array([1 - part, part]) @ p for p in (pair.real, pair.imag))
-        eigenvalues = real + 1j * imaginary
-        return Equilibrium(
-            self.states,
-            state,
-            {**self.parameters, self.parameter: where},
-            region,
-            branch.admissible,
-            eigenvalues,
-            residual=float("nan"),
-            interpolated=True,
-        )
+    def bistable(self, at_least: int = 2) -> NDArray[np.float64]:
+        """Intervals of the parameter with two (or more) stable equilibria, shape (k, 2).
+
+        Where a special point ends an interval, it ends exactly there. Virtual
+        branches do not count.
+
+        Parameters
+        ----------
+        at_least : int
+            How many stable equilibria.
+
+        Raises
+        ------
+        ArgumentError
+            For a number below one.
+        """
+        if at_least < 1:
+            raise ArgumentError(f"at_least = {at_least!r}; expected at least 1")
+        return stretches.multistable(self.branches, at_least)
+
+    def nearest(self, **values: float) -> Equilibrium:
+        """The point of any branch nearest to some values; see `Branch.nearest`."""
+        return nearest_of(self.branches, self.parameters, values, self.corrector)
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """The columns of `Branch.to_dict`, with the number of the branch, row by row."""
+        tables = [branch.to_dict() for branch in self.branches]
+        numbers = np.repeat(np.arange(len(tables)), [len(branch) for branch in self.branches])
+        columns = {"branch": numbers}
+        for name in tables[0] if tables else ():
+            columns[name] = np.concatenate([one[name] for one in tables])
+        return columns
+
+    def _repr_html_(self) -> str:
+        return diagram_html(self)
 
     def __repr__(self) -> str:
         low, high = self.over
@@ -197,28 +275,3 @@ class Diagram:
                     at = f"{self.parameter} = {point.parameters[self.parameter]:.6g}"
                     lines.append(f"{stem}   {point.label}: {at}, {point.description}")
         return "\n".join(lines)
-
-
-def hermite(
-    branch: Branch, rows: NDArray[np.intp], values: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """States between rows ``rows`` and ``rows + 1`` at parameter values, shape (m, n).
-
-    Cubic Hermite in the parameter where both end slopes are finite and mild,
-    linear otherwise (beside a fold the slope dx/dp grows without bound).
-    """
-    p0, p1 = branch.parameter[rows], branch.parameter[rows + 1]
-    x0, x1 = branch.state[rows], branch.state[rows + 1]
-    width = p1 - p0
-    part = ((values - p0) / width)[:, None]
-    chord = x1 - x0
-    straight = x0 + part * chord
-    with np.errstate(divide="ignore", invalid="ignore"):
-        m0 = branch.tangent[rows, :-1] / branch.tangent[rows, -1:] * width[:, None]
-        m1 = branch.tangent[rows + 1, :-1] / branch.tangent[rows + 1, -1:] * width[:, None]
-        cubic = (
-            x0 + part * m0 + part**2 * (3 * chord - 2 * m0 - m1) + part**3 * (m0 + m1 - 2 * chord)
-        )
-    bound = 3.0 * np.abs(chord) + 1e-12
-    mild = np.all((np.abs(m0) <= bound) & (np.abs(m1) <= bound), axis=1, keepdims=True)
-    return np.where(mild, cubic, straight)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -11,7 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.endings import outcome_of
 from fastslow.results.outcome import Outcome
+from fastslow.results.result import Result
+from fastslow.results.tables import Table
 
 #: The regimes by which sides of a gap were touched: lower, inside, upper as bits 1, 2, 4.
 REGIMES = (
@@ -27,7 +30,7 @@ REGIMES = (
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ensemble:
+class Ensemble(Table, Result):
     """What sums up each of m trajectories.
 
     A trajectory that could not go on keeps what it had reached; where it did
@@ -64,9 +67,16 @@ class Ensemble:
         How each ended, and in which of the modes.
     sampled : tuple of ndarray, optional
         Times (N,) or (m, N) and columns (m, n + n_forcing, N), NaN after the end of a trajectory.
-    describe : callable
-        Words for one outcome, from its code, mode, time with state, number of
-        steps and largest number in the state at the start.
+    method : str
+        How the steps were made; where a series is singular, collocation takes its place.
+    limits : tuple of int
+        Most steps and most crossings of one trajectory.
+    constants : mapping
+        The values of all other parameters.
+    equations : str
+        The model as text.
+    settings : mapping
+        How they were simulated.
 
     Examples
     --------
@@ -100,7 +110,13 @@ class Ensemble:
     codes: NDArray[np.int64]
     last_mode: NDArray[np.int64]
     sampled: tuple[NDArray[np.float64], NDArray[np.float64]] | None
-    describe: Callable[[int, int, NDArray[np.float64], int, float], Outcome]
+    method: str
+    limits: tuple[int, int]
+    constants: Mapping[str, float] = field(default_factory=dict)
+    equations: str = ""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    _row = "trajectory"
 
     def __len__(self) -> int:
         return len(self.final)
@@ -116,12 +132,14 @@ class Ensemble:
         size = np.abs(self.start).max(axis=1)
         ends = np.column_stack([self.reached, self.final])
         return tuple(
-            self.describe(
+            outcome_of(
                 int(self.codes[i]),
                 int(self.last_mode[i]),
                 ends[i],
                 int(self.n_steps[i]),
                 float(size[i]),
+                self.modes,
+                self.limits,
             )
             for i in range(len(self))
         )
@@ -158,9 +176,19 @@ class Ensemble:
             raise ArgumentError("this ensemble kept no samples; simulate_many with samples=")
         return self.sampled
 
-    def __getstate__(self) -> dict[str, Any]:
-        names = self.__dataclass_fields__
-        return {name: value for name, value in self.__dict__.items() if name in names}
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """What sums up each trajectory, one row each; samples are not among it."""
+        columns: dict[str, NDArray[Any]] = dict(self.parameters)
+        for name in ("start", "final", "minimum", "maximum"):
+            values = getattr(self, name)
+            columns |= {f"{name} {key}": values[:, k] for k, key in enumerate(self.states)}
+        for k, interface in enumerate(self.interfaces):
+            columns[f"hits {interface} upwards"] = self.hits[:, k, 0]
+            columns[f"hits {interface} downwards"] = self.hits[:, k, 1]
+        return {**columns, "reached": self.reached, "regime": self.regime, "success": self.success}
+
+    def _about(self) -> dict[str, Any]:
+        return {**super()._about(), **self.constants}
 
     def __repr__(self) -> str:
         count = len(self)
@@ -173,6 +201,7 @@ class Ensemble:
         if len(kinds):
             lines.append("  " + ", ".join(f"{k}: {n}" for k, n in zip(kinds, counts, strict=True)))
         done = int(np.count_nonzero(self.success))
+        lines.append(f"  {self.method}")
         lines.append(f"  {done} of {count} reached the end of time")
         if done < count:
             worst = int(np.flatnonzero(~self.success)[0])
@@ -184,7 +213,8 @@ def regimes(
     seen: NDArray[np.float64],
     end: NDArray[np.float64],
     period: NDArray[np.float64],
-    gap: tuple[int, int, int],
+    modes: tuple[str, ...],
+    gap: tuple[str, str, str],
 ) -> NDArray[np.str_]:
     """The regime of each trajectory from the times at which each mode was last left.
 
@@ -193,8 +223,15 @@ def regimes(
     seen : ndarray, shape (m, n_modes)
         Minus infinity for a mode never entered.
     end, period : ndarray, shape (m,)
-    gap : tuple of int
-        Modes below, inside and above the gap.
+    modes : tuple of str
+        Regions and sliding motions; sliding along an edge of the gap touches its side.
+    gap : tuple of str
+        Regions below, inside and above the gap.
     """
-    touched = seen[:, gap] > (end - period)[:, None]
-    return np.array(REGIMES)[touched @ np.array([1, 2, 4])]
+    lower, inside, upper = gap
+    bits = np.zeros(len(modes), dtype=np.int64)
+    for column, mode in enumerate(modes):
+        sides = mode.split("|")
+        bits[column] = (lower in sides) + 2 * (mode == inside) + 4 * (upper in sides)
+    touched = np.where(seen > (end - period)[:, None], bits, 0)
+    return np.array(REGIMES)[np.bitwise_or.reduce(touched, axis=1)]

@@ -2,94 +2,72 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.results.diagrams import Diagram
-from fastslow.results.points import SpecialPoint
+from fastslow.results.formulas import evaluated
+from fastslow.results.outcome import Outcome
+from fastslow.results.result import Result
+from fastslow.results.tables import Table
 from fastslow.results.trajectories import Trajectory
+from fastslow.results.transitions import Bursting, Moment, Phase, StableSheet, Transition
+
+#: The usual outcome of an overlay.
+MEASURED = Outcome("measured", "the diagram covers the whole run.", True)
 
 
-@dataclass(frozen=True)
-class StableSheet:
-    """A stable run of a branch that a trajectory can follow.
-
-    Parameters
-    ----------
-    label : str
-        The region, numbered where a region has several: ``"S1"``, ``"S1b"``.
-    branch : int
-        Number of the branch in the diagram.
-    start, stop : int
-        Rows ``start`` to ``stop - 1`` of the branch.
-    region : str
-        The region of its equilibria.
-    """
-
-    label: str
-    branch: int
-    start: int
-    stop: int
-    region: str
+#: Transitions that a summary lists; all are in ``transitions``.
+SHOWN = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Transition:
-    """A change of the followed sheet.
-
-    Parameters
-    ----------
-    time : float
-        When two thirds of the way from the old sheet to the new one were done.
-    value : float
-        The slow quantity at that time.
-    state : ndarray, shape (n,)
-        The state at that time.
-    from_sheet, to_sheet : str
-        Labels of the sheets.
-    special : SpecialPoint or None
-        The nearest special point that ends the old sheet.
-    delay : float
-        How far past the special point, away from the old sheet, the slow
-        quantity is, in its own units; nan without a special point.
-    """
-
-    time: float
-    value: float
-    state: NDArray[np.float64]
-    from_sheet: str
-    to_sheet: str
-    special: SpecialPoint | None
-    delay: float
-
-    @property
-    def kind(self) -> str:
-        """``"jump"`` at a fold, ``"crossing"`` at a boundary equilibrium, else ``"change"``."""
-        code = self.special.code if self.special is not None else ""
-        return {"LP": "jump", "BE": "crossing"}.get(code, "change")
-
-
-@dataclass(frozen=True, eq=False)
-class Overlay:
+class Overlay(Table, Result):
     """A trajectory laid over the equilibrium diagram of its frozen model.
 
     Parameters
     ----------
     diagram : Diagram
     run : Trajectory
-    time, slow, distance : ndarray, shape (N,)
-        Times, the slow quantity there, and the distance of the state from the
-        followed sheet (each state in units of the extent it has in the run or the diagram).
+    time, slow : ndarray, shape (N,)
+        Times, and the diagram's parameter there: a slow quantity of the run, or the
+        parameter of the path along which the model was frozen.
     state : ndarray, shape (N, n)
         The fast states at those times.
+    extent : ndarray, shape (n,)
+        Unit of each state in distances: its extent in the run or on the sheets that the run
+        can follow, whichever is larger, if that is within reason of what the branches span;
+        of a velocity at least that of its state times |λ|.
+    radius : float
+        What counts as near, in those units.
     sheets : tuple of StableSheet
         All stable sheets of the diagram.
     followed : ndarray of int, shape (N,)
-        Index into ``sheets``; −1 where the diagram has no stable sheet at all.
+        Index into ``sheets``; −1 where none is followed: before the first and after the last
+        sheet, while spiking on a cycle, and outside the diagram's range.
+    distance : ndarray, shape (N,)
+        From the followed sheet (past a Hopf point its unstable continuation, past a fold the
+        fold); where none is followed from the nearest stable one, infinite without any.
+    lag : ndarray, shape (N,)
+        How much time the motion is behind the sheet that it follows, X(w(t − lag)) ≈ x(t):
+        the deviation along the sheet over the speed at which the sheet drifts. nan where no
+        sheet is followed, or where the sheet or the slow quantity stands still.
+    relaxation : ndarray, shape (N,)
+        Relaxation time 1/|Re λ| of the followed sheet; nan where it is not stable.
+    phases : tuple of Phase
+        All of the run, in time.
     transitions : tuple of Transition
-        Every change of the followed sheet, in time.
+        Every leaving of a sheet and end of spiking, in time.
+    bursting : Bursting or None
+        What the rhythm is called; None without one.
+    turning : tuple of Moment
+        Where the slow quantity turns back.
+    outcome : Outcome
+        Whether the diagram covers the run.
     """
 
     diagram: Diagram
@@ -97,10 +75,36 @@ class Overlay:
     time: NDArray[np.float64]
     slow: NDArray[np.float64]
     state: NDArray[np.float64]
-    distance: NDArray[np.float64]
+    extent: NDArray[np.float64]
+    radius: float
     sheets: tuple[StableSheet, ...]
     followed: NDArray[np.intp]
+    distance: NDArray[np.float64]
+    lag: NDArray[np.float64]
+    relaxation: NDArray[np.float64]
+    phases: tuple[Phase, ...]
     transitions: tuple[Transition, ...]
+    bursting: Bursting | None
+    turning: tuple[Moment, ...]
+    outcome: Outcome = MEASURED
+
+    _row = "t"
+    _places = ("t",)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Time t, the slow quantity, states, distance, lag, and the label of the sheet followed."""
+        labels = np.array([*(sheet.label for sheet in self.sheets), ""])
+        return {
+            "t": self.time,
+            self.parameter: self.slow,
+            **{name: self.state[:, k] for k, name in enumerate(self.diagram.states)},
+            "distance": self.distance,
+            "lag": self.lag,
+            "sheet": labels[self.followed],
+        }
 
     @property
     def parameter(self) -> str:
@@ -112,26 +116,92 @@ class Overlay:
         """Delay of every transition, in the slow quantity's units."""
         return np.array([t.delay for t in self.transitions])
 
-    def summary(self) -> str:
-        """Share of time on each sheet and every transition, as text."""
-        name = self.parameter
+    def __getitem__(self, expression: object) -> NDArray[np.float64]:
+        """A state, slow quantity, t, distance, lag, or an expression in them, shape (N,).
+
+        Parameters may stand in it too.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is none of these.
+        ArgumentError
+            For what is no expression.
+        """
+        known = {
+            "t": self.time,
+            "distance": self.distance,
+            "lag": self.lag,
+            **self.run.parameters,
+            **self.diagram.parameters,
+            **{name: self.run[name] for name in self.run.columns},
+            self.parameter: self.slow,
+        }
+        return np.broadcast_to(evaluated(expression, known), self.time.shape)
+
+    def shares(self) -> dict[str, float]:
+        """Part of the time on each sheet that is followed, and in ``""`` on none."""
         weight = np.diff(self.time)
         total = float(weight.sum()) or 1.0
-        lines = [
-            f"{len(self.transitions)} transitions over t = {self.time[0]:g} to {self.time[-1]:g}"
-        ]
-        for index, sheet in enumerate(self.sheets):
-            share = float(weight[self.followed[:-1] == index].sum()) / total
-            if share > 0:
-                lines.append(f"  on {sheet.label}: {share:.1%} of the time")
-        for t in self.transitions:
-            past = "no special point ends the sheet left"
-            if t.special is not None:
-                at = f"{name} = {t.special[name]:.6g}"
-                past = f"{t.kind} at {t.special.label} ({at}), delay {t.delay:.3g}"
-            change = f"{t.from_sheet} → {t.to_sheet} at {name} = {t.value:.6g}"
-            lines.append(f"  t = {t.time:.6g}: {change}; {past}")
-        return "\n".join(lines)
+        labels = ["", *(s.label for s in self.sheets)]
+        times = np.bincount(self.followed[:-1] + 1, weight, len(labels)) / total
+        return {k: float(v) for k, v in zip(labels, times, strict=True) if v > 0}
+
+    def summary(self) -> str:
+        """The story in words and numbers: sheets, phases, rhythm, and every transition."""
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        name, count = self.parameter, len(self.transitions)
+        yield (
+            f"{count} transition{'' if count == 1 else 's'} over "
+            f"t = {self.time[0]:g} to {self.time[-1]:g}, "
+            f"{name} from {self.slow.min():.6g} to {self.slow.max():.6g}"
+        )
+        if not self.outcome:
+            yield f"  {self.outcome}"
+        if not self.sheets:
+            yield "  the diagram has no stable sheet"
+        elif not self.diagram.folds:
+            yield "  the diagram has no fold"
+        for label, share in self.shares().items():
+            yield f"  on {label or 'no sheet'}: {share:.1%} of the time{self._behind(label)}"
+        yield from self._spiking()
+        if self.bursting is not None:
+            yield f"  {self.bursting}"
+            yield from (f"    {sentence}" for sentence in self.bursting.evidence)
+        yield from (f"  {t.describe(name)}" for t in self.transitions[:SHOWN])
+        if count > SHOWN:
+            yield f"  and {count - SHOWN} more, in transitions"
+
+    def _behind(self, label: str) -> str:
+        """How far the motion is behind a sheet, in words."""
+        numbers = [k for k, sheet in enumerate(self.sheets) if sheet.label == label]
+        lags = self.lag[np.isin(self.followed, numbers) & np.isfinite(self.lag)]
+        if not len(lags):
+            return ""
+        middle = float(np.median(lags))
+        return f", typically {abs(middle):.3g} {'behind' if middle >= 0 else 'ahead'} in time"
+
+    def _spiking(self) -> Iterator[str]:
+        """Spiking phases that are alike, in one line each."""
+        groups: dict[tuple[str, tuple[str, ...]], list[Phase]] = {}
+        for phase in self.phases:
+            if phase.kind == "spiking":
+                groups.setdefault((phase.attractor, phase.sheets), []).append(phase)
+        for (attractor, sheets), met in groups.items():
+            counts, lengths = [p.spikes for p in met], [p.duration for p in met]
+            what = "on a cycle" if attractor == "cycle" else f"settling on {sheets[0]}"
+            yield (
+                f"  {len(met)} spiking phase{'' if len(met) == 1 else 's'} {what}: "
+                f"{_range(counts)} spikes, {_range(lengths)} long"
+            )
 
     def __repr__(self) -> str:
         return f"Overlay on {self.parameter}: {self.summary()}"
+
+
+def _range(values: Sequence[float]) -> str:
+    """The values from least to largest, to three digits."""
+    low, high = (f"{v:.3g}" if v < 1000 else f"{v:.0f}" for v in (min(values), max(values)))
+    return low if low == high else f"{low} to {high}"

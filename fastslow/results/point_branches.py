@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.errors import unknown_name
+from fastslow.results import formulas
+from fastslow.results.markup import points_html
+from fastslow.results.meetings import intersections
 from fastslow.results.outcome import Outcome
+from fastslow.results.point_columns import labels_at
 from fastslow.results.points import CODE_NAMES, SpecialPoints
+from fastslow.results.result import Result
+from fastslow.results.tables import Table, numbered
 
 
 @dataclass(frozen=True, eq=False)
-class PointBranch:
+class PointBranch(Table, Result):
     """A curve of folds, Hopf points, branch points or boundary equilibria.
 
     Parameters
@@ -46,6 +54,12 @@ class PointBranch:
     outcomes : tuple of Outcome
         Why the curve stopped at its first and its last row.
     closed : bool
+    parameters : mapping
+        The values of all other parameters.
+    equations : str
+        The model as text.
+    settings : mapping
+        How the curve was traced.
     """
 
     states: tuple[str, ...]
@@ -63,6 +77,9 @@ class PointBranch:
     special_rows: tuple[int, ...]
     outcomes: tuple[Outcome, Outcome]
     closed: bool = False
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    equations: str = ""
+    settings: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def outcome(self) -> Outcome:
@@ -73,13 +90,52 @@ class PointBranch:
         return len(self.state)
 
     def __getitem__(self, name: object) -> NDArray[np.float64]:
-        """Column of a state or of a parameter, shape (N,)."""
-        key = str(name)
-        if key in self.states:
-            return self.state[:, self.states.index(key)]
-        if key in self.parameter_names:
-            return self.parameter[:, self.parameter_names.index(key)]
-        raise unknown_name("column", key, [*self.states, *self.parameter_names])
+        """A state, a parameter, or an expression in them, shape (N,)."""
+        columns = {key: partial(self._column, k) for k, key in enumerate(self.point_names)}
+        return formulas.column(name, columns, self.parameters, len(self))
+
+    def _column(self, k: int) -> NDArray[np.float64]:
+        n = len(self.states)
+        return self.state[:, k] if k < n else self.parameter[:, k - n]
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """States and parameters, shape (N, n + 2)."""
+        return np.column_stack([self.state, self.parameter])
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """The columns of `points`."""
+        return (*self.states, *self.parameter_names)
+
+    def intersections(
+        self, other: PointBranch, x: object = None, y: object = None
+    ) -> NDArray[np.float64]:
+        """Where two curves meet in the plane of two columns; see `Branch.intersections`.
+
+        Parameters
+        ----------
+        other : PointBranch
+        x, y : str, optional
+            By default the two parameters.
+        """
+        first, second = self.parameter_names
+        names = str(first if x is None else x), str(second if y is None else y)
+        return intersections(self, other, names)
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Parameters, states, code, admissibility, coefficient, eigenvalues, labels of points."""
+        return {
+            **{name: self[name] for name in (*self.parameter_names, *self.states)},
+            "code": self.codes,
+            "admissible": self.admissible,
+            "coefficient": self.coefficient,
+            **numbered("eigenvalue", self.eigenvalues),
+            "label": labels_at(self.special, self.special_rows, len(self)),
+        }
+
+    def _repr_html_(self) -> str:
+        return points_html(self.special, repr(self).split("\n")[0])
 
     def __repr__(self) -> str:
         first, second = self.parameter_names

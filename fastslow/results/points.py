@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,6 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.errors import unknown_name
+from fastslow.results.markup import points_html
+from fastslow.results.point_columns import columns_of_points
+from fastslow.results.result import LIVE, Result
+from fastslow.results.tables import Table
 
 #: An eigenvalue counts as zero when its real part is below this times the largest modulus.
 NEUTRAL = 1e-10
@@ -81,7 +85,7 @@ def type_of(eigenvalues: ArrayLike) -> str:
     return f"{pseudo}focus" if turning[leading] else f"{pseudo}node"
 
 
-class _Point:
+class _Point(Result):
     """What every point has: names for its numbers."""
 
     states: tuple[str, ...]
@@ -127,6 +131,8 @@ class Equilibrium(_Point):
         Whether it is one of a continuum (its equilibrium is not isolated).
     interpolated : bool
         Whether it was read between stored points instead of solved for.
+    known_stability : str, optional
+        Its stability where the eigenvalues are not known, as in files of AUTO-07p.
     """
 
     states: tuple[str, ...]
@@ -138,11 +144,12 @@ class Equilibrium(_Point):
     residual: float = 0.0
     continuum: bool = False
     interpolated: bool = False
+    known_stability: str | None = None
 
     @property
     def stability(self) -> str:
         """``"stable"``, ``"unstable"`` or ``"neutral"``."""
-        return str(stability_of(self.eigenvalues))
+        return self.known_stability or str(stability_of(self.eigenvalues))
 
     @property
     def stable(self) -> bool:
@@ -155,16 +162,22 @@ class Equilibrium(_Point):
 
     @property
     def type(self) -> str:
-        """Node, focus, saddle, saddle-focus (pseudo-node, …) or non-hyperbolic."""
+        """Node, focus, saddle, saddle-focus (pseudo-node, …), non-hyperbolic or unknown."""
+        if self.known_stability is not None and np.isnan(self.eigenvalues).any():
+            return "unknown"
         return type_of(self.eigenvalues)
 
     def __repr__(self) -> str:
-        kind = (
-            f"{self.stability} {self.type}" if self.type != "non-hyperbolic" else "non-hyperbolic"
+        kind = {"non-hyperbolic": "non-hyperbolic", "unknown": self.stability}.get(
+            self.type, f"{self.stability} {self.type}"
         )
         seat = "in" if self.admissible else "virtual, of"
         more = ", one of a continuum" if self.continuum else ""
         return f"Equilibrium({self._values()}; {seat} {self.region}; {kind}{more})"
+
+
+#: Solves for the equilibrium of a region near a state: (region, state, value) -> Equilibrium.
+Corrector = Callable[[str, NDArray[np.float64], float], Equilibrium | None]
 
 
 class Equilibria(list[Equilibrium]):
@@ -311,10 +324,7 @@ class SpecialPoint(_Point):
     accuracy: float | None = None
     admissible: bool = True
     note: str = ""
-    source: Any = field(default=None, repr=False)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "source": None}
+    source: Any = field(default=None, repr=False, metadata=LIVE)
 
     @property
     def criticality(self) -> str | None:
@@ -326,24 +336,29 @@ class SpecialPoint(_Point):
         return "supercritical" if self.lyapunov < 0 else "subcritical"
 
     @property
-    def description(self) -> str:
-        """What it is and where, in words."""
+    def kind(self) -> str:
+        """What it is, in words."""
         kind = CODE_NAMES.get(self.code, self.code)
         if self.subtype or self.criticality:
             kind += f", {self.subtype or self.criticality}"
         if self.clarke is not None and self.clarke.q_hopf is not None:
             kind += " with Clarke-Hopf"
-        if not self.admissible:
-            kind = f"virtual {kind}"
+        return kind if self.admissible else f"virtual {kind}"
+
+    @property
+    def description(self) -> str:
+        """What it is and where, in words."""
         on = f" on {self.interface}" if self.interface else ""
-        return f"{kind}{on}; {self._values()}"
+        return f"{self.kind}{on}; {self._values()}"
 
     def __repr__(self) -> str:
         return f"SpecialPoint({self.label}: {self.description})"
 
 
-class SpecialPoints(tuple[SpecialPoint, ...]):
+class SpecialPoints(Table, Result, tuple[SpecialPoint, ...]):
     """Special points in order along a branch or diagram; called with a code, those of that code.
+
+    ``points["w"]`` is the column of a state or parameter, ``points[0]`` a point.
 
     Examples
     --------
@@ -351,8 +366,25 @@ class SpecialPoints(tuple[SpecialPoint, ...]):
     ()
     """
 
+    _row = "point"
+
     def __call__(self, code: str) -> SpecialPoints:
         """Those of one code; UnknownNameError for a code that there is not."""
         if code not in CODE_NAMES:
             raise unknown_name("special point code", code, CODE_NAMES)
         return SpecialPoints(point for point in self if point.code == code)
+
+    def __getitem__(self, key: Any) -> Any:
+        """A point by number, some by a slice, or a column by the name of a state or parameter."""
+        if isinstance(key, slice):
+            return SpecialPoints(tuple.__getitem__(self, key))
+        if hasattr(key, "__index__"):
+            return tuple.__getitem__(self, key)
+        return np.array([point[key] for point in self], dtype=float)
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Label, code, subtype, interface, regions, states, parameters, and how well known."""
+        return columns_of_points(self)
+
+    def _repr_html_(self) -> str:
+        return points_html(self)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.map_boundaries import MapBoundary, MapEdges, boundaries_of
 from fastslow.results.outcome import Outcome
+from fastslow.results.result import Result
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -23,7 +24,7 @@ FAILED = "failed"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RefinedMap:
+class RefinedMap(Result):
     """Labels over a plane of two parameters.
 
     Positions are counted in the finest cells, of which a cell of size s holds
@@ -261,7 +262,7 @@ class RefinedMap:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MapComparison:
+class MapComparison(Result):
     """What was found at the points of a map beside what was predicted.
 
     Parameters

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results import formulas
 from fastslow.results.dense import evaluate
 from fastslow.results.expressions import along_steps
+from fastslow.results.result import Result
 from fastslow.results.step_roots import find_roots
+from fastslow.results.tables import Table
 
 if TYPE_CHECKING:
     from fastslow.results.trajectories import Trajectory
@@ -21,7 +25,7 @@ DIRECTIONS = (None, -1, 0, 1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Section:
+class Section(Table, Result):
     """Points of a trajectory on a section.
 
     Parameters
@@ -43,14 +47,18 @@ class Section:
     table: NDArray[np.float64]
     directions: NDArray[np.int64]
 
+    _row = "t"
+    _places = ("t",)
+
     def __getitem__(self, name: object) -> NDArray[np.float64]:
-        """A column at the times of the section, shape (K,)."""
-        key = str(name)
-        if key == "t":
-            return self.times
-        if key not in self.names:
-            raise unknown_name("column", key, self.names)
-        return self.table[self.names.index(key)]
+        """A column, or an expression in columns, at the times of the section, shape (K,)."""
+        columns = {key: partial(self.table.__getitem__, k) for k, key in enumerate(self.names)}
+        return formulas.column(name, {**columns, "t": lambda: self.times}, {}, len(self))
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Time t, every column, and the direction."""
+        columns = dict(zip(self.names, self.table, strict=True))
+        return {"t": self.times, **columns, "direction": self.directions}
 
     def __len__(self) -> int:
         return len(self.times)

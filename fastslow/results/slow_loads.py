@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.results.result import Result
+
 Floats = NDArray[np.float64]
 
 #: The regime of a set of parameters at which there is no gap, and where nothing can be said.
@@ -14,7 +16,7 @@ NO_GAP, UNDECIDED = "no gap", "undecided"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SlowLoad:
+class SlowLoad(Result):
     """A gap under a load B + C sin(ω t), and the widest gap that the load carries the state across.
 
     All arrays have the shape of the parameters asked for, () for one set.

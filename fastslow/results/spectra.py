@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.result import Result
 from fastslow.results.sections import window_of
+from fastslow.results.tables import Table
 
 if TYPE_CHECKING:
     from fastslow.results.trajectories import Trajectory
@@ -49,7 +51,7 @@ class Peak:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Spectrum:
+class Spectrum(Table, Result):
     """One-sided amplitude spectrum of a column.
 
     Parameters
@@ -80,6 +82,17 @@ class Spectrum:
     span: tuple[float, float]
     frequency: NDArray[np.float64]
     amplitude: NDArray[np.float64]
+
+    _row = "frequency"
+    _places = ("frequency",)
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Frequency, angular frequency and amplitude."""
+        return {
+            "frequency": self.frequency,
+            "angular": self.angular,
+            "amplitude": self.amplitude,
+        }
 
     @cached_property
     def angular(self) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.results.outcome import Outcome
+from fastslow.results.result import Result
 from fastslow.results.sections import Section, poincare_section, stroboscopic_section
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ LATE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class SteadyState:
+class SteadyState(Result):
     """What a run settles on.
 
     Parameters

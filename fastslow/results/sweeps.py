@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.results.outcome import Outcome
+from fastslow.results.result import Result
+from fastslow.results.tables import Table
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SweepPass:
+class SweepPass(Result):
     """One pass over the values of a parameter, each run begun where the last one ended.
 
     Parameters
@@ -55,7 +59,7 @@ class SweepPass:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sweep:
+class Sweep(Table, Result):
     """A bifurcation diagram by simulation.
 
     Parameters
@@ -68,6 +72,12 @@ class Sweep:
         The same in full, e.g. ``"x where v = 0 downwards"``.
     passes : tuple of SweepPass
         One, or one each way.
+    parameters : mapping
+        The values of all other parameters.
+    equations : str
+        The model as text.
+    settings : mapping
+        How the runs were made.
     """
 
     parameter_name: str
@@ -75,6 +85,19 @@ class Sweep:
     what: str
     rule: str
     passes: tuple[SweepPass, ...]
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    equations: str = ""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    _row = "point"
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """The parameter, the column recorded, and the direction of the pass, point by point."""
+        return {
+            self.parameter_name: self.parameter,
+            self.name: self.x,
+            "direction": self.direction,
+        }
 
     @property
     def up(self) -> SweepPass | None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.errors import unknown_name
+from fastslow.results import formulas
 from fastslow.results.contacts import (
     Contacts,
     contacts_of,
@@ -18,22 +18,18 @@ from fastslow.results.contacts import (
     regime_of,
     residence_in,
 )
-from fastslow.results.crossings import Crossing, Segment, segments_of
+from fastslow.results.crossings import Crossing, Segment, crossings_of, regions_at, segments_of
 from fastslow.results.dense import columns_at, refined_table
+from fastslow.results.markup import trajectory_html
 from fastslow.results.outcome import Outcome
-from fastslow.results.sections import (
-    Section,
-    poincare_section,
-    stroboscopic_section,
-    window_of,
-)
-from fastslow.results.spectra import Spectrum, spectrum_of
-from fastslow.results.steady import SteadyState, steady_state
-from fastslow.results.turning import extremes_of
+from fastslow.results.recurrence import Recurrence
+from fastslow.results.result import Result
+from fastslow.results.sections import window_of
+from fastslow.results.tables import Table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory:
+class Trajectory(Recurrence, Table, Result):
     """A solution in time.
 
     Parameters
@@ -54,8 +50,11 @@ class Trajectory:
         Why the run ended.
     end : ndarray, shape (1 + n,)
         Time and state reached.
-    steps : ndarray, shape (n_steps, 3)
-        Time, length and mode of every step.
+    method : str
+        How the steps were made.
+    steps : ndarray, shape (n_steps, 4)
+        Time, length and mode of every step, and what took the place of a
+        series: 0 nothing, 1 collocation, 2 an implicit method.
     modes : tuple of str
         What the modes in ``steps`` and ``crossing_table`` are: regions, then sliding motions.
     crossing_table : ndarray, shape (n_crossings, 6 + n)
@@ -66,6 +65,10 @@ class Trajectory:
         Times (N,) asked for and their columns (n or n + n_forcing, N).
     span : tuple of float
         First and last time reached.
+    equations : str
+        The model as text.
+    settings : mapping
+        How it was simulated.
 
     Examples
     --------
@@ -90,11 +93,17 @@ class Trajectory:
     outcome: Outcome
     span: tuple[float, float]
     end: NDArray[np.float64]
+    method: str
     steps: NDArray[np.float64]
     modes: tuple[str, ...]
     crossing_table: NDArray[np.float64]
     series: NDArray[np.float64] | None
     sampled: tuple[NDArray[np.float64], NDArray[np.float64]] | None
+    equations: str = ""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    _row = "t"
+    _places = ("t",)
 
     @cached_property
     def t(self) -> NDArray[np.float64]:
@@ -107,13 +116,11 @@ class Trajectory:
         return (*self.states, *self.forcing)
 
     def __getitem__(self, name: object) -> NDArray[np.float64]:
-        """A state, slow state or slow quantity at the times ``t``, shape (N,)."""
-        key = str(name)
-        if key == "t":
-            return self.t
-        if key not in self.columns:
-            raise unknown_name("column", key, self.columns)
-        row = self.columns.index(key)
+        """A state, a slow quantity, or an expression in them, at the times ``t``, shape (N,)."""
+        columns = {key: partial(self._column, k) for k, key in enumerate(self.columns)}
+        return formulas.column(name, {**columns, "t": lambda: self.t}, self.parameters, len(self.t))
+
+    def _column(self, row: int) -> NDArray[np.float64]:
         values = self._table[1]
         if row >= len(values):
             values = self._all_sampled
@@ -150,18 +157,7 @@ class Trajectory:
     @cached_property
     def crossings(self) -> tuple[Crossing, ...]:
         """Every crossing in order of time."""
-        return tuple(
-            Crossing(
-                float(entry[0]),
-                entry[6:].copy(),
-                self.interfaces[int(entry[1])],
-                int(entry[2]),
-                self.modes[int(entry[3])],
-                self.modes[int(entry[4])],
-                bool(entry[5]),
-            )
-            for entry in self.crossing_table
-        )
+        return crossings_of(self)
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
@@ -236,157 +232,13 @@ class Trajectory:
         """
         return contacts_of(self, period, window_of(self, since, until))
 
-    def stroboscopic(
-        self, period: float | None = None, phase: float = 0.0, since: float | None = None
-    ) -> Section:
-        """States once every period, at start + phase + k·period.
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Time t, every column, and the region at that time."""
+        columns = {name: self[name] for name in self.columns}
+        return {"t": self.t, **columns, "region": regions_at(self, self.t)}
 
-        Parameters
-        ----------
-        period : float, optional
-            By default that of the forcing.
-        phase : float
-            Time after the start of the run, in units of time.
-        since : float, optional
-            Earlier points are left out.
-
-        Raises
-        ------
-        ArgumentError
-            Without a period, or without dense output.
-
-        Examples
-        --------
-        >>> import sympy as sp, fastslow as fs
-        >>> x, v, t = sp.symbols("x v t")
-        >>> run = fs.simulate(fs.Model({x: v, v: sp.sin(t) - x - v}), [-1, 0], periods=3)
-        >>> run.stroboscopic()["x"].round(9)
-        array([-1., -1., -1., -1.])
-        """
-        return stroboscopic_section(self, period, phase, since)
-
-    def section(
-        self,
-        expression: object = None,
-        level: float = 0.0,
-        *,
-        direction: int | None = None,
-        interface: object = None,
-        since: float | None = None,
-        until: float | None = None,
-    ) -> Section:
-        """Poincaré section: where an expression passes a level, or an interface is crossed.
-
-        Every root of every step's polynomial is found, to rounding; where the
-        run begins on the section there is no point.
-
-        Parameters
-        ----------
-        expression : str or Expr, optional
-            A column, or a polynomial in columns, parameters and t.
-        level : float
-        direction : int, optional
-            +1 upwards, −1 downwards, 0 for touches; all by default.
-        interface : str or Expr, optional
-            Instead of an expression: the crossings of this interface.
-        since, until : float, optional
-            The part of the run, by default all of it.
-
-        Raises
-        ------
-        UnknownNameError
-            For an unknown column, parameter or interface.
-        ArgumentError
-            For an expression that is no polynomial, or without dense output.
-
-        Examples
-        --------
-        >>> import sympy as sp, fastslow as fs
-        >>> x, v = sp.symbols("x v")
-        >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 10), tol=1e-13)
-        >>> (run.section("x", 0.0, direction=-1).times / sp.pi.evalf()).astype(float).round(9)
-        array([0.5, 2.5])
-        """
-        window = window_of(self, since, until)
-        return poincare_section(self, expression, level, direction, interface, window)
-
-    def spectrum(
-        self,
-        name: object,
-        since: float | None = None,
-        window: str = "hann",
-        samples: int | None = None,
-    ) -> Spectrum:
-        """Frequencies and amplitudes of a column.
-
-        Parameters
-        ----------
-        name : str or Symbol
-        since : float, optional
-            The transient before is left out; with forcing, so is what is left
-            over of a period, so that its multiples fall on bins.
-        window : str
-            ``"hann"``, ``"flattop"``, ``"blackman"``, ``"hamming"`` or ``"rectangular"``.
-        samples : int, optional
-            Even samples of the dense output; by default 16 a step, 4096 at least.
-
-        Raises
-        ------
-        UnknownNameError
-            For a name that is no column, or no window.
-        ArgumentError
-            For a time outside the run, or without dense output.
-        """
-        return spectrum_of(self, name, since, window, samples)
-
-    def steady(self, period: float | None = None, tol: float = 1e-6, most: int = 16) -> SteadyState:
-        """After how many periods the states repeat, and from which time on.
-
-        Without forcing, the returns to a Poincaré section take the place of
-        the periods: the state with the largest range passes its mean upwards.
-
-        Parameters
-        ----------
-        period : float, optional
-            By default that of the forcing.
-        tol : float
-            Largest difference that counts as a repeat, in units of each state's range.
-        most : int
-            Largest multiple that is tried.
-
-        Returns
-        -------
-        SteadyState
-            Also where nothing repeats: ``multiple`` is then None, and ``outcome`` says why.
-        """
-        return steady_state(self, period, tol, most)
-
-    def extremes(
-        self, name: object, since: float | None = None, until: float | None = None
-    ) -> tuple[float, float]:
-        """Minimum and maximum of a column in a part of the run, to rounding.
-
-        Every step's polynomial is maximised where its coefficients allow more
-        than the extremes at the ends of the steps.
-
-        Parameters
-        ----------
-        name : str or Symbol
-        since, until : float, optional
-            The part, by default all of it.
-
-        Raises
-        ------
-        UnknownNameError
-            For a name that is no column.
-        ArgumentError
-            For a time outside the run, or without dense output.
-        """
-        return extremes_of(self, name, since, until)
-
-    def __getstate__(self) -> dict[str, Any]:
-        names = self.__dataclass_fields__
-        return {name: value for name, value in self.__dict__.items() if name in names}
+    def _repr_html_(self) -> str:
+        return trajectory_html(self)
 
     def __repr__(self) -> str:
         low, high = self.span
@@ -394,6 +246,7 @@ class Trajectory:
             f"Trajectory of {', '.join(self.columns)} for t from {low:.6g} to {high:.6g}",
             f"  {len(self.steps)} steps, {len(self.crossing_table)} crossings, "
             f"{len(self.segments)} segments" + (f", regime {self.regime}" if self.regime else ""),
+            f"  {self.method}",
             f"  {self.outcome}",
         ]
         return "\n".join(lines)

@@ -11,12 +11,35 @@ from fastslow.simulation.extremes import widen_extremes
 from fastslow.simulation.modes import (
     MANY_MODES,
     NOT_DEFINED,
+    across,
     choose_mode,
+    expand,
     interface_noise,
-    step_length,
+    leaves,
 )
-from fastslow.simulation.polynomials import ZERO, horner
-from fastslow.simulation.settled import DAMPING, PAYS, long_step, settled
+from fastslow.simulation.polynomials import ZERO, horner, sample
+from fastslow.simulation.rooms import (
+    CALM,
+    CROSSINGS,
+    CROWDED,
+    LAST_EVENT,
+    LATE,
+    MODE,
+    PAUSE,
+    SAMPLES,
+    STEPS,
+    USUAL,
+    grown,
+)
+from fastslow.simulation.settled import (
+    DAMPING,
+    IMPLICIT,
+    LONGEST_WAIT,
+    PAYS,
+    WAIT,
+    long_step,
+    settled,
+)
 
 #: How the loop ended.
 REACHED_END = 0
@@ -28,45 +51,14 @@ NOT_UNIQUE = 5
 NO_WAY_ON = 6
 ACCUMULATION = 7
 
+#: It did not end: a plain step was taken in a region, and others may take the next.
+HANDED_OVER = -1
+
 #: Crossings in a row, none farther from the last than rounding of time, that end a run.
 CROWD = 40
 
 #: A crossing is near-tangential when moving h by this part of its scale would undo it.
 TANGENTIAL = 1e-6
-
-
-@part
-def grown(array):
-    """A copy with room for twice as many rows."""
-    larger = np.empty((2 * array.shape[0] + 16, array.shape[1]))
-    for i in range(array.shape[0]):
-        for j in range(array.shape[1]):
-            larger[i, j] = array[i, j]
-    return larger
-
-
-@part
-def sample(W, columns, rows, s, out, first):
-    """Evaluate rows of a step at the offsets s, into the columns of ``out`` from the first."""
-    n = s.shape[0]
-    for i in range(rows):
-        top = i * columns + columns - 1
-        # four at a time, because each waits for its own last product
-        for c in range(0, n - 3, 4):
-            s0, s1, s2, s3 = s[c], s[c + 1], s[c + 2], s[c + 3]
-            v0 = v1 = v2 = v3 = W[top]
-            for k in range(1, columns):
-                coefficient = W[top - k]
-                v0 = v0 * s0 + coefficient
-                v1 = v1 * s1 + coefficient
-                v2 = v2 * s2 + coefficient
-                v3 = v3 * s3 + coefficient
-            out[i, first + c] = v0
-            out[i, first + c + 1] = v1
-            out[i, first + c + 2] = v2
-            out[i, first + c + 3] = v3
-        for c in range(n - n % 4, n):
-            out[i, first + c] = horner(W, top - columns + 1, top, s[c])
 
 
 @part
@@ -77,24 +69,26 @@ def drive(
     signs,
     continuous,
     parameters,
-    start,
     span,
     tol,
     times,
     samples,
     since,
-    dense,
     limits,
     store,
     extremes,
     hits,
     seen,
+    room,
+    inputs,
+    carried,
+    counted,
+    handed,
 ):
-    """Follow one trajectory from start to end.
+    """Follow one trajectory to its end, or until others may take its next step.
 
     Every step and every crossing is put into a table, or, where there are
-    arrays for it, they are summed up as the run goes. Which of the two is
-    settled when this is compiled: without arrays their place holds None.
+    arrays for it, they are summed up as the run goes.
 
     Parameters
     ----------
@@ -107,7 +101,7 @@ def drive(
         number of fast states, or 0 for no implicit steps).
     signs : int64 array, shape (n_modes, n_interfaces)
     continuous : bool array, shape (n_interfaces,)
-    parameters, start : float64 arrays
+    parameters : float64 array
     span : tuple of float
         Start and end of time.
     tol : float
@@ -117,98 +111,102 @@ def drive(
         The first rows at those times, as far as they are reached; filled here.
     since : float
         Time from which extremes and hits count.
-    dense : bool
-        Whether the series of every step is kept.
     limits : tuple of int
         Largest numbers of steps and crossings.
     store : float64 array
-        Room for the series, replaced by a larger one where it does not suffice.
-    extremes : float64 array, shape (2, n_states), or None
-        Smallest and largest value of every state, widened here.
-    hits : int64 array, shape (n_interfaces, 2), or None
-        Crossings upwards and downwards, counted here.
-    seen : float64 array, shape (n_modes,), or None
-        When each mode was last left, set here.
+        Room for the series of every step, replaced by a larger one where it does
+        not suffice; empty where they are not to be kept.
+    extremes : float64 array, shape (2, n_states)
+        Smallest and largest value of every state, widened here; without rows
+        where steps and crossings are to be listed.
+    hits : int64 array, shape (n_interfaces, 2)
+        Crossings upwards and downwards, counted here unless they are listed.
+    seen : float64 array, shape (n_modes,)
+        When each mode was last left, set here unless steps are listed.
+    room : tuple of arrays
+        From `room_for`.
+    inputs : float64 array, shape (1 + n_states + n_forcing,)
+        Time and state, changed here.
+    carried : float64 array, shape (CARRIED,)
+    counted : int64 array, shape (COUNTED,)
+        What is carried from step to step, at first that of `beginnings`; changed here.
+    handed : int
+        After a plain step in one of so many first modes the run is handed over.
 
     Returns
     -------
-    code, mode : int
-        How it ended, and in which mode.
-    end : ndarray, shape (1 + n_states,)
-        Time and state reached.
-    n_steps : int
-    steps : ndarray, shape (n_steps, 3)
-        Time, length and mode of every step; no rows where they are summed up.
-    store : ndarray
-        Coefficients of states and slow quantities, step by step, when ``dense``.
-    crossings : ndarray, shape (n_crossings, 6 + n_states)
-        Time, interface, direction, mode before, mode after, near-tangential, state.
-    n_samples : int
-        How many samples were reached.
+    code : int
+        How it ended, or `HANDED_OVER`.
+    listed : tuple of ndarray
+        Time, length and mode of every step, shape (n_steps, 3), no rows where
+        they are summed up; coefficients of states and slow quantities, step by
+        step, where they are kept; and time, interface, direction, mode before, mode
+        after, near-tangential and state of every crossing, shape (n_crossings,
+        6 + n_states).
     """
     n_states, n_forcing, n_interfaces, n_modes, order = layout
-    n_rows, stack_rows, n_fast = sizes
     columns = order + 1
     kept = n_states + n_forcing
-    drift = kept + n_interfaces
     stride = kept * columns
-    size = n_rows * columns
-    t, late, stop = span[0], 0.0, span[1]
-    whole = stop - t
-    inputs = np.empty(1 + kept)
-    inputs[0] = t
-    for i in range(n_states):
-        inputs[1 + i] = start[i]
-    work, W = np.empty(size), np.empty(size)
-    right, poly = np.empty(size if n_fast > 0 else 0), np.empty(size if n_fast > 0 else 0)
-    matrices = np.empty((2, n_states, n_states + 1))
-    vectors = np.empty((5, max(1 + kept, columns)))
-    b, d = np.empty(columns), np.empty(columns)
-    stack = np.empty((stack_rows, columns + 3))
-    gradient = np.empty(2 + n_states)
-    noise = np.zeros(n_interfaces)
-    on = np.zeros(n_interfaces, dtype=np.bool_)
-    hit = np.zeros(n_interfaces, dtype=np.bool_)
-    rests = np.zeros(n_interfaces, dtype=np.bool_)
-    side = np.zeros(n_interfaces, dtype=np.int64)
-    steps = np.empty((64 if extremes is None else 0, 3))
-    crossings = np.empty((16 if extremes is None else 0, 6 + n_states))
-    offsets = np.empty(times.shape[0])
-    n_steps = n_crossings = n_samples = crowd = ZERO
-    mode = interface = np.int64(-1)
-    depth, floor, last_event, usual, longest = 1.0, 0.0, -np.inf, 0.0, 0.0
-    code = REACHED_END
-    choosing, touched = True, False
+    t, late, stop = inputs[0], carried[LATE], span[1]
+    whole = stop - span[0]
+    work, W, b, d, stack, gradient, noise, on, hit, rests, side, offsets = room[:12]
+    right, poly, matrices, vectors, memory = room[12:]
+    memory[:] = 0.0
+    n_fast = sizes[2]
+    for j in range(n_interfaces):
+        on[j] = hit[j] = rests[j] = False
+    listing, dense = extremes.shape[0] == 0, store.shape[0] > 0
+    steps = np.empty((64 if listing else 0, 4))
+    crossings = np.empty((16 if listing else 0, 6 + n_states))
+    n_steps, n_crossings = counted[STEPS], counted[CROSSINGS]
+    n_samples, crowd = counted[SAMPLES], counted[CROWDED]
+    mode, interface = counted[MODE], ZERO - 1
+    usual, last_event, depth, floor = carried[USUAL], carried[LAST_EVENT], 1.0, 0.0
     # implicit steps: when to try again, how long to wait after a failure, how many, how long
-    calm, pause, in_a_row, wanted = ZERO + 4, ZERO + 4, ZERO, 0.0
+    calm, pause, in_a_row = counted[CALM], counted[PAUSE], ZERO
+    wanted = longest = 0.0
+    code = REACHED_END
+    choosing, touched, ahead = mode < 0, False, False
     while True:
         if choosing:
-            call_address(address, max(mode, 0), inputs, parameters, work)
+            # most often one interface is crossed where the rates are continuous
+            before = mode
+            mode = across(signs, before, interface) if interface >= 0 and not touched else before
+            call_address(address, max(mode, 0), inputs, parameters, W)
             for i in range(n_states, kept):
-                inputs[1 + i] = work[i * columns]
+                inputs[1 + i] = W[i * columns]
+            others = ZERO
             for j in range(n_interfaces):
                 noise[j] = interface_noise(address, n_modes, j, inputs, parameters, gradient)
                 if j == interface:
                     noise[j] = max(noise[j], floor)
                 on[j] = hit[j] or abs(gradient[0]) <= noise[j]
                 side[j] = 1 if gradient[0] > 0.0 else -1
-            before = mode
-            mode = choose_mode(
-                address,
-                layout,
-                signs,
-                continuous,
-                inputs,
-                parameters,
-                tol,
-                whole,
-                on,
-                side,
-                before,
-                work,
-                b,
-                noise,
+                others += on[j] and j != interface
+            ahead = (
+                mode != before
+                and others == 0
+                and continuous[interface]
+                and leaves(W, layout, interface, signs[mode, interface], tol, whole, noise)
             )
+            if not ahead:
+                mode = choose_mode(
+                    address,
+                    layout,
+                    signs,
+                    continuous,
+                    inputs,
+                    parameters,
+                    tol,
+                    whole,
+                    on,
+                    side,
+                    before,
+                    work,
+                    b,
+                    noise,
+                )
             if mode < 0:
                 code = NO_WAY_ON
                 if mode == MANY_MODES:
@@ -221,7 +219,7 @@ def drive(
                 changed = before >= 0 and signs[before, j] != signs[mode, j]
                 if changed or (touched and mode == before and j == interface):
                     turn = signs[mode, j] - signs[before, j]
-                    if extremes is None:
+                    if listing:
                         if n_crossings == crossings.shape[0]:
                             crossings = grown(crossings)
                         crossings[n_crossings, 0] = t
@@ -239,7 +237,7 @@ def drive(
                 code = TOO_MANY_CROSSINGS
                 break
             choosing = touched = False
-            calm = pause = ZERO + 4
+            calm = pause = ZERO + WAIT
             in_a_row = ZERO
         remaining = (stop - t) - late
         if not remaining > 0.0:
@@ -251,8 +249,10 @@ def drive(
             # an implicit step has left the first coefficients of the series at its end
             W, right = right, W
         else:
-            call_address(address, mode, inputs, parameters, W)
-            longest = step_length(W, drift, order, tol)
+            longest = expand(
+                address, layout, mode, inputs, parameters, tol, remaining, W, memory, ahead
+            )
+            ahead = False
             if not longest > 0.0:
                 code = NOT_FINITE
                 break
@@ -260,7 +260,7 @@ def drive(
         for i in range(n_states, kept):
             inputs[1 + i] = W[i * columns]
         calm -= 1
-        if n_fast > 0 and calm <= 0 and (in_a_row > 0 or settled(W, drift, order, longest, tol)):
+        if n_fast > 0 and calm <= 0 and (in_a_row > 0 or settled(W, layout, longest, tol)):
             if in_a_row == 0:
                 wanted = 1.25 * longest
             taken, growth = long_step(
@@ -290,14 +290,15 @@ def drive(
             )
             long = taken > 0.0
             if long:
-                wanted, pause, in_a_row = growth * taken, ZERO + 4, in_a_row + 1
+                wanted, pause, in_a_row = growth * taken, ZERO + WAIT, in_a_row + 1
                 W, poly = poly, W
                 s, h, interface, final = 2.0, taken, ZERO - 1, taken >= remaining
             else:
                 if in_a_row > 0:
-                    call_address(address, mode, inputs, parameters, W)
-                    longest = step_length(W, drift, order, tol)
-                pause = min(2 * pause, 64)
+                    longest = expand(
+                        address, layout, mode, inputs, parameters, tol, remaining, W, memory, False
+                    )
+                pause = min(2 * pause, LONGEST_WAIT)
                 calm, in_a_row = pause, ZERO
         if not long:
             final = longest >= remaining
@@ -348,10 +349,11 @@ def drive(
         else:
             t = begin + h
         if taken > 0.0:
-            if extremes is None:
+            if listing:
                 if n_steps == steps.shape[0]:
                     steps = grown(steps)
                 steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, taken, mode
+                steps[n_steps, 3] = IMPLICIT if long else memory[0]
             else:
                 seen[mode] = t
                 if t > since:
@@ -390,9 +392,11 @@ def drive(
             if crowd == CROWD:
                 code = ACCUMULATION
                 break
-    end = np.empty(1 + n_states)
-    end[0] = t
-    for i in range(n_states):
-        end[1 + i] = inputs[1 + i]
-    listed = (steps[:n_steps], store, crossings[:n_crossings])
-    return (code, mode, end, n_steps, listed, n_samples)
+        elif mode < handed and not choosing and not final and in_a_row == 0:
+            code = HANDED_OVER
+            break
+    carried[LATE], carried[USUAL], carried[LAST_EVENT] = late, usual, last_event
+    counted[STEPS], counted[CROSSINGS] = n_steps, n_crossings
+    counted[SAMPLES], counted[CROWDED], counted[MODE] = n_samples, crowd, mode
+    counted[CALM], counted[PAUSE] = calm, pause
+    return code, (steps[:n_steps], store, crossings[:n_crossings])

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.compiled.generic import load_loop
-from fastslow.compiled.parts import part
+from fastslow.compiled.lane_steps import CompiledSteps, compile_steps
 from fastslow.compiled.series import CompiledSeries
 from fastslow.model.model import Model
 from fastslow.results.ensembles import Ensemble, regimes
 from fastslow.results.named import Named
 from fastslow.simulation.arguments import tolerance, whole_number
-from fastslow.simulation.driver import drive
 from fastslow.simulation.grouping import alike
+from fastslow.simulation.lanes import lanes_for
 from fastslow.simulation.many_arguments import (
     periods_of,
     spans_of,
@@ -26,21 +25,25 @@ from fastslow.simulation.many_arguments import (
     threads_of,
     times_of,
 )
-from fastslow.simulation.outcomes import outcome_of
+from fastslow.simulation.rooms import MODE, STEPS, beginnings, room_for
 from fastslow.simulation.trajectories import (
     SOURCES,
     default_order,
     gap_of,
     layout_of,
+    once_a_model,
     series_of,
     sizes_of,
 )
 
 Floats = NDArray[np.float64]
 
+steps_of = once_a_model(compile_steps)
+
 _ARGUMENTS = (
     "bounds",
     "address",
+    "lanes",
     "layout",
     "sizes",
     "signs",
@@ -48,7 +51,6 @@ _ARGUMENTS = (
     "tol",
     "limits",
     "parameters",
-    "starts",
     "spans",
     "since",
     "times",
@@ -56,67 +58,17 @@ _ARGUMENTS = (
     "extremes",
     "hits",
     "seen",
-    "ends",
+    "places",
+    "carried",
+    "counted",
     "codes",
+    "room",
 )
 
+_LANES = ("fastslow.compiled.lanes", "fastslow.compiled.lane_steps")
+
 #: Trajectories that a thread takes at a time, at most.
-_CHUNK = 64
-
-
-@part
-def drive_many(
-    bounds,
-    address,
-    layout,
-    sizes,
-    signs,
-    continuous,
-    tol,
-    limits,
-    parameters,
-    starts,
-    spans,
-    since,
-    times,
-    samples,
-    extremes,
-    hits,
-    seen,
-    ends,
-    codes,
-):
-    """Follow the trajectories from one number to another, each by itself.
-
-    The arguments are those of `drive` with one row for each trajectory
-    (``times`` may have one row for all); ``ends`` is filled with time and
-    state reached, ``codes`` with how it ended, in which mode, after how many steps.
-    """
-    store = np.empty(0)
-    for i in range(bounds[0], bounds[1]):
-        code, mode, end, n_steps, _, _ = drive(
-            address,
-            layout,
-            sizes,
-            signs,
-            continuous,
-            parameters[i],
-            starts[i],
-            (spans[i, 0], spans[i, 1]),
-            tol,
-            times[min(i, times.shape[0] - 1)],
-            samples[i],
-            since[i],
-            False,
-            limits,
-            store,
-            extremes[i],
-            hits[i],
-            seen[i],
-        )
-        for k in range(end.shape[0]):
-            ends[i, k] = end[k]
-        codes[i, 0], codes[i, 1], codes[i, 2] = code, mode, n_steps
+_CHUNK = 512
 
 
 def simulate_many(
@@ -132,7 +84,7 @@ def simulate_many(
     tol: float = 1e-9,
     samples: int | Sequence[float] | Floats | None = None,
     order: int | None = None,
-    implicit: bool = True,
+    implicit: bool = False,
     gap: str | None = None,
     max_steps: int = 1_000_000,
     max_crossings: int = 1_000_000,
@@ -172,7 +124,10 @@ def simulate_many(
     order : int, optional
         Order of the series, 4 to 40; by default that of `simulate`.
     implicit : bool
-        Whether an implicit method may take long steps through settled phases.
+        Whether an implicit method may take long steps through settled phases, one
+        trajectory at a time. Plain steps taken together are so cheap that this pays
+        only where the fast motion is some thirty times faster than the slow one lets
+        the steps be, as in stiff contacts.
     gap : str, optional
         The region that counts as the gap for `Ensemble.regime`.
     max_steps, max_crossings : int
@@ -194,7 +149,7 @@ def simulate_many(
     UnknownNameError
         For a state, parameter or gap that is not in the model.
     ModelError
-        For a function that has no Taylor recurrence.
+        For a function that cannot be compiled.
 
     Examples
     --------
@@ -218,9 +173,12 @@ def simulate_many(
     own = periods_of(model, period, count, swept)
     spans, since = spans_of(t, periods, start, settle, own)
     times = times_of(samples, spans, since)
-    groups = [(one, chosen, series_of(one, order)) for one, chosen in alike(model, swept, count)]
-    gaps = [gap_of(one, gap) for one, _, _ in groups]
-    modes = tuple(dict.fromkeys(name for *_, compiled in groups for name in compiled.modes))
+    groups = [
+        (one, chosen, series_of(one, order), steps_of(one, order))
+        for one, chosen in alike(model, swept, count)
+    ]
+    gaps = [gap_of(one, gap) for one, *_ in groups]
+    modes = tuple(dict.fromkeys(name for *_, compiled, _ in groups for name in compiled.modes))
     interfaces = tuple(dict.fromkeys(name for one, *_ in groups for name in one.interfaces))
     n = starts.shape[1]
     columns = n + len(model.forcing)
@@ -231,10 +189,11 @@ def simulate_many(
     regime = np.zeros(count, dtype="U16")
     sampled = np.empty((count, columns if times.size else 0, times.shape[1]))
     with _bar(count, progress) as bar:
-        for (one, chosen, compiled), between in zip(groups, gaps, strict=True):
+        for (one, chosen, compiled, lanes), between in zip(groups, gaps, strict=True):
             values = _parameter_table(compiled, one, swept, chosen)
             run = _run(
                 compiled,
+                lanes,
                 (tol, limits, threads),
                 sizes_of(model, compiled, implicit),
                 (values, starts[chosen], spans[chosen], since[chosen]),
@@ -249,9 +208,8 @@ def simulate_many(
             names = [*map(modes.index, compiled.modes), -1]
             codes[chosen, 1] = np.array(names)[codes[chosen, 1]]
             if between is not None:
-                lower, inside, upper = map(compiled.modes.index, between)
                 regime[chosen] = regimes(
-                    run[2], ends[chosen, 0], own[chosen], (lower, inside, upper)
+                    run[2], ends[chosen, 0], own[chosen], compiled.modes, between
                 )
     return Ensemble(
         (*model.states, *model.slow_states),
@@ -272,7 +230,11 @@ def simulate_many(
         codes[:, 0],
         codes[:, 1],
         (times if len(times) > 1 else times[0], sampled) if samples is not None else None,
-        partial(outcome_of, modes=modes, limits=limits),
+        "; ".join(dict.fromkeys(compiled.method for *_, compiled, _ in groups)),
+        limits,
+        {n: v for n, v in model.parameters.items() if n not in swept},
+        model.equations,
+        {"tol": tol, "order": order, "implicit": implicit},
     )
 
 
@@ -288,6 +250,7 @@ def _parameter_table(
 
 def _run(
     compiled: CompiledSeries,
+    lanes: CompiledSteps,
     settings: tuple[float, tuple[int, int], int],
     sizes: tuple[int, int, int],
     rows: tuple[Floats, Floats, Floats, Floats],
@@ -297,7 +260,7 @@ def _run(
 ) -> tuple[Any, ...]:
     """Extremes, hits, times seen, ends, codes and samples of trajectories with one series."""
     tol, limits, threads = settings
-    _, starts, spans, since = rows
+    values, starts, spans, since = rows
     count, n = starts.shape
     counted = (since <= spans[:, 0])[:, None]
     extremes = np.stack(
@@ -305,40 +268,51 @@ def _run(
     )
     hits = np.zeros((count, compiled.n_interfaces, 2), dtype=np.int64)
     seen = np.full((count, len(compiled.modes)), -np.inf)
-    ends = np.empty((count, 1 + n))
-    codes = np.empty((count, 3), dtype=np.int64)
+    places, carried, whole = beginnings(spans[:, 0], starts, compiled.n_forcing)
+    codes = np.empty(count, dtype=np.int64)
     samples = np.full((count, n_columns, times.shape[1]), np.nan)
-    loop = partial(
-        _many_loop(),
-        address=compiled.address,
-        layout=layout_of(compiled),
-        sizes=sizes,
-        signs=compiled.signs,
-        continuous=compiled.continuous,
-        tol=tol,
-        limits=limits,
-        parameters=rows[0],
-        starts=starts,
-        spans=spans,
-        since=since,
-        times=times,
-        samples=samples,
-        extremes=extremes,
-        hits=hits,
-        seen=seen,
-        ends=ends,
-        codes=codes,
-    )
+    layout = layout_of(compiled)
+    many = _many_loop()
+
+    def follow(chunk: tuple[int, int]) -> None:
+        many(
+            chunk,
+            compiled.address,
+            (lanes.address, lanes.regions),
+            layout,
+            sizes,
+            compiled.signs,
+            compiled.continuous,
+            tol,
+            limits,
+            values,
+            spans,
+            since,
+            times,
+            samples,
+            extremes,
+            hits,
+            seen,
+            places,
+            carried,
+            whole,
+            codes,
+            (
+                lanes_for(layout, lanes.regions, values.shape[1], count),
+                room_for(layout, sizes, times.shape[1]),
+            ),
+        )
+
     size = min(_CHUNK, max(1, count // (4 * threads)))
     chunks = [(i, min(i + size, count)) for i in range(0, count, size)]
     if min(threads, len(chunks)) == 1:
         for chunk in chunks:
-            loop(chunk)
+            follow(chunk)
             report(chunk[1] - chunk[0])
     else:
         pool = ThreadPoolExecutor(min(threads, len(chunks)))
         try:
-            waiting = {pool.submit(loop, chunk): chunk for chunk in chunks}
+            waiting = {pool.submit(follow, chunk): chunk for chunk in chunks}
             for done in as_completed(waiting):
                 done.result()
                 first, last = waiting[done]
@@ -346,7 +320,8 @@ def _run(
         finally:
             pool.shutdown(cancel_futures=True)
     extremes[np.isinf(extremes)] = np.nan
-    return extremes, hits, seen, ends, codes, samples
+    endings = np.column_stack([codes, whole[:, MODE], whole[:, STEPS]])
+    return extremes, hits, seen, places[:, : 1 + n], endings, samples
 
 
 def _bar(count: int, shown: bool) -> Any:
@@ -357,4 +332,4 @@ def _bar(count: int, shown: bool) -> Any:
 
 def _many_loop() -> Callable[..., Any]:
     """The compiled loop over trajectories."""
-    return load_loop("fastslow.simulation.ensembles", "drive_many", _ARGUMENTS, SOURCES)
+    return load_loop("fastslow.simulation.lanes", "drive_many", _ARGUMENTS, (*SOURCES, *_LANES))

@@ -6,8 +6,9 @@ import numpy as np
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
-from fastslow.simulation.modes import BEGINNING, EPSILON, interface_noise, scaled
+from fastslow.simulation.modes import BEGINNING, interface_noise, scaled
 from fastslow.simulation.polynomials import (
+    EPSILON,
     ONE,
     ZERO,
     curvature,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from fastslow.compiled.parts import part
-from fastslow.simulation.modes import EPSILON
 from fastslow.simulation.polynomials import (
     DEEPEST,
+    EPSILON,
     ZERO,
     excluded,
     halve,

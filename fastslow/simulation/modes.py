@@ -8,9 +8,8 @@ import numpy as np
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
-from fastslow.simulation.polynomials import ONE, ZERO, first_nonzero, first_strong
-
-EPSILON = float(np.finfo(float).eps)
+from fastslow.simulation.collocation import late_collocation
+from fastslow.simulation.polynomials import EPSILON, ONE, ZERO, first_nonzero, first_strong
 
 #: The part of a step over which the beginning of a motion is judged: over a whole one that
 #: stability limits, the last terms of the series are much larger than the motion itself.
@@ -58,6 +57,66 @@ def step_length(W, n_rows, order, tol):
 
 
 @part
+def expand(address, layout, mode, inputs, parameters, tol, room, W, memory, known):
+    """Fill ``W`` with polynomials of time from a point on.
+
+    The Taylor series where there is one; else, where its coefficients are not
+    known or not finite, a collocation polynomial.
+
+    Parameters
+    ----------
+    address, layout, mode, inputs, parameters
+        As for `drive`: the compiled function, and where.
+    tol : float
+    room : float
+        Longest step that is of use.
+    W : float64 array
+        Rows of coefficients, filled here.
+    memory : float64 array
+        What is carried from one step of a run to the next: `memory_size` numbers, zeros at
+        its beginning, or none for a single step. The first is 1 after a collocation.
+    known : bool
+        Whether the series is there already.
+
+    Returns
+    -------
+    float
+        How far the polynomials hold, NaN where the rates are not finite.
+    """
+    if not known:
+        call_address(address, mode, inputs, parameters, W)
+    length = step_length(W, layout[0] + layout[1] + layout[2], layout[4], tol)
+    if memory.shape[0] > 0:
+        memory[0] = 0.0
+    if length > 0.0:
+        return length
+    return instead(address, layout, mode, inputs, parameters, tol, room, W, memory)
+
+
+@part
+def instead(address, layout, mode, inputs, parameters, tol, room, W, memory):
+    """Call `late_collocation`: apart, so that the common case stays short."""
+    n_states, n_forcing, n_interfaces, n_modes, order = layout
+    return late_collocation(
+        address,
+        n_states,
+        n_forcing,
+        n_interfaces,
+        n_modes,
+        order,
+        mode,
+        inputs.ctypes,
+        parameters.ctypes,
+        tol,
+        room,
+        W.ctypes,
+        W.shape[0],
+        memory.ctypes,
+        memory.shape[0],
+    )
+
+
+@part
 def scaled(W, row, order, h, b):
     """Scale the coefficients of one row to the step, and sum their moduli but the first."""
     power = 1.0
@@ -75,6 +134,35 @@ def interface_noise(address, n_modes, j, inputs, parameters, gradient):
     """Size of h that is rounding error, from the moduli of its terms; fills the gradient."""
     call_address(address, n_modes + j, inputs, parameters, gradient)
     return 8.0 * EPSILON * gradient[1]
+
+
+@part
+def across(signs, mode, j):
+    """The mode on the other side of one interface, the same mode where there is none."""
+    for other in range(signs.shape[0]):
+        alike = signs[mode, j] != 0 and signs[other, j] == -signs[mode, j]
+        for i in range(signs.shape[1]):
+            alike = alike and (i == j or signs[other, i] == signs[mode, i])
+        if alike:
+            return other
+    return mode
+
+
+@part
+def leaves(W, layout, j, side, tol, longest, noise):
+    """Whether a motion from an interface goes to one side at once, by its drift.
+
+    Where the rates are continuous it does so in no other mode, as `choose_mode`
+    would find by looking at them all.
+    """
+    n_states, n_forcing, n_interfaces, _, order = layout
+    first_h = n_states + n_forcing
+    length = min(longest, step_length(W, first_h + n_interfaces, order, tol))
+    if not length > 0.0:
+        return False
+    drift = W[(first_h + j) * (order + 1) + 1]
+    noise[j] = max(noise[j], 32.0 * EPSILON * abs(drift) * length)
+    return drift * side * BEGINNING * length > noise[j]
 
 
 @part
@@ -149,6 +237,7 @@ def choose_mode(
     if certain:
         # even the worst is then only as wrong as rounding
         best_score = DISAGREES - 1
+    memory = np.empty(0)
     # two passes: every mode is judged over the same step, and by the largest rounding error
     shared = longest
     for judging in (False, True):
@@ -159,8 +248,9 @@ def choose_mode(
                     possible = False
             if not possible:
                 continue
-            call_address(address, mode, inputs, parameters, W)
-            length = step_length(W, drift, order, tol)
+            length = expand(
+                address, layout, mode, inputs, parameters, tol, longest, W, memory, False
+            )
             if not length > 0.0:
                 broken = True
                 continue
@@ -178,7 +268,7 @@ def choose_mode(
                     scaled(W, first_h + j, order, BEGINNING * shared, b)
                     score = min(score, agreement(b, order, noise[j], signs[mode, j]))
                 else:
-                    score = min(score, slides(W, drift, order, BEGINNING * shared, b))
+                    score = min(score, slides(W, drift, order, BEGINNING * shared, noise[j], b))
             if score > best_score:
                 best, best_score, equals = mode, score, 1
             elif score == best_score and best != NO_MODE:
@@ -187,14 +277,20 @@ def choose_mode(
                     best = mode
     if equals > 1 and best_score == AGREES and not certain:
         return MANY_MODES
-    return NOT_DEFINED if best == NO_MODE and broken else best
+    # one that disagrees is not taken in the place of one that is not known
+    return NOT_DEFINED if broken and best_score <= DISAGREES else best
 
 
 @part
-def slides(W, drift, order, h, b):
-    """Whether the fields of both sides point at the interface, a < 0 < b, now or next."""
+def slides(W, drift, order, h, noise, b):
+    """Whether the fields of both sides point at the interface, a < 0 < b, now or next.
+
+    A drift that moves h by less than its noise decides as little here as it
+    does of the motion to that side: where sliding ends, one of them goes on.
+    """
     columns = order + 1
     small = 32.0 * EPSILON * (abs(W[drift * columns]) + abs(W[(drift + 1) * columns]))
+    small = max(small, noise / h)
     for k in range(2):
         scaled(W, drift + k, order, h, b)
         first = first_strong(b, ZERO, order, small)

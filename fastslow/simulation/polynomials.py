@@ -6,14 +6,21 @@ so that the step is 0 <= s <= 1.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from fastslow.compiled.parts import part
 
+EPSILON = float(np.finfo(float).eps)
+
 #: Intervals of the subdivision are not made shorter than 2 to the power of minus this.
 DEEPEST = 44
+
+_INVERSE_BINOMIALS = np.array(
+    [[1.0 / math.comb(n, k) if k <= n else 0.0 for k in range(41)] for n in range(41)]
+)
 
 # plain integers would be literal types to Numba, and every function compiled once for each
 ZERO: Any = np.int64(0)
@@ -34,6 +41,30 @@ def horner(b, first, last, s):
     if (last - first) & 1 == 0:
         return even * square + b[first] + odd * s
     return even * s + odd
+
+
+@part
+def sample(W, columns, rows, s, out, first):
+    """Evaluate rows of a step at the offsets s, into the columns of ``out`` from the first."""
+    n = s.shape[0]
+    for i in range(rows):
+        top = i * columns + columns - 1
+        # four at a time, because each waits for its own last product
+        for c in range(0, n - 3, 4):
+            s0, s1, s2, s3 = s[c], s[c + 1], s[c + 2], s[c + 3]
+            v0 = v1 = v2 = v3 = W[top]
+            for k in range(1, columns):
+                coefficient = W[top - k]
+                v0 = v0 * s0 + coefficient
+                v1 = v1 * s1 + coefficient
+                v2 = v2 * s2 + coefficient
+                v3 = v3 * s3 + coefficient
+            out[i, first + c] = v0
+            out[i, first + c + 1] = v1
+            out[i, first + c + 2] = v2
+            out[i, first + c + 3] = v3
+        for c in range(n - n % 4, n):
+            out[i, first + c] = horner(W, top - columns + 1, top, s[c])
 
 
 @part
@@ -86,13 +117,14 @@ def excluded(b, first, last):
 def to_bernstein(b, first, n, stack):
     """Bernstein coefficients on [0, 1] of sum b_k s**(k - first), then its begin and width."""
     # divide by the binomials, then sum as in Pascal's triangle
-    binomial = 1.0
     for k in range(n + 1):
-        stack[0, k] = b[first + k] / binomial
-        binomial = binomial * (n - k) / (k + 1)
+        stack[0, k] = b[first + k] * _INVERSE_BINOMIALS[n, k]
     for level in range(1, n + 1):
-        for j in range(n, level - 1, -1):
-            stack[0, j] += stack[0, j - 1]
+        before = stack[0, level - 1]
+        for j in range(level, n + 1):
+            here = stack[0, j]
+            stack[0, j] = here + before
+            before = here
     stack[0, n + 1] = 0.0
     stack[0, n + 2] = 1.0
 
@@ -103,8 +135,11 @@ def halve(stack, row, n):
     for j in range(n + 1):
         stack[row + 1, j] = stack[row, j]
     for level in range(1, n + 1):
-        for j in range(n, level - 1, -1):
-            stack[row + 1, j] = 0.5 * (stack[row + 1, j] + stack[row + 1, j - 1])
+        before = stack[row + 1, level - 1]
+        for j in range(level, n + 1):
+            here = stack[row + 1, j]
+            stack[row + 1, j] = 0.5 * (here + before)
+            before = here
     for level in range(1, n + 1):
         for j in range(n - level + 1):
             stack[row, j] = 0.5 * (stack[row, j] + stack[row, j + 1])
@@ -175,23 +210,28 @@ def first_root(b, first, last, noise, stack):
 def refine(b, first, last, low, high):
     """The root of a sign change on [low, high] to rounding: Newton, kept inside the bracket."""
     at_low = horner(b, first, last, low)
-    s = 0.5 * (low + high)
+    s, moved = 0.5 * (low + high), 0.0
     for _ in range(100):
-        value = horner(b, first, last, s)
+        # value and derivative at once, because each waits for its own last product
+        value, rate = b[last], 0.0
+        for k in range(last - 1, first - 1, -1):
+            rate = rate * s + value
+            value = value * s + b[k]
         if value == 0.0:
             break
         if (value > 0.0) == (at_low > 0.0):
             low = s
         else:
             high = s
-        rate = slope(b, first, last, s)
         new = s - value / rate if rate != 0.0 else low - 1.0
         if not (low < new < high):
             new = 0.5 * (low + high)
-        if new == s or abs(new - s) <= 1e-16 * abs(new):
-            s = new
+        # the next correction is about K moved**2, as this one was K times the last squared
+        move = abs(new - s)
+        near = move <= 1e-16 * abs(new) or move * move * move <= 1e-17 * abs(new) * moved * moved
+        s, moved = new, move
+        if near:
             break
-        s = new
     return s
 
 

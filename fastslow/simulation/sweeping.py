@@ -137,7 +137,9 @@ def bifurcation_sweep(
             passes.append(_one_pass(model, turn, begin, settings, bar.update))
             finished = passes[-1].ends[np.isfinite(passes[-1].ends).all(axis=1)]
             begin = finished[-1] if len(finished) else begin
-    return Sweep(settings.parameter, name, what, rule, tuple(passes))
+    others = {n: v for n, v in model.parameters.items() if n != settings.parameter}
+    kept = {"settle": settings.settle, "keep": settings.keep, **settings.limits}
+    return Sweep(settings.parameter, name, what, rule, tuple(passes), others, model.equations, kept)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fastslow.compiled.generic import load_loop
 from fastslow.compiled.series import CompiledSeries, compile_series
 from fastslow.model.model import Model
+from fastslow.results.endings import outcome_of
 from fastslow.results.trajectories import Trajectory
 from fastslow.simulation.arguments import (
     gap_regions,
@@ -25,8 +26,8 @@ from fastslow.simulation.arguments import (
     tolerance,
     whole_number,
 )
-from fastslow.simulation.outcomes import outcome_of
-from fastslow.simulation.settled import DEGREE
+from fastslow.simulation.rooms import MODE, SAMPLES, STEPS, beginnings, room_for
+from fastslow.simulation.settled import DEGREE, IMPLICIT, SETTLED_ORDER
 
 _ARGUMENTS = (
     "address",
@@ -35,29 +36,40 @@ _ARGUMENTS = (
     "signs",
     "continuous",
     "parameters",
-    "start",
     "span",
     "tol",
     "times",
     "samples",
     "since",
-    "dense",
     "limits",
     "store",
     "extremes",
     "hits",
     "seen",
+    "room",
+    "inputs",
+    "carried",
+    "counted",
+    "handed",
 )
 SOURCES = (
+    "fastslow.simulation.collocation",
     "fastslow.simulation.driver",
     "fastslow.simulation.events",
     "fastslow.simulation.extremes",
+    "fastslow.simulation.lobatto",
+    "fastslow.simulation.matrices",
     "fastslow.simulation.modes",
     "fastslow.simulation.polynomials",
+    "fastslow.simulation.rooms",
     "fastslow.simulation.settled",
     "fastslow.compiled.parts",
     "fastslow.compiled.pointers",
+    "fastslow.compiled.series",
 )
+
+#: No extremes, hits and times of modes: steps and crossings are listed instead.
+_LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
 
 #: Depth of the work space of the event search.
 STACK_ROWS = 46
@@ -67,7 +79,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def _once_a_model(
+def once_a_model(
     function: Callable[Concatenate[Model, P], R],
 ) -> Callable[Concatenate[Model, P], R]:
     """Keep what was derived from a model for as long as the model lives."""
@@ -83,9 +95,9 @@ def _once_a_model(
     return remembered
 
 
-gap_of = _once_a_model(gap_regions)
-series_of = _once_a_model(compile_series)
-period_of = _once_a_model(Model.period)
+gap_of = once_a_model(gap_regions)
+series_of = once_a_model(compile_series)
+period_of = once_a_model(Model.period)
 
 
 def simulate(
@@ -109,7 +121,9 @@ def simulate(
 
     Taylor series of the rates, step by step (Jorba and Zou 2005); crossings
     are roots of the interface functions along the series of a step, so that
-    two crossings within one step are both found.
+    two crossings within one step are both found. Where a function has no
+    recurrence (gamma, Bessel functions, …), or a series is singular at a point
+    where the rates are not, collocation polynomials take their place.
 
     Parameters
     ----------
@@ -134,7 +148,8 @@ def simulate(
         Whether the series is kept, for evaluation at any time. Without it the
         memory does not grow with the number of steps by more than 24 bytes each.
     order : int, optional
-        Order of the series, 4 to 40; by default chosen by the tolerance.
+        Order of the series, 4 to 40, by default chosen by the tolerance; of
+        collocation polynomials 12 at most.
     implicit : bool
         Whether an implicit method may take long steps through settled phases,
         in which stability and not accuracy limits the series.
@@ -156,7 +171,7 @@ def simulate(
     UnknownNameError
         For an initial value or gap that is not in the model.
     ModelError
-        For a function that has no Taylor recurrence.
+        For a function that cannot be compiled.
 
     Examples
     --------
@@ -184,26 +199,33 @@ def simulate(
     kept = compiled.n_states + compiled.n_forcing
     rows = compiled.n_states if dense else kept
     sampled = np.empty((rows, len(times)))
-    code, mode, end, n_steps, (steps, store, crossings), reached = drive_loop()(
+    layout, sizes = layout_of(compiled), sizes_of(model, compiled, implicit)
+    (place,), (carried,), (counted,) = beginnings(
+        np.array([span[0]]), begin[None], compiled.n_forcing
+    )
+    code, (steps, store, crossings) = drive_loop()(
         compiled.address,
-        layout_of(compiled),
-        sizes_of(model, compiled, implicit),
+        layout,
+        sizes,
         compiled.signs,
         compiled.continuous,
         compiled.parameter_array(model),
-        begin,
         span,
         tol,
         times,
         sampled,
         span[0],
-        bool(dense),
         limits,
-        _room.store,
-        None,
-        None,
-        None,
+        _room.store if dense else np.empty(0),
+        *_LISTED,
+        room_for(layout, sizes, len(times)),
+        place,
+        carried,
+        counted,
+        0,
     )
+    end, reached = place[: 1 + compiled.n_states].copy(), counted[SAMPLES]
+    n_steps, mode = int(counted[STEPS]), int(counted[MODE])
     return Trajectory(
         (*model.states, *model.slow_states),
         tuple(model.forcing),
@@ -215,11 +237,20 @@ def simulate(
         outcome_of(code, mode, end, n_steps, float(np.abs(begin).max()), compiled.modes, limits),
         (span[0], float(end[0])),
         end,
+        _method(compiled, steps),
         steps,
         compiled.modes,
         crossings,
-        _kept(store, len(steps), kept, order + 1) if dense else None,
+        _kept(store, len(steps), kept, compiled.order + 1) if dense else None,
         (times[:reached], sampled[:, :reached]) if samples is not None else None,
+        equations=model.equations,
+        settings={
+            "tol": tol,
+            "order": order,
+            "implicit": implicit,
+            "max_steps": limits[0],
+            "max_crossings": limits[1],
+        },
     )
 
 
@@ -245,6 +276,17 @@ def _kept(store: NDArray[np.float64], *shape: int) -> NDArray[np.float64]:
     return series.reshape(shape)
 
 
+def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
+    """How a run was stepped, in words."""
+    words = [compiled.method]
+    collocated, implicit = (int(np.count_nonzero(steps[:, 3] == k)) for k in (1, IMPLICIT))
+    if collocated and not compiled.values_only:
+        words.append(f"{collocated} steps by collocation where it is singular")
+    if implicit:
+        words.append(f"{implicit} implicit steps of order {SETTLED_ORDER} through settled phases")
+    return ", ".join(words)
+
+
 def default_order(tol: float) -> int:
     """Order of the series for a tolerance, one of two so that little is compiled."""
     return 16 if tol >= 1e-11 else 24
@@ -263,7 +305,7 @@ def layout_of(compiled: CompiledSeries) -> tuple[int, int, int, int, int]:
 
 def sizes_of(model: Model, compiled: CompiledSeries, implicit: bool) -> tuple[int, int, int]:
     """Rows of the series, of the event search, and fast states if implicit steps are wanted."""
-    settling = implicit and compiled.order >= DEGREE
+    settling = implicit and compiled.order >= DEGREE and not compiled.values_only
     return compiled.n_rows, STACK_ROWS, len(model.states) if settling else 0
 
 

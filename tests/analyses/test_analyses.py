@@ -77,7 +77,7 @@ def test_what_the_runs_show(everything_drawn):
         assert light.stated == "bilateral"
         assert rows[f"load_amplitude_100_{scaling}"].stated == "unilateral"
         assert rows[f"gap_width_0.5_{scaling}"].stated == "unilateral"
-        assert light.passages == 0
+        assert light.transits == 0
         assert math.isnan(light.largest_delay)
 
 
@@ -131,7 +131,7 @@ def test_wider_gaps_delay_more(gaps):
     delays = [np.nanmax(np.abs(case.lay.delays)) for case in gaps]
     assert delays == sorted(delays)
     assert all(len(case.lay.transitions) == 6 for case in gaps)
-    assert {t.kind for case in gaps for t in case.lay.transitions} == {"crossing"}
+    assert {t.kind for case in gaps for t in case.lay.transitions} == {"transit"}
 
 
 def test_the_natural_frequency_falls_with_the_stiffness():

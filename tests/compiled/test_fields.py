@@ -1,5 +1,6 @@
 """Compiled rates and derivatives against SymPy's own numbers."""
 
+import mpmath
 import numpy as np
 import pytest
 import sympy as sp
@@ -51,7 +52,20 @@ def test_a_slow_quantity_without_value_is_named(gear):
 
 def test_a_function_that_cannot_be_compiled_is_named():
     x = sp.Symbol("x")
-    with pytest.raises(fs.FastSlowError, match=r"contain .*polygamma.* cannot be compiled"):
-        fs.equilibria(fs.Model({x: sp.gamma(x) - 2}))
+    with pytest.raises(fs.FastSlowError, match=r"contain the derivative of zeta, .* compiled"):
+        fs.equilibria(fs.Model({x: sp.zeta(x) - 2}))
     with pytest.raises(fs.FastSlowError, match=r"contain .*g.* cannot be compiled"):
         fs.equilibria(fs.Model({x: sp.Function("g")(x) - x}))
+
+
+def test_special_functions_are_continued():
+    # J0(x) = a folds where J1 vanishes; there J0'' = -J0
+    x, a = sp.symbols("x a")
+    model = fs.Model({x: sp.besselj(0, x) - a}, parameters={a: -0.35})
+    folds = fs.continue_equilibria(model, a, (-0.5, -0.31)).special("LP")
+    zero = float(mpmath.besseljzero(1, 1))
+    least = float(mpmath.j0(zero))
+    assert sorted(p.state[0] for p in folds) == pytest.approx([-zero, zero], abs=1e-8)
+    for point in folds:
+        assert point.parameters["a"] == pytest.approx(least, abs=1e-13)
+        assert point.coefficient == pytest.approx(-least / 2, abs=1e-9)

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from fastslow.compiled.recurrences import VALUES, scalar_code
+from fastslow.compiled.functions import CLOSED, ELEMENTARY, IN_MPMATH
+from fastslow.compiled.recurrences import scalar_code
 from fastslow.compiled.series import compile_series
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
@@ -15,9 +16,15 @@ ORDER = 12
 
 # u(t) stays inside every function's domain near t = 0.3
 U = sp.Rational(2, 5) + t / 3 + t**2 / 7
-SECOND = {sp.atan2: (U, 1 + t**2)}
-LARGE = {sp.acosh}
-FUNCTIONS = sorted(VALUES, key=lambda f: f.__name__)
+ARGUMENTS = {
+    sp.atan2: (U, 1 + t**2),
+    sp.LambertW: (-U / 3, -1),
+    sp.expint: (2, U),
+    sp.uppergamma: (a + 1, U),
+    sp.lowergamma: (a + 1, U),
+}
+LARGE = {sp.acosh, sp.acoth, sp.asec, sp.acsc, sp.li}
+FUNCTIONS = sorted(ELEMENTARY | CLOSED, key=lambda f: f.__name__)
 EXPRESSIONS = {
     "real power": (1 + U) ** sp.Rational(7, 3),
     "root": sp.sqrt(2 + U),
@@ -54,13 +61,13 @@ def call(compiled, mode, inputs, parameters, out):
 
 
 def expected(law):
-    function = sp.lambdify(t, law.subs(a, sp.Rational(7, 10)), "mpmath")
+    function = sp.lambdify(t, law.subs(a, sp.Rational(7, 10)), [IN_MPMATH, "mpmath"])
     with mpmath.workdps(40):
         return [float(c) for c in mpmath.taylor(function, mpmath.mpf("0.3"), ORDER)]
 
 
 def test_every_function():
-    laws = [f(*SECOND.get(f, (U + 2 if f in LARGE else U,))) for f in FUNCTIONS]
+    laws = [f(*ARGUMENTS.get(f, (U + 2 if f in LARGE else U,))) for f in FUNCTIONS]
     for law, found in zip(laws, coefficients(laws), strict=True):
         reference = np.array(expected(law))
         scale = 2.0 ** -np.arange(ORDER + 1)
@@ -76,9 +83,20 @@ def test_every_operation():
         assert np.abs((found - reference) * scale).max() < 1e-13 * (1 + abs(reference[0])), law
 
 
-def test_a_function_without_recurrence_is_named():
-    with pytest.raises(ModelError, match=r"gamma.*has no Taylor recurrence"):
-        compile_series(Model({x: sp.gamma(1 + x**2)}), 12)
+@pytest.mark.parametrize(
+    ("rate", "said"),
+    [
+        (sp.Function("f")(x) - x, r"contain f, which cannot be compiled; expected one of .*gamma"),
+        (sp.gamma(x) - sp.Function("f")(x), r"contain f, which cannot be compiled"),
+        (sp.LambertW(x, 2), r"LambertW cannot be compiled .* branch must be 0 or -1"),
+        (sp.expint(x, 2), r"expint cannot be compiled .* whole number"),
+        (sp.zeta(x, 2), r"zeta cannot be compiled .* number of arguments"),
+        (sp.gamma(x) + sp.Derivative(sp.zeta(x), x), r"contain the derivative of zeta"),
+    ],
+)
+def test_what_cannot_be_compiled_is_named(rate, said):
+    with pytest.raises(ModelError, match=said):
+        compile_series(Model({x: rate}), 12)
 
 
 def test_new_values_compile_nothing(tmp_path, monkeypatch):

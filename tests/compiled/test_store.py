@@ -115,3 +115,17 @@ def test_a_read_only_directory_is_used_without_compiling_again(cache, tmp_path):
     kept = {p.name: p.stat().st_mtime_ns for p in stored(cache)}
     assert names
     assert all(kept[name] == time for name, time in names.items())
+
+
+def test_code_with_special_functions_is_found_by_another_process(cache):
+    program = """
+import sympy as sp, fastslow as fs
+from fastslow.compiled import store
+x, t = sp.symbols("x t")
+run = fs.simulate(fs.Model({x: sp.besselj(0, t) - sp.airyai(x) * x}), [1.0], t=(0, 1))
+print(repr(float(run.end[1])), store._writable_directory())
+"""
+    first = finish(start(cache, program))[0]
+    before = {p: p.stat().st_mtime_ns for p in stored(cache)}
+    assert finish(start(cache, program))[0] == first
+    assert {p: p.stat().st_mtime_ns for p in stored(cache)} == before

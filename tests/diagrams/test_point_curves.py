@@ -299,7 +299,7 @@ def test_bad_input(reactor):
         fs.continue_points(pickle.loads(pickle.dumps(fold)), ("p1", "p2"), over=over)
     curve = fs.continue_points(fold, ("p1", "p2"), over={"p1": (0.1, 0.11), "p2": (13, 15)})
     with pytest.raises(fs.FastSlowError, match="unknown column"):
-        curve["p3"]
+        curve["p9"]
     with pytest.raises(fs.FastSlowError, match="unknown special point code"):
         curve.special("XX")
 

@@ -100,13 +100,19 @@ def test_a_level_that_is_not_reached(corner):
     assert "nan" in repr(law)
 
 
+def test_a_level_on_the_interface(corner):
+    """Reached when the interface is, with the lag."""
+    law = boundary_delay(corner_point(corner), 0.01, level={"x": 0})
+    assert law.delay == law.lag
+
+
 def test_wrong_boundary_points(corner, gap, cusp_fold):
     point = corner_point(corner)
     with pytest.raises(fs.ArgumentError, match=r"with p falling no stable sheet ends at BE1"):
         boundary_delay(point, -0.01, level={"x": 1})
     with pytest.raises(fs.ArgumentError, match="give level="):
         boundary_delay(point, 0.01)
-    with pytest.raises(fs.ArgumentError, match=r"expected a degenerate .* received BE1, non-smooth"):
+    with pytest.raises(fs.ArgumentError, match=r"degenerate .* received BE1, non-smooth"):
         gap_transit(point, 0.01)
     with pytest.raises(fs.ArgumentError, match="at a point BE"):
         boundary_delay(cusp_fold, 0.01)

@@ -60,7 +60,9 @@ def test_coefficients_of_the_cusp_in_closed_form(cusp_fold):
 
 def test_the_quadratic_fold_is_the_airy_solution():
     """x' = p + x² has the solution −ε^(1/3) A'/A, so that delays are known at every level."""
-    fold = fs.continue_equilibria(fs.Model({x: p + x**2}, parameters={p: -1}), "p", (-1, 1)).folds[0]
+    fold = fs.continue_equilibria(fs.Model({x: p + x**2}, parameters={p: -1}), "p", (-1, 1)).folds[
+        0
+    ]
     for level in (-0.001, 0.0, 0.01, 0.5, 20.0):
         for eps in (1e-3, 1e-6):
             law = fold_delay(fold, eps, level={"x": level})

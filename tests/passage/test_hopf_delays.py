@@ -5,7 +5,6 @@ import pickle
 
 import numpy as np
 import pytest
-import sympy as sp
 from scipy.integrate import quad
 from scipy.optimize import brentq
 

@@ -17,7 +17,7 @@ def lay(gear):
 
 def test_the_gear_changes_sides_at_the_gap(lay):
     assert [(t.from_sheet, t.to_sheet) for t in lay.transitions] == [("S1", "S3"), ("S3", "S1")] * 3
-    assert {t.kind for t in lay.transitions} == {"crossing"}
+    assert {t.kind for t in lay.transitions} == {"transit"}
     assert {t.special.code for t in lay.transitions} == {"BE"}
 
 
@@ -46,7 +46,7 @@ def test_the_change_is_where_two_thirds_of_the_way_are_done(lay, gear):
 def test_distance_is_that_to_the_closed_form(lay, gear):
     """On S1, x solves (x² + A)(x − D) = w; rows in between are interpolated to six digits."""
     a = gear.parameters["A"]
-    extent = np.ptp(lay.state, axis=0)
+    extent = lay.extent
     on = [k for k in range(0, len(lay.time), 40) if lay.sheets[lay.followed[k]].label == "S1"]
     on = [k for k in on if 0 < lay.slow[k] < 6]
     assert len(on) > 20
@@ -62,7 +62,7 @@ def test_summary_tells_the_story(lay):
     text = lay.summary()
     assert "6 transitions" in text
     assert "S1 → S3" in text
-    assert "crossing at BE2" in text
+    assert "transit at BE2" in text
 
 
 def test_jumps_at_both_folds():

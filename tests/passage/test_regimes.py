@@ -44,6 +44,18 @@ def test_the_criterion_beside_it(slow, found):
     assert set(expanded.disagreements) == {("bilateral", "unilateral upper")}
 
 
+def test_the_criterion_is_for_slow_loads(gear):
+    fast = fs.regime_map(
+        gear, {"omega": (0.1, 3), "C": (1.5, 8)}, [0, 0], cells=(12, 10), levels=2, periods=30
+    )
+    beside = fast.compare(
+        lambda omega, C: fs.slow_load_criterion(gear, {"omega": omega, "C": C}, exact=True).regime
+    )
+    assert beside.share == pytest.approx(0.93, abs=0.03)
+    wrong = np.concatenate(list(beside.disagreements.values()))
+    assert wrong[:, 0].min() > 0.3
+
+
 def test_the_boundary_in_the_width(slow):
     """At C/B = 1.03, a line of the grid, D* to the accuracy of the bisection."""
     omega = 0.02

@@ -20,8 +20,8 @@ def test_overlay_is_drawn_above_the_branches(gear_lay):
 def test_a_jump_is_told_apart_from_a_passage_of_the_gap(gear_lay, folded_lay):
     (passage,) = fs.plot.overlay(gear_lay).transitions
     (jump,) = fs.plot.overlay(folded_lay).transitions
-    assert passage.get_label() == "passage of BE"
-    assert jump.get_label() == "jump at LP"
+    assert passage.get_label() == "transit of the gap"
+    assert jump.get_label() == "jump at a fold"
     assert passage.get_marker() != jump.get_marker()
     assert len(jump.get_xdata()) == len(folded_lay.transitions)
 
@@ -36,7 +36,7 @@ def test_crossings_lie_on_the_trajectory(gear_lay):
 def test_each_thing_once_in_the_legend(folded_lay):
     texts = [t.get_text() for t in fs.plot.overlay(folded_lay).legend.get_texts()]
     assert len(texts) == len(set(texts))
-    assert {"stable", "unstable", "LP fold", "trajectory", "jump at LP"} <= set(texts)
+    assert {"stable", "unstable", "LP fold", "trajectory", "jump at a fold"} <= set(texts)
 
 
 def test_another_state(gear_lay):
@@ -70,3 +70,83 @@ def test_panel(gear_lay, tmp_path):
         inside = label.get_window_extent()
         assert frame.x0 < inside.x0
         assert inside.x1 < frame.x1
+
+
+def test_an_expression_on_the_vertical_axis(folded_lay):
+    drawn = fs.plot.overlay(folded_lay, "x**2 + v")
+    assert drawn.state == "x**2 + v"
+    assert drawn.ax.get_ylabel() == "$x^{2} + v$"
+    for line, branch in zip(drawn.diagram.lines[:1], folded_lay.diagram.branches, strict=False):
+        height = branch["x"] ** 2 + branch["v"]
+        assert np.isin(line.get_ydata(), height).all()
+    (fold,) = [m for m in drawn.diagram.markers if m.get_label().startswith("LP")]
+    points = folded_lay.diagram.folds
+    assert fold.get_ydata() == pytest.approx([p["x"] ** 2 + p["v"] for p in points], abs=1e-14)
+    states = np.array([c.state for c in folded_lay.run.crossings])
+    expected = states[:, 0] ** 2 + states[:, 1]
+    assert drawn.crossings.get_ydata() == pytest.approx(expected, abs=1e-14)
+    assert not drawn.diagram.bands.lines
+    with pytest.raises(fs.UnknownNameError, match="unknown name in an expression 'y'"):
+        fs.plot.overlay(folded_lay, "x + y")
+    with pytest.raises(fs.UnknownNameError, match="unknown state 'A'"):
+        fs.plot.overlay(folded_lay, "A")
+
+
+def test_turning_points_are_marked(gear_lay):
+    drawn = fs.plot.overlay(gear_lay)
+    assert drawn.turning.get_xdata() == pytest.approx([5.918, -1.174] * 2, abs=1e-3)
+    assert drawn.turning.get_label() == "$w$ turns back"
+    assert fs.plot.overlay(gear_lay, turning=False).turning is None
+
+
+def test_a_head_in_every_jump_of_the_last_period(folded_lay):
+    drawn = fs.plot.overlay(folded_lay)
+    tips = np.array([a.xy for a in drawn.arrows])
+    # a head in the gap, halfway between the sheets, both ways
+    assert (np.abs(tips[:, 1]) < 0.3).sum() == 2
+
+
+def test_in_space(folded_lay):
+    drawn = fs.plot.overlay(folded_lay, "x", "v")
+    slow, x, v = drawn.line.get_data_3d()
+    assert np.array_equal(slow, folded_lay.slow)
+    assert np.array_equal(np.column_stack([x, v]), folded_lay.state)
+    assert {line.get_label() for line in drawn.branches} == {"stable", "unstable", "neutral"}
+    axes = Figure().add_subplot(projection="3d")
+    given = fs.plot.overlay(folded_lay, ax=axes)
+    assert (given.ax, given.x, given.y) == (axes, "x", "v")
+    with pytest.raises(fs.ArgumentError, match='needs axes with projection="3d"'):
+        fs.plot.overlay(folded_lay, "x", "v", ax=Figure().add_subplot())
+
+
+def test_the_phases_stand_above_the_time_series(folded_lay):
+    drawn = fs.plot.panel(folded_lay)
+    strip = drawn.time_series.phases
+    assert [box.get_x() for box in strip] == [p.start for p in folded_lay.phases]
+    drawn.figure.draw_without_rendering()
+    top = drawn.time_series.ax.transAxes.transform((0, 1))[1]
+    for box in strip:
+        edge = box.get_window_extent()
+        assert edge.y1 == pytest.approx(top, abs=1)
+        inked = drawn.time_series.lines[0].get_window_extent()
+        assert inked.y1 < edge.y0 + 1
+    written = [w.get_text() for w in drawn.time_series.words if w.get_visible() and w.get_text()]
+    assert written == ["S1", "S3", "S1", "S3"]
+    texts = [t.get_text() for t in drawn.legend.get_texts()]
+    assert {"quiescent phase", "jump phase"} <= set(texts)
+
+
+def test_a_panel_of_a_columns_width(folded_lay):
+    drawn = fs.plot.panel(folded_lay, width=85 / 25.4)
+    drawn.figure.draw_without_rendering()
+    frames = [ax.get_window_extent() for ax in drawn.figure.axes]
+    assert len({round(f.x0) for f in frames}) == 1
+    assert frames[0].y0 > frames[1].y1
+    box, page = drawn.legend.get_window_extent(), drawn.figure.bbox
+    assert page.x0 <= box.x0
+    assert box.x1 <= page.x1
+
+
+def test_a_panel_shows_a_state(gear_lay):
+    with pytest.raises(fs.UnknownNameError, match="unknown state 'w'"):
+        fs.plot.panel(gear_lay, "w")

@@ -103,3 +103,23 @@ def test_spectrum_marks_its_lines():
     assert drawn.ax.get_xlabel() == "angular frequency"
     with pytest.raises(fs.ArgumentError, match="low < high"):
         fs.plot.spectrum(spectrum, over=(2, 1))
+
+
+@pytest.mark.parametrize("height", [40, 54, 90])
+@pytest.mark.parametrize("bins", [(1, 3), (40, 2000), (1, 1999)])
+def test_frequencies_stand_within_the_axes(height, bins):
+    # lines at the edges of the axes, as in runs that are very slow
+    frequency = np.linspace(0.0, 100.0, 2001)
+    amplitude = np.full_like(frequency, 1e-5)
+    amplitude[list(bins)] = 1.0, 0.5
+    spectrum = Spectrum("x", "hann", (0.0, 10.0), frequency, amplitude)
+    figure = Figure(figsize=(85 / 25.4, height / 25.4), layout="constrained")
+    ax = figure.subplots()
+    drawn = fs.plot.spectrum(spectrum, ax=ax, over=(0.0, 100.0), peaks=2)
+    figure.draw_without_rendering()
+    frame = ax.get_window_extent()
+    boxes = [label.get_window_extent() for label in drawn.labels]
+    assert boxes
+    for box in boxes:
+        assert frame.x0 < box.x0 < box.x1 < frame.x1
+        assert frame.y0 < box.y0 < box.y1 < frame.y1

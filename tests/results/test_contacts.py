@@ -131,10 +131,10 @@ def test_sliding_rests_against_its_side():
     )
     resting = fs.simulate(stops, [0], periods=2)
     assert resting.word == ("S2", "S1|S2")
-    assert resting.regime == "meshed upper"
-    assert fs.simulate(stops.with_parameters(B=-0.5), [0], periods=2).regime == "meshed lower"
+    assert regime(stops, [0], periods=2) == "meshed upper"
+    assert regime(stops.with_parameters(B=-0.5), [0], periods=2) == "meshed lower"
     # swung from stop to stop, never into them
-    assert fs.simulate(stops.with_parameters(B=0, C=0.5), [0], periods=2).regime == "bilateral"
+    assert regime(stops.with_parameters(B=0, C=0.5), [0], periods=2) == "bilateral"
     # lifted off the upper stop by ∫ w = 0.2 of the way of 0.5
     swing = stops.with_parameters(B=0.1, C=0.2, D=2)
-    assert fs.simulate(swing, [0], periods=3).regime == "unilateral upper"
+    assert regime(swing, [0], periods=3) == "unilateral upper"

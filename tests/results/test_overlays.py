@@ -1,11 +1,13 @@
-"""An overlay as data: shares of time, kinds of transitions, delays."""
+"""An overlay as data: shares of time, its story, expressions."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import fastslow as fs
-from fastslow.results.overlays import StableSheet, Transition
 from fastslow.results.points import SpecialPoint
+from fastslow.results.transitions import Moment, Phase, StableSheet, Transition
 
 
 def special(code):
@@ -15,38 +17,69 @@ def special(code):
     )  # fmt: skip
 
 
-def transition(code, delay=0.1):
+def transition(code, kind, **more):
     point = special(code) if code else None
-    return Transition(3.0, 0.6, np.ones(1), "S1", "S2", point, delay)
+    leave = Moment(2.5, 0.55, np.ones(1))
+    return Transition(
+        3.0, 0.6, np.ones(1), "S1", "S2", point, 0.1 if code else np.nan, kind, leave, **more
+    )
 
 
-@pytest.mark.parametrize(
-    ("code", "kind"), [("LP", "jump"), ("BE", "crossing"), ("HB", "change"), (None, "change")]
-)
-def test_kind(code, kind):
-    assert transition(code).kind == kind
-
-
-def test_summary(gear):
+@pytest.fixture(scope="module")
+def lay(gear):
     diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6))
+    run = fs.simulate(gear, [0, 0], periods=1)
+    return fs.overlay(diagram, run)
+
+
+def test_duration_and_width():
+    landed = transition("LP", "jump", land=Moment(4.0, 0.7, np.ones(1)))
+    assert (landed.duration, landed.width) == pytest.approx((1.5, 0.15))
+    assert np.isnan(transition("LP", "jump").duration)
+
+
+def test_sentences():
+    text = transition("LP", "jump", land=Moment(4.0, 0.7, np.ones(1))).describe("w")
+    assert text == (
+        "t = 3, w = 0.6: S1 → S2, jump at LP1, w = 0.5; delay 0.1; lands at w = 0.7, t = 4"
+    )
+    assert "no special point ends the sheet left" in transition(None, "change").describe("w")
+    steep = transition(None, "steep", steepness=0.234).describe("w")
+    assert "no bifurcation: the predicted lag |dX/dw| |dw/dt| / |Re λ| grows to 0.23" in steep
+
+
+def test_shares_and_summary(lay):
     sheets = (StableSheet("S3", 0, 0, 5, "S3"), StableSheet("S1", 0, 9, 12, "S1"))
     time = np.linspace(0, 10, 11)
-    lay = fs.Overlay(
-        diagram,
-        None,
-        time,
-        time / 10,
-        np.zeros((11, 2)),
-        np.zeros(11),
-        sheets,
-        np.array([0] * 3 + [1] * 8),
-        (transition("BE"), transition(None, np.nan)),
+    made = replace(
+        lay,
+        time=time,
+        slow=time / 10,
+        sheets=sheets,
+        followed=np.array([0] * 3 + [1] * 6 + [-1] * 2),
+        lag=np.full(11, -0.5),
+        phases=(Phase(0, 8, "quiescent", ("S3", "S1")), Phase(8, 10, "spiking", (), 4, "cycle")),
+        transitions=(transition("BE", "crossing"),) * 14,
+        bursting=None,
     )
-    lines = lay.summary().splitlines()
-    assert lines[0] == "2 transitions over t = 0 to 10"
-    assert lines[1:3] == ["  on S3: 30.0% of the time", "  on S1: 70.0% of the time"]
-    assert "crossing at BE1 (w = 0.5), delay 0.1" in lines[3]
-    assert "no special point" in lines[4]
-    assert lay.delays == pytest.approx([0.1, np.nan], nan_ok=True)
-    assert lay.parameter == "w"
-    assert repr(lay).startswith("Overlay on w")
+    assert made.shares() == pytest.approx({"": 0.1, "S3": 0.3, "S1": 0.6})
+    lines = made.summary().splitlines()
+    assert lines[0] == "14 transitions over t = 0 to 10, w from 0 to 1"
+    assert "  on no sheet: 10.0% of the time" in lines
+    assert "  on S3: 30.0% of the time, typically 0.5 ahead in time" in lines
+    assert "  1 spiking phase on a cycle: 4 spikes, 2 long" in lines
+    assert lines[-1] == "  and 2 more, in transitions"
+    assert made.delays == pytest.approx([0.1] * 14)
+
+
+def test_expressions(lay):
+    assert lay["x"] == pytest.approx(lay.state[:, 0], abs=0)
+    expected = lay.state[:, 0] ** 2 + lay.state[:, 1] - 41.67 * lay.slow
+    assert lay["x**2 + v - A*w"] == pytest.approx(expected, abs=1e-12)
+    assert lay["1"].shape == lay.time.shape
+    with pytest.raises(fs.UnknownNameError, match="unknown name in an expression 'y'"):
+        lay["y"]
+
+
+def test_repr(lay):
+    assert repr(lay).startswith("Overlay on w: 2 transitions over t = 0 to 628.319")

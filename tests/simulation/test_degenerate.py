@@ -151,3 +151,11 @@ def test_a_start_that_every_side_attracts_to_a_corner():
     run = simulate(Model({x: -sp.sign(x), y: -sp.sign(y)}), [0, 0], t=(0, 5))
     assert run.outcome.code == "no way on"
     assert not run.outcome
+
+
+def test_a_region_without_rates_is_not_passed_over():
+    # beyond x = 0 the rates are not defined, and the region before must not go on there
+    beyond = 1 + x * sp.log(-1 - x)
+    run = simulate(Model({x: sp.Piecewise((beyond, x > 0), (1, True))}), [-1], t=(0, 2))
+    assert not run.outcome
+    assert run.span[1] == pytest.approx(1.0, abs=1e-9)

@@ -1,4 +1,4 @@
-"""Ensembles: run by run the same as `simulate`, whatever the threads, order and neighbours."""
+"""Ensembles: run by run as `simulate` to the tolerance, bit for bit whatever the neighbours."""
 
 import math
 import pickle
@@ -20,15 +20,15 @@ D = np.array([0.1, 0.25, 0.4, 0.25, 0.3, 0.05, 0.2])
 C = np.array([3.5, 3.546, 2.0, 1.0, 5.0, 2.9, 4.0])
 
 
-def assert_alike(many: Ensemble, i: int, run, since: float | None = None) -> None:
-    """One of many is the trajectory that `simulate` gives."""
+def assert_alike(many: Ensemble, i: int, run, since: float | None = None, tol=1e-9) -> None:
+    """One of many is the trajectory that `simulate` gives, as far as both have its tolerance."""
     assert many.codes[i] == 0
     assert run.outcome
     assert many.outcomes[i] == run.outcome
     assert many.reached[i] == run.span[1]
-    assert many.n_steps[i] == len(run.steps)
-    scale = 1e-12 * (1 + np.abs(run.end[1:]).max())
-    assert many.final[i] == pytest.approx(run.end[1:], abs=0.1 * scale)
+    assert many.n_steps[i] == pytest.approx(len(run.steps), rel=0.02, abs=3)
+    scale = 10 * tol * (1 + np.abs(run.end[1:]).max())
+    assert many.final[i] == pytest.approx(run.end[1:], abs=scale)
     for column, name in enumerate(many.states):
         low, high = run.extremes(name, since)
         assert many.minimum[i, column] == pytest.approx(low, abs=scale)
@@ -60,7 +60,7 @@ def swept(gear):
 def test_each_is_the_trajectory_by_itself(gear, swept):
     for i in range(len(D)):
         model = gear.with_parameters(D=D[i], C=C[i])
-        assert_alike(swept, i, simulate(model, [0, 0], periods=1))
+        assert_alike(swept, i, simulate(model, [0, 0], periods=1, implicit=False))
     assert set(swept.regime) >= {"bilateral", "unilateral upper"}
     assert swept.success.all()
     assert swept.minimum.shape == swept.maximum.shape == swept.final.shape == (7, 2)
@@ -86,7 +86,7 @@ def test_initial_states_of_all_kinds(gear):
     states = np.array([[0.0, 0.0], [0.5, -1.0], [-1.0, 2.0]])
     many = simulate_many(gear, states, t=(1, 20))
     for i, state in enumerate(states):
-        assert_alike(many, i, simulate(gear, state, t=(1, 20)))
+        assert_alike(many, i, simulate(gear, state, t=(1, 20), implicit=False))
     named = simulate_many(gear, {v: states[:, 1], "x": states[:, 0]}, t=(1, 20))
     assert_identical(many, named)
     transposed = simulate_many(gear, np.asfortranarray(states), t=(1, 20))
@@ -96,11 +96,11 @@ def test_initial_states_of_all_kinds(gear):
 def test_a_transient_left_out(gear):
     many = simulate_many(gear, [0, 3], parameters={"C": C}, periods=1, settle=0.6)
     for i in range(len(C)):
-        run = simulate(gear.with_parameters(C=C[i]), [0, 3], periods=1)
+        run = simulate(gear.with_parameters(C=C[i]), [0, 3], periods=1, implicit=False)
         assert_alike(many, i, run, since=many.since[i])
     assert many.since == pytest.approx(np.full(7, 120 * math.pi))
     later = simulate_many(gear, [0, 3], t=(0, 10), settle=2.0)
-    run = simulate(gear, [0, 3], t=(0, 10))
+    run = simulate(gear, [0, 3], t=(0, 10), implicit=False)
     assert_alike(later, 0, run, since=2.0)
 
 
@@ -110,9 +110,9 @@ def test_own_periods(gear):
     assert many.span[:, 1] == pytest.approx(4 * math.pi / omega)
     assert many.t.shape == many["x"].shape == (3, 50)
     for i in range(3):
-        run = simulate(gear.with_parameters(omega=omega[i]), [0, 0], periods=2)
+        run = simulate(gear.with_parameters(omega=omega[i]), [0, 0], periods=2, implicit=False)
         assert_alike(many, i, run)
-        assert np.abs(many["x"][i] - run(many.t[i])[0]).max() < 1e-12
+        assert np.abs(many["x"][i] - run(many.t[i])[0]).max() < 1e-9
         assert np.abs(many["w"][i] - (2.372 + 3.546 * np.sin(omega[i] * many.t[i]))).max() < 1e-12
     given_periods = simulate_many(
         gear, [0, 0], parameters={"omega": omega}, periods=2, period=2 * np.pi / omega
@@ -125,9 +125,9 @@ def test_common_samples(gear):
     many = simulate_many(gear, [0, 0], parameters={"D": D}, t=(0, 30), samples=times)
     assert many.t.shape == (91,)
     assert many["v"].shape == (7, 91)
-    run = simulate(gear.with_parameters(D=D[4]), [0, 0], t=(0, 30), samples=times)
+    run = simulate(gear.with_parameters(D=D[4]), [0, 0], t=(0, 30), implicit=False, samples=times)
     for name in ("x", "v", "w"):
-        assert np.abs(many[name][4] - run[name]).max() < 1e-13
+        assert np.abs(many[name][4] - run[name]).max() < 1e-9
     counted = simulate_many(gear, [0, 0], t=(0, 30), settle=10, samples=3)
     assert counted.t.tolist() == [10, 20, 30]
 
@@ -137,14 +137,16 @@ def test_regions_that_some_values_empty(gear):
     clearance = np.array([0.25, 0.0, -0.1, 0.1])
     many = simulate_many(gear, [0, 0], parameters={"D": clearance}, t=(0, 30))
     for i, value in enumerate(clearance):
-        assert_alike(many, i, simulate(gear.with_parameters(D=value), [0, 0], t=(0, 30)))
+        assert_alike(
+            many, i, simulate(gear.with_parameters(D=value), [0, 0], t=(0, 30), implicit=False)
+        )
 
 
 def test_filippov(friction):
     mu = np.array([0.1, 0.3, 0.5, 1.5])
     many = simulate_many(friction, [2, 0], parameters={"mu": mu, "a": 1.2}, t=(0, 30))
     for i in range(4):
-        run = simulate(friction.with_parameters(mu=mu[i], a=1.2), [2, 0], t=(0, 30))
+        run = simulate(friction.with_parameters(mu=mu[i], a=1.2), [2, 0], t=(0, 30), implicit=False)
         assert_alike(many, i, run)
     assert many.hits.sum() > 10
 

@@ -94,3 +94,18 @@ def test_relay_feedback_oscillates_without_chatter():
     run = simulate(model, [1, 0], t=(0, 4), tol=1e-12)
     assert run.outcome
     assert 1 <= len(run.crossings) < 20
+
+
+@pytest.mark.parametrize("tol", [1e-6, 1e-9, 1e-13])
+def test_where_sliding_ends_one_way_goes_on(tol):
+    # the field above turns upwards at x = pi/2; by rounding and errors it seems to do so
+    # a little before or after the point where sliding is found to end
+    a = sp.Symbol("a")
+    above = sp.Piecewise((-sp.cos(x) * sp.exp(a * x), y > 0), (2, True))
+    model = Model({x: sp.Piecewise((1, y > 0), (3, True)), y: above}, parameters={a: 0.1})
+    for start in np.linspace(-0.3, 0.3, 41):
+        for value in (0.1, -0.2):
+            run = simulate(model.with_parameters(a=value), [start, 0], t=(0, 2.5), tol=tol)
+            assert run.outcome
+            assert run.word == ("S1|S2", "S1")
+            assert run.crossings[-1].state[0] == pytest.approx(math.pi / 2, abs=10 * tol)

@@ -11,16 +11,8 @@ from hypothesis import strategies as st
 from numba import njit
 
 from fastslow.model.model import Model
-from fastslow.simulation.settled import (
-    DEGREE,
-    P,
-    Q,
-    contracts,
-    factorise_in_place,
-    join,
-    solve_in_place,
-    weights,
-)
+from fastslow.simulation.matrices import contracts, factorise_in_place, solve_in_place
+from fastslow.simulation.settled import DEGREE, P, Q, join, weights
 from fastslow.simulation.trajectories import simulate
 
 x, y, z, v, t, w = sp.symbols("x y z v t w")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import trapezoid
 
 from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.results.outcome import Outcome
@@ -83,7 +84,7 @@ def test_a_tongue_is_followed_into_its_tip():
     # ∫ 2 (x - 0.1)³ from 0.1, less the part above y = 1 and below y = 0
     x = np.linspace(0.1, 1, 200_001)
     width = np.minimum((x - 0.1) ** 3, 0.31) + np.minimum((x - 0.1) ** 3, 0.69)
-    assert found.shares["locked"] == pytest.approx(np.trapezoid(width, x), abs=1e-3)
+    assert found.shares["locked"] == pytest.approx(trapezoid(width, x), abs=1e-3)
     points = np.concatenate([line.points for line in found.boundary("locked", "free")])
     # followed down to where the tongue is as wide as the finest cells
     assert points[:, 0].min() < 0.1 + (0.5 * found.steps[1]) ** (1 / 3) + 2 * found.steps[0]
@@ -294,7 +295,10 @@ def test_progress(capsys):
         ({"guard": 0.5}, "guard = 0.5"),
         ({"tol": 0}, "tol = 0; expected a positive number"),
         ({"function": lambda x, y: x}, "0.125 is no label of a map"),
-        ({"function": lambda x, y: [k % 2 or False for k, _ in enumerate(x)]}, "some labels are"),
+        (
+            {"function": lambda x, y: [k % 2 or False for k, _ in enumerate(x)], "levels": 0},
+            "some labels are",
+        ),
         ({"function": lambda x, y: [1]}, "returned 1 labels for 81 points"),
     ],
 )

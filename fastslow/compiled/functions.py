@@ -1,0 +1,214 @@
+"""The functions that a model may use: how each is computed, and which have a Taylor recurrence."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import mpmath
+import sympy as sp
+from sympy.core.function import ArgumentIndexError
+from sympy.printing.codeprinter import CodePrinter
+
+from fastslow.errors import ModelError
+
+#: How the value of a function is computed. Its higher coefficients follow from its derivative.
+ELEMENTARY = {
+    sp.exp: "math.exp({})",
+    sp.log: "math.log({})",
+    sp.sin: "math.sin({})",
+    sp.cos: "math.cos({})",
+    sp.tan: "math.tan({})",
+    sp.cot: "1.0 / math.tan({})",
+    sp.sec: "1.0 / math.cos({})",
+    sp.csc: "1.0 / math.sin({})",
+    sp.asin: "math.asin({})",
+    sp.acos: "math.acos({})",
+    sp.atan: "math.atan({})",
+    sp.acot: "math.atan(1.0 / ({}))",
+    sp.asec: "math.acos(1.0 / ({}))",
+    sp.acsc: "math.asin(1.0 / ({}))",
+    sp.atan2: "math.atan2({}, {})",
+    sp.sinh: "math.sinh({})",
+    sp.cosh: "math.cosh({})",
+    sp.tanh: "math.tanh({})",
+    sp.coth: "1.0 / math.tanh({})",
+    sp.sech: "1.0 / math.cosh({})",
+    sp.csch: "1.0 / math.sinh({})",
+    sp.asinh: "math.asinh({})",
+    sp.acosh: "math.acosh({})",
+    sp.atanh: "math.atanh({})",
+    sp.acoth: "math.atanh(1.0 / ({}))",
+    sp.asech: "math.acosh(1.0 / ({}))",
+    sp.acsch: "math.asinh(1.0 / ({}))",
+    sp.erf: "math.erf({})",
+    sp.erfc: "math.erfc({})",
+}
+
+#: Special functions whose derivatives lead back to functions of these two tables.
+CLOSED = {
+    sp.erfi: "special.erfi({}, 0)",
+    sp.erfinv: "special.erfinv({}, 0)",
+    sp.erfcinv: "special.erfcinv({}, 0)",
+    sp.fresnels: "special.fresnel({}, 0)",
+    sp.fresnelc: "special.fresnel({}, 1)",
+    sp.airyai: "special.airy({}, 0)",
+    sp.airyaiprime: "special.airy({}, 1)",
+    sp.airybi: "special.airy({}, 2)",
+    sp.airybiprime: "special.airy({}, 3)",
+    sp.Ei: "special.expi({}, 0)",
+    sp.li: "special.expi(math.log({}), 0)",
+    sp.Ci: "special.sine_cosine_integral({}, 1)",
+    sp.Chi: "special.hyperbolic_integral({}, 1)",
+    sp.LambertW: "special.lambertw({}, {})",
+    sp.expint: "special.expn({}, {}, 0)",
+    sp.uppergamma: "special.gammaincc({0}, {1}, 0) * special.gamma({0}, 0)",
+    sp.lowergamma: "special.gammainc({0}, {1}, 0) * special.gamma({0}, 0)",
+}
+
+#: Special functions whose derivatives lead ever farther, or are quotients at a zero of both.
+OPEN = {
+    sp.gamma: "special.gamma({}, 0)",
+    sp.loggamma: "special.loggamma({}, 0)",
+    sp.polygamma: "special.polygamma({}, {})",
+    sp.beta: "special.beta({}, {}, 0)",
+    sp.factorial: "special.gamma(1.0 + ({}), 0)",
+    sp.zeta: "1.0 + special.zetac({}, 0)",
+    sp.besselj: "special.jv({}, {}, 0)",
+    sp.bessely: "special.yv({}, {}, 0)",
+    sp.besseli: "special.iv({}, {}, 0)",
+    sp.besselk: "special.kv({}, {}, 0)",
+    sp.elliptic_k: "special.ellipk({}, 0)",
+    sp.elliptic_f: "special.ellipkinc({}, {}, 0)",
+    sp.elliptic_e: "special.ellipe({}, 0)",
+    sp.sinc: "special.sinc({})",
+    sp.Si: "special.sine_cosine_integral({}, 0)",
+    sp.Shi: "special.hyperbolic_integral({}, 0)",
+}
+
+VALUES = ELEMENTARY | CLOSED | OPEN
+
+#: Functions that mpmath knows under other names than SymPy.
+IN_MPMATH: dict[str, Callable[[Any], Any]] = {
+    "airyaiprime": lambda x: mpmath.airyai(x, derivative=1),
+    "airybiprime": lambda x: mpmath.airybi(x, derivative=1),
+    "erfcinv": lambda x: mpmath.erfinv(1 - x),
+}
+
+#: Functions that have a recurrence only in some of their arguments: their numbers.
+_IN_ARGUMENTS = {sp.LambertW: (0,), sp.expint: (1,), sp.uppergamma: (1,), sp.lowergamma: (1,)}
+
+#: What SymPy itself prints as Python.
+_PRINTED = (sp.Abs, sp.sign, sp.Max, sp.Min, sp.Heaviside, sp.Piecewise)
+
+#: Two forms of one name in SymPy: arguments that are left out there, another function here.
+_DEFAULTS = {sp.LambertW: (sp.Integer(0),)}
+_OTHERWISE = {(sp.elliptic_e, 2): "special.ellipeinc({}, {}, 0)"}
+
+
+def value_code(expression: sp.Function, code_of: Callable[[sp.Expr], str]) -> str:
+    """Source of a function's value, from the source of its arguments.
+
+    Raises
+    ------
+    ModelError
+        For a function that is not in the tables, or in a form that is not.
+    """
+    function, arguments = expression.func, expression.args
+    if function not in VALUES:
+        raise refusal([expression])
+    if len(arguments) == 1:
+        arguments += _DEFAULTS.get(function, ())
+    code = _OTHERWISE.get((function, len(arguments)), VALUES[function])
+    if _count(code) != len(arguments) or not _in_domain(function, arguments):
+        raise ModelError(f"{function} cannot be compiled in this form: {_form(function)}")
+    return f"({code.format(*map(code_of, arguments))})"
+
+
+def refusal(expressions: Iterable[sp.Expr]) -> ModelError:
+    """The error that names what in some expressions has no value."""
+    held = set().union(*(e.atoms(sp.Function, sp.Derivative, sp.Integral) for e in expressions))
+    names = {
+        f"the derivative of {f.expr.func}" if isinstance(f, sp.Derivative) else str(f.func)
+        for f in held
+        if f.func not in (*VALUES, *_PRINTED)
+    }
+    found = ", ".join(sorted(names)) or "complex numbers"
+    return ModelError(
+        f"the equations or their derivatives contain {found}, which cannot be compiled; "
+        "expected one of " + ", ".join(sorted(f.__name__ for f in VALUES))
+    )
+
+
+def teach_functions(printer: type[CodePrinter]) -> None:
+    """Let a printer of source know all functions that have a value."""
+
+    def show(self: CodePrinter, expr: sp.Function) -> str:
+        return value_code(expr, self._print)
+
+    # a printer looks for a method by the names of a class and of its parents; a function
+    # that is not known anywhere has AppliedUndef among them
+    for name in (*(f.__name__ for f in VALUES), "AppliedUndef"):
+        setattr(printer, f"_print_{name}", show)
+
+
+def _count(code: str) -> int:
+    """How many arguments a template takes."""
+    return len(set(re.findall(r"{\d?}", code))) if "{0}" in code else code.count("{}")
+
+
+def _in_domain(function: type[sp.Function], arguments: tuple[sp.Expr, ...]) -> bool:
+    if function is sp.LambertW:
+        return arguments[1] in (0, -1)
+    if function is sp.expint:
+        return bool(arguments[0].is_Integer and arguments[0] >= 0)
+    if function is sp.polygamma:
+        return bool(arguments[0].is_Integer)
+    return True
+
+
+def _form(function: type[sp.Function]) -> str:
+    forms = {
+        sp.LambertW: "the branch must be 0 or -1",
+        sp.expint: "the order must be a whole number",
+        sp.polygamma: "the order must be a whole number",
+    }
+    return forms.get(function, "another number of arguments was expected")
+
+
+def without_recurrence(expression: sp.Expr, changing: set[sp.Symbol]) -> set[str]:
+    """Names of functions of changing symbols that have no Taylor recurrence.
+
+    Examples
+    --------
+    >>> x, a = sp.symbols("x a")
+    >>> without_recurrence(sp.airyai(x) * sp.gamma(a), {x})
+    set()
+    >>> without_recurrence(sp.airyai(x) * sp.gamma(x), {x})
+    {'gamma'}
+    """
+    found = set()
+    for f in expression.atoms(sp.Function):
+        moving = {k for k, argument in enumerate(f.args) if argument.free_symbols & changing}
+        allowed = set(_IN_ARGUMENTS.get(f.func, range(len(f.args))))
+        if moving and (f.func in OPEN or not moving <= allowed):
+            found.add(f.func.__name__)
+    return found
+
+
+def slope_of(expression: sp.Function, index: int) -> sp.Expr:
+    """Derivative of a function by one of its arguments, numbered from 1.
+
+    Raises
+    ------
+    ModelError
+        If there is none.
+    """
+    if isinstance(expression, sp.LambertW):
+        # SymPy's is a quotient of zeros at 0
+        return sp.exp(-expression) / (1 + expression)
+    try:
+        return sp.sympify(expression.fdiff(index))
+    except ArgumentIndexError:
+        raise ModelError(f"{expression} has no derivative that could be compiled") from None

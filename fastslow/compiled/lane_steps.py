@@ -1,0 +1,369 @@
+"""Plain steps of several trajectories at once, for the regions of one model.
+
+A plain step is one of the Taylor series that stays in a region and comes to
+the end of nothing. The recurrences are those of `fastslow.compiled.series`;
+whatever is not certain about a step is left to the loop of one trajectory.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from fastslow.compiled.generic import digest_of
+from fastslow.compiled.lane_functions import Mathematics, exp2, log2
+from fastslow.compiled.lanes import Lanes, Mask, Trace, Workspace, added, polynomial
+from fastslow.compiled.series import Equations, equations_of, mode_source
+from fastslow.compiled.store import load_generated
+from fastslow.model.model import Model
+
+_HEADER = '''"""Plain steps of order {order} for {count} regions of {states} states.
+
+Traced by sources with the digest {digest}.
+"""
+from numba import cfunc
+
+from fastslow.compiled.lane_steps import plain_steps
+from fastslow.compiled.pointers import SIGNATURE
+
+
+'''
+_ENTRY = """take = plain_steps(({regions}), {signs}, {sizes})
+
+
+@cfunc(SIGNATURE, cache=True, error_model="numpy")
+def steps(mode, inputs, parameters, W):
+    take(mode, inputs, parameters, W)
+"""
+
+_SOURCES = (
+    "fastslow.compiled.lane_functions",
+    "fastslow.compiled.lane_steps",
+    "fastslow.compiled.lanes",
+    "fastslow.compiled.pointers",
+)
+
+#: Rows that come after time and states, then those of the smallest and largest
+#: values of the states: by how much the time is late, the time that no step may
+#: reach, the one that is to be reported, the usual length of a step, how many
+#: more steps are allowed, how many until an implicit one is tried; and of the last step
+#: its time, its length and how it went.
+LATE, LIMIT, NEXT, USUAL, ALLOWED, CALM, BEGAN, LENGTH, OUTCOME = range(9)
+ROWS = 9
+
+#: How a step went: it was not taken; it was; or it was, and its series is wanted.
+NOT_TAKEN, TAKEN, REPORTED = 0.0, 1.0, 2.0
+
+#: Larger models are not compiled: rows of all regions times the square of the order. The
+#: instructions are that many, and take half a minute per 100,000 to compile.
+_LARGEST = 50_000
+
+#: Smallest coefficient that limits a step.
+_SMALLEST = 1e-250
+
+
+@dataclass(frozen=True)
+class CompiledSteps:
+    """The compiled plain steps of a model.
+
+    Parameters
+    ----------
+    address : int
+        Of ``void(int64 region, double* lanes, double* parameters, double* W)``. It
+        takes steps until one of them is not `TAKEN` in every lane. The arrays
+        hold `WIDTH` numbers for each row: ``lanes`` time, states, the rows
+        that are named above and the smallest and largest values of every
+        state; ``parameters`` those of the series and the binary logarithm of
+        the tolerance; ``W`` is filled with the coefficients of states and slow
+        quantities where a step is `REPORTED`.
+    regions : int
+        How many, the first modes of the series; none for a model that is too large.
+    """
+
+    address: int
+    regions: int
+
+
+#: Of a model whose steps are not taken in lanes: without a series, with special
+#: functions, or too large.
+NO_STEPS = CompiledSteps(0, 0)
+
+_compiled: dict[Any, CompiledSteps] = {}
+
+
+def compile_steps(model: Model, order: int) -> CompiledSteps:
+    """Compile the plain steps of a model, or find them compiled already.
+
+    Parameters
+    ----------
+    model : Model
+    order : int
+        Order of the series.
+    """
+    equations = equations_of(model, order)
+    if equations not in _compiled:
+        _compiled[equations] = _compile(equations)
+    return _compiled[equations]
+
+
+def _compile(equations: Equations) -> CompiledSteps:
+    if equations.without_recurrence:
+        return NO_STEPS
+    n, order = len(equations.parameters), equations.order
+    new = equations.renamed()
+    sources = [mode_source(new, mode) for mode in new.modes]
+    if sum(rows for _, rows in sources) * order**2 > _LARGEST:
+        return NO_STEPS
+    text = _HEADER.format(
+        order=order, count=len(sources), states=len(new.states), digest=digest_of(_SOURCES)
+    )
+    for number, (body, _) in enumerate(sources):
+        text += f"def region_{number}(inputs, parameters, W, math):\n"
+        lines = [f"n = {order}", *(f"p{i} = parameters[{i}]" for i in range(n)), *body]
+        text += "".join(f"    {line}\n" for line in lines) + "\n\n"
+    if "special." in text:
+        return NO_STEPS
+    text += _ENTRY.format(
+        regions="".join(f"region_{i}, " for i in range(len(sources))),
+        signs=tuple(mode.signs for mode in new.modes),
+        sizes=(len(new.states), len(new.quantities), n, order),
+    )
+    return CompiledSteps(load_generated(text, "steps").steps.address, len(sources))
+
+
+def plain_steps(
+    regions: Sequence[Callable[..., None]],
+    signs: Sequence[Sequence[int]],
+    sizes: tuple[int, int, int, int],
+) -> Any:
+    """A function for Numba that takes the plain steps of several trajectories.
+
+    Parameters
+    ----------
+    regions : sequence of callable
+        Each fills a workspace from inputs and parameters, as the series does.
+    signs : sequence of sequence of int
+        Side of every interface, for each region.
+    sizes : tuple of int
+        (n_states, n_forcing, n_parameters, order).
+    """
+    from llvmlite import ir
+    from numba.extending import intrinsic
+
+    @intrinsic
+    def take(typingctx, mode, lanes, parameters, W):  # type: ignore[no-untyped-def]
+        from numba import types
+
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            end = builder.append_basic_block("end")
+            switch = builder.switch(args[0], end)
+            for number, region in enumerate(regions):
+                before = builder.append_basic_block("before")
+                step = builder.append_basic_block("step")
+                switch.add_case(ir.Constant(ir.IntType(64), number), before)
+                builder.position_at_end(step)
+                trace = Trace(context, ir.IRBuilder(before), builder)
+                _step(trace, region, signs[number], sizes, args[1:], (step, end))
+                trace.before.branch(step)
+            builder.position_at_end(end)
+            return context.get_dummy_value()
+
+        return types.void(mode, lanes, parameters, W), codegen
+
+    return take
+
+
+def _step(
+    trace: Trace,
+    region: Callable[..., None],
+    signs: Sequence[int],
+    sizes: tuple[int, int, int, int],
+    pointers: Sequence[Any],
+    blocks: tuple[Any, Any],
+) -> None:
+    """Trace a step and the branch to the next one or to the end."""
+    n, forcing, n_parameters, order = sizes
+    lanes, parameters, W = pointers
+    kept = n + forcing
+
+    def number(row: int) -> Lanes:
+        return trace.load(lanes, 1 + n + row)
+
+    inputs = [trace.load(lanes, i) for i in range(1 + n)]
+    given = [trace.load(parameters, i, steady=True) for i in range(n_parameters + 1)]
+    rows = _series(trace, region, inputs, given, kept + len(signs), order)
+    t, late, usual, allowed = inputs[0], number(LATE), number(USUAL), number(ALLOWED)
+    calm = number(CALM) - 1.0
+    longest = _length(rows, given[-1], order)
+    # as in the loop of one trajectory, a step between two times that are exact
+    h = added(added(t + longest) - t)
+    after = added(t + h)
+    taken = (longest < added(number(LIMIT) - t) - late) & (h > 0.0) & (h <= 2.0 * usual)
+    taken &= (allowed >= 1.0) & ~((calm <= 0.0) & _settled(rows, longest, given[-1], order))
+    state = [polynomial(row, h) for row in rows[:n]]
+    for value in (*state, *(row[k] for row in rows[n:kept] for k in (0, order))):
+        taken &= value - value <= 0.0
+    for condition in trace.conditions:
+        taken &= condition
+    extremes = [(number(ROWS + i), number(ROWS + n + i)) for i in range(n)]
+    away, single = _nothing_happens(trace, rows[:n], extremes, rows[kept:], signs, h)
+    taken &= away
+    plain = single & (after < number(NEXT))
+    widened = taken & single
+    for i, (value, (low, high)) in enumerate(zip(state, extremes, strict=True)):
+        trace.store((widened & (value < low)).choose(value, low), lanes, 1 + n + ROWS + i)
+        trace.store((widened & (value > high)).choose(value, high), lanes, 1 + n + ROWS + n + i)
+    for i, (new, old) in enumerate(zip((after, *state), inputs, strict=True)):
+        trace.store(taken.choose(new, old), lanes, i)
+    tenth = added(0.1 * usual)
+    results = {
+        USUAL: taken.choose((h > tenth).choose(h, tenth), usual),
+        ALLOWED: taken.choose(allowed - 1.0, allowed),
+        CALM: taken.choose(calm, calm + 1.0),
+        BEGAN: t,
+        LENGTH: h,
+        OUTCOME: taken.choose(plain.choose(TAKEN, REPORTED), NOT_TAKEN),
+    }
+    for place, result in results.items():
+        trace.store(result, lanes, 1 + n + place)
+    _branch(trace, taken, plain, blocks, lambda: _report(trace, rows[:kept], W))
+
+
+def _series(
+    trace: Trace,
+    region: Callable[..., None],
+    inputs: list[Lanes],
+    given: list[Lanes],
+    count: int,
+    order: int,
+) -> list[list[Lanes]]:
+    """The coefficients of states, slow quantities and interface functions."""
+    W = Workspace()
+    region(inputs, given, W, Mathematics(trace))
+    columns = order + 1
+    return [[trace.lanes(W[i * columns + k]) for k in range(columns)] for i in range(count)]
+
+
+def _length(rows: Sequence[Sequence[Lanes]], tolerance: Lanes, order: int) -> Lanes:
+    """The step whose last three terms are within the tolerance, as `step_length` has it."""
+    scales = [1.0 / (1.0 + abs(row[0])) for row in rows]
+    shortest: Lanes | None = None
+    for k in (order, order - 1, order - 2):
+        largest = tolerance.trace.lanes(_SMALLEST)
+        for row, scale in zip(rows, scales, strict=True):
+            size = added(abs(row[k]) * scale)
+            largest = (size > largest).choose(size, largest)
+        length = added((tolerance - log2(largest)) * (1.0 / k))
+        shortest = length if shortest is None else (length < shortest).choose(length, shortest)
+    assert shortest is not None
+    return exp2(shortest)
+
+
+def _settled(rows: Sequence[Sequence[Lanes]], h: Lanes, tolerance: Lanes, order: int) -> Mask:
+    """Whether stability and not accuracy limits a step, as `settled` has it."""
+    k = order // 2
+    before = h
+    for _ in range(k - 2):
+        before = added(before * h)
+    most = exp2(added(tolerance + 0.5 * order / math.log(2.0)))
+    calm = h > 0.0
+    for row in rows:
+        allowed = added(most * added(1.0 + abs(row[0])))
+        calm &= added(abs(row[k - 1]) * before) <= allowed
+        calm &= added(abs(row[k]) * added(before * h)) <= allowed
+    return calm
+
+
+def _nothing_happens(
+    trace: Trace,
+    states: Sequence[Sequence[Lanes]],
+    extremes: Sequence[tuple[Lanes, Lanes]],
+    interfaces: Sequence[Sequence[Lanes]],
+    signs: Sequence[int],
+    h: Lanes,
+) -> list[Mask]:
+    """Whether no interface is met in a step, and whether its ends hold all new extremes.
+
+    The sums of the moduli of the terms tell for most steps; for the others
+    their Bernstein coefficients, between which the values lie.
+    """
+
+    def judged(bounds: _Bounds) -> list[Mask]:
+        away = single = h > 0.0
+        for sign, row in zip(signs, interfaces, strict=True):
+            least, most, _ = bounds(row)
+            away &= row[0] > -least if sign > 0 else row[0] < -most
+        for row, (low, high) in zip(states, extremes, strict=True):
+            least, most, monotone = bounds(row)
+            single &= ((row[0] + least >= low) & (row[0] + most <= high)) | monotone
+        return [away, single]
+
+    away, single = judged(_Bounds(h, _by_moduli))
+    return trace.unless(away & single, [away, single], lambda: judged(_Bounds(h, _by_bernstein)))
+
+
+class _Bounds:
+    """What bounds the change of a row within a step, once for rows that differ in c_0 alone."""
+
+    def __init__(
+        self, h: Lanes, rule: Callable[[Sequence[Lanes], Lanes], tuple[Lanes, Lanes, Mask]]
+    ) -> None:
+        self.h, self.rule = h, rule
+        self.known: dict[tuple[int, ...], tuple[Lanes, Lanes, Mask]] = {}
+
+    def __call__(self, row: Sequence[Lanes]) -> tuple[Lanes, Lanes, Mask]:
+        key = tuple(id(c) for c in row[1:])
+        if key not in self.known:
+            self.known[key] = self.rule(row, self.h)
+        return self.known[key]
+
+
+def _by_moduli(row: Sequence[Lanes], h: Lanes) -> tuple[Lanes, Lanes, Mask]:
+    """Least and largest change, and whether the change has one sign: from sums of moduli."""
+    first = added(abs(row[1]) * h)
+    rest = added(polynomial([abs(c) for c in row[2:]], h) * added(h * h))
+    most = added(first + rest)
+    # k times the modulus of the k-th term is at most n times it
+    return -most, most, first > rest * (len(row) - 1)
+
+
+def _by_bernstein(row: Sequence[Lanes], h: Lanes) -> tuple[Lanes, Lanes, Mask]:
+    """The same from the Bernstein coefficients of the step."""
+    n = len(row) - 1
+    power, values = h.trace.lanes(1.0), [h.trace.lanes(0.0)]
+    for k in range(1, n + 1):
+        power = added(power * h)
+        values.append(added(row[k] * power * (1.0 / math.comb(n, k))))
+    for level in range(1, n + 1):
+        for j in range(n, level - 1, -1):
+            values[j] = added(values[j] + values[j - 1])
+    least = most = values[0]
+    rising = falling = h > 0.0
+    for a, b in pairwise(values):
+        least, most = (b < least).choose(b, least), (b > most).choose(b, most)
+        rising, falling = rising & (b >= a), falling & (b <= a)
+    return least, most, rising | falling
+
+
+def _report(trace: Trace, rows: Sequence[Sequence[Lanes]], W: Any) -> None:
+    """Put the coefficients where the caller finds them."""
+    for place, c in enumerate(c for row in rows for c in row):
+        trace.store(c, W, place)
+
+
+def _branch(
+    trace: Trace, taken: Mask, plain: Mask, blocks: tuple[Any, Any], report: Callable[[], None]
+) -> None:
+    """Go on after a plain step in every lane; else end, with a report where one is due."""
+    step, end = blocks
+    builder = trace.builder
+    stop, reporting = (builder.append_basic_block(name) for name in ("stop", "report"))
+    builder.cbranch((taken & plain).everywhere(), step, stop)
+    builder.position_at_end(stop)
+    builder.cbranch((plain | ~taken).everywhere(), end, reporting)
+    builder.position_at_end(reporting)
+    report()
+    builder.branch(end)

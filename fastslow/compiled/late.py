@@ -1,0 +1,77 @@
+"""Code that loops call by a symbol, compiled or read from the disk when it is first called.
+
+What few runs need would otherwise be compiled into every loop, and optimised
+again with each of them.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba import types
+
+from fastslow.compiled.generic import digest_of
+from fastslow.compiled.store import load_generated
+
+_ENTRY = '''"""Entry to {function} of {module}, sources {digest}."""
+from numba import cfunc
+
+from {module} import {function} as called
+from {module} import {signature} as kind
+
+
+@cfunc(kind, cache=True, error_model="numpy")
+def entry({arguments}):
+    return called({arguments})
+'''
+
+_C_TYPES: dict[Any, Any] = {types.int64: ctypes.c_int64, types.float64: ctypes.c_double}
+
+_callbacks: list[Any] = []
+
+
+def late_function(
+    module: str, function: str, signature: str, kind: Any, sources: tuple[str, ...]
+) -> Any:
+    """A function for compiled code to call, that is not compiled yet.
+
+    Compiled code that was read from the disk finds it as well, once the module
+    that calls this has been imported.
+
+    Parameters
+    ----------
+    module, function : str
+        Where the function is.
+    signature : str
+        Name of its type in that module.
+    kind : numba signature
+        That type: numbers and pointers, and a number as result.
+    sources : tuple of str
+        Every module whose code is compiled into it.
+
+    Returns
+    -------
+    numba.types.ExternalFunction
+    """
+    arguments = [_C_TYPES.get(argument, ctypes.c_void_p) for argument in kind.args]
+    prototype = ctypes.CFUNCTYPE(_C_TYPES[kind.return_type], *arguments)
+
+    @cache
+    def loaded() -> Any:
+        text = _ENTRY.format(
+            module=module,
+            function=function,
+            signature=signature,
+            digest=digest_of((module, *sources)),
+            arguments=", ".join(f"a{k}" for k in range(len(arguments))),
+        )
+        return prototype(load_generated(text, function).entry.address)
+
+    callback = prototype(lambda *given: loaded()(*given))
+    _callbacks.append(callback)
+    symbol = f"fastslow_{function}"
+    llvm.add_symbol(symbol, ctypes.cast(callback, ctypes.c_void_p).value)
+    return types.ExternalFunction(symbol, kind)

@@ -1,0 +1,261 @@
+"""When a trajectory follows which course of stable sheets, and when it leaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.passage.sheets import Course
+from fastslow.passage.slow_quantities import SlowQuantity
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: A new sheet is followed once this part of the way to it from the old one is done.
+WAY = 2.0 / 3.0
+
+#: A state's extent is between these parts of what the branches span.
+LEAST, MOST = 1e-3, 20.0
+
+#: Points that a course is drawn by when distances from it are measured.
+POINTS = 257
+
+#: A sheet is followed by what stays beside it for this many of its relaxation times.
+SETTLED = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A run measured against the courses of a diagram, sample by sample.
+
+    Parameters
+    ----------
+    time, slow : ndarray, shape (N,)
+    scaled : ndarray, shape (N, n)
+        Fast states in units of ``extent``.
+    extent : ndarray, shape (n,)
+    within : ndarray of bool, shape (N,)
+        Whether the slow quantity is in the range of the diagram.
+    courses : tuple of Course
+    places : ndarray, shape (N, courses, n)
+        Scaled states of the courses; beyond its end a course stays at its end state.
+    present : ndarray of bool, shape (N, courses)
+        Whether a stable sheet exists there.
+    curves : tuple of ndarray, shape (M, n + 1)
+        Points along each course, scaled: the states, and the slow quantity in units of ``span``.
+    span : float
+        The slow quantity's range in the run.
+    radius : float
+        What counts as near.
+    """
+
+    time: Array
+    slow: Array
+    scaled: Array
+    extent: Array
+    within: Mask
+    courses: tuple[Course, ...]
+    places: Array
+    present: Mask
+    curves: tuple[Array, ...]
+    span: float
+    radius: float
+
+    def apart(self, course: int) -> Array:
+        """Distance from a course at the same value of the slow quantity, shape (N,)."""
+        return np.asarray(np.linalg.norm(self.scaled - self.places[:, course], axis=1))
+
+    def beside(self, course: int, slow: Array, scaled: Array) -> Mask:
+        """Whether states are nearer than the radius to a course as a curve, shape (N,).
+
+        What lags behind a sheet is beside it all the same: the place where it is to
+        be found is one of a moment ago.
+        """
+        curve = self.curves[course]
+        points = np.column_stack([scaled, slow / self.span])
+        low, high = curve.min(axis=0) - self.radius, curve.max(axis=0) + self.radius
+        inside = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
+        beside = np.zeros(len(points), dtype=bool)
+        for part in np.array_split(inside, len(inside) // 4096 + 1):
+            beside[part] = _distance(points[part], curve) < self.radius
+        return beside
+
+    def way(self, old: int, new: int) -> Array:
+        """Which part of the way from one course to another the state has done, shape (N,)."""
+        return way_done(self.scaled, self.places[:, old], self.places[:, new])
+
+
+@dataclass(frozen=True)
+class Stay:
+    """Samples ``start`` to ``stop - 1``, in which one course is followed."""
+
+    course: int
+    start: int
+    stop: int
+
+
+def measured(
+    slow: SlowQuantity,
+    courses: tuple[Course, ...],
+    over: tuple[float, float],
+    radius: float,
+) -> Measured:
+    """Measure the samples of a run against all courses."""
+    run = slow.run
+    state = np.column_stack([run[name] for name in slow.states])
+    within = (slow.table >= over[0]) & (slow.table <= over[1])
+    extent = np.ptp(state, axis=0)
+    shape = (len(slow.table), len(courses), state.shape[1])
+    places, present = np.empty(shape), np.empty(shape[:2], dtype=bool)
+    for k, course in enumerate(courses):
+        present[:, k] = course.present(slow.table) & within
+        places[:, k] = course.state(slow.table)
+        if present[:, k].any():
+            extent = np.maximum(extent, np.ptp(places[present[:, k], k], axis=0))
+    fastest = float(np.median([c.fastest() for c in courses] or [0.0]))
+    size = np.abs(state).max(axis=0)
+    # what moves by rounding only has no extent
+    extent = np.where(extent > 1e-9 * size, extent, np.where(size > 0, size, 1.0))
+    extent = _bounded(extent, courses)
+    for rate, of in _velocities(slow):
+        extent[rate] = max(extent[rate], extent[of] * fastest)
+    span = max(float(np.ptp(slow.table)), 1e-3 * (over[1] - over[0]))
+    curves = tuple(_resampled(course.curve() / np.append(extent, span)) for course in courses)
+    return Measured(
+        run.t,
+        slow.table,
+        state / extent,
+        extent,
+        within,
+        courses,
+        places / extent,
+        present,
+        curves,
+        span,
+        radius,
+    )
+
+
+def _bounded(extent: Array, courses: tuple[Course, ...]) -> Array:
+    """Extents within reach of what the branches span, where they span anything.
+
+    A run that hardly moves, or that grows without bound, is no measure for its own distances.
+    """
+    if not courses:
+        return extent
+    rows = np.concatenate([c.curve()[:, :-1] for c in courses])
+    span = np.ptp(rows, axis=0)
+    low, high = LEAST * span, MOST * span
+    return np.where(span > 0, np.clip(extent, low, high), extent)
+
+
+def _velocities(slow: SlowQuantity) -> list[tuple[int, int]]:
+    """Pairs (i, j) of fast states where state i is the time derivative of state j.
+
+    A sheet that drifts carries a velocity with it, which is no distance from the sheet:
+    it is small beside the velocities of the fast motion.
+    """
+    if not slow.dense:
+        return []
+    series = slow.run.series
+    assert series is not None
+    rows = [slow.run.columns.index(name) for name in slow.states]
+    return [
+        (i, j)
+        for j in range(len(rows))
+        for i in range(len(rows))
+        if i != j and np.array_equal(series[:, rows[j], 1], series[:, rows[i], 0])
+    ]
+
+
+def _resampled(curve: Array) -> Array:
+    """A curve by points evenly spaced along it."""
+    along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
+    even = np.linspace(0.0, along[-1], POINTS)
+    return np.column_stack([np.interp(even, along, column) for column in curve.T])
+
+
+def _distance(points: Array, curve: Array) -> Array:
+    """Distance of points (N, d) from a polygonal curve (M, d), near its nearest vertex."""
+    square = (points**2).sum(axis=1)[:, None] - 2 * points @ curve.T + (curve**2).sum(axis=1)
+    nearest = np.argmin(square, axis=1)
+    least = np.full(len(points), np.inf)
+    for first in (np.maximum(nearest - 1, 0), np.minimum(nearest, len(curve) - 2)):
+        begin, chord = curve[first], curve[first + 1] - curve[first]
+        length = (chord**2).sum(axis=1)
+        part = ((points - begin) * chord).sum(axis=1) / np.where(length > 0, length, 1.0)
+        foot = begin + np.clip(part, 0.0, 1.0)[:, None] * chord
+        least = np.minimum(least, np.linalg.norm(points - foot, axis=1))
+    return least
+
+
+def way_done(scaled: Array, old: Array, new: Array) -> Array:
+    """Which part of the way from an old place to a new one states have done."""
+    chord = new - old
+    length = (chord**2).sum(axis=-1)
+    done = ((scaled - old) * chord).sum(axis=-1)
+    return np.asarray(done / np.where(length > 0, length, np.inf))
+
+
+def stays_of(m: Measured) -> list[Stay]:
+    """Every course that is followed, in order of time.
+
+    A course is come to where its stable part is near for half a relaxation time (less
+    at the end of the run, where more is not to be had); what only passes by is gone
+    sooner. It is left where it is no longer near, or where two thirds of the way to
+    another stable sheet are done.
+    """
+    beside = [m.beside(k, m.slow, m.scaled) for k in range(len(m.courses))]
+    visits = [v for k, near in enumerate(beside) for v in _visits(k, near & m.present[:, k])]
+    stays: list[Stay] = []
+    here = 0
+    while True:
+        following = [(max(v.start, here), v) for v in visits if v.stop > here]
+        if stays:
+            # back on the same course only after it was away
+            following = [
+                (s, v) for s, v in following if v.course != stays[-1].course or v.start >= here
+            ]
+        following = [(s, v) for s, v in following if _settles(m, v.course, s, v.stop)]
+        if not following:
+            return stays
+        first = min(s for s, _ in following)
+        tied = [v.course for s, v in following if s == first]
+        course = tied[0] if len(tied) == 1 else _nearest(m, first, tied)
+        here = _left(m, course, first, beside[course])
+        stays.append(Stay(course, first, here))
+        if here >= len(m.time):
+            return stays
+
+
+def _visits(course: int, near: Mask) -> list[Stay]:
+    edges = np.flatnonzero(np.diff(np.r_[False, near, False].astype(int)))
+    return [Stay(course, int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _settles(m: Measured, course: int, start: int, stop: int) -> bool:
+    """Whether a visit lasts for the relaxation times that make it a stay."""
+    if stop - start < 2:
+        return False
+    if stop == len(m.time) and len(m.time) > 2:
+        return True
+    rate = -m.courses[course].relaxation(m.slow[start:stop])
+    gained = np.minimum(0.5 * (rate[1:] + rate[:-1]) * np.diff(m.time[start:stop]), 1e12)
+    return bool(gained.sum() >= SETTLED)
+
+
+def _nearest(m: Measured, row: int, tied: list[int]) -> int:
+    return min(tied, key=lambda k: float(m.apart(k)[row]))
+
+
+def _left(m: Measured, course: int, start: int, beside: Mask) -> int:
+    """The first sample from ``start`` on at which a course is left."""
+    rows = slice(start, None)
+    away = ~beside[rows] | ~m.within[rows]
+    for other in range(len(m.courses)):
+        if other != course:
+            away |= m.present[rows, other] & (m.way(course, other)[rows] > WAY)
+    away[0] = False
+    return start + (int(np.argmax(away)) if away.any() else len(away))

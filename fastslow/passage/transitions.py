@@ -1,0 +1,366 @@
+"""Leavings and landings of a trajectory: where, when, and what is responsible."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.passage.excursions import Excursion
+from fastslow.passage.sheets import Course, ends_of, over_a_gap
+from fastslow.passage.slow_quantities import SlowQuantity
+from fastslow.passage.stays import WAY, Measured, Stay, way_done
+from fastslow.results.crossings import Crossing
+from fastslow.results.diagrams import Diagram
+from fastslow.results.points import SpecialPoint
+from fastslow.results.transitions import SPIKING, Moment, StableSheet, Transition
+
+Array = NDArray[np.float64]
+
+#: A sheet left at no more than this part of the slow range before its end was left because of it.
+BEFORE = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """All that transitions are read off.
+
+    Parameters
+    ----------
+    diagram : Diagram
+    slow : SlowQuantity
+    m : Measured
+    sheets : tuple of StableSheet
+    followed : ndarray of int, shape (N,)
+        The sheet of each sample of a stay (past its end still that sheet), −1 elsewhere.
+    drift : ndarray, shape (N,)
+        dw/dt.
+    """
+
+    diagram: Diagram
+    slow: SlowQuantity
+    m: Measured
+    sheets: tuple[StableSheet, ...]
+    followed: NDArray[np.intp]
+    drift: Array
+
+    def moment(self, time: float) -> Moment:
+        """The slow quantity and the state at a time."""
+        value, state = self.slow.at(np.array([time]))
+        return Moment(float(time), float(value[0]), state[0].copy())
+
+    def first(self, start: float, stop: float, over: Callable[[Array, Array], Array]) -> float:
+        """First time of an interval, to rounding, from which on a condition holds.
+
+        Parameters
+        ----------
+        start, stop : float
+            Times; at the second the condition holds.
+        over : callable
+            (slow (N,), state (N, n)) -> bool (N,).
+        """
+        while stop - start > 4.0 * np.finfo(float).eps * max(abs(start), abs(stop)):
+            times = np.linspace(start, stop, 33)
+            holds = np.asarray(over(*self.slow.at(times)), dtype=bool)
+            holds[0], holds[-1] = False, True
+            k = int(np.argmax(holds))
+            if not times[k] - times[k - 1] < stop - start:
+                break
+            start, stop = float(times[k - 1]), float(times[k])
+        return stop
+
+    def left(self, stay: Stay, rival: int | None) -> Moment:
+        """Where a stay ends."""
+        time, course = self.m.time, self.m.courses[stay.course]
+        if stay.stop >= len(time):
+            return self.moment(float(time[-1]))
+        other = None if rival is None else self.m.courses[rival]
+
+        def away(slow: Array, state: Array) -> Array:
+            scaled = state / self.m.extent
+            far = ~self.m.beside(stay.course, slow, scaled)
+            if other is not None:
+                places = (c.state(slow) / self.m.extent for c in (course, other))
+                far |= other.present(slow) & (way_done(scaled, *places) > WAY)
+            return np.asarray(far)
+
+        return self.moment(self.first(float(time[stay.stop - 1]), float(time[stay.stop]), away))
+
+    def landed(self, stay: Stay, not_before: float) -> Moment:
+        """Where a stay begins."""
+        time, course = self.m.time, self.m.courses[stay.course]
+
+        def near(slow: Array, state: Array) -> Array:
+            beside = self.m.beside(stay.course, slow, state / self.m.extent)
+            return np.asarray(course.present(slow) & beside)
+
+        since = max(float(time[max(stay.start - 1, 0)]), not_before)
+        if since >= time[stay.start]:
+            return self.moment(since)
+        return self.moment(self.first(since, float(time[stay.start]), near))
+
+    def two_thirds(self, old: Stay, new: Stay) -> Moment | None:
+        """Where two thirds of the way from one course to another are done."""
+        rows = slice(old.stop, new.start + 1)
+        over = self.m.present[rows, new.course] & (self.m.way(old.course, new.course)[rows] > WAY)
+        if not over.any():
+            return None
+        row = old.stop + int(np.argmax(over))
+        one, other = self.m.courses[old.course], self.m.courses[new.course]
+
+        def done(slow: Array, state: Array) -> Array:
+            unit = self.m.extent
+            way = way_done(state / unit, one.state(slow) / unit, other.state(slow) / unit)
+            return np.asarray(other.present(slow) & (way > WAY))
+
+        return self.moment(self.first(float(self.m.time[row - 1]), float(self.m.time[row]), done))
+
+    def outward(self, sheet: StableSheet, point: SpecialPoint) -> float:
+        """+1 where a special point is at the upper end of a sheet, −1 at the lower."""
+        branch = self.diagram.branches[sheet.branch]
+        ends = branch.parameter[[sheet.start, sheet.stop - 1]]
+        return 1.0 if point[self.diagram.parameter] >= ends.mean() else -1.0
+
+    def passed(self, sheet: StableSheet, rows: slice) -> SpecialPoint | None:
+        """The end of a sheet that the slow quantity goes past first in some samples."""
+        found: list[tuple[int, SpecialPoint]] = []
+        for point in ends_of(self.diagram, sheet):
+            past = self.m.slow[rows] - point[self.diagram.parameter]
+            beyond = self.outward(sheet, point) * past
+            if (beyond > 0).any():
+                found.append((int(np.argmax(beyond > 0)), point))
+        return min(found, key=lambda f: f[0])[1] if found else None
+
+    def delay(self, sheet: StableSheet, point: SpecialPoint | None, value: float) -> float:
+        if point is None:
+            return float("nan")
+        delay = self.outward(sheet, point) * (value - point[self.diagram.parameter])
+        return delay if abs(delay) > 1e-13 * self.m.span else 0.0
+
+    def slope(self, point: SpecialPoint | None, until: float) -> float:
+        """|dw/dt| where the slow quantity last passed a special point before a time, or then."""
+        time = self.m.time
+        row = max(int(np.searchsorted(time, until, side="right")) - 1, 0)
+        if point is not None:
+            value = point[self.diagram.parameter]
+            change = np.flatnonzero(np.diff(self.m.slow[: row + 1] > value))
+            if len(change):
+                row = int(change[-1])
+                rising = self.m.slow[row] <= value
+                until = self.first(
+                    float(time[row]), float(time[row + 1]), lambda w, _: (w > value) == rising
+                )
+        step = 1e-5 * float(time[-1] - time[0])
+        pair = np.clip([until - step, until + step], time[0], time[-1])
+        first, second = self.slow.at(pair)[0]
+        return float(abs(second - first) / (pair[1] - pair[0])) if pair[1] > pair[0] else 0.0
+
+
+def passages_within(p: Passage, stay: Stay) -> list[Transition]:
+    """Changes of sheet along one course: passages of boundary equilibria and unstable stretches."""
+    found = []
+    rows = np.arange(stay.start, stay.stop)
+    for row in rows[1:][np.diff(p.followed[rows]) != 0]:
+        left, entered = p.sheets[p.followed[row - 1]], p.sheets[p.followed[row]]
+        course = p.m.courses[stay.course]
+        last = stay.start + int(np.flatnonzero(p.m.present[stay.start : row, stay.course])[-1])
+        special = p.passed(left, slice(last, row + 1))
+        low, high = course.ranges[course.sheets.index(int(p.followed[row]))]
+
+        def entering(slow: Array, state: Array, low: float = low, high: float = high) -> Array:
+            return np.asarray((slow >= low) & (slow <= high))
+
+        here = p.moment(p.first(float(p.m.time[row - 1]), float(p.m.time[row]), entering))
+        kind, note = "crossing", ""
+        if special is not None and special.code == "BE":
+            crossing = _crossing(p, special, left, entered, here.time)
+            here = p.moment(crossing.time) if crossing is not None else here
+        elif special is not None and special.code == "HB":
+            kind, note = "Hopf", "stays near the branch all along its unstable stretch"
+        found.append(
+            Transition(
+                here.time, here.value, here.state, left.label, entered.label, special,
+                p.delay(left, special, here.value), kind, here, here,
+                p.slope(special, float(p.m.time[row])), note=note,
+            )
+        )  # fmt: skip
+    return found
+
+
+def steep_parts(p: Passage, stay: Stay) -> list[Transition]:
+    """Where a sheet goes on, but so steeply that its state at the same value is out of reach.
+
+    Such a part begins and ends where the distance at the same value of the slow quantity
+    passes the radius; one that reaches to the end of the stay belongs to the leaving.
+    """
+    course = p.m.courses[stay.course]
+    rows = slice(stay.start, stay.stop)
+    behind = (p.m.apart(stay.course)[rows] >= p.m.radius) & p.m.present[rows, stay.course]
+    edges = np.flatnonzero(np.diff(behind.astype(int)))
+    if behind[0]:
+        edges = edges[1:]
+    found = []
+    for start, stop in zip(edges[::2], edges[1::2], strict=False):
+        inside = slice(stay.start + int(start), stay.start + int(stop) + 2)
+        steepness = _steepness(p, course, stay, inside)
+        sheets = p.followed[inside]
+        time = p.m.time[inside]
+        worst = inside.start + int(np.argmax(p.m.apart(stay.course)[inside]))
+        lags = steepness >= 0.5 * p.m.radius and _behind(p, stay.course, worst)
+        if not lags or np.ptp(sheets):
+            continue
+        here = p.moment(float(p.m.time[worst]))
+        label = p.sheets[sheets[0]].label
+        found.append(
+            Transition(
+                here.time, here.value, here.state, label, label, None, float("nan"), "steep",
+                p.moment(float(time[0])), p.moment(float(time[-1])), p.slope(None, here.time),
+                steepness,
+            )
+        )  # fmt: skip
+    return found
+
+
+def _behind(p: Passage, number: int, row: int) -> bool:
+    """Whether the deviation of a sample points back along the course that drifts away."""
+    slope = p.m.courses[number].slope(p.m.slow[row : row + 1])[0] / p.m.extent
+    back = -slope * p.drift[row]
+    deviation = p.m.scaled[row] - p.m.places[row, number]
+    sizes = np.linalg.norm(back) * np.linalg.norm(deviation)
+    return bool(back @ deviation > 0.7 * sizes)
+
+
+def _crossing(
+    p: Passage, point: SpecialPoint, left: StableSheet, entered: StableSheet, time: float
+) -> Crossing | None:
+    """The crossing of a boundary equilibrium's interface that is nearest in time."""
+    met = [
+        c
+        for c in p.slow.run.crossings
+        if c.interface == point.interface
+        and (c.from_region, c.to_region) == (left.region, entered.region)
+    ]
+    nearest = min(met, key=lambda c: abs(c.time - time), default=None)
+    if nearest is None or not p.m.time[0] <= nearest.time <= p.m.time[-1]:
+        return None
+    # one that belongs to this passage lies before the slow quantity turns back
+    between = slice(*np.searchsorted(p.m.time, sorted((time, nearest.time))))
+    inside = p.m.slow[between]
+    turned = len(inside) > 2 and len(np.unique(np.sign(np.diff(inside)))) > 1
+    return None if turned else nearest
+
+
+def leaving(p: Passage, excursion: Excursion) -> Transition:
+    """The transition that begins with leaving a sheet."""
+    old, new = excursion.old, excursion.new
+    assert old is not None
+    course = p.m.courses[old.course]
+    rows = slice(old.start, old.stop)
+    last = old.start + int(np.flatnonzero(p.m.present[rows, old.course])[-1])
+    left = p.sheets[p.followed[old.stop - 1]]
+    leave = p.left(old, None if new is None else new.course)
+    stop = len(p.m.time) if new is None else new.start + 1
+    special = p.passed(left, slice(last, stop))
+    land = None if new is None else p.landed(new, leave.time)
+    entered = None if new is None else p.sheets[p.followed[new.start]]
+    here = leave
+    if new is not None and not excursion.cycle and new.course != old.course:
+        here = p.two_thirds(old, new) or leave
+    to_sheet = SPIKING if excursion.cycle else "" if entered is None else entered.label
+    if special is None and to_sheet != left.label:
+        special = _just_before(p, left, leave.value)
+    steepness = _steepness(p, course, old, slice(max(old.stop - 2, 0), stop))
+    kind, note = _kind(p, excursion, left, entered, special, steepness)
+    if kind == "transit":
+        leave, land = _across(p, left, entered, here.time) or (leave, land)
+    if excursion.turns and not excursion.cycle:
+        count = len(excursion.turns)
+        note = f"{count} oscillation{'s' if count > 1 else ''} on landing"
+    value = here.value
+    return Transition(
+        here.time, value, here.state, left.label, to_sheet, special,
+        p.delay(left, special, value), kind, leave, None if excursion.cycle else land,
+        p.slope(special, here.time),
+        steepness, note,
+    )  # fmt: skip
+
+
+def _just_before(p: Passage, left: StableSheet, value: float) -> SpecialPoint | None:
+    """The end of a sheet that was left a little before it."""
+    reach = BEFORE * float(np.ptp(p.m.slow))
+    near = [
+        point
+        for point in ends_of(p.diagram, left)
+        if abs(point[p.diagram.parameter] - value) <= reach
+    ]
+    return min(near, key=lambda e: abs(e[p.diagram.parameter] - value), default=None)
+
+
+def _steepness(p: Passage, course: Course, stay: Stay, rows: slice) -> float:
+    """Largest predicted lag behind a course where it is stable, in units of the extent."""
+    slow = p.m.slow[rows]
+    rate = -course.relaxation(slow)
+    usable = p.m.present[rows, stay.course] & (rate > 0)
+    if not usable.any():
+        return float("nan")
+    slope = np.linalg.norm(course.slope(slow[usable]) / p.m.extent, axis=1)
+    lag = slope * np.abs(p.drift[rows][usable]) / rate[usable]
+    lag = lag[np.isfinite(lag)]
+    return float(lag.max()) if len(lag) else float("nan")
+
+
+def _kind(
+    p: Passage,
+    excursion: Excursion,
+    left: StableSheet,
+    entered: StableSheet | None,
+    special: SpecialPoint | None,
+    steepness: float,
+) -> tuple[str, str]:
+    """Kind of a leaving, and what else is to be said."""
+    back = entered is not None and entered.label == left.label and not excursion.cycle
+    if special is not None:
+        if special.code == "LP" or special.subtype == "non-smooth fold":
+            return "jump", ""
+        if special.code == "HB":
+            return "Hopf", ""
+        if special.code == "BE" and back:
+            return "excursion", "past the end of the sheet and back"
+        if special.code == "BE" and entered is not None:
+            if over_a_gap(p.diagram, left, entered):
+                return "transit", ""
+            if entered.region in special.regions:
+                return "crossing", ""
+        return "change", ""
+    touch = _touch(p, excursion)
+    if touch is not None:
+        return "grazing", f"touches {touch.interface} at t = {touch.time:.6g}"
+    if back:
+        return ("steep" if steepness >= 0.5 * p.m.radius else "excursion"), ""
+    return "change", ""
+
+
+def _touch(p: Passage, excursion: Excursion) -> Crossing | None:
+    """The first touch of an interface around a leaving: from one fast oscillation before it on."""
+    start, stop = excursion.rows(p.m)
+    since = p.m.time[max(start - (stop - start), 0)]
+    until = p.m.time[min(stop, len(p.m.time) - 1)]
+    return next(
+        (c for c in p.slow.run.crossings if since <= c.time <= until and c.tangential), None
+    )
+
+
+def _across(
+    p: Passage, left: StableSheet, entered: StableSheet | None, time: float
+) -> tuple[Moment, Moment] | None:
+    """Where a trajectory leaves the one side of a gap and reaches the other."""
+    if entered is None:
+        return None
+    crossings: Sequence[Crossing] = p.slow.run.crossings
+    out = [c for c in crossings if c.from_region == left.region and c.time <= time]
+    if not out:
+        return None
+    reach = [c for c in crossings if c.to_region == entered.region and c.time > out[-1].time]
+    return (p.moment(out[-1].time), p.moment(reach[0].time)) if reach else None

@@ -1,0 +1,314 @@
+"""Eigenvalues in the complex plane: along a branch, and along the Clarke path at an interface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colorbar import Colorbar
+from matplotlib.colors import Normalize
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError
+from fastslow.plot.labels import key, place, settle, tag
+from fastslow.plot.style import (
+    GREY,
+    MARKERS,
+    MM,
+    SMALL,
+    TEXT,
+    VERMILION,
+    Drawing,
+    axes_for,
+    root,
+    typeset,
+)
+from fastslow.results.branches import Branch
+from fastslow.results.overlays import Overlay
+from fastslow.results.points import CODE_NAMES, SpecialPoint
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: A colour map that grows evenly in lightness, for all kinds of sight.
+COLOURS = "viridis"
+
+#: Points along a Clarke path.
+FINE = 801
+
+
+@dataclass(frozen=True, eq=False)
+class EigenvalueDrawing(Drawing):
+    """Eigenvalues drawn in the complex plane.
+
+    Parameters
+    ----------
+    ax : Axes
+    paths : tuple of LineCollection
+        One for each region gone through, coloured by the parameter.
+    jumps : tuple of Line2D
+        From the eigenvalues on one side of an interface to those on the other.
+    markers : tuple of Line2D
+        Special points: where an eigenvalue crosses the imaginary axis, or jumps.
+    labels : tuple of Annotation
+    bar : Colorbar
+    legend : Legend or None
+    """
+
+    paths: tuple[LineCollection, ...]
+    jumps: tuple[Line2D, ...]
+    markers: tuple[Line2D, ...]
+    labels: tuple[Annotation, ...]
+    bar: Colorbar
+    legend: Legend | None
+
+
+def eigenvalue_path(
+    source: Overlay | Branch, *, ax: Axes | None = None, label: bool = True, legend: bool = True
+) -> EigenvalueDrawing:
+    """Draw the eigenvalues along a branch, coloured by its parameter.
+
+    At an interface the eigenvalues jump; grey dashes lead from the old ones to the
+    new ones. Folds and Hopf points are marked on the imaginary axis, where they cross
+    it. Eigenvalues at infinity (of sliding) are left out.
+
+    Parameters
+    ----------
+    source : Overlay or Branch
+        Of an overlay, the parts of the branches between the sheets that are followed,
+        as far as the slow quantity goes.
+    ax : Axes, optional
+        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+    label : bool
+        Whether to write LP1, BE1, … beside the marks.
+    legend : bool
+        Whether to draw a legend.
+
+    Returns
+    -------
+    EigenvalueDrawing
+
+    Raises
+    ------
+    ArgumentError
+        For an overlay in which no sheet is followed.
+    """
+    parts = [(source, slice(0, len(source)))] if isinstance(source, Branch) else _followed(source)
+    own, ax = ax is None, axes_for(ax, height=78 * MM)
+    values = np.concatenate([branch.parameter[rows] for branch, rows in parts])
+    scale = Normalize(float(values.min()), float(values.max()))
+    paths: list[LineCollection] = []
+    jumps: list[Line2D] = []
+    met: list[SpecialPoint] = []
+    for branch, rows in parts:
+        path = _matched(branch.eigenvalues[rows])
+        region, parameter = branch.region[rows], branch.parameter[rows]
+        edges = np.flatnonzero(region[1:] != region[:-1]) + 1
+        for start, stop in zip([0, *edges], [*edges, len(path)], strict=True):
+            paths.append(_coloured(ax, path[start:stop], parameter[start:stop], scale))
+        for edge in edges:
+            for one, other in zip(path[edge - 1], path[edge], strict=True):
+                jumps += ax.plot(
+                    [one.real, other.real],
+                    [one.imag, other.imag],
+                    color=GREY,
+                    linestyle=(0, (3, 2)),
+                    linewidth=0.8,
+                    zorder=2.0,
+                    label="jump at an interface",
+                )
+        met += [
+            point
+            for point, row in zip(branch.special, branch.special_rows, strict=True)
+            if point.code != "EP" and rows.start <= row < rows.stop
+        ]
+    markers, labels = _marks(ax, met, label)
+    name = parts[0][0].parameter_name
+    bar = _framed(ax, paths, typeset(name))
+    handles: list[Artist] = [*markers, *jumps[:1]]
+    shown = key(ax, handles, own) if legend and handles else None
+    settle(ax)
+    place(ax, labels, [] if shown is None else [shown])
+    return EigenvalueDrawing(ax, tuple(paths), tuple(jumps), markers, labels, bar, shown)
+
+
+def clarke_path(
+    point: SpecialPoint, *, ax: Axes | None = None, legend: bool = True
+) -> EigenvalueDrawing:
+    """Draw the eigenvalues of q J₁ + (1 − q) J₂ at a boundary equilibrium for 0 ≤ q ≤ 1.
+
+    Where the path crosses the imaginary axis at zero the boundary equilibrium
+    is a non-smooth fold; where a pair crosses it, in the plane, a Clarke-Hopf point
+    (Leine and Nijmeijer 2004).
+
+    Parameters
+    ----------
+    point : SpecialPoint
+        A boundary equilibrium of a continuous model.
+    ax : Axes, optional
+        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+    legend : bool
+        Whether to draw a legend.
+
+    Returns
+    -------
+    EigenvalueDrawing
+
+    Raises
+    ------
+    ArgumentError
+        If the point has no Clarke path.
+    """
+    if point.clarke is None:
+        raise ArgumentError(
+            f"{point.label} has no Clarke path; expected a boundary equilibrium of a model "
+            "that is continuous across its interface"
+        )
+    own, ax = ax is None, axes_for(ax, height=78 * MM)
+    q = np.linspace(0.0, 1.0, FINE)
+    path = _matched(point.clarke.path(q))
+    paths = (_coloured(ax, path, q, Normalize(0.0, 1.0)),)
+    markers: list[Line2D] = []
+    first, second = point.clarke.regions
+    for at, marker, text in ((1.0, "o", f"q = 1, {first}"), (0.0, "s", f"q = 0, {second}")):
+        markers += _dots(ax, point.clarke.path(at), marker, "white", "black", text)
+    for found, marker, text in (
+        (point.clarke.q_zero, "*", "zero eigenvalue"),
+        (point.clarke.q_hopf, "P", "pair on the axis"),
+    ):
+        if found is not None:
+            size = np.abs(point.clarke.path(found))
+            roots = point.clarke.path(found)
+            on = roots[np.abs(roots.real) <= 1e-6 * max(float(size.max()), 1e-300)]
+            markers += _dots(ax, on, marker, VERMILION, "black", f"{text}, q = {found:.4g}")
+    bar = _framed(ax, paths, typeset("q"))
+    ax.set_title(f"{point.label}: {point.subtype}", fontsize=TEXT)
+    shown = key(ax, markers, own) if legend else None
+    return EigenvalueDrawing(ax, paths, (), tuple(markers), (), bar, shown)
+
+
+def _followed(lay: Overlay) -> list[tuple[Branch, slice]]:
+    """Rows of every branch from the first to the last that is followed."""
+    used = [lay.sheets[k] for k in np.unique(lay.followed) if k >= 0]
+    if not used:
+        raise ArgumentError("this trajectory follows no sheet, so that there is no path to draw")
+    low, high = float(lay.slow.min()), float(lay.slow.max())
+    parts = []
+    for number in dict.fromkeys(sheet.branch for sheet in used):
+        branch = lay.diagram.branches[number]
+        own = [sheet for sheet in used if sheet.branch == number]
+        start, stop = min(s.start for s in own), max(s.stop for s in own)
+        inside = (branch.parameter >= low) & (branch.parameter <= high)
+        rows = start + np.flatnonzero(inside[start:stop])
+        if len(rows) > 1:
+            parts.append((branch, slice(int(rows[0]), int(rows[-1]) + 1)))
+    if not parts:
+        raise ArgumentError("the slow quantity passes fewer than two points of the branches")
+    return parts
+
+
+def _matched(values: Complex) -> Complex:
+    """Eigenvalues row by row in an order in which each goes on from its nearest."""
+    path = np.where(np.isfinite(values.real), values, np.nan + 0j)
+    for row in range(1, len(path)):
+        left = list(range(path.shape[1]))
+        order = []
+        for before in path[row - 1]:
+            gaps = [abs(path[row, k] - before) for k in left]
+            order.append(left.pop(int(np.argmin(np.nan_to_num(gaps, nan=np.inf)))))
+        path[row] = path[row, order]
+    return path
+
+
+def _coloured(ax: Axes, path: Complex, parameter: Array, scale: Normalize) -> LineCollection:
+    """Lines of all eigenvalues of one stretch, coloured by the parameter."""
+    path, parameter = _through_collisions(path, parameter)
+    places = np.stack([path.real, path.imag], axis=-1)
+    pieces = np.stack([places[:-1], places[1:]], axis=2).reshape(-1, 2, 2)
+    middle = np.repeat(0.5 * (parameter[1:] + parameter[:-1]), path.shape[1])
+    good = np.isfinite(pieces).all(axis=(1, 2))
+    lines = LineCollection(list(pieces[good]), cmap=COLOURS, norm=scale, linewidths=2.0, zorder=3.0)
+    lines.set_capstyle("round")
+    lines.set_array(middle[good])
+    ax.add_collection(lines)
+    return lines
+
+
+def _through_collisions(path: Complex, parameter: Array) -> tuple[Complex, Array]:
+    """The path with a row put in wherever two real eigenvalues and a pair go over into each other.
+
+    They meet on the real axis; without that point a line would cut the corner.
+    """
+    real = np.abs(path.imag) <= 1e-9 * np.maximum(np.abs(path).max(axis=1, keepdims=True), 1e-300)
+    changed = real[1:] != real[:-1]
+    at = np.flatnonzero(changed.sum(axis=1) == 2)
+    between = 0.5 * (path[at] + path[at + 1])
+    for row, moved in zip(between, changed[at], strict=True):
+        row[moved] = row[moved].real.mean()
+    middle = 0.5 * (parameter[at] + parameter[at + 1])
+    return np.insert(path, at + 1, between, axis=0), np.insert(parameter, at + 1, middle)
+
+
+def _dots(ax: Axes, roots: Complex, marker: str, face: str, edge: str, text: str) -> list[Line2D]:
+    return ax.plot(
+        roots.real,
+        roots.imag,
+        linestyle="none",
+        marker=marker,
+        markersize=8.0 if marker == "*" else 4.5,
+        markerfacecolor=face,
+        markeredgecolor=edge,
+        markeredgewidth=0.7,
+        zorder=4.0,
+        label=text,
+    )
+
+
+def _marks(
+    ax: Axes, met: Sequence[SpecialPoint], label: bool
+) -> tuple[tuple[Line2D, ...], tuple[Annotation, ...]]:
+    """Special points: what crosses the imaginary axis, or all eigenvalues of the point."""
+    markers: list[Line2D] = []
+    labels: list[Annotation] = []
+    for code in CODE_NAMES:
+        roots: list[complex] = []
+        for point in (p for p in met if p.code == code):
+            values = point.eigenvalues[np.isfinite(point.eigenvalues.real)]
+            if code in ("LP", "HB", "BP", "NSD") and len(values):
+                near = np.abs(values.real)
+                values = values[near <= near.min() + 1e-9 * max(float(np.abs(values).max()), 1e-9)]
+            roots += values.tolist()
+            if label and len(values):
+                top = max(values, key=lambda z: z.imag)
+                labels.append(tag(ax, point.label, (float(top.real), float(top.imag))))
+        if roots:
+            marker, colour = MARKERS[code]
+            at = np.array(roots)
+            text = f"{code} {CODE_NAMES[code]}"
+            if code == "BE":
+                # open, because other points may lie there too
+                markers += _dots(ax, at, marker, "none", colour, text)
+            else:
+                markers += _dots(ax, at, marker, colour, "white", text)
+    return tuple(markers), tuple(labels)
+
+
+def _framed(ax: Axes, paths: Sequence[LineCollection], name: str) -> Colorbar:
+    """Axes, their names, both axes of the plane, and the bar of colours."""
+    ax.autoscale_view()
+    ax.margins(0.08)
+    ax.axvline(0.0, color="black", linewidth=0.8, zorder=1.0)
+    ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1.0)
+    ax.set_xlabel(r"$\mathrm{Re}\,\lambda$")
+    ax.set_ylabel(r"$\mathrm{Im}\,\lambda$")
+    bar = root(ax).colorbar(paths[0], ax=ax, pad=0.02, aspect=30)
+    bar.set_label(name, fontsize=TEXT)
+    bar.ax.tick_params(labelsize=SMALL, width=0.6, length=2.5)
+    return bar

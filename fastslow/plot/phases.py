@@ -1,0 +1,83 @@
+"""The phases of a motion as a strip above its time series."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+from matplotlib.text import Text
+
+from fastslow.plot.style import BLACK, PHASES, root
+from fastslow.results.transitions import Phase
+
+#: Height of the strip and size of its words, in points.
+HEIGHT, WORDS = 10.0, 6.0
+
+
+def draw_phases(
+    ax: Axes, phases: Sequence[Phase]
+) -> tuple[tuple[Rectangle, ...], tuple[Text, ...]]:
+    """Draw phases as a strip along the upper edge of a time series.
+
+    Parameters
+    ----------
+    ax : Axes
+        With time on the horizontal axis; room is made above what is drawn.
+    phases : sequence of Phase
+
+    Returns
+    -------
+    tuple of Rectangle
+        One for each phase.
+    tuple of Text
+        What each is called: the sheets that a quiescent phase follows, the number of
+        spikes. `fit_words` hides those without room.
+    """
+    whole = ax.get_window_extent().height * 72.0 / root(ax).dpi
+    height = min(HEIGHT / whole, 0.5)
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + height / (1.0 - height) * (high - low))
+    frame = ax.get_xaxis_transform()
+    boxes, words = [], []
+    for phase in phases:
+        box = Rectangle(
+            (phase.start, 1.0 - height),
+            phase.duration,
+            height,
+            transform=frame,
+            zorder=4.8,
+            linewidth=0.0,
+            **PHASES[phase.kind],
+        )
+        ax.add_patch(box)
+        boxes.append(box)
+        words.append(
+            ax.text(
+                0.5 * (phase.start + phase.end),
+                1.0 - 0.5 * height,
+                _text(phase),
+                transform=frame,
+                ha="center",
+                va="center",
+                fontsize=WORDS,
+                color=BLACK,
+                zorder=4.9,
+                clip_on=True,
+            )
+        )
+    return tuple(boxes), tuple(words)
+
+
+def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text]) -> None:
+    """Hide the words that are wider than their boxes, in axes with their final places."""
+    for box, word in zip(boxes, words, strict=True):
+        word.set_visible(word.get_window_extent().width <= box.get_window_extent().width)
+
+
+def _text(phase: Phase) -> str:
+    if phase.kind == "quiescent":
+        return " ".join(phase.sheets)
+    if phase.kind == "spiking":
+        return f"{phase.spikes} spikes"
+    return "outside" if phase.kind == "outside" else ""

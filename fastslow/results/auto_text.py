@@ -1,0 +1,264 @@
+"""The text of files of AUTO-07p: diagrams (b., fort.7), solutions (s.), diagnostics (d.).
+
+The layout is that of the manual (Doedel and Oldeman 2012, AUTO-07P: continuation and
+bifurcation software for ordinary differential equations, chapter 4).
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import FileError
+
+Array = NDArray[np.float64]
+
+#: Branch, point, type and label take so many characters, every number as many again.
+WIDTH = 19
+
+#: What begins a row: branch, point, type and label.
+LEADING = 4
+
+
+@dataclass(frozen=True, eq=False)
+class AutoCurve:
+    """One curve of a diagram file.
+
+    Parameters
+    ----------
+    constants : mapping
+        AUTO's constants that its header shows, such as ``"IPS"``, and ``"parnames"``
+        and ``"unames"``.
+    columns : tuple of str
+        Names of the numbers.
+    branches, points, types, labels : ndarray of int, shape (N,)
+        Of a stable point the number is negative.
+    numbers : ndarray, shape (N, len(columns))
+    line : int
+        Where in the file its rows begin.
+    """
+
+    constants: Mapping[str, Any]
+    columns: tuple[str, ...]
+    branches: NDArray[np.int64]
+    points: NDArray[np.int64]
+    types: NDArray[np.int64]
+    labels: NDArray[np.int64]
+    numbers: Array
+    line: int
+
+
+@dataclass
+class _Reading:
+    """What is known so far while a file is read."""
+
+    constants: dict[str, Any] = field(default_factory=dict)
+    header: str = ""
+    line: int = 0
+    rows: list[list[str]] = field(default_factory=list)
+
+
+def lines_of(path: Path) -> list[str]:
+    """The lines of a text file.
+
+    Raises
+    ------
+    FileError
+        When it cannot be read.
+    """
+    try:
+        return path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as error:
+        raise FileError(f"{path} cannot be read: {error.strerror or error}") from error
+
+
+def sections_of(path: Path) -> list[AutoCurve]:
+    """Every curve of a diagram file, in order.
+
+    Raises
+    ------
+    FileError
+        For a file that is none, with the line.
+    """
+    now = _Reading()
+    found: list[AutoCurve] = []
+    for number, line in enumerate(lines_of(path), start=1):
+        words = line.split()
+        if not words:
+            continue
+        if words[0] == "0":
+            found += _finished(path, now)
+            _header(now, line)
+        else:
+            now.line = now.line or number
+            now.rows.append(words)
+    found += _finished(path, now)
+    return found
+
+
+def _header(now: _Reading, line: str) -> None:
+    """Take in one line of a header."""
+    text = line.strip()[1:].strip()
+    if text.startswith("PT"):
+        now.header = line
+        return
+    if re.fullmatch(r"[-+.\dE\s]+", text):
+        # the window of the plot begins the header of a new run
+        now.constants = {}
+        return
+    for name, value in re.findall(r"(\w+)\s*=\s*(-?\d+)(?![\d.E])", text):
+        now.constants[name] = int(value)
+    named = re.match(r"(parnames|unames)\s*=\s*(\{.*\})", text)
+    if named:
+        try:
+            now.constants[named[1]] = dict(ast.literal_eval(named[2]))
+        except (ValueError, SyntaxError, TypeError):
+            return
+
+
+def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
+    """The section whose rows were gathered, if there were any."""
+    if not now.rows:
+        return
+    where = f"{path}, line {now.line}"
+    if not now.header:
+        raise FileError(f"{where}: numbers without a header; expected a diagram file of AUTO-07p")
+    count = len(now.rows[0])
+    columns = _columns(now.header, count - LEADING)
+    if count <= LEADING + 1 or len(columns) != count - LEADING:
+        raise FileError(
+            f"{where}: {count} numbers under the header {now.header.strip()!r}; expected a diagram "
+            "file of AUTO-07p"
+        )
+    values = []
+    for k, row in enumerate(now.rows):
+        if len(row) != count:
+            raise FileError(
+                f"{path}, row {k + 1} after line {now.line - 1}: {len(row)} numbers, expected "
+                f"{count}; the file is cut short or damaged"
+            )
+        values.append([real(word, path) for word in row])
+    table = np.array(values)
+    whole = table[:, :LEADING].astype(np.int64)
+    yield AutoCurve(
+        dict(now.constants),
+        columns,
+        whole[:, 0],
+        whole[:, 1],
+        whole[:, 2],
+        whole[:, 3],
+        table[:, LEADING:],
+        now.line,
+    )
+    now.rows, now.line = [], 0
+
+
+def _columns(header: str, count: int) -> tuple[str, ...]:
+    """Names of the numbers, each in the middle of as many characters as the number takes."""
+    text = header.expandtabs()
+    names = tuple(text[WIDTH * (k + 1) : WIDTH * (k + 2)].strip() for k in range(count))
+    if all(names) and not text[WIDTH * (count + 1) :].strip():
+        return names
+    return tuple(re.split(r"\s{2,}", header.strip())[LEADING:])
+
+
+def real(word: str, path: Path) -> float:
+    """A number as Fortran writes it, ``1.5D-3`` and ``-1.7976+308`` included.
+
+    Examples
+    --------
+    >>> real("1.5D-3", Path("b.x")), real("-1.7976+308", Path("b.x"))
+    (0.0015, -1.7976e+308)
+    """
+    text = re.sub(r"(?<=[\d.])[dD]?([+-]\d+)$", r"e\1", word)
+    try:
+        return float(text)
+    except ValueError:
+        raise FileError(
+            f"{path}: {word!r} is no number; the file is cut short or damaged"
+        ) from None
+
+
+def parameters_of(path: Path) -> dict[int, Array]:
+    """All parameters of the labelled equilibria of a solutions file, by label.
+
+    Periodic solutions are passed over.
+
+    Raises
+    ------
+    FileError
+        For a file that is none, or cut short.
+    """
+    lines = lines_of(path)
+    found: dict[int, Array] = {}
+    at = 0
+    while at < len(lines):
+        words = lines[at].split()
+        if not words:
+            at += 1
+            continue
+        try:
+            head = [int(word) for word in words]
+            label, parts, rows, count = head[3], head[6], head[8], head[11]
+        except (ValueError, IndexError):
+            raise FileError(
+                f"{path}, line {at + 1}: expected the header of a solution of AUTO-07p"
+            ) from None
+        block = [word for line in lines[at + 1 : at + 1 + rows] for word in line.split()]
+        if at + rows >= len(lines) or len(block) < count:
+            raise FileError(f"{path} is cut short: the solution with label {label} is not whole")
+        at += 1 + rows
+        if parts == 1:
+            # the parameters stand last
+            found[label] = np.array([real(word, path) for word in block[len(block) - count :]])
+    return found
+
+
+#: A line of diagnostics with an eigenvalue: its number and its two parts.
+_EIGENVALUE = re.compile(r"\s*-?\d+\s+-?\d+\s+Eigenvalue\s+(\d+):\s+(\S+)\s+(\S+)")
+
+#: A line of diagnostics that repeats a row of the diagram: branch and point.
+_ROW = re.compile(r"\s*(-?\d+)\s+(-?\d+)\s+(?:[A-Z]{2}\s+)?\d+(?:\s+-?\d\.\d+\S*){3}")
+
+
+def eigenvalues_of(path: Path, curves: Sequence[AutoCurve], n: int) -> list[NDArray[np.complex128]]:
+    """Eigenvalues at the points of curves, from the file of diagnostics of the same run.
+
+    Both files go through the curves in the same order; a row of the diagram follows
+    the eigenvalues found at it, the last ones for a point that was looked for.
+
+    Returns
+    -------
+    list of ndarray, shape (N, n) for each curve
+        NaN where the file shows none.
+    """
+    rows: list[tuple[int, int, list[complex]]] = []
+    shown: list[complex] = []
+    for line in lines_of(path):
+        one, row = _EIGENVALUE.match(line), _ROW.match(line)
+        if one is not None:
+            if int(one[1]) == 1:
+                shown = []
+            shown.append(complex(real(one[2], path), real(one[3], path)))
+        elif row is not None:
+            rows.append((abs(int(row[1])), abs(int(row[2])), shown))
+            shown = []
+    tables = []
+    at = 0
+    for curve in curves:
+        table = np.full((len(curve.points), n), np.nan + 0j)
+        for k, place in enumerate(zip(abs(curve.branches), abs(curve.points), strict=True)):
+            there = next((j for j in range(at, len(rows)) if rows[j][:2] == place), None)
+            if there is not None:
+                at = there + 1
+                if len(rows[there][2]) == n:
+                    table[k] = rows[there][2]
+        tables.append(table)
+    return tables

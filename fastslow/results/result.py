@@ -1,0 +1,55 @@
+"""What every result can do: be pickled and saved, without what lives only in this process."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+#: Metadata of a field that lives only in this process, such as a model: dropped when kept.
+LIVE = {"live": True}
+
+
+class Result:
+    """A result that can be kept in a file."""
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write this to a file that `fastslow.load` reads back bit for bit.
+
+        The file takes its place whole or not at all. What lives only in this
+        process (the model behind a diagram, which corrects what is read off it)
+        is not kept.
+
+        Parameters
+        ----------
+        path : str or path
+            Ends in ``.npz``, or in ``.nc`` for NetCDF (extra ``data``).
+
+        Raises
+        ------
+        ArgumentError
+            For another ending.
+        FileError
+            When the file cannot be written.
+        MissingPackageError
+            For ``.nc`` without the extra ``data``.
+
+        Examples
+        --------
+        >>> import tempfile, fastslow as fs
+        >>> diagram = fs.continue_equilibria(fs.systems.harmonic_gear().frozen(), "w", (-2, 6))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     diagram.save(f"{folder}/gear.npz")
+        ...     again = fs.load(f"{folder}/gear.npz")
+        >>> bool((again["x"] == diagram["x"]).all())
+        True
+        """
+        from fastslow.results.files import write
+
+        write(self, path)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # neither what was computed from the fields, nor what lives only in this process
+        fields = getattr(self, "__dataclass_fields__", {})
+        live = {name for name, field in fields.items() if field.metadata.get("live")}
+        kept = {name: value for name, value in self.__dict__.items() if name in fields}
+        return {name: None if name in live else value for name, value in kept.items()}

@@ -1,0 +1,221 @@
+"""What an overlay finds along a trajectory: sheets, phases, transitions, the kind of bursting."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.results.points import SpecialPoint
+
+#: Stands for a sheet where the fast motion follows none.
+SPIKING = "spiking"
+
+#: Every kind of transition, and what happens there.
+KINDS = {
+    "jump": "leaves at a fold, smooth or not",
+    "Hopf": "leaves at a Hopf point",
+    "crossing": "goes on across a boundary equilibrium",
+    "transit": "crosses a gap, over a continuum of equilibria",
+    "steep": "falls behind a steep slope without bifurcation",
+    "grazing": "leaves where it touches an interface",
+    "end of spiking": "the fast oscillation ends",
+    "excursion": "leaves a sheet that has not ended and comes back",
+    "change": "leaves for another reason",
+}
+
+
+@dataclass(frozen=True)
+class StableSheet:
+    """A stable run of a branch, in one region, that a trajectory can follow.
+
+    Parameters
+    ----------
+    label : str
+        The region, numbered where a region has several: ``"S1"``, ``"S1.2"``.
+    branch : int
+        Number of the branch in the diagram.
+    start, stop : int
+        Rows ``start`` to ``stop - 1`` of the branch.
+    region : str
+        The region of its equilibria.
+    """
+
+    label: str
+    branch: int
+    start: int
+    stop: int
+    region: str
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """A place along a trajectory.
+
+    Parameters
+    ----------
+    time, value : float
+        The time, and the slow quantity then.
+    state : ndarray, shape (n,)
+        The fast state then.
+    """
+
+    time: float
+    value: float
+    state: NDArray[np.float64] = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Transition:
+    """A leaving of the followed sheet, or the end of a spiking phase, up to the next sheet.
+
+    Parameters
+    ----------
+    time, value : float
+        When it happened, and the slow quantity then: between two sheets where two
+        thirds of the way from the old one to the new one are done; at the passage of
+        a boundary equilibrium where the interface is crossed; at the start of spiking
+        where the old sheet is left; at its end the last spike.
+    state : ndarray, shape (n,)
+        The state at that time.
+    from_sheet, to_sheet : str
+        Labels of the sheets, or ``"spiking"``; to_sheet is "" where the run ends before
+        it comes to another sheet.
+    special : SpecialPoint or None
+        The special point responsible: the end of the old sheet that was passed.
+    delay : float
+        How far past the special point, away from the old sheet, the slow
+        quantity is at ``value``, in its own units; nan without a special point.
+    kind : str
+        ``"jump"``, ``"Hopf"``, ``"crossing"``, ``"transit"``, ``"steep"``, ``"grazing"``,
+        ``"end of spiking"``, ``"excursion"`` or ``"change"``.
+    leave : Moment
+        Where the old sheet is farther away than the radius of the overlay; across a gap
+        the crossing of its first interface.
+    land : Moment or None
+        Where the new sheet is nearer than that for good; across a gap the first crossing of
+        its other interface; None where the run ends before.
+    slope : float
+        |dw/dt| of the slow quantity w where it passes the special point (at ``time`` without one).
+    steepness : float
+        Largest predicted lag of the motion behind the old sheet, |dX/dw| |dw/dt| / |Re λ|,
+        in units of each state's extent: well below 1 a sheet is followed.
+    note : str
+        Further evidence in words.
+    """
+
+    time: float
+    value: float
+    state: NDArray[np.float64]
+    from_sheet: str
+    to_sheet: str
+    special: SpecialPoint | None
+    delay: float
+    kind: str
+    leave: Moment
+    land: Moment | None = None
+    slope: float = float("nan")
+    steepness: float = float("nan")
+    note: str = ""
+
+    @property
+    def duration(self) -> float:
+        """Time from leaving to landing; nan without a landing."""
+        return float("nan") if self.land is None else self.land.time - self.leave.time
+
+    @property
+    def width(self) -> float:
+        """Change of the slow quantity from leaving to landing; nan without a landing."""
+        return float("nan") if self.land is None else abs(self.land.value - self.leave.value)
+
+    def describe(self, name: str) -> str:
+        """In one line, with the slow quantity's name."""
+        change = f"t = {self.time:.6g}, {name} = {self.value:.6g}: "
+        if self.to_sheet == self.from_sheet:
+            change += f"{self.from_sheet} left and met again, "
+        else:
+            change += f"{self.from_sheet} → {self.to_sheet or 'end of run'}, "
+        parts = [self.kind]
+        if self.special is not None:
+            words = self.special.subtype or self.special.criticality
+            label = self.special.label + (f" ({words})" if words else "")
+            parts[0] += f" at {label}, {name} = {self.special[name]:.6g}"
+            if np.isfinite(self.delay):
+                parts.append(f"delay {self.delay:.3g}")
+        elif self.kind not in ("steep", "end of spiking"):
+            parts.append("no special point ends the sheet left")
+        if self.kind == "steep":
+            parts.append(
+                f"no bifurcation: the predicted lag |dX/d{name}| |d{name}/dt| / |Re λ| grows to "
+                f"{self.steepness:.2g} of the state's extent"
+            )
+        if self.kind == "transit" and self.land is not None:
+            parts.append(
+                f"not a bifurcation: {self.duration:.4g} long, {self.width:.4g} wide in {name}, "
+                f"where |d{name}/dt| = {self.slope:.4g}"
+            )
+        elif self.land is not None and self.land.time > self.time:
+            parts.append(f"lands at {name} = {self.land.value:.6g}, t = {self.land.time:.6g}")
+        if self.note and self.kind != "end of spiking":
+            parts.append(self.note)
+        return change + "; ".join(parts)
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A stretch of time of one kind of motion.
+
+    Parameters
+    ----------
+    start, end : float
+    kind : str
+        ``"quiescent"`` (follows a sheet), ``"spiking"`` (two oscillations or more away from
+        the sheets), ``"jump"`` (from one sheet to the next), ``"transit"`` (the same across a
+        gap), ``"excursion"`` (from a sheet and back to it), ``"transient"`` (at the start or
+        the end of the run, near no sheet) or ``"outside"`` (the diagram does not go so far).
+    sheets : tuple of str
+        Labels of the sheets followed, in order; for spiking that settles on a sheet, that one.
+    spikes : int
+        Maxima of the observed state.
+    attractor : str
+        Of a spiking phase ``"cycle"``, or ``"equilibrium"`` where the oscillation decays on to a
+        stable sheet that was there all the time; else "".
+    intervals : tuple of float
+        Times between successive spikes.
+    sizes : tuple of float
+        Of a spiking phase, the rise of the observed state to each spike, in its own units.
+    """
+
+    start: float
+    end: float
+    kind: str
+    sheets: tuple[str, ...] = ()
+    spikes: int = 0
+    attractor: str = ""
+    intervals: tuple[float, ...] = ()
+    sizes: tuple[float, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        return self.end - self.start
+
+
+@dataclass(frozen=True)
+class Bursting:
+    """What a rhythm of quiescent and spiking phases (or of jumps) is called, and why.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``"fold/Hopf bursting"``: the bifurcation that starts the spiking before the
+        stroke, that which ends it after (Izhikevich 2000).
+    evidence : tuple of str
+        Sentences that the name rests on.
+    """
+
+    name: str
+    evidence: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return self.name

@@ -1,0 +1,382 @@
+"""Steps by collocation, where a Taylor series does not exist.
+
+The polynomial of degree n through the state at the beginning of a step whose
+derivative equals the rates at n points of Lobatto (Hairer and Wanner 1996,
+section IV.5, Lobatto IIIA) is of order n throughout the step and of order
+2 n - 2 at its end. It is found by fixed-point iteration from the polynomial of
+the step before, and takes the place of the series: rows of coefficients in time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import types
+from numba.np.numpy_support import carray
+
+from fastslow.compiled.late import late_function
+from fastslow.compiled.parts import part
+from fastslow.compiled.pointers import DOUBLES, call_address
+from fastslow.simulation.lobatto import (
+    AT_F,
+    HIGHEST,
+    INTEGRALS,
+    LOWEST,
+    TO_C,
+    TO_F,
+    WORST,
+    C,
+    F,
+)
+from fastslow.simulation.polynomials import EPSILON
+
+#: Most iterations of one attempt, and most attempts for one step.
+ITERATIONS, ATTEMPTS = 40, 100
+
+#: How much of the tolerance the estimate may reach, and the iteration may leave.
+SHARE, LEFT = 0.5, 0.02
+
+
+def memory_size(n_states: int, order: int) -> int:
+    """Numbers to carry: whether the last step was such a one, its place, lengths and rates."""
+    return 5 + n_states * min(order, HIGHEST)
+
+
+@part
+def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
+    """Replace the values and rates in ``W`` by collocation polynomials; see `modes.expand`."""
+    n_states, n_forcing, n_interfaces, _, order = layout
+    columns = order + 1
+    first_h = n_states + n_forcing
+    drift = first_h + n_interfaces
+    n = min(order, HIGHEST)
+    table = n - LOWEST
+    # rates are known of the states and of the interface functions
+    n_rates = n_states + n_interfaces
+    start, scale = np.empty(n_rates), np.empty(n_rates)
+    rates, defect = np.empty((n_rates, n)), np.empty((n_rates, n + 1))
+    values = np.empty((n_forcing + 2, n + 2))
+    finite = 0.0
+    for i in range(n_rates):
+        row = columns * (i if i < n_states else i + n_forcing)
+        start[i], rates[i, 0] = W[row], W[row + 1]
+        scale[i] = 1.0 / (1.0 + abs(W[row]))
+        finite += 0.0 * (W[row] + W[row + 1])
+    for k in range(n_forcing):
+        finite += 0.0 * W[(n_states + k) * columns]
+    if finite != 0.0:
+        return np.nan
+    point, out = np.empty(inputs.shape[0]), np.zeros(W.shape[0])
+    if memory.shape[0] > 0 and memory[1] > 0.0:
+        h = min(room, memory[1])
+    else:
+        h = min(room, first_length(address, layout, mode, inputs, parameters, tol, W, point, out))
+    done = False
+    for _ in range(ATTEMPTS):
+        if inputs[0] + h == inputs[0]:
+            return np.nan
+        predict(memory, inputs[0], mode, h, n, n_states, rates)
+        taken = iterate(
+            address, layout, mode, inputs, parameters, tol, h, start, scale, rates, point, out
+        )
+        if taken == 0:
+            h *= 0.4
+            continue
+        error = check(
+            address,
+            layout,
+            mode,
+            inputs,
+            parameters,
+            h,
+            start,
+            scale,
+            rates,
+            defect,
+            values,
+            point,
+            out,
+        )
+        if not error < np.inf:
+            h *= 0.4
+            continue
+        growth = 4.0
+        if error > 0.0:
+            growth = min(4.0, 0.9 * (SHARE * tol / error) ** (1.0 / (n + 1)))
+        if error <= SHARE * tol or error <= 8.0 * EPSILON:
+            done = True
+            break
+        h *= max(growth, 0.1)
+    if not done:
+        return np.nan
+    if taken > 12:
+        growth = min(growth, 0.9)
+    for k in range(drift + 2):
+        for j in range(2 if k < n_states else 1, columns):
+            W[k * columns + j] = 0.0
+    work = np.empty(n + 1)
+    for i in range(n_rates):
+        row = columns * (i if i < n_states else i + n_forcing)
+        to_powers(rates[i], C[table], n, work)
+        power = 1.0
+        for k in range(n):
+            W[row + k + 1] = work[k] * power / (k + 1)
+            power /= h
+    for i in range(n_forcing + 2):
+        row = columns * (n_states + i if i < n_forcing else drift + i - n_forcing)
+        to_powers(values[i], F[table], n + 1, work)
+        power = 1.0
+        for k in range(n + 1):
+            W[row + k] = work[k] * power
+            power /= h
+    if memory.shape[0] > 0:
+        memory[0], memory[1], memory[2], memory[3], memory[4] = 1.0, growth * h, h, inputs[0], mode
+        for i in range(n_states):
+            for k in range(n):
+                memory[5 + i * n + k] = (k + 1) * W[i * columns + k + 1]
+    return h
+
+
+@part
+def first_length(address, layout, mode, inputs, parameters, tol, W, point, out):
+    """A length to try first, from the rates and how they change (Hairer et al. 1993, II.4)."""
+    n_states, order = layout[0], layout[4]
+    columns = order + 1
+    rate = 0.0
+    for i in range(n_states):
+        rate = max(rate, abs(W[i * columns + 1]) / (1.0 + abs(W[i * columns])))
+    short = 1e-3 / rate if rate > 0.0 else 1e-3
+    point[0] = inputs[0] + short
+    for i in range(n_states):
+        point[1 + i] = inputs[1 + i] + short * W[i * columns + 1]
+    call_address(address, mode, point, parameters, out)
+    change = 0.0
+    for i in range(n_states):
+        difference = abs(out[i * columns + 1] - W[i * columns + 1]) / short
+        change = max(change, difference / (1.0 + abs(W[i * columns])))
+    most = max(rate, change)
+    length = 100.0 * short
+    if most > 0.0:
+        length = min(length, (tol / most) ** (1.0 / (min(order, HIGHEST) + 1)))
+    return length if length > 0.0 else short
+
+
+@part
+def predict(memory, t, mode, h, n, n_states, rates):
+    """Rates at the points of a step, continued from the step before or constant."""
+    known = memory.shape[0] > 0 and memory[2] > 0.0 and memory[4] == mode
+    offset = t - memory[3] if known else 0.0
+    # far beyond the step before its polynomial is no guide
+    known = known and offset + h <= 2.5 * memory[2]
+    table = n - LOWEST
+    for i in range(rates.shape[0]):
+        for j in range(1, n):
+            rates[i, j] = rates[i, 0]
+        if known and i < n_states:
+            here = 0.0
+            for j in range(n):
+                s = offset + C[table, j] * h
+                value = 0.0
+                for k in range(n - 1, -1, -1):
+                    value = value * s + memory[5 + i * n + k]
+                if j == 0:
+                    here = value
+                else:
+                    rates[i, j] += value - here
+
+
+@part
+def iterate(address, layout, mode, inputs, parameters, tol, h, start, scale, rates, point, out):
+    """Iterate the rates at the points of a step until the states there stand still.
+
+    Returns
+    -------
+    int
+        How often, 0 where they do not.
+    """
+    n_states, n_forcing, _, _, order = layout
+    columns, n = order + 1, rates.shape[1]
+    table = n - LOWEST
+    states = np.empty((n, n_states))
+    last = np.inf
+    for count in range(ITERATIONS):
+        change = 0.0
+        for j in range(1, n):
+            for i in range(n_states):
+                total = 0.0
+                for k in range(n):
+                    total += TO_C[table, j, k] * rates[i, k]
+                value = start[i] + h * total
+                if count > 0:
+                    change = max(change, abs(value - states[j, i]) * scale[i])
+                states[j, i] = value
+        if count > 0:
+            if change <= max(LEFT * tol, 4.0 * EPSILON):
+                return count
+            if not change < np.inf or (count > 2 and change > 0.9 * last):
+                return 1 if change <= 64.0 * EPSILON else 0
+            last = change
+        for j in range(1, n):
+            point[0] = inputs[0] + C[table, j] * h
+            for i in range(n_states):
+                point[1 + i] = states[j, i]
+            call_address(address, mode, point, parameters, out)
+            for i in range(rates.shape[0]):
+                row = columns * (i if i < n_states else i + n_forcing)
+                rates[i, j] = out[row + 1]
+    return 0
+
+
+@part
+def check(
+    address,
+    layout,
+    mode,
+    inputs,
+    parameters,
+    h,
+    start,
+    scale,
+    rates,
+    defect,
+    values,
+    point,
+    out,
+):
+    """Evaluate the rates between the points of a step, and the slow quantities and drifts there.
+
+    Returns
+    -------
+    float
+        The largest integral of the difference between the rates and the derivatives of
+        the polynomials, relative to 1 + |y|, not finite where the rates are not.
+    """
+    n_states, n_forcing, n_interfaces, _, order = layout
+    columns, n = order + 1, rates.shape[1]
+    table = n - LOWEST
+    drift = n_states + n_forcing + n_interfaces
+    error = finite = 0.0
+    for j in range(n + 2):
+        s = F[table, j] if j <= n else WORST[table]
+        if j > n and n_forcing == 0:
+            break
+        point[0] = inputs[0] + s * h
+        for i in range(n_states):
+            total = 0.0
+            if j <= n:
+                for k in range(n):
+                    total += TO_F[table, j, k] * rates[i, k]
+            point[1 + i] = start[i] + h * total
+        call_address(address, mode, point, parameters, out)
+        for k in range(n_forcing + 2):
+            row = n_states + k if k < n_forcing else drift + k - n_forcing
+            values[k, j] = out[row * columns]
+            finite += 0.0 * values[k, j] if k < n_forcing else 0.0
+        if j > n:
+            break
+        for i in range(rates.shape[0]):
+            row = columns * (i if i < n_states else i + n_forcing)
+            slope = 0.0
+            for k in range(n):
+                slope += AT_F[table, j, k] * rates[i, k]
+            defect[i, j] = out[row + 1] - slope
+            finite += 0.0 * defect[i, j]
+    for i in range(rates.shape[0]):
+        for j in range(1, n + 1):
+            total = 0.0
+            for k in range(n + 1):
+                total += INTEGRALS[table, j, k] * defect[i, k]
+            error = max(error, abs(h * total) * scale[i])
+    for k in range(n_forcing):
+        # slow quantities depend on time alone: the states at that place play no part
+        between = newton(values[k], F[table], n + 1, WORST[table])
+        difference = abs(between - values[k, n + 1])
+        error = max(error, difference / (1.0 + abs(values[k, 0])))
+    return error if finite == 0.0 else np.nan
+
+
+@part
+def newton(data, points, count, s):
+    """Value at one place of the polynomial through data at points (Neville)."""
+    work = np.empty(count)
+    for k in range(count):
+        work[k] = data[k]
+    for level in range(1, count):
+        for k in range(count - level):
+            a, b = points[k], points[k + level]
+            work[k] = ((s - b) * work[k] + (a - s) * work[k + 1]) / (a - b)
+    return work[0]
+
+
+@part
+def to_powers(data, points, count, work):
+    """Coefficients of the powers of s of the polynomial through data at points.
+
+    Divided differences, then their sum by Horner's rule: what rounding adds is
+    as small as rounding of the data, other than with a matrix, whose large
+    entries would cancel.
+    """
+    for k in range(count):
+        work[k] = data[k]
+    for level in range(1, count):
+        for k in range(count - 1, level - 1, -1):
+            work[k] = (work[k] - work[k - 1]) / (points[k] - points[k - level])
+    for k in range(count - 2, -1, -1):
+        # multiply what stands above by s - points[k]
+        for j in range(k, count - 1):
+            work[j] -= points[k] * work[j + 1]
+
+
+@part
+def step_by_collocation(
+    address,
+    n_states,
+    n_forcing,
+    n_interfaces,
+    n_modes,
+    order,
+    mode,
+    inputs,
+    parameters,
+    tol,
+    room,
+    W,
+    size,
+    memory,
+    carried,
+):
+    """`collocate` with pointers for arrays."""
+    return collocate(
+        address,
+        (n_states, n_forcing, n_interfaces, n_modes, order),
+        mode,
+        carray(inputs, 1 + n_states + n_forcing),
+        carray(parameters, 1),
+        tol,
+        room,
+        carray(W, size),
+        carray(memory, carried),
+    )
+
+
+#: Type of `step_by_collocation`.
+SIGNATURE = types.float64(
+    *[types.int64] * 7,
+    *[DOUBLES] * 2,
+    *[types.float64] * 2,
+    *[DOUBLES, types.int64] * 2,
+)
+
+#: Few runs need it: it is compiled when the first of them does.
+late_collocation = late_function(
+    "fastslow.simulation.collocation",
+    "step_by_collocation",
+    "SIGNATURE",
+    SIGNATURE,
+    (
+        "fastslow.simulation.lobatto",
+        "fastslow.simulation.polynomials",
+        "fastslow.compiled.parts",
+        "fastslow.compiled.pointers",
+        "fastslow.compiled.series",
+    ),
+)

@@ -1,0 +1,256 @@
+"""Many trajectories: their plain steps several at once, everything else one by one.
+
+What becomes of a trajectory depends on itself alone: a step that can be taken in
+lanes is taken in lanes, beside copies of another one where there are too few.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.compiled import lane_steps as step
+from fastslow.compiled.lanes import WIDTH
+from fastslow.compiled.parts import part
+from fastslow.compiled.pointers import call_address
+from fastslow.simulation.driver import HANDED_OVER, drive
+from fastslow.simulation.extremes import widen_extremes
+from fastslow.simulation.polynomials import ZERO, sample
+from fastslow.simulation.rooms import CALM, LATE, MODE, SAMPLES, STEPS, USUAL
+
+#: Trajectories under way at a time, so that some region has one for every lane.
+UNDER_WAY = 8 * WIDTH
+
+
+def lanes_for(
+    layout: tuple[int, int, int, int, int], regions: int, n_values: int, count: int
+) -> tuple[NDArray[Any], ...]:
+    """Work space of `drive_many`: what is in the lanes, and who waits for what."""
+    n, n_forcing, _, _, order = layout
+    under_way = min(UNDER_WAY, count)
+    return (
+        np.zeros((1 + n + step.ROWS + 2 * n, WIDTH)),
+        np.zeros((n_values + 1, WIDTH)),
+        np.empty(((n + n_forcing) * (order + 1), WIDTH)),
+        np.empty(WIDTH, dtype=np.int64),
+        np.empty((max(1, regions), under_way), dtype=np.int64),
+        np.empty(max(1, regions), dtype=np.int64),
+        np.empty(under_way, dtype=np.int64),
+    )
+
+
+@part
+def drive_many(
+    bounds,
+    address,
+    lanes,
+    layout,
+    sizes,
+    signs,
+    continuous,
+    tol,
+    limits,
+    parameters,
+    spans,
+    since,
+    times,
+    samples,
+    extremes,
+    hits,
+    seen,
+    places,
+    carried,
+    counted,
+    codes,
+    room,
+):
+    """Follow the trajectories from one number to another to their ends.
+
+    The arguments are those of `drive` with one row for each trajectory
+    (``times`` may have one row for all); ``lanes`` holds the address of the plain
+    steps and the number of their regions, ``codes`` is filled with how each
+    ended, and ``room`` is that of `lanes_for` and that of a single run.
+    """
+    n_states = layout[0]
+    steps, regions = lanes
+    rows, given, series, held, ready, n_ready, alone = room[0]
+    store, following = np.empty(0), bounds[0]
+    n_alone = count = mode = ZERO
+    for region in range(n_ready.shape[0]):
+        n_ready[region] = 0
+    for lane in range(WIDTH):
+        held[lane] = -1
+        given[parameters.shape[1], lane] = math.log2(tol)
+    while n_alone < min(alone.shape[0], bounds[1] - bounds[0]):
+        alone[n_alone] = following
+        n_alone += 1
+        following += 1
+    while True:
+        while n_alone > 0:
+            i = alone[n_alone - 1]
+            codes[i], _ = drive(
+                address,
+                layout,
+                sizes,
+                signs,
+                continuous,
+                parameters[i],
+                (spans[i, 0], spans[i, 1]),
+                tol,
+                times[min(i, times.shape[0] - 1)],
+                samples[i],
+                since[i],
+                limits,
+                store,
+                extremes[i],
+                hits[i],
+                seen[i],
+                room[1],
+                places[i],
+                carried[i],
+                counted[i],
+                regions,
+            )
+            if codes[i] != HANDED_OVER and following < bounds[1]:
+                alone[n_alone - 1] = following
+                following += 1
+                continue
+            n_alone -= 1
+            if codes[i] == HANDED_OVER:
+                region = counted[i, MODE]
+                ready[region, n_ready[region]] = i
+                n_ready[region] += 1
+        fullest = mode
+        for region in range(regions):
+            if n_ready[region] > n_ready[fullest]:
+                fullest = region
+        if count == 0 or count + n_ready[mode] < min(n_ready[fullest], WIDTH):
+            # another region fills more lanes
+            for lane in range(WIDTH):
+                i = held[lane]
+                if i >= 0:
+                    put_down(rows, lane, i, limits, since, places, carried, counted, extremes, seen)
+                    ready[mode, n_ready[mode]] = i
+                    n_ready[mode] += 1
+                    held[lane] = -1
+            count, mode = ZERO, fullest
+        if count + n_ready[mode] == 0:
+            break
+        for lane in range(WIDTH):
+            if held[lane] < 0 and n_ready[mode] > 0:
+                n_ready[mode] -= 1
+                count += 1
+                i = held[lane] = ready[mode, n_ready[mode]]
+                take_up(
+                    rows, lane, i, limits, since, spans, times, places, carried, counted, extremes
+                )
+                if sizes[2] == 0:
+                    rows[1 + n_states + step.CALM, lane] = np.inf
+                for k in range(parameters.shape[1]):
+                    given[k, lane] = parameters[i, k]
+        if count < WIDTH:
+            copy_into_the_rest(held, rows, given)
+        call_address(steps, mode, rows, given, series)
+        for lane in range(WIDTH):
+            i = held[lane]
+            if i < 0:
+                continue
+            outcome = rows[1 + n_states + step.OUTCOME, lane]
+            if outcome == step.REPORTED:
+                report(
+                    rows, lane, i, series, layout, since, times, counted, samples, extremes, room[1]
+                )
+            elif outcome == step.NOT_TAKEN:
+                put_down(rows, lane, i, limits, since, places, carried, counted, extremes, seen)
+                held[lane] = -1
+                count -= 1
+                alone[n_alone] = i
+                n_alone += 1
+
+
+@part
+def take_up(rows, lane, i, limits, since, spans, times, places, carried, counted, extremes):
+    """Give a trajectory a lane."""
+    n = extremes.shape[2]
+    for k in range(1 + n):
+        rows[k, lane] = places[i, k]
+    rows[1 + n + step.LATE, lane] = carried[i, LATE]
+    rows[1 + n + step.USUAL, lane] = carried[i, USUAL]
+    rows[1 + n + step.ALLOWED, lane] = limits[0] - counted[i, STEPS]
+    rows[1 + n + step.CALM, lane] = counted[i, CALM]
+    rows[1 + n + step.NEXT, lane] = next_time(times, i, counted[i, SAMPLES])
+    # no extremes are widened before they count, and no step goes from there to where they do
+    counting = places[i, 0] >= since[i]
+    rows[1 + n + step.LIMIT, lane] = spans[i, 1] if counting else min(since[i], spans[i, 1])
+    for k in range(n):
+        rows[1 + n + step.ROWS + k, lane] = extremes[i, 0, k] if counting else -np.inf
+        rows[1 + n + step.ROWS + n + k, lane] = extremes[i, 1, k] if counting else np.inf
+
+
+@part
+def put_down(rows, lane, i, limits, since, places, carried, counted, extremes, seen):
+    """Take a trajectory from its lane."""
+    n = extremes.shape[2]
+    steps = limits[0] - np.int64(rows[1 + n + step.ALLOWED, lane])
+    if steps > counted[i, STEPS]:
+        seen[i, counted[i, MODE]] = rows[0, lane]
+        counted[i, STEPS] = steps
+        if rows[1 + n + step.CALM, lane] < np.inf:
+            counted[i, CALM] = np.int64(rows[1 + n + step.CALM, lane])
+    if places[i, 0] >= since[i]:
+        for k in range(n):
+            extremes[i, 0, k] = rows[1 + n + step.ROWS + k, lane]
+            extremes[i, 1, k] = rows[1 + n + step.ROWS + n + k, lane]
+    for k in range(1 + n):
+        places[i, k] = rows[k, lane]
+    carried[i, USUAL] = rows[1 + n + step.USUAL, lane]
+
+
+@part
+def copy_into_the_rest(held, rows, given):
+    """Put copies of one trajectory into the lanes that hold none."""
+    first = 0
+    while held[first] < 0:
+        first += 1
+    for lane in range(WIDTH):
+        if held[lane] < 0:
+            for k in range(rows.shape[0]):
+                rows[k, lane] = rows[k, first]
+            for k in range(given.shape[0]):
+                given[k, lane] = given[k, first]
+
+
+@part
+def report(rows, lane, i, series, layout, since, times, counted, samples, extremes, room):
+    """Add the samples and the extremes within the last step of a lane."""
+    n, order = layout[0], layout[4]
+    _, W, b, d, stack = room[:5]
+    offsets = room[11]
+    began, length = rows[1 + n + step.BEGAN, lane], rows[1 + n + step.LENGTH, lane]
+    for k in range(series.shape[0]):
+        W[k] = series[k, lane]
+    if began >= since[i]:
+        for k in range(n):
+            extremes[i, 0, k] = rows[1 + n + step.ROWS + k, lane]
+            extremes[i, 1, k] = rows[1 + n + step.ROWS + n + k, lane]
+        widen_extremes(W, n, order, 0.0, length, extremes[i], b, d, stack)
+        for k in range(n):
+            rows[1 + n + step.ROWS + k, lane] = extremes[i, 0, k]
+            rows[1 + n + step.ROWS + n + k, lane] = extremes[i, 1, k]
+    first = last = counted[i, SAMPLES]
+    while next_time(times, i, last) <= rows[0, lane]:
+        offsets[last] = (next_time(times, i, last) - began) - rows[1 + n + step.LATE, lane]
+        last += 1
+    if last > first:
+        sample(W, order + 1, samples.shape[1], offsets[first:last], samples[i], first)
+    counted[i, SAMPLES] = last
+    rows[1 + n + step.NEXT, lane] = next_time(times, i, last)
+
+
+@part
+def next_time(times, i, k):
+    """When a sample of a trajectory is due, infinite after the last."""
+    return times[min(i, times.shape[0] - 1), k] if k < times.shape[1] else np.inf

@@ -1,0 +1,87 @@
+"""What a run is between two steps, and the memory that its steps work in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.compiled.parts import part
+from fastslow.simulation.collocation import memory_size
+from fastslow.simulation.settled import WAIT
+
+#: Numbers carried from step to step: by how much the time is late, the usual length of a
+#: step, the time of the last event.
+LATE, USUAL, LAST_EVENT = 0, 1, 2
+
+#: Whole numbers carried: steps, crossings and samples so far, crossings crowded
+#: together, the mode, -1 before the first was chosen, steps until an implicit one is
+#: tried, and how many to wait for should it fail.
+STEPS, CROSSINGS, SAMPLES, CROWDED, MODE, CALM, PAUSE = 0, 1, 2, 3, 4, 5, 6
+
+
+def beginnings(
+    times: NDArray[np.float64], states: NDArray[np.float64], n_forcing: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """What `drive` carries from step to step, of several runs at their beginnings.
+
+    Parameters
+    ----------
+    times : ndarray, shape (m,)
+    states : ndarray, shape (m, n)
+    n_forcing : int
+
+    Returns
+    -------
+    places : ndarray, shape (m, 1 + n + n_forcing)
+        Times, states, and room for the slow quantities.
+    carried : ndarray, shape (m, 3)
+    counted : ndarray of int64, shape (m, 7)
+    """
+    m = len(times)
+    places = np.column_stack([times, states, np.zeros((m, n_forcing))])
+    carried = np.zeros((m, 3))
+    carried[:, LAST_EVENT] = -np.inf
+    counted = np.zeros((m, 7), dtype=np.int64)
+    counted[:, MODE] = -1
+    counted[:, [CALM, PAUSE]] = WAIT
+    return places, carried, counted
+
+
+def room_for(
+    layout: tuple[int, int, int, int, int], sizes: tuple[int, int, int], n_times: int
+) -> tuple[NDArray[Any], ...]:
+    """Work space of `drive`, for one run after the other."""
+    n_states, n_forcing, n_interfaces, _, order = layout
+    columns = order + 1
+    settling = sizes[0] * columns if sizes[2] > 0 else 0
+    return (
+        np.empty(sizes[0] * columns),
+        np.empty(sizes[0] * columns),
+        np.empty(columns),
+        np.empty(columns),
+        np.empty((sizes[1], columns + 3)),
+        np.empty(2 + n_states),
+        np.empty(n_interfaces),
+        np.empty(n_interfaces, dtype=np.bool_),
+        np.empty(n_interfaces, dtype=np.bool_),
+        np.empty(n_interfaces, dtype=np.bool_),
+        np.empty(n_interfaces, dtype=np.int64),
+        np.empty(n_times),
+        np.empty(settling),
+        np.empty(settling),
+        np.empty((2, n_states, n_states + 1)),
+        np.empty((5, max(1 + n_states + n_forcing, columns))),
+        np.zeros(memory_size(n_states, order)),
+    )
+
+
+@part
+def grown(array):
+    """A copy with room for twice as many rows."""
+    larger = np.empty((2 * array.shape[0] + 16, array.shape[1]))
+    for i in range(array.shape[0]):
+        for j in range(array.shape[1]):
+            larger[i, j] = array[i, j]
+    return larger

@@ -1,0 +1,167 @@
+"""Functions of lanes, against the same functions of single numbers."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from llvmlite import ir
+from numba import njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from fastslow.compiled.lane_functions import Mathematics, exp2, log2
+from fastslow.compiled.lanes import WIDTH, Trace, Workspace, added, polynomial
+
+
+def compiled(function, count=1):
+    """A function of lanes, from an array of shape (count, m) to one of shape (m,)."""
+
+    @intrinsic
+    def apply(typingctx, given, out):
+        def codegen(context, builder, sig, args):
+            pointers = [
+                cgutils.create_struct_proxy(t)(context, builder, value=v).data
+                for t, v in zip(sig.args, args, strict=True)
+            ]
+            before, step = (builder.append_basic_block(name) for name in ("before", "step"))
+            builder.branch(before)
+            builder.position_at_end(step)
+            trace = Trace(context, ir.IRBuilder(before), builder)
+            result = function(trace, *(trace.load(pointers[0], i) for i in range(count)))
+            trace.store(result, pointers[1], 0)
+            trace.before.branch(step)
+            return context.get_dummy_value()
+
+        return types.void(given, out), codegen
+
+    @njit
+    def call(given, out):
+        apply(given, out)
+
+    def whole(*numbers):
+        rows = np.array(np.broadcast_arrays(*numbers), dtype=float)
+        m = rows.shape[1]
+        padded = np.concatenate([rows, np.ones((count, -m % WIDTH))], axis=1)
+        out = np.empty(padded.shape[1])
+        for k in range(0, padded.shape[1], WIDTH):
+            call(np.ascontiguousarray(padded[:, k : k + WIDTH]), out[k : k + WIDTH])
+        return out[:m]
+
+    return whole
+
+
+@pytest.fixture(scope="module")
+def sine():
+    return compiled(lambda trace, x: Mathematics(trace).sin(x))
+
+
+@pytest.fixture(scope="module")
+def cosine():
+    return compiled(lambda trace, x: Mathematics(trace).cos(x))
+
+
+@settings(max_examples=200)
+@given(st.floats(-1e6, 1e6))
+def test_sine_and_cosine_to_the_last_place(sine, cosine, x):
+    with mpmath.workdps(40):
+        for function, exact in ((sine, mpmath.sin), (cosine, mpmath.cos)):
+            value = exact(mpmath.mpf(x))
+            error = abs(mpmath.mpf(float(function([x])[0])) - value)
+            assert error <= 1.01 * np.spacing(abs(float(value))) + 1e-21 * abs(x)
+
+
+def test_sine_and_cosine_near_their_zeros(sine, cosine):
+    x = np.arange(-40, 41) * (math.pi / 4)
+    assert sine(x) == pytest.approx(np.sin(x), abs=1.2e-16)
+    assert cosine(x) == pytest.approx(np.cos(x), abs=1.2e-16)
+    assert sine([0.0, -0.0, 1e-300]).tolist() == [0.0, -0.0, 1e-300]
+    # odd and even to the last bit
+    x = np.linspace(0.1, 1e5, 4001)
+    assert np.array_equal(sine(-x), -sine(x))
+    assert np.array_equal(cosine(-x), cosine(x))
+
+
+def test_a_lane_whose_argument_is_too_large_is_not_to_be_used():
+    def usable(trace, x):
+        Mathematics(trace).sin(x)
+        return trace.conditions[0].choose(1.0, 0.0)
+
+    assert compiled(usable)([0.0, -9e5, 2e6, np.inf, np.nan]).tolist() == [1, 1, 0, 0, 0]
+
+
+@given(st.floats(1e-250, 1e250), st.floats(-900, 900))
+def test_logarithm_and_power_to_four_digits(rough, x, y):
+    logarithm, power = rough
+    assert logarithm([x])[0] == pytest.approx(math.log2(x), abs=2e-5)
+    assert power([y])[0] == pytest.approx(2.0**y, rel=2e-5)
+
+
+@pytest.fixture(scope="module")
+def rough():
+    return compiled(lambda trace, x: log2(x)), compiled(lambda trace, y: exp2(y))
+
+
+def test_other_functions_are_those_of_numba():
+    def mixed(trace, x, y):
+        m = Mathematics(trace)
+        return m.sqrt(m.atan2(x, y)) + m.pow(x, 1.5) * m.tanh(y) - m.erf(x) / m.exp(0.5)
+
+    x, y = np.array([0.3, 1.0, 2.5]), np.array([2.0, 0.1, 1.0])
+    erf = np.array([math.erf(value) for value in x])
+    expected = np.sqrt(np.arctan2(x, y)) + x**1.5 * np.tanh(y) - erf / math.exp(0.5)
+    assert compiled(mixed, 2)(x, y) == pytest.approx(expected, rel=1e-15)
+
+
+def test_sums_of_all_kinds():
+    def mixed(trace, x, y):
+        W = Workspace()
+        W[0] = 2.0 - x
+        s = 0.0
+        s -= x * y
+        s += 3.0 * x
+        s += s
+        W[1] = s + W[0] - 0.0 + 0.0 * y
+        W[2] = -W[1] - x * y + (-1.0) * y
+        return added(1.0 / W[2]) + 0.0 / x + polynomial([x, 1.0, y], x) + abs(-x)
+
+    x, y = np.linspace(-2, 2, 11) + 0.01, np.linspace(1, 3, 11)
+    one = 6 * x - 2 * x * y + 2 - x
+    expected = 1 / (-one - x * y - y) + x + x + y * x**2 + np.abs(x)
+    assert compiled(mixed, 2)(x, y) == pytest.approx(expected, rel=1e-14)
+
+
+def test_masks():
+    def between(trace, x, y):
+        inside = (x > 0.0) & (x <= y)
+        edge = ~inside & ((x >= y) | (x < -1.0))
+        return edge.choose(2.0, inside.choose(1.0, 0.0))
+
+    x = np.array([-2.0, -1.0, 0.0, 0.5, 1.0, 1.5, np.nan])
+    assert compiled(between, 2)(x, 1.0).tolist() == [2, 0, 0, 1, 1, 2, 0]
+
+
+def test_a_closer_look_is_taken_where_one_lane_is_not_clear():
+    def looked(trace, x):
+        clear = x < 10.0
+        (result,) = trace.unless(clear, [x > 100.0], lambda: [x > 5.0])
+        return result.choose(1.0, 0.0)
+
+    look = compiled(looked)
+    few = np.arange(WIDTH, dtype=float)
+    assert look(few).tolist() == [0] * WIDTH
+    few[0] = 11.0
+    assert look(few).tolist() == [1.0, *(few[1:] > 5)]
+
+
+def test_what_is_steady_is_computed_before():
+    def constant(trace, x):
+        value = trace.lanes(2.0) * 3.0 + 1.0
+        assert value.steady
+        assert not (value * x).steady
+        assert Mathematics(trace).sin(0.5).steady
+        return value * x + Mathematics(trace).cos(0.0)
+
+    assert compiled(constant)([1.0, -2.0]).tolist() == [8, -13]

@@ -1,0 +1,167 @@
+"""The stories that the overlay tells of known models."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+
+FOLD_HR = 49 / 27  # z where x³ + 2x² + z = 3 folds, at x = −4/3
+
+
+def laid(model, parameter, over, start, **span):
+    diagram = fs.continue_equilibria(model.frozen(), parameter, over=over)
+    return fs.overlay(diagram, fs.simulate(model, start, **span))
+
+
+@pytest.fixture(scope="module")
+def hindmarsh_rose():
+    """Slow, and at the usual value of r."""
+    return {
+        r: laid(fs.systems.hindmarsh_rose(r=r), "z", (1.5, 2.5), [-1.5, -10, 1.9], t=(0, t))
+        for r, t in ((0.001, 1400), (0.003, 900), (0.006, 800))
+    }
+
+
+@pytest.mark.parametrize("r", [0.001, 0.003, 0.006])
+def test_hindmarsh_rose_is_quiescent_up_to_the_fold(hindmarsh_rose, r):
+    lay = hindmarsh_rose[r]
+    starts = [t for t in lay.transitions if t.to_sheet == "spiking"][1:]
+    assert len(starts) >= 2
+    for start in starts:
+        assert (start.kind, start.from_sheet, start.special.code) == ("jump", "S1", "LP")
+        assert start.special["z"] == pytest.approx(FOLD_HR, abs=1e-12)
+        # past the fold, which is passed with z falling
+        assert start.delay > 0
+        assert start.value == pytest.approx(FOLD_HR - start.delay, abs=1e-12)
+
+
+@pytest.mark.parametrize(("r", "spikes"), [(0.001, 9), (0.003, 4), (0.006, 2)])
+def test_hindmarsh_rose_spikes(hindmarsh_rose, r, spikes):
+    """Counted again as the upward passages of x = 1, one for each spike."""
+    lay = hindmarsh_rose[r]
+    bursts = [p for p in lay.phases if p.kind == "spiking"][1:-1]
+    assert {p.attractor for p in bursts} == {"cycle"}
+    for phase in bursts:
+        section = lay.run.section("x", 1.0, direction=1, since=phase.start, until=phase.end)
+        assert len(section.times) == phase.spikes == spikes
+        on = (lay.time > phase.start) & (lay.time < phase.end)
+        assert np.all(lay.followed[on] == -1)
+        assert np.isnan(lay.lag[on]).all()
+
+
+def test_the_end_of_spiking_is_no_bifurcation_of_equilibria(hindmarsh_rose):
+    lay = hindmarsh_rose[0.001]
+    assert str(lay.bursting) == "fold/homoclinic (candidate) bursting"
+    evidence = " ".join(lay.bursting.evidence)
+    assert "a bifurcation of the cycle, not of equilibria" in evidence
+    assert "passes a saddle at" in evidence
+    for phase in [p for p in lay.phases if p.kind == "spiking"][1:-1]:
+        # towards a saddle the period grows, the amplitude does not
+        assert np.all(np.diff(phase.intervals) > 0)
+        assert phase.intervals[-1] > 1.5 * np.median(phase.intervals)
+        assert min(phase.sizes) > 0.7 * max(phase.sizes)
+    ends = [t for t in lay.transitions if t.kind == "end of spiking"]
+    assert all(t.special is None for t in ends)
+    assert all(t.value > FOLD_HR + 0.2 for t in ends)
+    assert all(t.land.time > t.time for t in ends)
+
+
+def test_with_two_spikes_no_more_is_claimed_than_is_seen(hindmarsh_rose):
+    assert str(hindmarsh_rose[0.006].bursting) == "fold/cycle bursting"
+
+
+def test_van_der_pol_under_a_slow_load():
+    """Hopf points at w = ±1: entered late, left where the cycle shrinks to the focus."""
+    lay = laid(fs.systems.van_der_pol(C=1.5, omega=0.005), "w", (-2, 2), [0.1, 0], periods=2)
+    assert str(lay.bursting) == "symmetric Hopf/Hopf bursting"
+    leavings = [t for t in lay.transitions if t.kind == "Hopf"]
+    assert len(leavings) == 4
+    for t in leavings:
+        assert t.delay > 0.5
+        assert abs(t.special["w"]) == pytest.approx(1, abs=1e-12)
+        assert t.value == pytest.approx(t.special["w"] * (1 - t.delay), abs=1e-12)
+    for t in (t for t in lay.transitions if t.kind == "end of spiking"):
+        assert t.special.code == "HB"
+        assert abs(abs(t.value) - 1) < 0.05
+    # the branch is followed along its unstable part as well: there the lag has a meaning still
+    unstable = (np.abs(lay.slow) < 0.9) & (lay.followed >= 0)
+    assert lay.distance[unstable].max() < 1.1 * lay.radius
+    assert np.isnan(lay.relaxation[unstable]).all()
+
+
+def test_fitzhugh_nagumo_passes_its_hopf_points_slowly():
+    """Hopf points where v² = 1 − εb; the exit is late, and no cycle is small."""
+    model = fs.systems.fitzhugh_nagumo(I_0=0.9, I_1=0.9, omega=0.0005)
+    lay = laid(model, "I", (-0.2, 2), [-1.2, -0.6], periods=1)
+    first, second = sorted(p["I"] for p in lay.diagram.special("HB"))
+    v = -np.sqrt(1 - 0.064)
+    assert first == pytest.approx((v + 0.7) / 0.8 - v + v**3 / 3, abs=1e-12)
+    leavings = [t for t in lay.transitions if t.kind == "Hopf"]
+    assert {t.special["I"] for t in leavings} == {first, second}
+    for t in leavings:
+        assert t.special.criticality == "subcritical"
+        assert 0.1 < t.delay < 0.2
+    ends = [t for t in lay.transitions if t.kind == "end of spiking"]
+    assert all("not of equilibria" in t.note for t in ends)
+    assert lay.bursting.name == "subHopf/fold cycle (candidate) bursting"
+
+
+def test_fitzhugh_nagumo_under_a_ramp():
+    """Entry and exit: ∫ Re λ dI between them vanishes, until rounding or the amplitude ends it."""
+    i, t, v, r = sp.symbols("I t v r")
+    parts = {v: v - v**3 / 3 - r + i, r: sp.Rational(8, 100) * (v + 0.7 - 0.8 * r)}
+    model = fs.Model(parts, forcing={i: sp.Rational(1, 4) + t / 5000})
+    lay = laid(model, "I", (0.2, 0.7), [-1.03, -0.41], t=(0, 1500))
+    (leaving, *_) = lay.transitions
+    assert leaving.kind == "Hopf"
+    assert leaving.special["I"] == pytest.approx(0.33128, abs=1e-5)
+    assert leaving.slope == pytest.approx(1 / 5000, rel=1e-9)
+    assert 0 < leaving.delay < 0.15
+    assert lay.phases[-1].kind == "spiking"
+    assert lay.transitions[-1].to_sheet == "spiking"
+
+
+def test_relaxation_is_no_bursting():
+    """van der Pol in Liénard's form: folds at y = ±2/3, a jump at each, no spike."""
+    lay = laid(
+        fs.systems.van_der_pol_relaxation(epsilon=0.002),
+        "y",
+        (-1.2, 1.2),
+        [2.0, 0.0],
+        t=(0, 2000),
+    )
+    assert str(lay.bursting) == "relaxation oscillation (symmetric fold/fold)"
+    assert {p.kind for p in lay.phases} == {"quiescent", "jump"}
+    assert lay.summary().count("jump at LP") == len(lay.transitions)
+
+
+def test_settling_by_oscillations_is_point_point_bursting():
+    """A double well with weak damping rings on each landing."""
+    x, v, w, t = sp.symbols("x v w t")
+    model = fs.Model({x: v, v: w + x - x**3 - v / 5}, forcing={w: sp.sin(t / 200)})
+    lay = laid(model, "w", (-1.2, 1.2), [-1, 0.0], periods=2)
+    assert str(lay.bursting) == "symmetric fold/fold bursting (point-point)"
+    spiking = [p for p in lay.phases if p.kind == "spiking"]
+    assert {p.attractor for p in spiking} == {"equilibrium"}
+    assert {t_.kind for t_ in lay.transitions} == {"jump"}
+    # what settles follows the sheet that it settles on
+    for phase in spiking:
+        late = (lay.time > phase.start + 0.8 * phase.duration) & (lay.time < phase.end)
+        assert {lay.sheets[k].label for k in lay.followed[late]} == set(phase.sheets)
+
+
+def test_a_cycle_that_reaches_an_interface():
+    """r' = (w − r²) r about the origin: at w = 1 the cycle touches x = 1, and is drawn away."""
+    x, y, w, t = sp.symbols("x y w t")
+    pull = sp.Max(x - 1, 0)
+    growth = w - x**2 - y**2
+    model = fs.Model(
+        {x: growth * x - 4 * y + 40 * pull, y: growth * y + 4 * x - 8 * pull},
+        forcing={w: sp.Rational(1, 2) - sp.cos(t / 100)},
+    )
+    lay = laid(model, "w", (-0.6, 1.6), [0.3, 0], periods=1)
+    assert str(lay.bursting) == "Hopf/grazing (candidate) bursting"
+    end = next(t_ for t_ in lay.transitions if t_.kind == "end of spiking")
+    assert end.value == pytest.approx(1.0, abs=0.02)
+    assert "x - 1 is reached for the first time" in end.note

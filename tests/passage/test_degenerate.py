@@ -1,0 +1,228 @@
+"""Overlays of what has no sheet, no forcing, no dense output, or no common range."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+
+x, v, w, t = sp.symbols("x v w t")
+
+
+@pytest.fixture(scope="module")
+def cusp():
+    return fs.systems.cusp(omega=0.002)
+
+
+@pytest.fixture(scope="module")
+def diagram(cusp):
+    return fs.continue_equilibria(cusp.frozen(), "p", over=(-1.2, 1.2))
+
+
+@pytest.fixture(scope="module")
+def lay(cusp, diagram):
+    return fs.overlay(diagram, fs.simulate(cusp, [-1.0], periods=2))
+
+
+def covers(lay):
+    """The phases follow each other from the start of the run to its end."""
+    ends = [phase.end for phase in lay.phases]
+    assert [phase.start for phase in lay.phases] == [lay.time[0], *ends[:-1]]
+    assert ends[-1] == lay.time[-1]
+
+
+def test_phases_cover_the_run(lay):
+    covers(lay)
+    assert [p.kind for p in lay.phases] == ["quiescent", "jump"] * 4 + ["quiescent"]
+
+
+def test_one_stable_sheet(gear):
+    low = gear.with_parameters(B=3.0, C=0.5)
+    only = fs.continue_equilibria(low.frozen(), "w", over=(2, 4))
+    lay = fs.overlay(only, fs.simulate(low, [0.3, 0], periods=1))
+    assert [s.label for s in lay.sheets] == ["S1"]
+    assert lay.transitions == ()
+    assert lay.bursting is None
+    covers(lay)
+
+
+def test_no_stable_sheet_on_a_cycle():
+    """Between its Hopf points the van der Pol oscillator has no stable equilibrium."""
+    model = fs.Model({x: v, v: (1 - x**2) * v - x + w}, forcing={w: sp.sin(t / 100) / 2})
+    none = fs.continue_equilibria(model.frozen(), "w", over=(-0.6, 0.6))
+    lay = fs.overlay(none, fs.simulate(model, [0.5, 0.0], periods=1))
+    assert lay.sheets == ()
+    assert np.all(lay.followed == -1)
+    assert np.isinf(lay.distance).all()
+    (phase,) = lay.phases
+    assert (phase.kind, phase.attractor) == ("spiking", "cycle")
+    # the period of the cycle at μ = 1 is 6.663 for w = 0
+    assert np.median(phase.intervals) == pytest.approx(6.66, rel=0.03)
+    assert "the diagram has no stable sheet" in lay.summary()
+
+
+def test_no_stable_sheet_and_no_cycle():
+    model = fs.Model({x: x - w}, forcing={w: sp.sin(t / 100) / 2})
+    none = fs.continue_equilibria(model.frozen(), "w", over=(-0.6, 0.6))
+    lay = fs.overlay(none, fs.simulate(model, [0.0], t=(0, 3)))
+    assert [p.kind for p in lay.phases] == ["transient"]
+
+
+def test_a_run_that_leaves_the_range_of_the_diagram(cusp, lay):
+    narrow = fs.continue_equilibria(cusp.frozen(), "p", over=(-0.7, 1.2))
+    cut = fs.overlay(narrow, lay.run)
+    assert cut.outcome.code == "outside the diagram"
+    assert "p runs from -0.999999 to 0.999999, the diagram from -0.7 to 1.2" in cut.summary()
+    outside = cut.slow < -0.7
+    assert np.all(cut.followed[outside] == -1)
+    assert np.isnan(cut.lag[outside]).all()
+    # what lies inside is as it was
+    assert [t_.time for t_ in cut.transitions] == pytest.approx([t_.time for t_ in lay.transitions])
+    assert [p.kind for p in cut.phases].count("outside") == 2
+    covers(cut)
+
+
+def test_a_run_that_is_nowhere_in_the_diagram(cusp, lay):
+    far = fs.overlay(fs.continue_equilibria(cusp.frozen(), "p", over=(3, 4)), lay.run)
+    assert [p.kind for p in far.phases] == ["outside"]
+    assert far.transitions == ()
+    assert np.all(far.followed == -1)
+
+
+def test_without_dense_output(cusp, diagram, lay):
+    run = fs.simulate(cusp, [-1.0], periods=2, dense=False, samples=6000)
+    light = fs.overlay(diagram, run)
+    assert [t_.kind for t_ in light.transitions] == ["jump"] * 4
+    for one, other in zip(light.transitions, lay.transitions, strict=True):
+        assert one.time == pytest.approx(other.time, abs=1.1 * 6284 / 6000)
+    covers(light)
+
+
+def test_a_diagram_over_a_range_given_downwards(cusp, diagram, lay):
+    """Branches traced in the other sense, whose rows descend, give the same answer."""
+    turned = fs.Diagram(
+        **{
+            **{k: getattr(diagram, k) for k in diagram.__dataclass_fields__},
+            "branches": tuple(reversed_rows(b) for b in diagram.branches),
+        }
+    )
+    other = fs.overlay(turned, lay.run)
+    assert [t_.time for t_ in other.transitions] == pytest.approx(
+        [t_.time for t_ in lay.transitions], abs=1e-7
+    )
+    assert [t_.special.label for t_ in other.transitions] == [
+        t_.special.label for t_ in lay.transitions
+    ]
+    assert other.distance == pytest.approx(lay.distance, abs=1e-9)
+
+
+def reversed_rows(b):
+    last = len(b) - 1
+    return fs.Branch(
+        b.states,
+        b.parameter_name,
+        b.state[::-1],
+        b.parameter[::-1],
+        -b.tangent[::-1],
+        b.eigenvalues[::-1],
+        b.region[::-1],
+        type(b.special)(b.special[::-1]),
+        tuple(last - row for row in b.special_rows[::-1]),
+        b.outcomes[::-1],
+    )
+
+
+def test_no_forcing_at_rest_and_on_the_way(cusp, diagram):
+    still = cusp.with_parameters(a=0)
+    rest = fs.overlay(diagram, fs.simulate(still, [-1.0], t=(0, 50)))
+    assert [p.kind for p in rest.phases] == ["quiescent"]
+    assert np.isnan(rest.lag).all()
+    assert rest.turning == ()
+    way = fs.overlay(diagram, fs.simulate(still, [-2.0], t=(0, 50)))
+    assert [p.kind for p in way.phases] == ["transient", "quiescent"]
+    assert way.transitions == ()
+    assert way.distance[-1] == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.parametrize("amplitude", [0.386, 0.39])
+def test_a_forcing_that_turns_at_the_fold(cusp, diagram, amplitude):
+    """0.001 past the fold it turns too soon to be carried over, 0.005 past it is late enough."""
+    model = cusp.with_parameters(a=amplitude, omega=0.01)
+    lay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=2))
+    assert [m.value for m in lay.turning] == pytest.approx(
+        [amplitude, -amplitude, amplitude, -amplitude], rel=1e-4
+    )
+    if amplitude == 0.386:
+        assert lay.transitions == ()
+    else:
+        # the fold was passed, the jump takes place on the way back
+        assert [t_.kind for t_ in lay.transitions] == ["jump"] * 4
+        for jump, turn in zip(lay.transitions, lay.turning, strict=True):
+            assert jump.time > turn.time
+            assert abs(jump.value) < amplitude
+    covers(lay)
+
+
+def test_turning_points(lay):
+    expected = np.pi / 0.002 * (np.arange(4) + 0.5)
+    assert [m.time for m in lay.turning] == pytest.approx(expected, rel=1e-5)
+    assert [m.value for m in lay.turning] == pytest.approx([1, -1, 1, -1], abs=1e-8)
+
+
+def test_sheets_that_are_images_of_each_other(lay):
+    """The two halves of the cusp: what happens on one happens on the other half a period later."""
+    up, down = lay.transitions[:2]
+    assert down.time - up.time == pytest.approx(np.pi / 0.002, abs=1e-5)
+    assert down.delay == pytest.approx(up.delay, abs=1e-8)
+    assert down.state == pytest.approx(-up.state, abs=1e-6)
+
+
+@pytest.mark.parametrize("radius", [0.05, 0.2])
+def test_the_radius_does_not_move_a_jump(diagram, lay, radius):
+    other = fs.overlay(diagram, lay.run, radius=radius)
+    assert [t_.time for t_ in other.transitions] == [t_.time for t_ in lay.transitions]
+
+
+def test_bad_arguments(diagram, lay):
+    with pytest.raises(fs.ArgumentError, match="radius = 0; expected a number between 0 and 1"):
+        fs.overlay(diagram, lay.run, radius=0)
+    with pytest.raises(fs.UnknownNameError, match="unknown state 'y'"):
+        fs.overlay(diagram, lay.run, observed="y")
+    other = fs.Model({v: w - v}, forcing={w: t})
+    with pytest.raises(fs.UnknownNameError, match="unknown state of the trajectory 'x'"):
+        fs.overlay(diagram, fs.simulate(other, [0], t=(0, 1)))
+
+
+def test_a_run_that_ends_in_a_jump(cusp, diagram, lay):
+    first = lay.transitions[0]
+    run = fs.simulate(cusp, [-1.0], t=(0, 0.5 * (first.leave.time + first.time)))
+    short = fs.overlay(diagram, run)
+    (leaving,) = short.transitions
+    assert leaving.land is None
+    assert np.isnan(leaving.duration)
+    assert leaving.to_sheet == ""
+    assert leaving.special.label == first.special.label
+    assert "end of run" in short.summary()
+    covers(short)
+
+
+def test_one_sample(cusp, diagram):
+    run = fs.simulate(cusp, [-1.0], t=(0, 1), dense=False, samples=[0.5])
+    lay = fs.overlay(diagram, run)
+    assert (lay.phases, lay.transitions) == ((), ())
+    assert lay.followed.tolist() == [-1]
+    assert "0 transitions over t = 0.5 to 0.5" in lay.summary()
+    assert fs.plot.overlay(lay).handles
+
+
+def test_a_run_that_grows_without_bound():
+    """x' = w + x²: past the fold at w = 0 there is nothing to land on."""
+    model = fs.Model({x: w + x**2}, forcing={w: t / 50 - 1})
+    run = fs.simulate(model, [-1.0], t=(0, 100))
+    assert not run.outcome
+    lay = fs.overlay(fs.continue_equilibria(model.frozen(), "w", over=(-1.2, 1.2)), run)
+    (leaving,) = lay.transitions
+    assert (leaving.kind, leaving.to_sheet, leaving.land) == ("jump", "", None)
+    assert 0 < leaving.delay < 2.338 * (1 / 50) ** (2 / 3)
+    assert np.isfinite(lay.lag[lay.slow < -0.1]).all()
+    covers(lay)

@@ -1,0 +1,86 @@
+"""Several forcings as functions of one parameter: the overlay finds it along the run."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+
+x, t, g, w1, w2, omega = sp.symbols("x t g w1 w2 omega")
+
+
+@pytest.fixture(scope="module")
+def two_forcings():
+    """x' = w1 + w2 x − x³ with w1 = cos 2θ, w2 = 1 + cos(θ)/2, θ = ω t."""
+    return fs.Model(
+        {x: w1 + w2 * x - x**3},
+        forcing={w1: sp.cos(2 * omega * t), w2: 1 + sp.cos(omega * t) / 2},
+        parameters={omega: 0.002},
+    )
+
+
+@pytest.fixture(scope="module")
+def run(two_forcings):
+    return fs.simulate(two_forcings, [1.0], periods=1)
+
+
+@pytest.fixture(scope="module")
+def polynomial(two_forcings):
+    fast = two_forcings.frozen(slow={w1: 2 * g**2 - 1, w2: 1 + g / 2})
+    return fs.continue_equilibria(fast, "g", over=(-1.1, 1.1))
+
+
+def test_the_diagram_carries_its_path(polynomial):
+    assert polynomial.path == {"w1": "2*g**2 - 1", "w2": "g/2 + 1"}
+
+
+def test_the_parameter_is_found_from_the_forcing(polynomial, run):
+    lay = fs.overlay(polynomial, run)
+    assert lay.parameter == "g"
+    assert lay.slow == pytest.approx(np.cos(0.002 * lay.time), abs=1e-13)
+    assert lay.outcome
+    for t_ in lay.transitions:
+        assert t_.value == pytest.approx(np.cos(0.002 * t_.time), abs=1e-12)
+
+
+def test_folds_are_those_of_the_cubic(polynomial):
+    """On the path x³ = w1 + w2 x folds where w1² = 4 w2³/27."""
+    for point in polynomial.folds:
+        first, second = 2 * point["g"] ** 2 - 1, 1 + point["g"] / 2
+        assert 27 * first**2 == pytest.approx(4 * second**3, abs=1e-10)
+
+
+def test_another_parameter_of_the_same_path_gives_the_same_jumps(two_forcings, polynomial, run):
+    """With w1 = cos 2h, w2 = 1 + cos(h)/2 the parameter h itself turns back at 0 and π."""
+    fast = two_forcings.frozen(slow={w1: sp.cos(2 * g), w2: 1 + sp.cos(g) / 2})
+    lay = fs.overlay(fs.continue_equilibria(fast, "g", over=(0, 3.2)), run)
+    one = [t_.time for t_ in fs.overlay(polynomial, run).transitions]
+    assert len(one) == 4
+    assert [t_.time for t_ in lay.transitions] == pytest.approx(one, abs=0.01)
+    middle = (lay.time > 100) & (lay.time < 1400)
+    assert lay.slow[middle] == pytest.approx(0.002 * lay.time[middle], abs=1e-9)
+    assert lay.slow.min() == pytest.approx(0, abs=1e-4)
+    assert lay.slow.max() == pytest.approx(np.pi, abs=1e-3)
+
+
+def test_a_run_off_the_path_is_refused(two_forcings, run):
+    fast = two_forcings.frozen(slow={w1: g, w2: g / 2})
+    diagram = fs.continue_equilibria(fast, "g", over=(-1, 1))
+    with pytest.raises(fs.ArgumentError, match="leaves the path w2 = g/2"):
+        fs.overlay(diagram, run)
+
+
+def test_a_path_gone_over_twice_is_refused():
+    model = fs.Model({x: w1 - x}, forcing={w1: sp.cos(t / 500) ** 2})
+    diagram = fs.continue_equilibria(model.frozen(slow={w1: g**2}), "g", over=(-1, 1))
+    run = fs.simulate(model, [1.0], periods=1)
+    with pytest.raises(fs.ArgumentError, match="passes every place twice"):
+        fs.overlay(diagram, run)
+
+
+def test_a_parameter_that_is_no_slow_quantity_is_refused(two_forcings, run):
+    fast = two_forcings.frozen().with_parameters(w1=0.1)
+    held = fs.continue_equilibria(fast, "w2", over=(0, 2))
+    lay = fs.overlay(held, run)
+    assert lay.outcome.code == "another slow quantity"
+    assert "holds w1 = 0.1, in the run it goes from -1 to 1" in lay.summary()

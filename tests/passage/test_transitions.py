@@ -1,0 +1,181 @@
+"""Leavings and landings: where, when, and what is responsible."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+
+x, v, w, t, omega = sp.symbols("x v w t omega")
+
+
+def laid(model, parameter, over, start, **span):
+    diagram = fs.continue_equilibria(model.frozen(), parameter, over=over)
+    return fs.overlay(diagram, fs.simulate(model, start, **span))
+
+
+def test_lag_of_a_linear_model():
+    """x' = w − x with w = t/100 settles on x = w − 1/100: one time unit behind."""
+    model = fs.Model({x: w - x}, forcing={w: t / 100})
+    lay = laid(model, "w", (-1, 5), [-0.01], t=(0, 400), samples=200)
+    assert lay.lag == pytest.approx(np.ones(200), abs=1e-6)
+    assert lay.relaxation == pytest.approx(np.ones(len(lay.time)), abs=1e-12)
+    assert lay.distance * lay.extent[0] == pytest.approx(np.full(len(lay.time), 0.01), abs=1e-8)
+    assert lay.shares() == {"S1": pytest.approx(1.0)}
+    assert "typically 1 behind in time" in lay.summary()
+
+
+@pytest.fixture(scope="module")
+def steep():
+    """x = 3w + tanh(20w), followed with relaxation time 1: no fold, slope 23 at w = 0."""
+    model = fs.Model(
+        {x: 3 * w + sp.tanh(20 * w) - x},
+        forcing={w: sp.sin(omega * t)},
+        parameters={omega: 0.05},
+    )
+    return model, fs.continue_equilibria(model.frozen(), "w", over=(-1.1, 1.1))
+
+
+def test_a_steep_slope_is_no_bifurcation(steep):
+    model, diagram = steep
+    lay = fs.overlay(diagram, fs.simulate(model, [0.0], periods=2))
+    assert {t_.kind for t_ in lay.transitions} == {"steep"}
+    assert len(lay.transitions) == 3
+    assert lay.bursting is None
+    for t_ in lay.transitions:
+        assert t_.special is None
+        assert np.isnan(t_.delay)
+        assert t_.from_sheet == t_.to_sheet == "S1"
+        # |dX/dw| |dw/dt| / |Re λ| is 23 · 0.05 at w = 0, between two samples
+        assert 0.9 < t_.steepness / (23 * 0.05 / lay.extent[0]) <= 1
+        assert t_.leave.time < t_.time < t_.land.time
+        assert abs(t_.value) < 0.1
+    assert "no bifurcation: the predicted lag" in lay.summary()
+
+
+def test_the_same_slope_taken_slowly_is_followed(steep):
+    model, diagram = steep
+    slow = model.with_parameters(omega=0.01)
+    lay = fs.overlay(diagram, fs.simulate(slow, [0.0], periods=1))
+    assert lay.transitions == ()
+    assert [p.kind for p in lay.phases] == ["quiescent"]
+
+
+def test_the_gap_is_crossed_as_the_crossings_say(gear):
+    lay = laid(gear, "w", (-2, 6.5), [0, 0], periods=3)
+    p = gear.parameters
+    slope = p["omega"] * np.sqrt(p["C"] ** 2 - p["B"] ** 2)
+    for t_ in lay.transitions:
+        out, reached = (
+            [c for c in lay.run.crossings if c.time <= t_.time][-1],
+            next(c for c in lay.run.crossings if c.time > t_.time),
+        )
+        assert (t_.leave.time, t_.land.time) == (out.time, reached.time)
+        assert t_.duration == pytest.approx(reached.time - out.time, rel=1e-12)
+        load = [p["B"] + p["C"] * np.sin(p["omega"] * c.time) for c in (out, reached)]
+        assert t_.width == pytest.approx(abs(load[1] - load[0]), rel=1e-9)
+        assert t_.slope == pytest.approx(slope, rel=1e-6)
+        # crossing takes √(4D/s) + 1 and 2√(Ds) + s, as the slope goes to zero
+        assert t_.duration == pytest.approx(np.sqrt(4 * p["D"] / slope) + 1, rel=0.03)
+        assert t_.width == pytest.approx(2 * np.sqrt(p["D"] * slope) + slope, rel=0.06)
+    text = lay.summary()
+    assert "the diagram has no fold" in text
+    assert "not a bifurcation: 7.112 long, 0.1813 wide in w, where |dw/dt| = 0.02636" in text
+    assert lay.bursting.name == "fast-slow oscillation across the gap, without bifurcation"
+    assert {q.kind for q in lay.phases} == {"transient", "quiescent", "transit"}
+
+
+def test_a_gap_entered_and_left_on_the_same_side(gear):
+    """The load falls below zero for too short a time: the far side is not reached."""
+    light = gear.with_parameters(B=0.5, C=0.6, D=0.5, omega=0.2)
+    lay = laid(light, "w", (-2, 2), [0.51, 0], periods=2)
+    assert lay.run.regime == "unilateral upper"
+    for t_ in lay.transitions:
+        assert (t_.kind, t_.from_sheet, t_.to_sheet) == ("excursion", "S1", "S1")
+        assert t_.special.code == "BE"
+        assert t_.note == "past the end of the sheet and back"
+        assert 0 < t_.delay < 0.1
+        inside = lay.run(np.linspace(t_.leave.time, t_.time + 1, 9))[0]
+        assert np.all(np.abs(inside) < 0.5)
+    assert [p.kind for p in lay.phases[:3]] == ["quiescent", "excursion", "quiescent"]
+    assert lay.bursting is None
+
+
+def test_negative_stiffness_jumps_late_at_its_folds(folded_gear):
+    """A < −D²: the delay falls as the 2/3 power of ε, here between two speeds."""
+    delays = []
+    diagram = None
+    for speed in (0.002, 0.0005):
+        model = folded_gear.with_parameters(B=0, C=0.3, omega=speed)
+        diagram = diagram or fs.continue_equilibria(model.frozen(), "w", over=(-0.5, 0.5))
+        lay = fs.overlay(diagram, fs.simulate(model, [0.9, 0], periods=1))
+        (jump,) = lay.transitions
+        assert jump.kind == "jump"
+        assert abs(jump.special["w"]) == pytest.approx(0.0894402097712473, abs=1e-13)
+        expected = 0.3 * speed * np.sqrt(1 - (0.0894402097712473 / 0.3) ** 2)
+        assert jump.slope == pytest.approx(expected, rel=1e-6)
+        delays.append(jump.delay)
+    assert np.log(delays[0] / delays[1]) / np.log(4) == pytest.approx(2 / 3, abs=0.05)
+
+
+def test_a_persistent_boundary_equilibrium_is_passed_on():
+    """x' = w − x − (x)₊: the slope of the sheet changes at x = 0, the lag shows in the delay."""
+    model = fs.Model({x: w - x - sp.Max(x, 0)}, forcing={w: sp.sin(t / 50)})
+    lay = laid(model, "w", (-1.2, 1.2), [-0.02], periods=1)
+    assert [(t_.kind, t_.from_sheet, t_.to_sheet) for t_ in lay.transitions] == [
+        ("crossing", "S2", "S1"),
+        ("crossing", "S1", "S2"),
+    ]
+    for t_, crossing in zip(lay.transitions, lay.run.crossings, strict=True):
+        assert t_.time == crossing.time
+        assert t_.delay == pytest.approx(abs(np.sin(crossing.time / 50)), abs=1e-12)
+        assert 0 < t_.delay < 0.03
+    assert [p.kind for p in lay.phases] == ["quiescent"]
+    assert lay.phases[0].sheets == ("S2", "S1")
+
+
+def test_a_non_smooth_fold():
+    """x' = w + |x| − x²/10: stable for x < 0 up to w = 0, where it meets the unstable x > 0."""
+    law = (6 * sp.sin(t / 50) - 3) / 10
+    model = fs.Model({x: w + sp.Abs(x) - x**2 / 10}, forcing={w: law})
+    lay = laid(model, "w", (-1.2, 1.2), [-0.3], periods=1)
+    (jump,) = lay.transitions
+    assert (jump.kind, jump.special.subtype) == ("jump", "non-smooth fold")
+    assert 0 < jump.delay == pytest.approx(jump.value, abs=1e-12)
+    assert jump.leave.time < jump.time < jump.land.time
+
+
+def test_pseudo_equilibria_are_sheets():
+    """x' = w − x/4 − sign x slides on x = 0 for |w| < 1."""
+    model = fs.Model({x: w - sp.sign(x) - x / 4}, forcing={w: 3 * sp.sin(t / 100)})
+    lay = laid(model, "w", (-3.2, 3.2), [0.5], periods=2)
+    order = ["S1|S2", "S1", "S1|S2", "S2", "S1|S2", "S1", "S1|S2", "S2", "S1|S2"]
+    assert [lay.transitions[0].from_sheet, *(t_.to_sheet for t_ in lay.transitions)] == order
+    assert {t_.kind for t_ in lay.transitions} == {"crossing"}
+    off = [t_ for t_ in lay.transitions if t_.from_sheet == "S1|S2"]
+    assert all(t_.delay == 0.0 for t_ in off)
+    sliding = lay.followed == next(k for k, s in enumerate(lay.sheets) if s.label == "S1|S2")
+    assert np.abs(lay.state[sliding & (lay.time > 2)]).max() < 1e-12
+
+
+def test_a_pitchfork_is_left_late():
+    """x' = w x − x³: past w = 0 the zero is left where ∫ w dt since the entry is made up for."""
+    model = fs.Model({x: w * x - x**3}, forcing={w: sp.sin(t / 50)})
+    lay = laid(model, "w", (-1.2, 1.2), [0.1], periods=2)
+    late = [t_ for t_ in lay.transitions if t_.delay > 0.1]
+    assert late
+    assert {t_.special.code for t_ in late} == {"BP"}
+    assert lay.bursting is None
+
+
+def test_a_short_unstable_stretch_is_followed_all_along():
+    """Hopf points at w = ±1, passed too quickly for the oscillation to grow."""
+    law = {x: v, v: (1 - x**2) * v / 10 - x + w}
+    model = fs.Model(law, forcing={w: t / 20 - 2})
+    lay = laid(model, "w", (-2.1, 2.1), [-2, 0.05], t=(0, 80))
+    (passage,) = lay.transitions
+    assert (passage.kind, passage.special.code) == ("Hopf", "HB")
+    assert "all along its unstable stretch" in passage.note
+    assert passage.special["w"] == pytest.approx(-1, abs=1e-9)
+    assert passage.delay == pytest.approx(2, abs=1e-6)
+    assert [p.kind for p in lay.phases] == ["quiescent"]

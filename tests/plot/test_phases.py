@@ -1,0 +1,38 @@
+"""The strip of phases above a time series."""
+
+import pytest
+from matplotlib.figure import Figure
+
+import fastslow as fs
+from fastslow.results.transitions import Phase
+
+
+def test_a_figure_of_its_own_names_what_has_room(folded_lay):
+    run, phases = folded_lay.run, folded_lay.phases
+    drawn = fs.plot.time_series(run, phases=phases)
+    assert len(drawn.phases) == len(drawn.words) == len(phases)
+    for word, box, phase in zip(drawn.words, drawn.phases, phases, strict=True):
+        if phase.kind == "quiescent":
+            assert word.get_text() == phase.sheets[0]
+        room = box.get_window_extent().width
+        assert word.get_visible() == (word.get_window_extent().width <= room)
+
+
+@pytest.mark.parametrize(
+    ("phase", "text"),
+    [
+        (Phase(0, 100, "quiescent", ("S1", "S2")), "S1 S2"),
+        (Phase(0, 100, "spiking", (), 7, "cycle"), "7 spikes"),
+        (Phase(0, 100, "outside"), "outside"),
+        (Phase(0, 100, "jump", ("S1",)), ""),
+    ],
+)
+def test_what_a_phase_is_called(folded_lay, phase, text):
+    drawn = fs.plot.time_series(folded_lay.run, phases=[phase])
+    assert drawn.words[0].get_text() == text
+
+
+def test_no_phases_no_strip(folded_lay):
+    drawn = fs.plot.time_series(folded_lay.run, ax=Figure().add_subplot())
+    assert drawn.phases == drawn.words == ()
+    assert drawn.ax.get_ylim()[1] == pytest.approx(1.15, abs=0.1)
