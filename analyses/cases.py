@@ -108,7 +108,9 @@ def draw(figure: str, scaling: str, folder: Path) -> None:
         look: dict[str, Any] = {"crossings": False, "interfaces": values, "linewidth": 0.8}
         series = fs.plot.time_series(case.run, "x", ax=axes[0], **look)
         portrait = fs.plot.phase_portrait(case.run, ax=axes[1], **look)
-        overlays.append(fs.plot.overlay(case.lay, ax=axes[2], label=False, legend=False))
+        overlay = fs.plot.overlay(case.lay, ax=axes[2], label=False, legend=False)
+        assert isinstance(overlay, fs.plot.OverlayDrawing)
+        overlays.append(overlay)
         place(axes[0], bands=series.bands)
         place(axes[1], bands=portrait.bands)
         for number, ax in enumerate(axes):

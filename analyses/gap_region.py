@@ -27,9 +27,9 @@ STATED = ("bilateral", "bilateral", "unilateral upper")
 #: What a point of the map is called: which of the widths have bilateral impacts.
 AS_STATED, ALL, FEWER = "as stated", "bilateral up to 0.5", "not at 0.25"
 
-#: From a tenth of the source's largest frequency to that; decimal logarithms of C/B − 1.
-FREQUENCIES = (0.1 * FASTEST, FASTEST)
-EXCESSES = {"consistent": (-2.4, -1.2), "printed": (-3.2, -2.0)}
+#: From a fifth of the source's largest frequency to that; decimal logarithms of C/B − 1.
+FREQUENCIES = (0.2 * FASTEST, FASTEST)
+EXCESSES = {"consistent": (-2.3, -1.3), "printed": (-3.1, -2.1)}
 
 
 def word_of(regimes: tuple[str, ...]) -> str:
@@ -63,7 +63,7 @@ def region(scaling: str) -> fs.RefinedMap:
     over = {"omega": FREQUENCIES, "excess": EXCESSES[scaling]}
     # the stiff gear of the printed scaling takes four times as long
     cells = (6, 6) if scaling == "consistent" else (4, 6)
-    return fs.refined_map(words, over, cells=cells, levels=1, tol=1e-4)
+    return fs.refined_map(words, over, cells=cells, levels=1, tol=5e-4)
 
 
 def edge(scaling: str, width: float, omega: Floats) -> Floats:
