@@ -41,6 +41,9 @@ SHOWN = 150
 #: Upper limit of the load's frequency in the source, 1 rad/s, in dimensionless units.
 FASTEST = gear_scales().time
 
+#: Frequencies that the source allows, from 0.1 rad/s on.
+ALLOWED = FASTEST * np.geomspace(0.1, 1.0, 10)
+
 
 def gear(scaling: str, omega: float = OMEGA, **values: float) -> fs.Model:
     """The dimensionless gear from physical values, with a dimensionless load frequency."""

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 Verdict = Literal["holds", "does not hold", "holds only where", "beyond the paper"]
 VERDICTS: tuple[str, ...] = get_args(Verdict)
 
-#: Numbers from an angle whose change counts as little: less than by a half.
+#: A change by less than a half counts as little.
 LITTLE = 1.5
 
 

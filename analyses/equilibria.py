@@ -124,8 +124,8 @@ def _nodes(scaling: str) -> Finding:
     return Finding(
         scaling,
         "beyond the paper",
-        "A node beside the gap needs A < 1/4 − D²: k1 below {k1:.3g} N m/rad at the gap of "
-        "{gap:.2g} rad that D = {D} is. The cases have A from {smallest:.3g} on: no change between "
+        "A node beside the gap needs A < 1/4 − D²: k1 below {k1:.3g} N m/rad at D = {D}, "
+        "a gap of ±{gap:.2g} rad. The cases have A from {smallest:.3g} on: no change between "
         "node and focus but in the gap itself.",
         {
             "k1": (0.25 - GAP**2) / per,

@@ -15,17 +15,19 @@ import numpy as np
 
 import fastslow as fs
 from analyses import gap_region
-from analyses.cases import FASTEST, GAP, WIDTHS, draw, extent, gear, laid_cases, scan
+from analyses.cases import ALLOWED, FASTEST, GAP, WIDTHS, draw, extent, gear, laid_cases, scan
 from analyses.claims import LITTLE, Claim, Finding
 from analyses.passages import OMEGA
 from fastslow.systems.gears import SCALINGS, gear_scales
 
 FIGURES = ("gap_width_consistent", "gap_width_printed")
 
-#: Frequencies that the source allows, 0.1 to 1 rad/s, and far beyond: ω_o up to 6, and up to 3
-#: for the stiffer gear of the printed scaling.
-ALLOWED = FASTEST * np.geomspace(0.1, 1.0, 10)
+#: Frequencies far beyond those that the source allows; the printed gear is the stiffer one.
 BEYOND = {"consistent": np.arange(0.02, 6.01, 0.02), "printed": np.arange(0.1, 3.01, 0.1)}
+
+
+#: The torque "T_om" and the mean torque T_m that the source gives, N m.
+PEAK, MEAN = 15.0, 10.0
 
 
 @cache
@@ -76,11 +78,13 @@ def _bilateral(scaling: str) -> Finding:
     found = scanned(scaling)
     both = found[WIDTHS[0]] + found[WIDTHS[1]]
     count = both.count("bilateral")
+    peak = [r for D in WIDTHS[:2] for r in scan(scaling, ALLOWED, D=D, T_am=PEAK - MEAN)]
     return Finding(
         scaling,
         "holds" if count == len(both) else "holds only where" if count else "does not hold",
-        "Bilateral in {count} of {runs} runs at T_am = 15 N m.",
-        {"count": count, "runs": len(both)},
+        'Bilateral in {count} of {runs} runs at T_am = 15 N m, as which "T_om = 15" is read. Were '
+        "it the peak of the torque, T_am = 5 N m, {peak} of {runs} would be.",
+        {"count": count, "runs": len(both), "peak": peak.count("bilateral")},
     )
 
 

