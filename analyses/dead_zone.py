@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 import fastslow as fs
+from analyses.claims import Claim, Finding
 from fastslow.plot.bands import draw_bands
 from fastslow.plot.style import BRANCH, LINES, axes_for, typeset
 
@@ -51,6 +53,31 @@ def draw() -> fs.plot.Drawing:
     values = {"x - D": ("x", GAP), "x + D": ("x", -GAP)}
     draw_bands(ax, "x", values, x, regions_of(x), vertical=True)
     return fs.plot.Drawing(ax)
+
+
+@cache
+def claims() -> tuple[Claim, ...]:
+    """Figure 1 and equation (1)."""
+    left, middle, right = transmitted(np.array([-1.0, 0.0, 1.0]))
+    odd = left == -right and middle == 0.0
+    return (
+        Claim(
+            "1",
+            "Figure 1 and (1): the teeth transmit θ − φ, 0 in the gap, θ + φ.",
+            "f(x), read off the equations of the gear at D = 0.25.",
+            (
+                Finding(
+                    "either",
+                    "holds" if odd else "does not hold",
+                    "f(−1) = {left:.2f}, f(0) = {middle:.0f}, f(1) = {right:.2f}, once the third "
+                    'condition is read as θ < −φ; as printed, "θ < φ", f would have two values '
+                    "up to 2φ apart on the gap.",
+                    {"left": float(left), "middle": abs(float(middle)), "right": float(right)},
+                ),
+            ),
+            ("dead_zone",),
+        ),
+    )
 
 
 def main(folder: Path) -> dict[str, float]:

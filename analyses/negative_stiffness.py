@@ -2,17 +2,32 @@
 
 Not a case of the source, whose stiffness is positive: there the curve has no
 fold. Folds are at x = ±(D + √(D² − 3A))/3; for A = −0.6, D = 0.25 their load is
-∓0.0894402097712473.
+∓0.0894402097712473. They begin at the corners, where A = −D². A load that swings
+beyond both folds makes relaxation oscillations.
 """
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 import fastslow as fs
-from analyses.passages import OMEGA, Row, Setting, saved
+from analyses.cases import SHOWN, gear
+from analyses.claims import Claim, Finding
+from analyses.passages import OMEGA, Case, Setting, draw, laid
+from analyses.physical_route import within
+from fastslow.plot.style import FULL, MM, SMALL, TEXT, dressed, new_figure, save
+from fastslow.systems.gears import SCALINGS
+
+Floats = NDArray[np.float64]
 
 STIFFNESS, GAP, SWING = -0.6, 0.25, 0.4
+
+#: The plane in which relaxation oscillations are looked for.
+OVER = {"A": (-1.0, -0.07), "C": (0.005, 0.4)}
 
 
 def settings() -> list[Setting]:
@@ -22,10 +37,117 @@ def settings() -> list[Setting]:
     return [Setting("negative_stiffness", title, gear)]
 
 
-def main(folder: Path) -> list[Row]:
-    """Draw the panel into a folder and return its numbers."""
-    return [saved(setting, folder) for setting in settings()]
+@cache
+def case() -> Case:
+    """The case, run and laid over its diagram."""
+    (setting,) = settings()
+    return laid(setting)
+
+
+@cache
+def fold_curves() -> tuple[fs.PointBranch, ...]:
+    """The folds over load and stiffness, up to where they meet the interfaces."""
+    over = {"w": (-0.3, 0.3), "A": (-1.0, 0.1)}
+    return tuple(
+        fs.continue_points(fold, ("w", "A"), over=over, virtual=False)
+        for fold in case().diagram.folds
+    )
+
+
+def fold_load(A: Floats) -> Floats:
+    """The load at the fold x < −D, (x² + A)(x + D) at x = −(D + √(D² − 3A))/3."""
+    x = (GAP + np.sqrt(GAP**2 - 3 * A)) / 3
+    return np.asarray(-(x * x + A) * (x - GAP))
+
+
+@cache
+def relaxation() -> fs.RefinedMap:
+    """Where a load without a mean carries the gear from side to side."""
+    model = case().setting.model
+    return fs.regime_map(model, OVER, [1.0, 0.0], cells=(8, 8), levels=2, tol=5e-4, periods=3)
+
+
+def onset() -> tuple[float, float]:
+    """Amplitude at which oscillations begin, in loads of the fold: least and most."""
+    lines = relaxation().boundary("bilateral", "meshed upper")
+    points = np.concatenate([line.points for line in lines])
+    far = points[points[:, 0] < STIFFNESS]
+    ratios = far[:, 1] / fold_load(far[:, 0])
+    return float(ratios.min()), float(ratios.max())
+
+
+@cache
+def claims() -> tuple[Claim, ...]:
+    """Where the S-shape and the relaxation oscillations of this genre begin."""
+    meets = [point for curve in fold_curves() for point in curve.special("BF")]
+    apart = max(
+        float(np.abs(np.abs(curve["w"]) - fold_load(curve["A"])).max()) for curve in fold_curves()
+    )
+    least, most = onset()
+    jumps = [t for t in case().lay.transitions if t.kind == "jump"]
+    stiff = [-(GAP**2) / gear(scaling).parameters["A"] * 3000.0 for scaling in SCALINGS]
+    return (
+        Claim(
+            "B4",
+            "Folds and relaxation oscillations need negative stiffness: A < −D².",
+            "The fold continued over load and A, against its closed form; the regime over A and "
+            "the amplitude of a load without a mean, ω_o = 0.01, D = 0.25.",
+            (
+                Finding(
+                    "either",
+                    "beyond the paper",
+                    "The fold meets the corner at A = {meet:.6f} = −D², which is k1 = {soft:.3g} "
+                    "(consistent) or {hard:.2g} N m/rad (printed) at D = 0.25; the cases have "
+                    "1000 or more. It is the closed form within {apart:.0e}. For A < −0.6 the gear "
+                    "jumps from side to side when the load swings {least:.2f} to {most:.2f} times "
+                    "as far as the fold; in the case drawn {jumps:.0f} times in three periods.",
+                    {
+                        "meet": meets[0]["A"],
+                        "soft": stiff[0],
+                        "hard": stiff[1],
+                        "apart": within(apart),
+                        "least": least,
+                        "most": most,
+                        "jumps": len(jumps),
+                    },
+                ),
+            ),
+            ("negative_stiffness", "relaxation"),
+        ),
+    )
+
+
+def draw_plane(folder: Path) -> None:
+    """Draw the folds over load and stiffness, and where relaxation oscillations begin."""
+    sheet = new_figure(FULL, 72 * MM)
+    left, right = (dressed(ax) for ax in sheet.subplots(1, 2))
+    fs.plot.parameter_plane(*fold_curves(), ax=left, legend=False)
+    left.annotate("folds", (0.5, 0.35), xycoords="axes fraction", fontsize=SMALL, ha="center")
+    left.set_title("(a)", loc="left", fontsize=TEXT)
+    A = np.linspace(*OVER["A"], 200)
+    curves = {"load of the fold": (A, fold_load(A))}
+    marks = {"case drawn": (STIFFNESS, 0.99 * SWING)}
+    fs.plot.regime_map(relaxation(), ax=right, curves=curves, marks=marks, legend=False)
+    right.annotate(
+        "load of the fold",
+        (A[70], float(fold_load(A[70:71])[0])),
+        xytext=(24, 26),
+        textcoords="offset points",
+        arrowprops={"arrowstyle": "-", "linewidth": 0.6},
+        fontsize=SMALL,
+    )
+    right.set_title("(b)", loc="left", fontsize=TEXT)
+    for suffix in ("png", "pdf"):
+        save(sheet, folder / f"relaxation.{suffix}", SHOWN)
+
+
+def main(folder: Path) -> None:
+    """Draw the figures into a folder."""
+    drawing = draw(case())
+    for suffix in ("png", "pdf"):
+        drawing.save(folder / f"negative_stiffness.{suffix}")
+    draw_plane(folder)
 
 
 if __name__ == "__main__":
-    print(*main(Path("figures")), sep="\n")
+    main(Path("figures"))

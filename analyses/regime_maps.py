@@ -9,7 +9,7 @@ curve is the criterion for a slow load; it needs no simulation.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -138,16 +138,29 @@ def predicted(plane: Plane, exact: bool) -> Callable[[Floats, Floats], list[str]
     return regimes
 
 
-def critical_ratio(plane: Plane, first: Floats, exact: bool) -> Floats:
-    """C/B at which the criterion's widest gap is the gap itself, by bisection."""
-    p: dict[str, Any] = {**dict(gear().parameters), plane.parameter: first}
-    low, high = np.ones_like(first), np.full_like(first, 2.0)
-    for _ in range(50):
+def critical_ratio(parameters: Mapping[str, Any], exact: bool) -> Floats:
+    """C/B at which the criterion's widest gap is the gap itself, by bisection.
+
+    Parameters
+    ----------
+    parameters : mapping
+        A, B, D and omega of the gear, numbers or arrays broadcast together.
+    exact : bool
+        As in `fastslow.slow_load_gap`.
+    """
+    A, B, D, omega = np.broadcast_arrays(*(parameters[name] for name in ("A", "B", "D", "omega")))
+    # the excess C/B - 1 is halved on a logarithmic scale
+    low, high = np.full(D.shape, -9.0), np.full(D.shape, 9.0)
+    for _ in range(60):
         middle = 0.5 * (low + high)
-        swing, stiffness = p["B"] * middle, p["A"] + p["D"] ** 2
-        widest = fs.slow_load_gap(p["B"], swing, p["omega"], stiffness=stiffness, exact=exact)
-        low, high = np.where(widest < p["D"], middle, low), np.where(widest < p["D"], high, middle)
-    return high
+        swing = B * (1.0 + 10.0**middle)
+        wide = fs.slow_load_gap(B, swing, omega, stiffness=A + D**2, exact=exact) < D
+        low, high = np.where(wide, middle, low), np.where(wide, high, middle)
+    return np.asarray(1.0 + 10.0**high)
+
+
+def _along(plane: Plane, first: Floats) -> dict[str, Any]:
+    return {**dict(gear().parameters), plane.parameter: first}
 
 
 def row(plane: Plane, found: fs.RefinedMap) -> MapRow:
@@ -158,7 +171,8 @@ def row(plane: Plane, found: fs.RefinedMap) -> MapRow:
     agree, away, change = [], [], []
     for exact in (False, True):
         agree.append(found.compare(predicted(plane, exact)).share)
-        away.append(float(np.abs(critical_ratio(plane, edge[:, 0], exact) - edge[:, 1]).max()))
+        there = critical_ratio(_along(plane, edge[:, 0]), exact)
+        away.append(float(np.abs(there - edge[:, 1]).max()))
     for width in WIDTHS:
         at = edge[np.abs(edge[:, 0] - width) < 1e-9, 1]
         change.append(float(at[0]) if plane.parameter == "D" else float("nan"))
@@ -179,7 +193,7 @@ def row(plane: Plane, found: fs.RefinedMap) -> MapRow:
 def draw(plane: Plane, found: fs.RefinedMap) -> fs.plot.MapDrawing:
     """The map with the criterion's curve over it."""
     first = np.linspace(*plane.over, 200)
-    curve = (first, critical_ratio(plane, first, exact=False))
+    curve = (first, critical_ratio(_along(plane, first), exact=False))
     drawing = fs.plot.regime_map(found, curves={"slow-load criterion": curve})
     drawing.ax.set_ylabel("$C/B$")
     drawing.ax.set_title(plane.title, fontsize=8)

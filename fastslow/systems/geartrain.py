@@ -73,6 +73,35 @@ class GearScaling:
     agrees: bool
 
 
+def two_inertia_model() -> Model:
+    """Equations (2): the load side and the motor side, each with its angle and speed.
+
+    The load torque is Tm + Tam sin(Omega t), the motor's Tm; Ji and N stand
+    here only, and make J = N² Ji Jo/(N² Ji + Jo).
+
+    Examples
+    --------
+    >>> two_inertia_model().states
+    ('theta_o', 'v_o', 'theta_i', 'v_i')
+    """
+    outer, inner, v_outer, v_inner = map(real, ("theta_o", "theta_i", "v_o", "v_i"))
+    ratio, j_outer, j_inner, c, w = map(real, ("N", "Jo", "Ji", "c", "w"))
+    mean, wave, speed = map(real, ("Tm", "Tam", "Omega"))
+    twist, rate = outer - inner / ratio, v_outer - v_inner / ratio
+    inside = c * rate + _spring(twist)
+    used = {name: value for name, value in VALUES.items() if name != "J"}
+    return Model(
+        {
+            outer: v_outer,
+            v_outer: (w - inside) / j_outer,
+            inner: v_inner,
+            v_inner: (inside - mean) / (ratio * j_inner),
+        },
+        forcing={w: mean + wave * sp.sin(speed * TIME)},
+        parameters={**used, "N": 100.0, "Ji": 6.8e-4},
+    )
+
+
 def twist_equation() -> sp.Expr:
     """Acceleration of θ = θ_o − θ_i/N, derived from the two inertias (2).
 
@@ -88,18 +117,10 @@ def twist_equation() -> sp.Expr:
     ['Ji', 'Jo', 'N', 'Omega', 'Tam', 'Tm', 'c', 'k1', 'k2', 'kappa', 'phi', 't', 'theta', 'v']
     """
     outer, inner, v_outer, v_inner = map(real, ("theta_o", "theta_i", "v_o", "v_i"))
-    ratio, j_outer, j_inner, c = map(real, ("N", "Jo", "Ji", "c"))
-    torque_mean, torque_wave, speed = map(real, ("Tm", "Tam", "Omega"))
-    twist, rate = outer - inner / ratio, v_outer - v_inner / ratio
-    load = torque_mean + torque_wave * sp.sin(speed * TIME)
-    inside = c * rate + _spring(twist)
-    rates = {
-        outer: v_outer,
-        v_outer: (load - inside) / j_outer,
-        inner: v_inner,
-        v_inner: (inside / ratio - torque_mean / ratio) / j_inner,
-    }
-    return reduce_to(rates, {"theta": twist, "v": rate})["v"]
+    model, ratio = two_inertia_model(), real("N")
+    load = {real("w"): model.forcing["w"]}
+    rates = {real(name): rate.subs(load) for name, rate in model.rates.items()}
+    return reduce_to(rates, {"theta": outer - inner / ratio, "v": v_outer - v_inner / ratio})["v"]
 
 
 def _spring(twist: sp.Expr) -> sp.Expr:

@@ -2,22 +2,21 @@
 
 import csv
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from PIL import Image
 
 from analyses import __main__ as everything
-from analyses import (
-    dead_zone,
-    gap_width,
-    load_amplitude,
-    negative_stiffness,
-    regime_maps,
-    stiffness,
-)
-from analyses.passages import OMEGA, laid
+from analyses import claims_page, dead_zone, negative_stiffness
+from analyses.cases import laid_cases
+from analyses.passages import OMEGA
+from fastslow.systems.gears import SCALINGS
+
+DOCS = Path(everything.__file__).parents[1] / "docs"
 
 
 @pytest.fixture(scope="module")
@@ -28,23 +27,42 @@ def everything_drawn(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def gaps():
-    return [laid(setting) for setting in gap_width.settings()]
+    return laid_cases("gap_width", "consistent")
 
 
 @pytest.fixture(scope="module")
 def folded():
-    (setting,) = negative_stiffness.settings()
-    return laid(setting)
+    return negative_stiffness.case()
 
 
 def test_every_figure_is_written(everything_drawn):
     folder, rows = everything_drawn
-    for name in ("dead_zone", *rows, *(plane.name for plane in regime_maps.PLANES)):
+    for name in claims_page.CAPTIONS:
         for suffix in ("png", "pdf"):
             assert (folder / f"{name}.{suffix}").stat().st_size > 5000
     with (folder / "summary.csv").open(encoding="utf-8") as file:
         assert [line["case"] for line in csv.DictReader(file)] == list(rows)
-    assert len(rows) == 10
+    assert len(rows) == 19
+
+
+def test_the_index_shows_every_figure_with_its_claim(everything_drawn):
+    folder, _ = everything_drawn
+    text = (folder / "index.md").read_text(encoding="utf-8")
+    assert text == claims_page.page(claims_page.all_claims(), "")
+    shown = set(re.findall(r"^!\[[^\]]*\]\((\w+)\.png\)$", text, re.MULTILINE))
+    assert shown == claims_page.CAPTIONS.keys()
+
+
+def test_the_figures_of_the_docs_are_those_drawn(everything_drawn):
+    folder, _ = everything_drawn
+    for name in claims_page.CAPTIONS:
+        with Image.open(folder / f"{name}.png") as image:
+            image.thumbnail((1000, 1000))
+            drawn = np.asarray(image.convert("RGB"), dtype=float)
+        with Image.open(DOCS / "figures" / f"{name}.png") as image:
+            shown = np.asarray(image.convert("RGB"), dtype=float)
+        assert shown.shape == drawn.shape, name
+        assert np.abs(shown - drawn).mean() < 6, name
 
 
 def test_what_the_runs_show(everything_drawn):
@@ -53,11 +71,14 @@ def test_what_the_runs_show(everything_drawn):
     assert {name for name, row in rows.items() if row.LP} == {"negative_stiffness"}
     regimes = {name: row.regime for name, row in rows.items() if row.regime != "bilateral"}
     # the source states the opposite: bilateral at 10 N m, unilateral at 50, 100 and at D = 0.5
-    assert regimes == {"load_amplitude_10": "meshed upper"}
-    assert rows["load_amplitude_10"].stated == "bilateral"
-    assert rows["load_amplitude_100"].stated == rows["gap_width_0.5"].stated == "unilateral"
-    assert rows["load_amplitude_10"].transits == 0
-    assert math.isnan(rows["load_amplitude_10"].largest_delay)
+    assert regimes == {f"load_amplitude_10_{scaling}": "meshed upper" for scaling in SCALINGS}
+    for scaling in SCALINGS:
+        light = rows[f"load_amplitude_10_{scaling}"]
+        assert light.stated == "bilateral"
+        assert rows[f"load_amplitude_100_{scaling}"].stated == "unilateral"
+        assert rows[f"gap_width_0.5_{scaling}"].stated == "unilateral"
+        assert light.transits == 0
+        assert math.isnan(light.largest_delay)
 
 
 def test_the_table_has_a_line_for_each_case(everything_drawn):
@@ -115,7 +136,7 @@ def test_wider_gaps_delay_more(gaps):
 
 def test_the_natural_frequency_falls_with_the_stiffness():
     frequencies = []
-    for case in map(laid, stiffness.settings()):
+    for case in laid_cases("stiffness", "consistent"):
         (point,) = case.diagram.at(w=2.0)
         p, x = case.setting.model.parameters, point["x"]
         expected = math.sqrt(3 * x**2 - 2 * p["D"] * x + p["A"] - 0.25)
@@ -125,7 +146,7 @@ def test_the_natural_frequency_falls_with_the_stiffness():
 
 
 def test_the_smallest_load_amplitude_never_unloads():
-    cases = [laid(setting) for setting in load_amplitude.settings()]
+    cases = laid_cases("load_amplitude", "consistent")
     lowest = [float(case.run["w"].min()) for case in cases]
     assert lowest[0] == pytest.approx(0.00834, abs=1e-4)
     assert max(lowest[1:]) < -9
@@ -149,6 +170,6 @@ def test_folds_and_jumps(folded):
 def test_the_figure_of_the_readme_is_the_one_drawn(everything_drawn):
     folder, _ = everything_drawn
     drawn = imread(folder / "negative_stiffness.png")
-    shown = imread(Path(everything.__file__).parents[1] / "docs/figures/overlay.png")
+    shown = imread(DOCS / "figures/overlay.png")
     assert shown.shape == drawn.shape
     assert np.abs(shown - drawn).mean() < 0.02

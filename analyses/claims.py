@@ -1,0 +1,87 @@
+"""What the source states, what is computed for it, and the verdict, as one record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+Verdict = Literal["holds", "does not hold", "holds only where", "beyond the paper"]
+VERDICTS: tuple[str, ...] = get_args(Verdict)
+
+#: A change by less than a half counts as little.
+LITTLE = 1.5
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found about a claim.
+
+    Parameters
+    ----------
+    scaling : str
+        ``"consistent"``, ``"printed"``, or ``"either"`` for what does not depend on it.
+    verdict : {"holds", "does not hold", "holds only where", "beyond the paper"}
+    template : str
+        The evidence in words, with the numbers in braces.
+    numbers : mapping
+        Name to value; every one stands in the template.
+
+    Examples
+    --------
+    >>> Finding("either", "holds", "{n:.0f} of {m:.0f} runs", {"n": 3, "m": 3}).words
+    '3 of 3 runs'
+    """
+
+    scaling: str
+    verdict: Verdict
+    template: str
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def words(self) -> str:
+        """The evidence, with U+2212 as minus sign in front of numbers."""
+        return self.template.format(**self.numbers).replace(" -", " −")
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One sentence of the source, or one result beyond it, with its findings.
+
+    Parameters
+    ----------
+    number : str
+    sentence : str
+        In own words, with a short quotation.
+    computed : str
+        What is computed to test it.
+    findings : tuple of Finding
+        One for each scaling, or one for both.
+    figures : tuple of str
+        Names of the figures that show it.
+    """
+
+    number: str
+    sentence: str
+    computed: str
+    findings: tuple[Finding, ...]
+    figures: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """The verdict of all findings; both where the scalings differ."""
+        verdicts = list(dict.fromkeys(f.verdict for f in self.findings))
+        if len(verdicts) == 1:
+            return verdicts[0]
+        return "; ".join(f"{f.scaling}: {f.verdict}" for f in self.findings)
+
+
+def table(claims: Iterable[Claim]) -> str:
+    """The claims and their verdicts as a table in Markdown."""
+    lines = ["| | claim | scaling | verdict | evidence |", "|---|---|---|---|---|"]
+    for claim in claims:
+        for k, finding in enumerate(claim.findings):
+            first = (claim.number, claim.sentence) if k == 0 else ("", "")
+            cells = (*first, finding.scaling, f"**{finding.verdict}**", finding.words)
+            lines.append("| " + " | ".join(cells).replace("||", "‖") + " |")
+    return "\n".join(lines)

@@ -1,0 +1,137 @@
+"""The page on which every claim stands with its verdict, its numbers and its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+from PIL import Image
+
+from analyses import (
+    dead_zone,
+    equilibria,
+    gap_width,
+    load_amplitude,
+    negative_stiffness,
+    physical_route,
+    responses,
+    stiffness,
+)
+from analyses.claims import VERDICTS, Claim, table
+
+SOURCES = (
+    dead_zone,
+    physical_route,
+    gap_width,
+    stiffness,
+    load_amplitude,
+    responses,
+    equilibria,
+    negative_stiffness,
+)
+
+#: What each figure shows.
+CAPTIONS = {
+    "dead_zone": "The dead zone of Fig. 1.",
+    "physical_route": "One motion in four models, ω = 1 rad/s. (a) The angle of the load side, "
+    "from two inertias. (b) The twist under both scalings, brought back to rad. (c) Distance of "
+    "the twist from that of the two inertias; dashed, 1e-9.",
+    "gap_width_consistent": "Fig. 3 under the consistent scaling: time series, phase portraits, "
+    "overlays on the frozen equilibria.",
+    "gap_width_printed": "Fig. 3 under the printed scaling.",
+    "gap_region": "Where the three widths of Fig. 3 behave as stated; each point is three runs. "
+    "Dashed: the slow-load criterion for D = 0.5 (upper) and 0.25 (lower).",
+    "regimes_width": "Regimes over D and C/B at ω_o = 0.01; dashed, the slow-load criterion.",
+    "regimes_frequency": "Regimes over ω_o and C/B at D = 0.25; dashed, the slow-load criterion.",
+    "map_width_load": "Regimes over D and C/B − 1 at ω_o = 0.01, with the cases of Fig. 3 (by D) "
+    "and of Fig. 5 (by T_am; 10 N m has C < B).",
+    "map_frequency_width": "Regimes over ω_o and D at T_am = 15 N m, with the cases of Fig. 3.",
+    "map_stiffness_torque": "Regimes over k1 and T_am at D = 0.25, ω_o = 0.01, near the lightest "
+    "case of Fig. 5; the others, and those of Fig. 4 at 15 N m, lie above.",
+    "stiffness_consistent": "Fig. 4 under the consistent scaling.",
+    "stiffness_printed": "Fig. 4 under the printed scaling.",
+    "contact_frequency": "Frequency in contact over the load: lines, √(3x² − 2Dx + A − 1/4); "
+    "circles, timed on the trajectories. Dashed: from here on k1 = 1000 is faster than 7000.",
+    "load_amplitude_consistent": "Fig. 5 under the consistent scaling.",
+    "load_amplitude_printed": "Fig. 5 under the printed scaling.",
+    "responses": "Time in the gap (a to c) and twist (d to f) over D, k1 and T_am; lines, laws.",
+    "equilibria": "The frozen equilibria of every case.",
+    "eigenvalues": "Eigenvalues along the equilibria, (a) of the source's gear, (b) of a soft one "
+    "that has nodes beside the gap.",
+    "negative_stiffness": "A gear with A < −D²: it follows a stable sheet past its fold and jumps.",
+    "relaxation": "(a) The folds over load and stiffness end on the interfaces at A = −D². "
+    "(b) Where a load C sin(ω t) makes relaxation oscillations (bilateral).",
+}
+
+HEAD = """\
+# The paper, claim by claim
+
+M. Ding, "Fast-slow Dynamical Analysis in Harmonic Gear Transmission System with Non-smooth Gear
+Clearance Condition", Current Journal of Applied Science and Technology 42(7), 66-75, 2023,
+doi 10.9734/CJAST/2023/v42i74082 (CC BY 4.0).
+
+The paper leaves out the load's frequency ω (0 < ω < 1 is given), initial states and time spans,
+and its parameters do not follow from its equations: a factor θ_s was forgotten. Every claim is
+tested under the scaling that follows (*consistent*) and under the one printed (*printed*), over
+frequencies and starts where those matter; single runs have ω_o = 0.01 and three periods from rest.
+Claims B1 to B4 are results beyond the paper. The page is written by `python -m analyses --docs`.
+"""
+
+
+@cache
+def all_claims() -> tuple[Claim, ...]:
+    """Every claim with its findings, in order."""
+    return tuple(claim for source in SOURCES for claim in source.claims())
+
+
+def page(claims: Sequence[Claim], figures: str) -> str:
+    """The page in Markdown.
+
+    Parameters
+    ----------
+    claims : sequence of Claim
+    figures : str
+        What stands before the name of a figure's file, e.g. ``"figures/"``.
+    """
+    counts = [
+        f"{sum(f.verdict == verdict for c in claims for f in c.findings)} × {verdict}"
+        for verdict in VERDICTS
+    ]
+    lines = [HEAD, f"Findings: {', '.join(counts)}.", "", table(claims), ""]
+    shown: set[str] = set()
+    for claim in claims:
+        lines += [f"## {claim.number}. {claim.sentence}", "", f"*Computed:* {claim.computed}", ""]
+        for finding in claim.findings:
+            lines.append(f"- {finding.scaling}: **{finding.verdict}.** {finding.words}")
+        lines.append("")
+        for name in claim.figures:
+            if name in shown:
+                continue
+            shown.add(name)
+            caption = CAPTIONS[name]
+            lines += [f"![{caption}]({figures}{name}.png)", "", f"*{name}*: {caption}", ""]
+        seen = [f"[{name}]({figures}{name}.png)" for name in claim.figures]
+        if seen:
+            lines += [f"Figures: {', '.join(seen)}.", ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def write_docs(drawn: Path, docs: Path) -> None:
+    """Write the page and its figures, in fewer colours, into a folder of documentation.
+
+    Parameters
+    ----------
+    drawn : Path
+        Where the figures are.
+    docs : Path
+        Gets ``claims.md``, and ``figures`` inside it the figures.
+    """
+    claims = all_claims()
+    (docs / "figures").mkdir(parents=True, exist_ok=True)
+    (docs / "claims.md").write_text(page(claims, "figures/"), encoding="utf-8")
+    for name in dict.fromkeys(name for claim in claims for name in claim.figures):
+        with Image.open(drawn / f"{name}.png") as image:
+            image.thumbnail((1000, 1000))
+            few = image.convert("RGB").quantize(200)
+            few.save(docs / "figures" / f"{name}.png", optimize=True)

@@ -1,0 +1,522 @@
+"""Every number of the verdict table, and what stands behind it."""
+
+import math
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.optimize import brentq
+
+import fastslow as fs
+from analyses import (
+    case_maps,
+    cases,
+    claims_page,
+    dead_zone,
+    equilibria,
+    gap_region,
+    gap_width,
+    load_amplitude,
+    negative_stiffness,
+    physical_route,
+    responses,
+    stiffness,
+)
+from analyses.claims import VERDICTS, Claim, Finding, table
+from fastslow.systems.gears import SCALINGS, gear_scales
+
+DOCS = Path(claims_page.__file__).parents[1] / "docs"
+
+#: Verdict and numbers of every finding, to six digits.
+EXPECTED = {
+    ("1", "either"): ("holds", {"left": -0.75, "middle": 0.0, "right": 0.75}),
+    ("2", "either"): ("holds", {"spread": 1e-09, "turn": 41.4337, "rigid": 1e-09}),
+    ("3", "consistent"): ("holds", {"spread": 1e-09}),
+    ("3", "printed"): ("does not hold", {"A": 291.667, "B": 17.0783, "misfit": 0.561754}),
+    ("4", "consistent"): ("holds", {"separation": 353.379}),
+    ("4", "printed"): ("holds", {"separation": 6048.67}),
+    ("5", "consistent"): ("holds", {"count": 100.0, "runs": 100.0, "peak": 0.0}),
+    ("5", "printed"): ("holds", {"count": 100.0, "runs": 100.0, "peak": 0.0}),
+    ("6", "consistent"): (
+        "holds only where",
+        {
+            "count": 0.0,
+            "runs": 50.0,
+            "share": 0.201389,
+            "low": 10.1981,
+            "high": 10.294,
+            "distance": 0.000367951,
+            "from": 3.7,
+            "to": 4.84,
+            "slowest": 0.98,
+            "times": 53.7715,
+        },
+    ),
+    ("6", "printed"): (
+        "holds only where",
+        {
+            "count": 0.0,
+            "runs": 50.0,
+            "share": 0.203125,
+            "low": 10.0603,
+            "high": 10.0747,
+            "distance": 0.000482555,
+            "top": 3.0,
+        },
+    ),
+    ("7", "consistent"): ("holds", {"wide": 0.0888785, "narrow": 0.307231}),
+    ("7", "printed"): ("does not hold", {"wide": 0.000384427, "narrow": 0.0243785}),
+    ("8", "consistent"): ("holds only where", {"slow": 64.758, "fast": 35.5241, "degrees": 119.18}),
+    ("8", "printed"): ("holds only where", {"slow": 1105.95, "fast": 606.679, "degrees": 119.178}),
+    ("9", "consistent"): ("holds", {"same": 41.0, "widths": 41.0}),
+    ("9", "printed"): ("holds", {"same": 41.0, "widths": 41.0}),
+    ("10", "consistent"): (
+        "does not hold",
+        {"first": 0.369972, "last": 1.17668, "twist": 3.18047, "teeth": 1.03949},
+    ),
+    ("10", "printed"): (
+        "does not hold",
+        {"first": 0.211476, "last": 1.01624, "twist": 4.80546, "teeth": 1.41517},
+    ),
+    ("11", "consistent"): (
+        "holds only where",
+        {
+            "soft": 3.69688,
+            "middle": 6.43662,
+            "hard": 9.84802,
+            "off": 0.001,
+            "load": 300.72,
+            "torque": 1262.24,
+            "top": 5.91743,
+        },
+    ),
+    ("11", "printed"): (
+        "holds only where",
+        {
+            "soft": 63.645,
+            "middle": 110.239,
+            "hard": 168.393,
+            "off": 0.001,
+            "load": 1478590.0,
+            "torque": 366279.0,
+            "top": 101.059,
+        },
+    ),
+    ("12", "consistent"): (
+        "does not hold",
+        {"soft": 0.702268, "middle": 0.369972, "hard": 0.272917, "ratio": 2.57319},
+    ),
+    ("12", "printed"): (
+        "holds",
+        {"soft": 0.230466, "middle": 0.211476, "hard": 0.205625, "ratio": 1.12081},
+    ),
+    ("13", "consistent"): (
+        "holds only where",
+        {"slow": 0.097881, "fast": 0.0982639, "depth": 0.347718, "force": 2.43137},
+    ),
+    ("13", "printed"): (
+        "holds only where",
+        {"slow": 0.344441, "fast": 0.344498, "depth": 0.37344, "force": 2.61407},
+    ),
+    ("14", "consistent"): (
+        "holds only where",
+        {
+            "count": 0.0,
+            "runs": 50.0,
+            "ratio": 0.996483,
+            "lowest": 0.00834225,
+            "means": 20.0,
+            "tried": 40.0,
+            "largest": 9.26062,
+        },
+    ),
+    ("14", "printed"): (
+        "holds only where",
+        {
+            "count": 0.0,
+            "runs": 50.0,
+            "ratio": 0.996483,
+            "lowest": 0.142471,
+            "means": 20.0,
+            "tried": 40.0,
+            "largest": 9.26062,
+        },
+    ),
+    ("15", "consistent"): (
+        "holds only where",
+        {
+            "count": 100.0,
+            "runs": 100.0,
+            "light": 4.98242,
+            "heavy": 9.96483,
+            "mean": 108.181,
+            "stated": 0.0,
+            "tried": 40.0,
+        },
+    ),
+    ("15", "printed"): (
+        "holds only where",
+        {
+            "count": 100.0,
+            "runs": 100.0,
+            "light": 4.98242,
+            "heavy": 9.96483,
+            "mean": 108.181,
+            "stated": 0.0,
+            "tried": 40.0,
+        },
+    ),
+    ("16", "consistent"): (
+        "holds",
+        {
+            "high": 6.4451,
+            "times": 644.51,
+            "off": 0.01,
+            "low": 6.44286,
+            "slow": 0.322035,
+            "fast": 0.442892,
+        },
+    ),
+    ("16", "printed"): (
+        "holds",
+        {
+            "high": 110.239,
+            "times": 11023.9,
+            "off": 0.01,
+            "low": 110.239,
+            "slow": 1.08135,
+            "fast": 1.42371,
+        },
+    ),
+    ("17", "consistent"): ("holds", {"light": 0.113096, "middle": 1.06325, "heavy": 1.61672}),
+    ("17", "printed"): ("holds", {"light": 0.00664318, "middle": 0.533216, "heavy": 0.566432}),
+    ("18", "consistent"): ("holds", {"light": 0.00362104, "middle": 2.06911, "heavy": 2.84624}),
+    ("18", "printed"): ("holds", {"light": 1.24533e-05, "middle": 0.405663, "heavy": 0.53395}),
+    ("B1", "consistent"): (
+        "beyond the paper",
+        {
+            "least": 1.61518,
+            "most": 16.9368,
+            "late": 0.0562885,
+            "slow": 0.203799,
+            "stiff": 0.0163469,
+            "far": 0.012886,
+        },
+    ),
+    ("B1", "printed"): (
+        "beyond the paper",
+        {
+            "least": 0.598245,
+            "most": 4.66275,
+            "late": 0.00517722,
+            "slow": 0.520983,
+            "stiff": 0.000274537,
+            "far": 0.00730568,
+        },
+    ),
+    ("B2", "consistent"): (
+        "beyond the paper",
+        {
+            "cases": 9.0,
+            "curves": 9.0,
+            "folds": 0.0,
+            "ends": 18.0,
+            "real": -0.5,
+            "q": 0.00599856,
+            "law": 0.00599856,
+        },
+    ),
+    ("B2", "printed"): (
+        "beyond the paper",
+        {
+            "cases": 9.0,
+            "curves": 9.0,
+            "folds": 0.0,
+            "ends": 18.0,
+            "real": -0.5,
+            "q": 2.05714e-05,
+            "law": 2.05714e-05,
+        },
+    ),
+    ("B3", "consistent"): (
+        "beyond the paper",
+        {"k1": 13.5, "gap": 0.0146385, "D": 0.25, "smallest": 13.8889},
+    ),
+    ("B3", "printed"): (
+        "beyond the paper",
+        {"k1": 0.0462857, "gap": 0.000857143, "D": 0.25, "smallest": 4050.93},
+    ),
+    ("B4", "either"): (
+        "beyond the paper",
+        {
+            "meet": -0.0625,
+            "soft": -4.5,
+            "hard": -0.0154286,
+            "apart": 1e-09,
+            "least": 1.01103,
+            "most": 1.02025,
+            "jumps": 5.0,
+        },
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def findings():
+    return {(c.number, f.scaling): f for c in claims_page.all_claims() for f in c.findings}
+
+
+def test_every_number_of_the_table(findings):
+    assert findings.keys() == EXPECTED.keys()
+    for key, (verdict, numbers) in EXPECTED.items():
+        assert findings[key].verdict == verdict, key
+        assert findings[key].numbers.keys() == numbers.keys(), key
+        for name, value in numbers.items():
+            assert findings[key].numbers[name] == pytest.approx(value, rel=2e-5, abs=1e-9), (
+                key,
+                name,
+            )
+
+
+def test_every_number_stands_in_its_words(findings):
+    for finding in findings.values():
+        for name in finding.numbers:
+            assert f"{{{name}:" in finding.template or f"{{{name}}}" in finding.template
+
+
+def test_both_scalings_have_a_verdict():
+    claims = claims_page.all_claims()
+    numbers = [claim.number for claim in claims]
+    assert numbers == [str(k) for k in range(1, 19)] + ["B1", "B2", "B3", "B4"]
+    for claim in claims:
+        told = tuple(f.scaling for f in claim.findings)
+        assert told in (SCALINGS, ("either",))
+        assert all(f.verdict in VERDICTS for f in claim.findings)
+        assert all(name in claims_page.CAPTIONS for name in claim.figures)
+
+
+def test_the_page_in_the_docs_is_what_the_scripts_write():
+    text = (DOCS / "claims.md").read_text(encoding="utf-8")
+    assert text == claims_page.page(claims_page.all_claims(), "figures/")
+    for claim in claims_page.all_claims():
+        for name in claim.figures:
+            assert f"](figures/{name}.png)" in text
+            assert (DOCS / "figures" / f"{name}.png").stat().st_size < 100_000
+
+
+def test_a_page_shows_each_figure_once():
+    one = Claim("1", "a", "b", (Finding("either", "holds", "{n:.0f}", {"n": -2}),), ("dead_zone",))
+    text = claims_page.page([one, one], "")
+    assert text.count("![") == 1
+    assert text.count("](dead_zone.png)") == 3
+    assert "2 × holds, 0 × does not hold" in text
+
+
+def test_a_claim_whose_scalings_differ_says_both():
+    split = Claim(
+        "1",
+        "a",
+        "b",
+        (Finding("consistent", "holds", "yes"), Finding("printed", "does not hold", "no")),
+    )
+    assert split.verdict == "consistent: holds; printed: does not hold"
+    assert table([split]).splitlines()[3] == "|  |  | printed | **does not hold** | no |"
+
+
+def test_docs_are_written_with_their_figures(tmp_path):
+    for name in claims_page.CAPTIONS:
+        Image.new("RGB", (1200, 600), (200, 30, 30)).save(tmp_path / f"{name}.png")
+    claims_page.write_docs(tmp_path, tmp_path / "docs")
+    assert (tmp_path / "docs/claims.md").read_text(encoding="utf-8").startswith("# The paper")
+    with Image.open(tmp_path / "docs/figures/gap_region.png") as image:
+        assert image.size == (1000, 500)
+
+
+def test_dead_zone_claim_reads_the_equations():
+    (claim,) = dead_zone.claims()
+    assert claim.verdict == "holds"
+
+
+def test_one_motion_in_four_models():
+    found = physical_route.route()
+    # units of θ_s; the twist reaches 0.44 of them, the load side turns 41 rad
+    assert found.spread < 1e-11
+    assert found.rigid_error < 1e-13
+    assert found.load_side.max() > 41
+    assert np.abs(found.twist).max() / found.scale == pytest.approx(0.4402309819, abs=1e-9)
+    assert physical_route.within(2e-9) == 2e-9
+
+
+def test_the_widest_gap_against_its_expansion():
+    for scaling in SCALINGS:
+        p = cases.gear(scaling).parameters
+        for omega, rel in ((0.01, 2e-6), (cases.FASTEST, 5e-6)):
+            with mpmath.workdps(30):
+                root = mpmath.sqrt(p["C"] ** 2 - p["B"] ** 2)
+                leading = (root - p["B"] * mpmath.acos(p["B"] / p["C"])) / omega
+                stiff = p["A"] + cases.GAP**2
+                expanded = leading - omega * root / 4 * (1 - 1 / stiff) ** 2
+            assert gap_width.widest(scaling, omega) == pytest.approx(float(expanded), rel=rel)
+
+
+def test_the_region_of_figure_3_is_that_of_the_criterion():
+    for scaling in SCALINGS:
+        assert gap_region.distance(scaling) < 1e-3
+        model = cases.gear(scaling)
+        p = model.parameters
+        # just inside both edges at 1 rad/s the widths are on either side, just outside not
+        low, high = (gap_region.edge(scaling, D, np.array([cases.FASTEST]))[0] for D in (0.25, 0.5))
+        for excess, word in (
+            (low - 1e-3, gap_region.FEWER),
+            (low + 1e-3, gap_region.AS_STATED),
+            (high - 1e-3, gap_region.AS_STATED),
+            (high + 1e-3, gap_region.ALL),
+        ):
+            regimes = [
+                fs.simulate(
+                    model.with_parameters(D=D, C=p["B"] * (1 + 10**excess), omega=cases.FASTEST),
+                    [D, 0],
+                    periods=2,
+                ).regime
+                for D in cases.WIDTHS
+            ]
+            assert gap_region.word_of(tuple(regimes)) == word
+
+
+def test_the_maps_that_hold_the_cases():
+    for plane in case_maps.MAPS:
+        for scaling in SCALINGS:
+            share = case_maps.criterion(plane, scaling).share
+            # resonances, which the criterion knows nothing of, begin at ω_o of about a half
+            least = 0.96 if plane.name == "map_frequency_width" else 1.0
+            assert least <= share <= 1.0
+    found = case_maps.simulated(case_maps.MAPS[0], "consistent")
+    assert all(found.at(*place) == "bilateral" for place in case_maps.MAPS[0].marks.values())
+    found = case_maps.simulated(case_maps.MAPS[2], "consistent")
+    assert found.at(*case_maps.MAPS[2].marks["10 N m"]) == "meshed upper"
+
+
+def test_bilateral_impacts_between_resonances_end_where_stated():
+    # 3.7 to 4.84 in steps of 0.02: inside as stated, two steps outside not
+    for omega, stated in ((3.66, False), (3.7, True), (4.3, True), (4.84, True), (4.88, False)):
+        regimes = [
+            fs.simulate(cases.gear("consistent", omega, D=D), [0, 0], periods=40).regime
+            for D in cases.WIDTHS
+        ]
+        assert (tuple(regimes) == gap_region.STATED) is stated
+
+
+def test_the_flank_is_the_branch_of_the_diagram():
+    for scaling in SCALINGS:
+        case = cases.laid_cases("stiffness", scaling)[1]
+        p = case.setting.model.parameters
+        (point,) = case.diagram.at(w=0.7 * p["B"])
+        assert stiffness.flank(0.7 * p["B"], p["A"], p["D"]) == pytest.approx(point["x"], rel=1e-12)
+        frequency = stiffness.natural(0.7 * p["B"], p["A"], p["D"])
+        assert np.abs(point.eigenvalues.imag) == pytest.approx([frequency] * 2, rel=1e-10)
+
+
+def test_vibrations_in_contact_have_the_natural_frequency():
+    for scaling in SCALINGS:
+        found = stiffness.vibrations(scaling)
+        frequencies = [v.frequency for v in found]
+        assert frequencies == sorted(frequencies)
+        for vibration in found:
+            assert vibration.frequency == pytest.approx(vibration.predicted, rel=3e-4)
+
+
+def test_where_a_softer_gear_is_faster():
+    for scaling in SCALINGS:
+        for k1 in cases.STIFFNESSES:
+            A = cases.gear(scaling, k1=k1).parameters["A"]
+            load = stiffness.turning_load(A, 0.1)
+            for factor, rises in ((0.98, 1), (1.02, -1)):
+                ends = [stiffness.natural(factor * load, a, 0.1) for a in (A, A * (1 + 1e-6))]
+                assert np.sign(ends[1] - ends[0]) == rises
+        load = stiffness.overtaking_load(scaling)
+        roots = []
+        for k1 in (1000, 7000):
+            A = cases.gear(scaling, k1=k1).parameters["A"]
+            # x³ − D x² + A x − D A − w = 0 has one real root for these
+            x = next(r.real for r in np.roots([1, -0.1, A, -0.1 * A - load]) if abs(r.imag) < 1e-6)
+            roots.append(3 * x * x - 0.2 * x + A)
+        assert roots[0] == pytest.approx(roots[1], rel=1e-9)
+
+
+def test_light_bilateral_and_heavy_not_is_found_nowhere():
+    for scaling in SCALINGS:
+        rows = load_amplitude.over_means(scaling)
+        for mean, regimes in zip(load_amplitude.MEANS, rows, strict=True):
+            # the load changes sign where C > B, at these frequencies enough to cross the gap
+            for T_am, regime in zip(cases.TORQUES, regimes, strict=True):
+                signs = load_amplitude.ratio(T_am) * 10 / mean
+                assert abs(signs - 1) > 0.005
+                assert regime == ("bilateral" if signs > 1 else "meshed upper")
+
+
+def test_the_time_in_the_gap_against_the_law_of_the_toolkit():
+    case = cases.laid_cases("gap_width", "consistent")[1]
+    p = case.setting.model.parameters
+    slope = p["omega"] * math.sqrt(p["C"] ** 2 - p["B"] ** 2)
+    law = fs.predict_delay(equilibria.corner(case), -slope)
+    assert responses.crossing_time(p["D"], slope) == pytest.approx(law.transit_time, rel=5e-3)
+    found = responses.response("D", "consistent")
+    row = list(found.values).index(0.25)
+    assert found.transit[row] == pytest.approx(law.transit_time, rel=1e-2)
+    # of quadruple precision, at A = 41.67, B = 2.372, C = 3.546
+    assert found.transit[row] == pytest.approx(7.11204519, rel=2e-4)
+
+
+def test_the_limits_of_the_time_in_the_gap():
+    assert responses.crossing_time(1e8, 1.0) == pytest.approx(math.sqrt(4e8) + 1, rel=1e-7)
+    assert responses.crossing_time(1e-12, 1.0) == pytest.approx(12e-12 ** (1 / 3), rel=1e-3)
+
+
+def test_eigenvalues_turn_complex_where_the_determinant_is_a_quarter():
+    for scaling in SCALINGS:
+        for case in cases.laid_cases("gap_width", scaling):
+            p = case.setting.model.parameters
+            expected = 1 / (4 * (p["A"] + p["D"] ** 2))
+            assert equilibria.complex_from(case) == pytest.approx(expected, rel=1e-6)
+
+
+def test_nodes_end_where_two_eigenvalues_meet():
+    load = equilibria.node_load(equilibria.SOFT, cases.GAP)
+    model = cases.gear("consistent").with_parameters(A=equilibria.SOFT, D=cases.GAP).frozen()
+    for factor, kind in ((0.999, "node"), (1.001, "focus")):
+        (point,) = fs.equilibria(model, w=factor * load)
+        assert point.type == kind
+    assert equilibria.node_load(41.67, 0.25) == 0
+    (branch,) = equilibria.soft_diagram().branches
+    inside = np.abs(branch["w"]) < 0.99 * load
+    assert np.abs(branch.eigenvalues.imag[inside]).max() == 0
+    assert np.abs(branch.eigenvalues.imag[~inside][:3]).min() > 0
+
+
+def test_folds_begin_on_the_interfaces():
+    for curve in negative_stiffness.fold_curves():
+        (meet,) = curve.special("BF")
+        assert meet["A"] == pytest.approx(-(cases.GAP**2), abs=1e-12)
+        assert meet["w"] == pytest.approx(0, abs=1e-12)
+    # an independent extremum of (x² + A)(x − D)
+    slope = lambda x: 3 * x * x - 2 * cases.GAP * x - 0.6  # noqa: E731
+    x = brentq(slope, 0.3, 1.0, xtol=1e-15)
+    load = (x * x - 0.6) * (x - cases.GAP)
+    assert negative_stiffness.fold_load(np.array([-0.6]))[0] == pytest.approx(-load, rel=1e-12)
+
+
+def test_relaxation_oscillations_begin_a_little_beyond_the_fold():
+    least, most = negative_stiffness.onset()
+    assert 1 < least < most < 1.03
+    assert negative_stiffness.case().run.regime == "bilateral"
+
+
+def test_the_output_speed_from_the_two_inertias():
+    case = cases.laid_cases("load_amplitude", "consistent")[2]
+    scales = gear_scales()
+    low, high = cases.extent(case, "v")
+    # N² J_i is 6.8 kg m², 283 times J_o
+    expected = (high - low) * scales.angle / scales.time * 6.8 / 6.824
+    assert load_amplitude.output_speed(case, "consistent") == pytest.approx(expected, rel=1e-12)
