@@ -1,8 +1,8 @@
 """Elementary functions of lanes.
 
 Sine and cosine by reduction to an eighth of a turn and the polynomials of
-fdlibm (Sun Microsystems 1993), to a unit in the last place; other functions
-one lane after the other. Logarithm and power to base 2 are for lengths of
+fdlibm (Sun Microsystems 1993), to three units in the last place; other
+functions one lane after the other. Logarithm and power to base 2 are for lengths of
 steps only, to four digits.
 """
 

@@ -65,12 +65,12 @@ def cosine():
 
 @settings(max_examples=200)
 @given(st.floats(-1e6, 1e6))
-def test_sine_and_cosine_to_the_last_place(sine, cosine, x):
+def test_sine_and_cosine_to_three_units_in_the_last_place(sine, cosine, x):
     with mpmath.workdps(40):
         for function, exact in ((sine, mpmath.sin), (cosine, mpmath.cos)):
             value = exact(mpmath.mpf(x))
             error = abs(mpmath.mpf(float(function([x])[0])) - value)
-            assert error <= 1.01 * np.spacing(abs(float(value))) + 1e-21 * abs(x)
+            assert error <= 3 * np.spacing(abs(float(value))) + 1e-21 * abs(x)
 
 
 def test_sine_and_cosine_near_their_zeros(sine, cosine):
