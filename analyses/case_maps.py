@@ -138,7 +138,7 @@ def simulated(plane: CaseMap, scaling: str) -> fs.RefinedMap:
         return list(found)
 
     # the stiff gear of the printed scaling takes four times as long
-    levels = 3 if scaling == "consistent" else 2
+    levels = 2 if scaling == "printed" and all(plane.logarithmic) else 3
     return fs.refined_map(regimes, plane.over, cells=(8, 7), levels=levels, tol=2e-3)
 
 
