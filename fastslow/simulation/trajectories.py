@@ -152,7 +152,9 @@ def simulate(
         collocation polynomials 12 at most.
     implicit : bool
         Whether an implicit method may take long steps through settled phases,
-        in which stability and not accuracy limits the series.
+        in which stability and not accuracy limits the series. They forget what is
+        smaller than ``tol``: where a slow passage through a Hopf point decays below
+        it, its exit depends on ``tol``, with them or without.
     gap : str, optional
         The region that counts as the gap for `Trajectory.regime`.
     max_steps, max_crossings : int
