@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
-from fastslow.results.expressions import evaluated, names_in
+from fastslow.results.formulas import evaluated, names_in
 from fastslow.results.refined_maps import RefinedMap
 from fastslow.results.slow_loads import NO_GAP
 from fastslow.simulation.arguments import initial_state
@@ -137,7 +137,8 @@ def _values(
     for name in laws:
         if name not in model.parameters:
             raise unknown_name("parameter", name, model.parameters)
-    used = {name for law in laws.values() for name in names_in(law)}
+    valid = dict.fromkeys([*model.parameters, *axes])
+    used = {name for law in laws.values() for name in names_in(law, valid)}
     for name in axes:
         if name not in model.parameters and name not in used:
             raise unknown_name("parameter", name, model.parameters)

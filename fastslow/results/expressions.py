@@ -1,15 +1,13 @@
-"""Expressions read from text: values at numbers, and polynomials along the steps of a run."""
+"""Expressions read from text as polynomials along the steps of a run."""
 
 from __future__ import annotations
 
 import ast
-import operator
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
 
@@ -20,97 +18,6 @@ Array = NDArray[np.float64]
 
 #: Powers higher than this are taken for a slip of the pen.
 HIGHEST_POWER = 8
-
-#: What an expression in numbers may hold, beside names and numbers.
-FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "sqrt": np.sqrt,
-    "exp": np.exp,
-    "log": np.log,
-    "sin": np.sin,
-    "cos": np.cos,
-    "tan": np.tan,
-    "Abs": np.abs,
-}
-OPERATORS: dict[type, Callable[..., Any]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-    ast.USub: operator.neg,
-    ast.UAdd: operator.pos,
-}
-
-
-def evaluated(expression: object, values: Mapping[str, ArrayLike]) -> Array:
-    """An expression at given values of the names in it.
-
-    Parameters
-    ----------
-    expression : str, number or Expr
-        Read from what it prints: names, numbers, ``+ - * / **``, ``pi`` and the
-        functions sqrt, exp, log, sin, cos, tan and Abs.
-    values : mapping
-        Name to number or array.
-
-    Raises
-    ------
-    UnknownNameError
-        For a name without value.
-    ArgumentError
-        For anything else in the expression.
-
-    Examples
-    --------
-    >>> evaluated("2*ratio**2 + sqrt(D)", {"ratio": [1.0, 2.0], "D": 0.25})
-    array([2.5, 8.5])
-    """
-    text = str(expression)
-    try:
-        tree = ast.parse(text, mode="eval")
-    except SyntaxError:
-        raise ArgumentError(f"{text!r} is no expression in {', '.join(values)}") from None
-    arrays = {name: np.asarray(value, dtype=float) for name, value in values.items()}
-    return np.asarray(_value(tree.body, arrays, text), dtype=float)
-
-
-def names_in(expression: object) -> set[str]:
-    """The names of the values that an expression needs.
-
-    Examples
-    --------
-    >>> sorted(names_in("sqrt(A)*ratio"))
-    ['A', 'ratio']
-    """
-    try:
-        tree = ast.parse(str(expression), mode="eval")
-    except SyntaxError:
-        return set()
-    found = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    return found - {*FUNCTIONS, "pi"}
-
-
-def _value(node: ast.expr, values: Mapping[str, Array], text: str) -> Any:
-    """The value of a parsed expression; nothing in it is ever run."""
-    if isinstance(node, ast.Name):
-        if node.id not in values and node.id != "pi":
-            raise unknown_name("name in an expression", node.id, values)
-        return values.get(node.id, np.pi)
-    if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
-        return np.float64(node.value)
-    if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
-        return OPERATORS[type(node.op)](_value(node.operand, values, text))
-    if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
-        operands = _value(node.left, values, text), _value(node.right, values, text)
-        return OPERATORS[type(node.op)](*operands)
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
-        function = FUNCTIONS.get(node.func.id)
-        if function is not None and len(node.args) == 1:
-            return function(_value(node.args[0], values, text))
-    raise ArgumentError(
-        f"{text!r} holds {ast.unparse(node)!r}; expected names, numbers, + - * / ** and "
-        + ", ".join(FUNCTIONS)
-    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ VALUES = {"x": np.array([0.3, -1.2]), "v": np.array([2.0, 0.5]), "k": 3.0}
         sp.sin(x) ** 3 + sp.pi - sp.E * sp.log(v),
         -x / (1 + sp.Symbol("k") * v**2),
         sp.atan(x) + sp.cosh(v) - sp.Rational(1, 7),
+        sp.tan(x) * v ** sp.Rational(1, 3) - sp.Float(0.1),
     ],
 )
 def test_it_agrees_with_sympy(expression):
@@ -48,11 +49,18 @@ def test_a_name_need_not_be_an_identifier():
         "x if v else k",
         "'x'",
         "True",
+        "__import__('os')",
+        "x v",
     ],
 )
 def test_what_is_no_expression_is_refused(text):
     with pytest.raises(ArgumentError, match="is no expression in x, v, k"):
         evaluated(text, VALUES)
+
+
+def test_a_nearly_right_name_is_suggested():
+    with pytest.raises(UnknownNameError, match="'rato'; did you mean 'ratio'"):
+        evaluated("B*rato", {"B": 1, "ratio": 2})
 
 
 def test_an_unknown_name_is_refused():
