@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import sympy as sp
 
+from fastslow.arguments import instance, takes
 from fastslow.compiled.store import cache_directory
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.tracing import continue_equilibria
@@ -15,6 +16,7 @@ from fastslow.simulation.ensembles import simulate_many
 from fastslow.simulation.trajectories import simulate
 
 
+@takes(models=instance(Model))
 def warm(*models: Model) -> Path:
     """Compile what simulation and continuation need, and keep it on disk.
 

@@ -29,6 +29,7 @@ LAYERS = [
     "symbolic",
     "model",
     "results",
+    "arguments",
     "errors",
 ]
 
@@ -88,6 +89,7 @@ def test_third_parties_stay_in_their_layers(path):
     if layer == "plot":
         assert foreign <= {"matplotlib", "numpy"}
         assert {n.split(".")[1] for n in modules_of(path) if n.startswith("fastslow.")} <= {
+            "arguments",
             "errors",
             "plot",
             "results",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import flag, formula, instance, interval, items, mapping, takes
 from fastslow.continuation import curves
 from fastslow.continuation.curves import Frame
 from fastslow.continuation.settings import Continuation
@@ -41,6 +41,13 @@ CURVES = {
 }
 
 
+@takes(
+    point=instance(SpecialPoint),
+    parameters=items(formula),
+    over=mapping,
+    settings=instance(Continuation),
+    virtual=flag,
+)
 def continue_points(
     point: SpecialPoint,
     parameters: Sequence[Any],
@@ -121,15 +128,13 @@ def continue_points(
 
 
 def _names(parameters: Sequence[Any]) -> tuple[str, str]:
-    names = [str(p) for p in parameters] if not isinstance(parameters, str) else [parameters]
+    names = [str(p) for p in parameters]
     if len(names) != 2 or names[0] == names[1]:
         raise ArgumentError(f"parameters={parameters!r}: expected two different parameters")
     return names[0], names[1]
 
 
 def _ranges(names: tuple[str, str], over: Mapping[Any, tuple[float, float]]) -> tuple[Array, Array]:
-    if not isinstance(over, Mapping):
-        raise ArgumentError(f"over={over!r}: expected {{'{names[0]}': (low, high), …}}")
     given = {str(k): v for k, v in over.items()}
     for name in given:
         if name not in names:
@@ -138,17 +143,7 @@ def _ranges(names: tuple[str, str], over: Mapping[Any, tuple[float, float]]) -> 
     for name in names:
         if name not in given:
             raise ArgumentError(f"over has no range for '{name}'")
-        try:
-            low, high = (float(v) for v in given[name])
-        except (TypeError, ValueError):
-            raise ArgumentError(
-                f"over['{name}']={given[name]!r}: expected two numbers, its range"
-            ) from None
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise ArgumentError(
-                f"over['{name}']=({low:g}, {high:g}): expected an increasing, finite range"
-            )
-        bounds.append((low, high))
+        bounds.append(interval(f"over['{name}']", given[name]))
     table = np.array(bounds)
     return table[:, 0], table[:, 1]
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import flag, instance, mapping, takes
 from fastslow.diagrams.equations import region_equations, same
 from fastslow.diagrams.fields import FrozenField
 from fastslow.model.model import Model
@@ -19,6 +20,7 @@ Array = NDArray[np.float64]
 IDLE = "(none)"
 
 
+@takes(model=instance(Model), values=mapping, virtual=flag)
 def equilibria(
     model: Model,
     values: Mapping[Any, float] | None = None,

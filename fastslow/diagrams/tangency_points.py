@@ -12,6 +12,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from fastslow.arguments import instance, mapping, takes
 from fastslow.continuation.location import newton
 from fastslow.diagrams.equations import DEGREE, STARTS, real_roots
 from fastslow.diagrams.modes import Mode, drift, modes_of
@@ -31,6 +32,7 @@ SMALL = 1e-9
 MOVED = 1e-3
 
 
+@takes(model=instance(Model), values=mapping)
 def tangencies(
     model: Model, values: Mapping[Any, float] | None = None, /, **named: float
 ) -> Tangencies:

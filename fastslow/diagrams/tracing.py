@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from functools import lru_cache
@@ -12,6 +11,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from fastslow.arguments import finite_numbers, flag, formula, instance, interval, takes
 from fastslow.continuation.loops import loop
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.assembly import Curve, branch_of, joined, rising
@@ -38,6 +38,14 @@ ADMISSIBLE = Outcome(
 )
 
 
+@takes(
+    model=instance(Model),
+    parameter=formula,
+    over=interval,
+    settings=instance(Continuation),
+    marks=finite_numbers,
+    virtual=flag,
+)
 def continue_equilibria(
     model: Model,
     parameter: Any,
@@ -91,7 +99,7 @@ def continue_equilibria(
     [0.38490017946, -0.38490017946]
     """
     name = str(parameter)
-    lower, upper = _range(name, over)
+    lower, upper = over
     for mark in marks:
         if not lower <= mark <= upper:
             raise ArgumentError(
@@ -155,21 +163,6 @@ def _too_many(settings: Continuation) -> Outcome:
         "Continuation(branches=…) to look for them.",
         False,
     )
-
-
-def _range(name: str, over: Any) -> tuple[float, float]:
-    try:
-        lower, upper = (float(v) for v in over)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"over={over!r}: expected two numbers, the range of {name}") from None
-    if not (math.isfinite(lower) and math.isfinite(upper)):
-        raise ArgumentError(f"over=({lower:g}, {upper:g}): expected finite ends of the range")
-    if lower >= upper:
-        hint = f"; did you mean ({upper:g}, {lower:g})?" if lower > upper else ""
-        raise ArgumentError(
-            f"over=({lower:g}, {upper:g}): expected an increasing range of {name}{hint}"
-        )
-    return lower, upper
 
 
 @lru_cache(maxsize=64)

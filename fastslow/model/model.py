@@ -10,6 +10,7 @@ from typing import Any
 
 import sympy as sp
 
+from fastslow.arguments import formula, mapping, real_number, shown, takes
 from fastslow.errors import ModelError, unknown_name
 from fastslow.model.interfaces import Interface, Region, vanishes_on
 from fastslow.model.periods import common_period
@@ -79,6 +80,14 @@ class Model:
     regions: Named[Region]
     structure: Structure = field(repr=False)
 
+    @takes(
+        rates=mapping,
+        forcing=mapping,
+        parameters=mapping,
+        slow=mapping,
+        interfaces=mapping,
+        regions=mapping,
+    )
     def __init__(
         self,
         rates: Written,
@@ -118,6 +127,7 @@ class Model:
         model._fill(structure, values)
         return model
 
+    @takes(changes=mapping)
     def with_parameters(self, changes: Written | None = None, /, **named: float) -> Model:
         """The same model at other parameter values; region names are kept.
 
@@ -149,6 +159,7 @@ class Model:
             values[str(key)] = number(f"parameter {key}", value)
         return self._from(self.structure, values)
 
+    @takes(name=formula)
     def freed(self, name: str) -> Model:
         """The model with one parameter's value taken away, to vary it.
 
@@ -170,6 +181,7 @@ class Model:
         values = {n: v for n, v in self.parameters.items() if n != name}
         return self._from(replace(self.structure, free=free), values)
 
+    @takes(slow=mapping)
     def frozen(self, slow: Written | None = None) -> Model:
         """The fast subsystem: every slow quantity becomes a parameter without a value.
 
@@ -208,6 +220,7 @@ class Model:
             path[str(key)] = law.xreplace({s: real(s.name) for s in law.free_symbols})
         return self._from(*self.structure.frozen(path, self.parameters))
 
+    @takes(name=formula)
     def ramped(self, name: object, rate: float, start: float = 0.0) -> Model:
         """The model with one parameter drifting at a constant rate: start + rate·t.
 
@@ -379,10 +392,7 @@ def number(what: str, value: object) -> float:
     ...
     fastslow.errors.ModelError: parameter A: expected a finite number, received '1/0'
     """
-    try:
-        result = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        result = math.nan
-    if not math.isfinite(result):
-        raise ModelError(f"{what}: expected a finite number, received {value!r}")
+    result = real_number(value)
+    if result is None or not math.isfinite(result):
+        raise ModelError(f"{what}: expected a finite number, received {shown(value)}")
     return result

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from fastslow.arguments import finite, formula, instance, mapping, takes
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.passage.boundary_delays import boundary_delay, gap_transit
@@ -13,6 +14,13 @@ from fastslow.results.delays import BoundaryDelay, FoldDelay, GapTransit
 from fastslow.results.points import CODE_NAMES, SpecialPoint
 
 
+@takes(
+    point=instance(SpecialPoint),
+    rate=finite,
+    level=mapping,
+    parameter=formula,
+    model=instance(Model),
+)
 def predict_delay(
     point: SpecialPoint,
     rate: float,

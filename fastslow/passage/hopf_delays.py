@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import finite, instance, positive, takes
 from fastslow.errors import ArgumentError
 from fastslow.passage.sites import WrongWay, drift, require_code
 from fastslow.results.branches import Branch
@@ -26,6 +27,13 @@ MEMORY = 30.0
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
+@takes(
+    diagram=instance(Diagram),
+    point=instance(SpecialPoint),
+    entry=finite,
+    rate=finite,
+    gain=positive,
+)
 def hopf_exit(
     diagram: Diagram,
     point: SpecialPoint,
@@ -88,8 +96,6 @@ def hopf_exit(
     """
     require_code(point, "HB", "the exit after a Hopf point")
     speed = drift(rate)
-    if not (math.isfinite(gain) and gain > 0):
-        raise ArgumentError(f"gain = {gain!r}; expected a positive ratio of amplitudes")
     name = diagram.parameter
     branch, row = _place(diagram, point)
     here, way = point[name], 1 if speed > 0 else -1

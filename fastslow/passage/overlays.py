@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import finite, formula, instance, takes
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.passage.bursting import Burst, bursting_of
 from fastslow.passage.cycle_ends import cycle_end, ending
@@ -38,6 +39,7 @@ FLAT = 1e-9
 STILL = 1e-3
 
 
+@takes(diagram=instance(Diagram), run=instance(Trajectory), radius=finite, observed=formula)
 def overlay(
     diagram: Diagram, run: Trajectory, *, radius: float = 0.1, observed: object = None
 ) -> Overlay:

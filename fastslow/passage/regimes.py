@@ -8,6 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastslow.arguments import (
+    either,
+    flag,
+    function,
+    instance,
+    mapping,
+    positive,
+    takes,
+    text,
+    tolerance,
+)
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.results.formulas import evaluated, names_in
@@ -21,6 +32,17 @@ Floats = NDArray[np.float64]
 Parameters = Mapping[Any, Any] | Callable[[Floats, Floats], Mapping[Any, Any]]
 
 
+@takes(
+    model=instance(Model),
+    over=mapping,
+    parameters=either(function, mapping),
+    run_tol=tolerance,
+    tol=positive,
+    gap=text,
+    period=positive,
+    periods=positive,
+    progress=flag,
+)
 def regime_map(
     model: Model,
     over: Mapping[Any, tuple[float, float]],

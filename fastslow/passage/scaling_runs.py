@@ -10,6 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
+from fastslow.arguments import (
+    finite,
+    flag,
+    formula,
+    instance,
+    mapping,
+    numbers,
+    takes,
+    tolerance,
+    whole,
+)
 from fastslow.diagrams.tracing import continue_equilibria
 from fastslow.errors import ArgumentError, FastSlowError
 from fastslow.model.model import Model
@@ -37,6 +48,16 @@ FORGOTTEN = 40.0
 REACH = 4.0
 
 
+@takes(
+    model=instance(Model),
+    point=instance(SpecialPoint),
+    level=mapping,
+    start=finite,
+    parameter=formula,
+    tol=tolerance,
+    max_steps=whole(1, 2**40),
+    progress=flag,
+)
 def delay_scaling(
     model: Model,
     point: SpecialPoint,
@@ -122,10 +143,7 @@ def delay_scaling(
 
 
 def _speeds(rates: ArrayLike) -> Array:
-    try:
-        eps = np.array(rates, dtype=float)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"rates = {rates!r}; expected positive numbers") from None
+    eps = numbers("rates", rates)
     if eps.ndim != 1 or len(eps) < 2 or not np.isfinite(eps).all() or np.any(eps <= 0):
         raise ArgumentError(f"rates = {rates!r}; expected at least two positive speeds")
     eps = np.sort(eps)[::-1]
@@ -164,7 +182,7 @@ def _starts(site: Site, laws: list[Law], start: float | None) -> list[tuple[floa
     way = 1.0 if laws[0].rate > 0 else -1.0
     far = [_distance(site, law) for law in laws]
     if start is not None:
-        if not (math.isfinite(start) and way * (here - start) > 0):
+        if not (way * (here - start) > 0):
             side = "below" if way > 0 else "above"
             raise ArgumentError(f"start = {start!r}; expected a value {side} {name} = {here:g}")
         far = [abs(here - start)] * len(laws)

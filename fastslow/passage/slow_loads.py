@@ -9,16 +9,18 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
+from fastslow.arguments import finite_numbers, flag, instance, mapping, numbers, shown, takes, text
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.periods import frequencies
 from fastslow.model.structure import TIME, real
 from fastslow.results.slow_loads import SlowLoad
-from fastslow.simulation.arguments import floats, gap_regions
+from fastslow.simulation.arguments import gap_regions
 
 Floats = NDArray[np.float64]
 
 
+@takes(exact=flag)
 def slow_load_gap(
     B: ArrayLike,
     C: ArrayLike,
@@ -87,7 +89,7 @@ def slow_load_gap(
     >>> slow_load_gap(2.0, [1.0, 4.0], 0.1).round(3)
     array([ 0.  , 13.61])
     """
-    mean, swing = np.abs(_finite("B", B)), np.abs(_finite("C", C))
+    mean, swing = np.abs(finite_numbers("B", B)), np.abs(finite_numbers("C", C))
     rate, c, k = (
         _positive("omega", omega),
         _positive("damping", damping),
@@ -142,6 +144,7 @@ def _exact(B: Floats, C: Floats, omega: Floats, c: Floats, k: Floats) -> Floats:
     return np.where(leaves, widest, 0.0)
 
 
+@takes(model=instance(Model), parameters=mapping, exact=flag, gap=text)
 def slow_load_criterion(
     model: Model,
     parameters: Mapping[Any, ArrayLike] | None = None,
@@ -189,7 +192,7 @@ def slow_load_criterion(
     >>> fs.slow_load_criterion(gear, {"D": [0.5, 0.6], "C": 2.5}).regime
     array(['bilateral', 'bilateral'], dtype='<U16')
     """
-    swept = {str(n): floats(f"parameter {n}", v) for n, v in (parameters or {}).items()}
+    swept = {str(n): finite_numbers(f"parameter {n}", v) for n, v in (parameters or {}).items()}
     for name in swept:
         if name not in model.parameters:
             raise unknown_name("parameter", name, model.parameters)
@@ -287,15 +290,8 @@ def _quotient(B: Floats, C: Floats) -> Floats:
     return np.where(C > B, B / np.where(C > B, C, 1.0), 1.0)
 
 
-def _finite(name: str, given: ArrayLike) -> Floats:
-    values = floats(name, given)
-    if not np.isfinite(values).all():
-        raise ArgumentError(f"{name} = {given!r}; expected finite numbers")
-    return values
-
-
 def _positive(name: str, given: ArrayLike) -> Floats:
-    values = floats(name, given)
+    values = numbers(name, given)
     if not np.all(values > 0.0):
-        raise ArgumentError(f"{name} = {given!r}; expected positive numbers")
+        raise ArgumentError(f"{name} = {shown(given)}; expected positive numbers")
     return values

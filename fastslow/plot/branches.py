@@ -13,6 +13,8 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
+from fastslow.arguments import flag, formula, instance, takes
+from fastslow.plot.arguments import line_colour, line_style
 from fastslow.plot.bands import Bands, draw_bands
 from fastslow.plot.heights import along, at_point, expression_of, written
 from fastslow.plot.labels import key, place, settle, tag
@@ -56,6 +58,17 @@ class DiagramDrawing(Drawing):
         return [*(shown[kind] for kind in LINES if kind in shown), *self.markers]
 
 
+@takes(
+    diagram=instance(Diagram),
+    x=formula,
+    ax=instance(Axes),
+    label=flag,
+    legend=flag,
+    virtual=flag,
+    interfaces=flag,
+    color=line_colour,
+    style=line_style,
+)
 def diagram(
     diagram: Diagram,
     x: object = None,

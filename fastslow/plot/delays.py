@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from fastslow.arguments import flag, instance, takes
 from fastslow.errors import ArgumentError
 from fastslow.plot.labels import legend_below, legend_inside, settle
 from fastslow.plot.style import BLUE, GREY, MM, SMALL, VERMILION, Drawing, axes_for, typeset
@@ -53,6 +54,7 @@ class DelayDrawing(Drawing):
     legend: Legend | None
 
 
+@takes(scaling=instance(DelayScaling), ax=instance(Axes), legend=flag)
 def delay_scaling(
     scaling: DelayScaling, *, ax: Axes | None = None, legend: bool = True
 ) -> DelayDrawing:

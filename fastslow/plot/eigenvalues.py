@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
+from fastslow.arguments import flag, instance, takes
 from fastslow.errors import ArgumentError
 from fastslow.plot.labels import key, place, settle, tag
 from fastslow.plot.style import (
@@ -70,6 +71,7 @@ class EigenvalueDrawing(Drawing):
     legend: Legend | None
 
 
+@takes(source=instance(Overlay, Branch), ax=instance(Axes), label=flag, legend=flag)
 def eigenvalue_path(
     source: Overlay | Branch, *, ax: Axes | None = None, label: bool = True, legend: bool = True
 ) -> EigenvalueDrawing:
@@ -139,6 +141,7 @@ def eigenvalue_path(
     return EigenvalueDrawing(ax, tuple(paths), tuple(jumps), markers, labels, bar, shown)
 
 
+@takes(point=instance(SpecialPoint), ax=instance(Axes), legend=flag)
 def clarke_path(
     point: SpecialPoint, *, ax: Axes | None = None, legend: bool = True
 ) -> EigenvalueDrawing:

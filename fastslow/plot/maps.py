@@ -15,6 +15,8 @@ from matplotlib.patches import Patch
 from matplotlib.text import Annotation, Text
 from numpy.typing import ArrayLike, NDArray
 
+from fastslow.arguments import flag, instance, mapping, takes
+from fastslow.plot.arguments import line_style
 from fastslow.plot.labels import key, place, settle, tag
 from fastslow.plot.style import BLACK, GREY, SMALL, VERMILION, Drawing, axes_for, typeset
 from fastslow.results.refined_maps import FAILED, RefinedMap
@@ -68,6 +70,16 @@ class MapDrawing(Drawing):
     legend: Legend | None
 
 
+@takes(
+    result=instance(RefinedMap),
+    ax=instance(Axes),
+    curves=mapping,
+    marks=mapping,
+    fills=mapping,
+    label=flag,
+    legend=flag,
+    style=line_style,
+)
 def regime_map(
     result: RefinedMap,
     *,

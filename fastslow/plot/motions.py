@@ -13,7 +13,9 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Annotation, Text
 from numpy.typing import NDArray
 
+from fastslow.arguments import flag, formula, instance, items, mapping, takes, whole
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.plot.arguments import line_colour, line_style
 from fastslow.plot.arrows import draw_arrows, length_along
 from fastslow.plot.bands import Bands, Values, draw_bands
 from fastslow.plot.labels import settle
@@ -61,6 +63,16 @@ class MotionDrawing(Drawing):
     words: tuple[Text, ...] = ()
 
 
+@takes(
+    run=instance(Trajectory),
+    x=formula,
+    ax=instance(Axes),
+    crossings=flag,
+    interfaces=mapping,
+    phases=items(instance(Phase)),
+    color=line_colour,
+    style=line_style,
+)
 def time_series(
     run: Trajectory,
     x: object = None,
@@ -119,6 +131,17 @@ def time_series(
     return MotionDrawing(ax, "t", name, lines, dots, (), bands, *strip)
 
 
+@takes(
+    run=instance(Trajectory),
+    x=formula,
+    y=formula,
+    ax=instance(Axes),
+    crossings=flag,
+    interfaces=mapping,
+    arrows=whole(0),
+    color=line_colour,
+    style=line_style,
+)
 def phase_portrait(
     run: Trajectory,
     x: object = None,

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.patches import Patch
 
+from fastslow.arguments import formula, instance, path, positive, takes, text
 from fastslow.errors import unknown_name
 from fastslow.plot.labels import legend_below, place, settle
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
@@ -40,6 +41,7 @@ class PanelDrawing:
     overlay: OverlayDrawing
     legend: Legend
 
+    @takes(path=path, dpi=positive)
     def save(self, path: str | Path, dpi: float = 300) -> Path:
         """Write the figure, in the format of the suffix, with text kept as text.
 
@@ -60,6 +62,7 @@ class PanelDrawing:
         return self.overlay._repr_png_()
 
 
+@takes(lay=instance(Overlay), state=formula, title=text, width=positive)
 def panel(
     lay: Overlay, state: object = None, *, title: str = "", width: float = FULL
 ) -> PanelDrawing:

@@ -14,7 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
+from fastslow.arguments import flag, formula, instance, takes
 from fastslow.errors import ArgumentError
+from fastslow.plot.arguments import line_colour, line_style
 from fastslow.plot.arrows import draw_heads, points
 from fastslow.plot.branches import DiagramDrawing, draw_branches
 from fastslow.plot.heights import expression_of
@@ -72,6 +74,20 @@ class OverlayDrawing(Drawing):
         return [*self.diagram.handles, *self.lines[::-1], *extra, *self.transitions]
 
 
+@takes(
+    lay=instance(Overlay),
+    x=formula,
+    y=formula,
+    ax=instance(Axes),
+    label=flag,
+    legend=flag,
+    crossings=flag,
+    turning=flag,
+    interfaces=flag,
+    virtual=flag,
+    color=line_colour,
+    style=line_style,
+)
 def overlay(
     lay: Overlay,
     x: object = None,

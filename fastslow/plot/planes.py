@@ -13,7 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
+from fastslow.arguments import flag, instance, takes
 from fastslow.errors import ArgumentError
+from fastslow.plot.arguments import line_style
 from fastslow.plot.labels import key, place, settle, tag
 from fastslow.plot.style import CURVES, MARKERS, Drawing, axes_for, typeset
 from fastslow.results.point_branches import PointBranch
@@ -42,6 +44,14 @@ class PlaneDrawing(Drawing):
     legend: Legend | None
 
 
+@takes(
+    curves=instance(PointBranch),
+    ax=instance(Axes),
+    label=flag,
+    legend=flag,
+    virtual=flag,
+    style=line_style,
+)
 def parameter_plane(
     *curves: PointBranch,
     ax: Axes | None = None,

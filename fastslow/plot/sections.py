@@ -9,7 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
+from fastslow.arguments import formula, instance, positive, takes
 from fastslow.errors import ArgumentError
+from fastslow.plot.arguments import line_style
 from fastslow.plot.labels import key
 from fastslow.plot.style import BLACK, BLUE, VERMILION, Drawing, axes_for, typeset, widen
 from fastslow.results.sections import Section
@@ -43,6 +45,14 @@ class SectionDrawing(Drawing):
     legend: Legend | None
 
 
+@takes(
+    section=instance(Section),
+    x=formula,
+    y=formula,
+    ax=instance(Axes),
+    size=positive,
+    style=line_style,
+)
 def section(
     section: Section,
     x: object = None,

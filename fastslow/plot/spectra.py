@@ -10,7 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
+from fastslow.arguments import flag, instance, interval, takes, whole
 from fastslow.errors import ArgumentError
+from fastslow.plot.arguments import line_colour, line_style
 from fastslow.plot.labels import settle, tag
 from fastslow.plot.style import MM, MOTION, VERMILION, Drawing, axes_for, root, typeset
 from fastslow.results.spectra import Spectrum
@@ -47,6 +49,15 @@ class SpectrumDrawing(Drawing):
     labels: tuple[Annotation, ...]
 
 
+@takes(
+    spectrum=instance(Spectrum),
+    ax=instance(Axes),
+    angular=flag,
+    over=interval,
+    peaks=whole(0),
+    color=line_colour,
+    style=line_style,
+)
 def spectrum(
     spectrum: Spectrum,
     *,

@@ -11,6 +11,8 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fastslow.arguments import path, positive, takes
+
 # M. Okabe and K. Ito, Color Universal Design, 2008
 BLACK, ORANGE, GREEN = "#000000", "#E69F00", "#009E73"
 BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
@@ -156,6 +158,7 @@ class Drawing:
         """The figure that holds the axes."""
         return root(self.ax)
 
+    @takes(path=path, dpi=positive)
     def save(self, path: str | Path, dpi: float = 300) -> Path:
         """Write the figure, in the format of the suffix, with text kept as text.
 

@@ -10,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
+from fastslow.arguments import flag, instance, positive, takes
+from fastslow.plot.arguments import line_style
 from fastslow.plot.labels import key
 from fastslow.plot.style import BLACK, BLUE, GREY, VERMILION, Drawing, axes_for, typeset, widen
 from fastslow.results.sweeps import Sweep, SweepPass
@@ -48,6 +50,7 @@ class SweepDrawing(Drawing):
     legend: Legend | None
 
 
+@takes(sweep=instance(Sweep), ax=instance(Axes), size=positive, legend=flag, style=line_style)
 def sweep(
     sweep: Sweep,
     *,

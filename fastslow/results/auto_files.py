@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import mapping, path, takes, text
 from fastslow.errors import FileError, unknown_name
 from fastslow.results.auto_text import AutoCurve, eigenvalues_of, parameters_of, sections_of
 from fastslow.results.branches import Branch
@@ -29,6 +30,7 @@ EQUILIBRIA = (1, 11)
 REGION = "S1"
 
 
+@takes(path=path, solutions=path, diagnostics=path, names=mapping, parameter=text)
 def read_auto(
     path: str | os.PathLike[str],
     solutions: str | os.PathLike[str] | None = None,

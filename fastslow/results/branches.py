@@ -10,6 +10,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import flag, formula, takes, text
 from fastslow.errors import unknown_name
 from fastslow.results import formulas, selecting, stretches
 from fastslow.results.levels import Pieces, asked, chosen, passages, pieces_of, stored
@@ -181,6 +182,7 @@ class Branch(Table, Result):
         """Smallest and largest value of the parameter."""
         return float(self.pieces.low.min()), float(self.pieces.high.max())
 
+    @takes(stable=flag, region=text)
     def at(
         self, *, stable: bool | None = None, region: str | None = None, **value: float
     ) -> list[Equilibrium]:
@@ -209,6 +211,7 @@ class Branch(Table, Result):
         found = passages(self, where, self.parameters, self.corrector)
         return chosen(found, stable, region, self.regions)
 
+    @takes(stable=flag, region=text, code=text)
     def select(
         self,
         *,
@@ -278,6 +281,7 @@ class Branch(Table, Result):
         """
         return nearest_of([self], self.parameters, values, self.corrector)
 
+    @takes(x=formula, y=formula)
     def intersections(self, other: Branch, x: str, y: str) -> NDArray[np.float64]:
         """Where two branches meet in the plane of two columns, shape (k, 2).
 

@@ -10,6 +10,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import flag, takes, text, whole
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results import formulas, stretches
 from fastslow.results.branches import Branch
@@ -133,6 +134,7 @@ class Diagram(Table, Result):
     def boundary_equilibria(self) -> SpecialPoints:
         return self.special("BE")
 
+    @takes(stable=flag, region=text)
     def at(
         self, *, stable: bool | None = None, region: str | None = None, **value: float
     ) -> list[Equilibrium]:
@@ -176,6 +178,7 @@ class Diagram(Table, Result):
         # pseudo-equilibria lie in no region of the model
         return tuple(dict.fromkeys([*self.regions, *(r for b in self.branches for r in b.regions)]))
 
+    @takes(stable=flag, region=text, code=text)
     def select(
         self,
         *,
@@ -222,6 +225,7 @@ class Diagram(Table, Result):
         )
         return replace(self, branches=branches, over=over)
 
+    @takes(at_least=whole(1))
     def bistable(self, at_least: int = 2) -> NDArray[np.float64]:
         """Intervals of the parameter with two (or more) stable equilibria, shape (k, 2).
 
@@ -238,8 +242,6 @@ class Diagram(Table, Result):
         ArgumentError
             For a number below one.
         """
-        if at_least < 1:
-            raise ArgumentError(f"at_least = {at_least!r}; expected at least 1")
         return stretches.multistable(self.branches, at_least)
 
     def nearest(self, **values: float) -> Equilibrium:

@@ -12,6 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from fastslow.arguments import path, takes
 from fastslow.errors import ArgumentError, FastSlowError, FileError, MissingPackageError
 from fastslow.results.encoding import Arrays, BrokenError, decoded, encoded
 from fastslow.results.storage import read_archive, read_netcdf, write_archive, write_netcdf
@@ -69,6 +70,7 @@ def write(result: object, path: str | os.PathLike[str]) -> None:
         beside.unlink(missing_ok=True)
 
 
+@takes(path=path)
 def load(path: str | os.PathLike[str]) -> Any:
     """Read a result that was saved, by this or an earlier version.
 

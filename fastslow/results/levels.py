@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.interpolation import hermite
 from fastslow.results.points import Corrector, Equilibrium
@@ -188,10 +189,7 @@ def asked(
     if list(value) != [parameter]:
         wrong = next((name for name in value if name != parameter), "nothing")
         raise unknown_name(f"{what} parameter", wrong, [parameter])
-    try:
-        where = float(value[parameter])
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{parameter} = {value[parameter]!r}; expected a number") from None
+    where = finite(parameter, value[parameter])
     low, high = over
     if not low <= where <= high:
         raise ArgumentError(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.levels import between, read_off, stored
 from fastslow.results.points import Corrector, Equilibrium
@@ -34,8 +35,7 @@ def nearest_of(
     for name, value in values.items():
         if name not in valid:
             raise unknown_name("state or parameter", name, valid)
-        if not math.isfinite(value):
-            raise ArgumentError(f"{name} = {value!r}; expected a finite number")
+        finite(name, value)
     tables = [np.column_stack([b[name] for name in values]) for b in branches]
     low = np.min([t.min(axis=0) for t in tables], axis=0)
     high = np.max([t.max(axis=0) for t in tables], axis=0)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import formula, takes
 from fastslow.results import formulas
 from fastslow.results.markup import points_html
 from fastslow.results.meetings import intersections
@@ -108,6 +109,7 @@ class PointBranch(Table, Result):
         """The columns of `points`."""
         return (*self.states, *self.parameter_names)
 
+    @takes(x=formula, y=formula)
     def intersections(
         self, other: PointBranch, x: object = None, y: object = None
     ) -> NDArray[np.float64]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
+from fastslow.arguments import finite, formula, positive, takes, text, whole
 from fastslow.results.sections import (
     Section,
     poincare_section,
@@ -25,6 +26,7 @@ class Recurrence:
     def _run(self) -> Trajectory:
         return cast("Trajectory", self)
 
+    @takes(period=positive, phase=finite, since=finite)
     def stroboscopic(
         self,
         period: float | None = None,
@@ -57,6 +59,7 @@ class Recurrence:
         """
         return stroboscopic_section(self._run, period, phase, since)
 
+    @takes(expression=formula, level=finite, interface=formula, since=finite, until=finite)
     def section(
         self,
         expression: object = None,
@@ -102,6 +105,7 @@ class Recurrence:
         window = window_of(self._run, since, until)
         return poincare_section(self._run, expression, level, direction, interface, window)
 
+    @takes(since=finite, window=text, samples=whole(8, 2**24))
     def spectrum(
         self,
         name: object,
@@ -131,6 +135,7 @@ class Recurrence:
         """
         return spectrum_of(self._run, name, since, window, samples)
 
+    @takes(period=positive, tol=positive, most=whole(1))
     def steady(self, period: float | None = None, tol: float = 1e-6, most: int = 16) -> SteadyState:
         """After how many periods the states repeat, and from which time on.
 
@@ -153,6 +158,7 @@ class Recurrence:
         """
         return steady_state(self._run, period, tol, most)
 
+    @takes(since=finite, until=finite)
     def extremes(
         self, name: object, since: float | None = None, until: float | None = None
     ) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastslow.arguments import function, takes
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.map_boundaries import MapBoundary, MapEdges, boundaries_of
 from fastslow.results.outcome import Outcome
@@ -186,6 +187,7 @@ class RefinedMap(Result):
         found = self._worded(self._codes_at(place.reshape(-1, 2))).reshape(place.shape[:-1])
         return found if found.ndim else found.item()
 
+    @takes(predict=function)
     def compare(self, predict: Callable[[Floats, Floats], Sequence[Any]]) -> MapComparison:
         """Set what a function predicts beside what was found, at every point evaluated.
 

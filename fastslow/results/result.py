@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from typing import Any
 
+from fastslow.arguments import path, takes
+
 #: Metadata of a field that lives only in this process, such as a model: dropped when kept.
 LIVE = {"live": True}
 
@@ -12,6 +14,7 @@ LIVE = {"live": True}
 class Result:
     """A result that can be kept in a file."""
 
+    @takes(path=path)
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write this to a file that `fastslow.load` reads back bit for bit.
 

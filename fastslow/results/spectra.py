@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import finite, takes, whole
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.result import Result
 from fastslow.results.sections import window_of
@@ -99,6 +100,7 @@ class Spectrum(Table, Result):
         """Angular frequencies, shape (N,)."""
         return 2.0 * np.pi * self.frequency
 
+    @takes(n=whole(0), least=finite)
     def peaks(self, n: int = 5, least: float = 1e-6) -> tuple[Peak, ...]:
         """The largest lines beside the mean, largest first.
 
@@ -190,8 +192,6 @@ def spectrum_of(
     if samples is None:
         steps = int(np.count_nonzero(run.steps[:, 0] + run.steps[:, 1] > first))
         samples = 2 ** int(np.ceil(np.log2(np.clip(PER_STEP * steps, FEWEST, MOST))))
-    elif samples < 8:
-        raise ArgumentError(f"samples = {samples}; expected at least 8")
     part = np.arange(samples) / samples
     values = run.dense_columns(first + (last - first) * part)[run.columns.index(str(name))]
     mean = float(values.mean())

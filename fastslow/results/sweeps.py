@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import finite, takes
 from fastslow.errors import ArgumentError
 from fastslow.results.outcome import Outcome
 from fastslow.results.result import Result
@@ -139,6 +140,7 @@ class Sweep(Table, Result):
             if not outcome
         )
 
+    @takes(tol=finite)
     def hysteresis(self, tol: float = 1e-3) -> Array:
         """Intervals of the parameter over which the two passes differ.
 

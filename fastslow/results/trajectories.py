@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastslow.arguments import finite, numbers, positive, takes
 from fastslow.results import formulas
 from fastslow.results.contacts import (
     Contacts,
@@ -136,6 +137,7 @@ class Trajectory(Recurrence, Table, Result):
         """
         return self.dense_columns(times)[: len(self.states)]
 
+    @takes(times=numbers)
     def dense_columns(self, times: ArrayLike) -> NDArray[np.float64]:
         """All columns at any times of the run, shape (n + n_forcing, N).
 
@@ -184,6 +186,7 @@ class Trajectory(Recurrence, Table, Result):
         """The part of the run spent in every region (and in every sliding motion)."""
         return residence_in(self, self.span)
 
+    @takes(since=finite, until=finite)
     def hits(
         self,
         interface: object,
@@ -210,6 +213,7 @@ class Trajectory(Recurrence, Table, Result):
         """
         return count_hits(self, interface, direction, window_of(self, since, until))
 
+    @takes(since=finite, until=finite, period=positive)
     def contacts(
         self,
         since: float | None = None,

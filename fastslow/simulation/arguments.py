@@ -10,6 +10,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from fastslow.arguments import numbers, positive
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 
@@ -43,7 +44,7 @@ def initial_state(model: Model, start: Any) -> NDArray[np.float64]:
                 f"of {', '.join(names)}"
             )
         start = [given[n] for n in names]
-    values = floats("the initial state", start)
+    values = numbers("the initial state", start)
     if values.shape != (len(names),):
         raise ArgumentError(
             f"the initial state has shape {values.shape}; expected {len(names)} values, for "
@@ -56,7 +57,7 @@ def initial_state(model: Model, start: Any) -> NDArray[np.float64]:
 
 
 def time_span(
-    t: Any, periods: Any, start: Any, period: Any, own_period: Callable[[], float | None]
+    t: Any, periods: Any, start: float, period: float | None, own_period: Callable[[], float | None]
 ) -> tuple[tuple[float, float], float | None]:
     """Start and end of time, and the common period: the given one, else the model's own.
 
@@ -69,12 +70,10 @@ def time_span(
     if (t is None) == (periods is None):
         received = "both" if t is not None else "neither"
         raise ArgumentError(f"expected t=(start, end) or periods=, received {received}")
-    if period is not None:
-        period = positive("period", period)
     if t is not None:
         if start != 0:
             raise ArgumentError("start= goes with periods=; with t=(start, end) it is in t")
-        values = floats("t", t)
+        values = numbers("t", t)
         if values.shape != (2,):
             raise ArgumentError(f"t = {t!r}; expected a pair (start, end)")
         first, last = map(float, values)
@@ -82,9 +81,6 @@ def time_span(
             raise ArgumentError(f"t = ({first:g}, {last:g}); expected finite times, start < end")
         return (first, last), period if period is not None else own_period()
     count = positive("periods", periods)
-    first = float(floats("start", start))
-    if not math.isfinite(first):
-        raise ArgumentError(f"start = {first}; expected a finite time")
     if period is None:
         period = own_period()
     if period is None:
@@ -92,7 +88,7 @@ def time_span(
             f"periods={periods!r}, but nothing in this model has a common period; give "
             "t=(start, end), or the period as period="
         )
-    return (first, first + count * period), period
+    return (start, start + count * period), period
 
 
 def sample_times(
@@ -111,7 +107,7 @@ def sample_times(
         if samples < 2:
             raise ArgumentError(f"samples = {samples}; expected at least 2, or an array of times")
         return np.linspace(*span, int(samples))
-    times = np.atleast_1d(floats("samples", samples))
+    times = np.atleast_1d(numbers("samples", samples))
     if times.ndim != 1 or not np.isfinite(times).all() or np.any(np.diff(times) < 0):
         raise ArgumentError("samples: expected increasing, finite times")
     if len(times) and (times[0] < span[0] or times[-1] > span[1]):
@@ -119,23 +115,6 @@ def sample_times(
             f"samples from {times[0]:g} to {times[-1]:g} leave the run, [{span[0]:g}, {span[1]:g}]"
         )
     return np.ascontiguousarray(times)
-
-
-def tolerance(tol: Any) -> float:
-    """A tolerance between rounding and 0.1."""
-    value = positive("tol", tol)
-    if not 1e-16 <= value <= 0.1:
-        raise ArgumentError(f"tol = {value:g}; expected a number from 1e-16 to 0.1")
-    return value
-
-
-def whole_number(name: str, value: Any, least: int, most: int) -> int:
-    """An integer within bounds."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise ArgumentError(f"{name} = {value!r}; expected a whole number")
-    if not least <= value <= most:
-        raise ArgumentError(f"{name} = {value}; expected from {least} to {most}")
-    return int(value)
 
 
 def require_values(model: Model) -> None:
@@ -207,19 +186,3 @@ def _growth(model: Model, function: sp.Expr) -> int:
             rate = function.diff(symbol).subs(model.values)
             return -1 if rate.is_number and rate.is_negative else 1
     return 1
-
-
-def floats(name: str, value: Any) -> NDArray[np.float64]:
-    """An array of numbers."""
-    try:
-        return np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{name}: expected numbers, received {value!r}") from None
-
-
-def positive(name: str, value: Any) -> float:
-    """One finite number above zero."""
-    number = floats(name, value)
-    if number.ndim or not math.isfinite(number) or number <= 0:
-        raise ArgumentError(f"{name} = {value!r}; expected a positive number")
-    return float(number)

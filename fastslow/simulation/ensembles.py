@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastslow.arguments import finite, flag, instance, mapping, takes, text, tolerance, whole
 from fastslow.compiled.generic import load_loop
 from fastslow.compiled.lane_steps import CompiledSteps, compile_steps
 from fastslow.compiled.series import CompiledSeries
 from fastslow.model.model import Model
 from fastslow.results.ensembles import Ensemble, regimes
 from fastslow.results.named import Named
-from fastslow.simulation.arguments import tolerance, whole_number
 from fastslow.simulation.grouping import alike
 from fastslow.simulation.lanes import pool_for
 from fastslow.simulation.many_arguments import (
@@ -71,6 +71,20 @@ _LANES = ("fastslow.compiled.lanes", "fastslow.compiled.lane_steps")
 _CHUNK = 512
 
 
+@takes(
+    model=instance(Model),
+    parameters=mapping,
+    start=finite,
+    settle=finite,
+    tol=tolerance,
+    order=whole(4, 40),
+    implicit=flag,
+    gap=text,
+    max_steps=whole(1, 2**40),
+    max_crossings=whole(1, 2**40),
+    threads=whole(1),
+    progress=flag,
+)
 def simulate_many(
     model: Model,
     states: ArrayLike | Mapping[Any, ArrayLike],
@@ -165,12 +179,8 @@ def simulate_many(
     """
     starts, swept = starts_and_parameters(model, states, parameters)
     count = len(starts)
-    tol = tolerance(tol)
-    order = whole_number("order", default_order(tol) if order is None else order, 4, 40)
-    limits = (
-        whole_number("max_steps", max_steps, 1, 2**40),
-        whole_number("max_crossings", max_crossings, 1, 2**40),
-    )
+    order = default_order(tol) if order is None else order
+    limits = (max_steps, max_crossings)
     threads = threads_of(threads)
     own = periods_of(model, period, count, swept)
     spans, since = spans_of(t, periods, start, settle, own)

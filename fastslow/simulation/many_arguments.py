@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import numbers, positive
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.periods import common_periods
 from fastslow.model.structure import TIME, real
-from fastslow.simulation.arguments import floats, positive
 
 Floats = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ def starts_and_parameters(
         For a name that is no state or no parameter.
     """
     names = (*model.states, *model.slow_states)
-    given = {str(k): floats(f"parameter {k}", v) for k, v in (parameters or {}).items()}
+    given = {str(k): numbers(f"parameter {k}", v) for k, v in (parameters or {}).items()}
     valid = [*model.parameters, *(n for n in model.free if n not in model.parameters)]
     for name, values in given.items():
         if name not in valid:
@@ -45,7 +45,7 @@ def starts_and_parameters(
         )
     _one_length("parameters", given)
     if isinstance(states, Mapping):
-        columns = {str(k): floats(f"initial {k}", v) for k, v in states.items()}
+        columns = {str(k): numbers(f"initial {k}", v) for k, v in states.items()}
         for name, values in columns.items():
             if name not in names:
                 raise unknown_name("state", name, names)
@@ -60,7 +60,7 @@ def starts_and_parameters(
         _one_length("initial states", columns)
         table = np.stack(np.broadcast_arrays(*(columns[n] for n in names)), axis=-1)
     else:
-        table = floats("the initial states", states)
+        table = numbers("the initial states", states)
     if table.ndim not in (1, 2) or table.shape[-1] != len(names):
         raise ArgumentError(
             f"the initial states have shape {table.shape}; expected (m, {len(names)}) or "
@@ -97,7 +97,7 @@ def _one_length(what: str, given: Mapping[str, Floats]) -> None:
 def periods_of(model: Model, period: Any, count: int, swept: Mapping[str, Floats]) -> Floats:
     """The period of every trajectory, shape (m,), NaN where there is none."""
     if period is not None:
-        given = floats("period", period)
+        given = numbers("period", period)
         if given.ndim > 1 or given.size not in (1, count):
             raise ArgumentError(f"period has shape {given.shape}; expected one, or ({count},)")
         for value in given.reshape(-1):
@@ -112,7 +112,9 @@ def periods_of(model: Model, period: Any, count: int, swept: Mapping[str, Floats
     return common_periods(laws, TIME, values)
 
 
-def spans_of(t: Any, periods: Any, start: Any, settle: Any, own: Floats) -> tuple[Floats, Floats]:
+def spans_of(
+    t: Any, periods: Any, start: float, settle: float, own: Floats
+) -> tuple[Floats, Floats]:
     """First and last time of every trajectory (m, 2), and the time from which it counts (m,).
 
     Raises
@@ -124,13 +126,12 @@ def spans_of(t: Any, periods: Any, start: Any, settle: Any, own: Floats) -> tupl
     if (t is None) == (periods is None):
         received = "both" if t is not None else "neither"
         raise ArgumentError(f"expected t=(start, end) or periods=, received {received}")
-    dropped = floats("settle", settle)
-    if dropped.ndim or not (np.isfinite(dropped) and dropped >= 0):
+    if settle < 0:
         raise ArgumentError(f"settle = {settle!r}; expected a number from 0")
     if t is not None:
         if start != 0:
             raise ArgumentError("start= goes with periods=; with t=(start, end) it is in t")
-        values = floats("t", t)
+        values = numbers("t", t)
         if values.shape != (2,):
             raise ArgumentError(f"t = {t!r}; expected a pair (start, end)")
         if not (np.isfinite(values).all() and values[0] < values[1]):
@@ -141,9 +142,6 @@ def spans_of(t: Any, periods: Any, start: Any, settle: Any, own: Floats) -> tupl
         spans = np.tile(values, (len(own), 1))
     else:
         length = positive("periods", periods)
-        first = floats("start", start)
-        if first.ndim or not np.isfinite(first):
-            raise ArgumentError(f"start = {start!r}; expected a finite time")
         without = np.flatnonzero(np.isnan(own))
         if len(without):
             raise ArgumentError(
@@ -151,10 +149,10 @@ def spans_of(t: Any, periods: Any, start: Any, settle: Any, own: Floats) -> tupl
                 "period; give t=(start, end), or the period as period="
             )
         unit = own
-        spans = np.stack([np.full(len(own), float(first)), first + length * own], axis=1)
-    if dropped >= length:
+        spans = np.stack([np.full(len(own), start), start + length * own], axis=1)
+    if settle >= length:
         raise ArgumentError(f"settle = {settle!r} leaves nothing of the run, which is {length:g}")
-    return spans, spans[:, 0] + dropped * unit
+    return spans, spans[:, 0] + settle * unit
 
 
 def times_of(samples: Any, spans: Floats, since: Floats) -> Floats:
@@ -174,7 +172,7 @@ def times_of(samples: Any, spans: Floats, since: Floats) -> Floats:
         rows = slice(0, 1) if common else slice(None)
         times = np.linspace(since[rows], spans[rows, 1], int(samples), axis=1)
         return np.ascontiguousarray(times)
-    times = np.atleast_1d(floats("samples", samples))
+    times = np.atleast_1d(numbers("samples", samples))
     if times.ndim != 1 or not np.isfinite(times).all() or np.any(np.diff(times) < 0):
         raise ArgumentError("samples: expected increasing, finite times")
     low, high = spans[:, 0].max(), spans[:, 1].min()
@@ -186,12 +184,10 @@ def times_of(samples: Any, spans: Floats, since: Floats) -> Floats:
     return np.ascontiguousarray(times[None, :])
 
 
-def threads_of(threads: Any) -> int:
+def threads_of(threads: int | None) -> int:
     """The number of threads: as given, else the cores that this process may use."""
     if threads is not None:
-        if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
-            raise ArgumentError(f"threads = {threads!r}; expected a whole number from 1")
-        return int(threads)
+        return threads
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

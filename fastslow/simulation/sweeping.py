@@ -11,12 +11,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
+from fastslow.arguments import (
+    finite,
+    finite_numbers,
+    flag,
+    formula,
+    instance,
+    positive,
+    takes,
+    text,
+    tolerance,
+    whole,
+)
 from fastslow.errors import ArgumentError, FastSlowError, unknown_name
 from fastslow.model.model import Model
 from fastslow.results.outcome import Outcome
 from fastslow.results.sweeps import Sweep, SweepPass
 from fastslow.results.trajectories import Trajectory
-from fastslow.simulation.arguments import initial_state, whole_number
+from fastslow.simulation.arguments import initial_state
 from fastslow.simulation.trajectories import simulate
 
 Array = NDArray[np.float64]
@@ -25,6 +37,22 @@ What = Literal["stroboscopic", "extremes", "section"]
 KINDS = ("stroboscopic", "extremes", "section")
 
 
+@takes(
+    model=instance(Model),
+    parameter=formula,
+    column=formula,
+    settle=whole(0, 10**9),
+    keep=whole(1, 10**9),
+    what=text,
+    phase=finite,
+    section=formula,
+    level=finite,
+    back=flag,
+    tol=tolerance,
+    max_steps=whole(1, 2**40),
+    period=positive,
+    progress=flag,
+)
 def bifurcation_sweep(
     model: Model,
     parameter: object,
@@ -118,11 +146,11 @@ def bifurcation_sweep(
         str(parameter),
         columns.index(name),
         what,
-        whole_number("settle", settle, 0, 10**9),
-        whole_number("keep", keep, 1, 10**9),
-        float(phase),
+        settle,
+        keep,
+        phase,
         section,
-        float(level),
+        level,
         direction,
         period,
         {"tol": tol, "max_steps": max_steps},
@@ -160,12 +188,11 @@ class _Settings:
 
 
 def _values(values: ArrayLike) -> Array:
-    try:
-        order = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"values: expected numbers, received {values!r}") from None
-    if order.ndim != 1 or not len(order) or not np.isfinite(order).all():
-        raise ArgumentError("values: expected a one-dimensional array of finite numbers")
+    order = finite_numbers("values", values)
+    if order.ndim != 1 or not len(order):
+        raise ArgumentError(
+            f"values of shape {order.shape}; expected a one-dimensional array, not empty"
+        )
     change = np.diff(order)
     if not ((change > 0).all() or (change < 0).all()):
         raise ArgumentError("values: expected strictly rising or strictly falling numbers")

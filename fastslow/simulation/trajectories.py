@@ -12,6 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import finite, flag, instance, positive, takes, text, tolerance, whole
 from fastslow.compiled.generic import load_loop
 from fastslow.compiled.series import CompiledSeries, compile_series
 from fastslow.model.model import Model
@@ -23,8 +24,6 @@ from fastslow.simulation.arguments import (
     require_values,
     sample_times,
     time_span,
-    tolerance,
-    whole_number,
 )
 from fastslow.simulation.implicit_steps import DEGREE, IMPLICIT, SETTLED_ORDER
 from fastslow.simulation.rooms import MODE, SAMPLES, STEPS, beginnings, room_for
@@ -100,6 +99,18 @@ series_of = once_a_model(compile_series)
 period_of = once_a_model(Model.period)
 
 
+@takes(
+    model=instance(Model),
+    start=finite,
+    period=positive,
+    tol=tolerance,
+    dense=flag,
+    order=whole(4, 40),
+    implicit=flag,
+    gap=text,
+    max_steps=whole(1, 2**40),
+    max_crossings=whole(1, 2**40),
+)
 def simulate(
     model: Model,
     state: Sequence[float] | Mapping[Any, float] | NDArray[np.float64],
@@ -185,17 +196,12 @@ def simulate(
     array([-1.,  0.])
     """
     require_values(model)
-    tol = tolerance(tol)
     begin = initial_state(model, state)
     span, period = time_span(t, periods, start, period, lambda: period_of(model))
     times = sample_times(samples, span)
     if order is None:
         order = default_order(tol)
-    order = whole_number("order", order, 4, 40)
-    limits = (
-        whole_number("max_steps", max_steps, 1, 2**40),
-        whole_number("max_crossings", max_crossings, 1, 2**40),
-    )
+    limits = (max_steps, max_crossings)
     between = gap_of(model, gap)
     compiled = series_of(model, order)
     kept = compiled.n_states + compiled.n_forcing

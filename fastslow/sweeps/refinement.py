@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import flag, function, interval, mapping, positive, takes, whole
 from fastslow.errors import ArgumentError
 from fastslow.results.map_boundaries import MapEdges
 from fastslow.results.refined_maps import FAILED, Label, RefinedMap, label_of
@@ -19,6 +20,7 @@ Cell = tuple[int, int, int]
 Function = Callable[[Floats, Floats], Sequence[Any] | NDArray[Any]]
 
 
+@takes(function=function, over=mapping, tol=positive, progress=flag)
 def refined_map(
     function: Function,
     over: Mapping[Any, tuple[float, float]],
@@ -86,8 +88,6 @@ def refined_map(
     names, ranges = _ranges(over)
     first = _count("cells", cells, 1)
     levels, guard = _whole("levels", levels, 0), _whole("guard", guard, 0)
-    if tol is not None and not (math.isfinite(tol) and tol > 0):
-        raise ArgumentError(f"tol = {tol!r}; expected a positive number")
     size = 2**levels
     shape = (first[0] * size, first[1] * size)
     if math.prod(shape) > 2**60:
@@ -121,13 +121,7 @@ def _ranges(
         raise ArgumentError(f"over: expected the ranges of two parameters, received {received}")
     ranges = []
     for name, given in zip(names, over.values(), strict=True):
-        try:
-            low, high = (float(value) for value in given)
-        except (TypeError, ValueError):
-            raise ArgumentError(f"over {name}: expected (low, high), received {given!r}") from None
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise ArgumentError(f"over {name} = ({low:g}, {high:g}); expected finite, low < high")
-        ranges.append((low, high))
+        ranges.append(interval(f"over {name}", given))
     return (names[0], names[1]), (ranges[0], ranges[1])
 
 
@@ -140,9 +134,7 @@ def _count(what: str, given: Any, least: int) -> tuple[int, int]:
 
 
 def _whole(what: str, given: Any, least: int) -> int:
-    if isinstance(given, bool) or not isinstance(given, int | np.integer) or given < least:
-        raise ArgumentError(f"{what} = {given!r}; expected a whole number from {least}")
-    return int(given)
+    return int(whole(least)(what, given))
 
 
 def _bar(shown: bool) -> Any:

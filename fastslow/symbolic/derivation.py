@@ -9,6 +9,7 @@ from typing import Any
 import sympy as sp
 from sympy.core.relational import Relational
 
+from fastslow.arguments import instance, takes
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
@@ -98,6 +99,7 @@ class Derivation:
         return summary(self)
 
 
+@takes(model=instance(Model))
 def derive(model: Model, assume: Any = None) -> Derivation:
     """Derive equilibria, stability, folds and boundary equilibria in closed form.
 

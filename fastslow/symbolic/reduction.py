@@ -7,12 +7,14 @@ from typing import Any
 
 import sympy as sp
 
+from fastslow.arguments import mapping, takes
 from fastslow.errors import ArgumentError
 from fastslow.model.structure import real
 from fastslow.results.named import Named
 from fastslow.symbolic.reading import read_formula
 
 
+@takes(rates=mapping, combinations=mapping)
 def reduce_to(rates: Mapping[Any, Any], combinations: Mapping[Any, Any]) -> Named[sp.Expr]:
     """Rates of linear combinations of states, where these need no other state.
 

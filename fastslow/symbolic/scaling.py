@@ -8,6 +8,7 @@ from typing import Any
 
 import sympy as sp
 
+from fastslow.arguments import instance, mapping, takes, text
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
@@ -47,6 +48,7 @@ class Scaling:
     forcing: Named[sp.Expr]
 
 
+@takes(model=instance(Model), region=text, replace=mapping)
 def nondimensionalise(
     model: Model,
     ones: Iterable[tuple[Any, Any]],
@@ -333,6 +335,7 @@ def _matched(
         left = [sp.expand(g.subs(unknown, value)) for g in left]
 
 
+@takes(one=mapping, other=mapping)
 def disagreements(one: Mapping[str, Any], other: Mapping[str, Any]) -> Named[sp.Expr]:
     """Ratios, other to one, of the entries of two scalings that differ.
 

@@ -12,6 +12,7 @@ import sympy as sp
 from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.str import StrPrinter
 
+from fastslow.arguments import instance, mapping, path, takes, text
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.interfaces import Region
 from fastslow.model.model import Model, number
@@ -67,6 +68,7 @@ FUNCTIONS = (
 )
 
 
+@takes(model=instance(Model), format=text, path=path, region=text, values=mapping, start=mapping)
 def export(
     model: Model,
     format: str,

@@ -8,7 +8,7 @@ from typing import Literal
 
 import sympy as sp
 
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.arguments import finite, positive, takes, word
 from fastslow.model.model import Model
 
 Scaling = Literal["consistent", "printed"]
@@ -93,6 +93,15 @@ class GearScales:
     angle: float
 
 
+@takes(
+    scaling=word("scaling", SCALINGS),
+    J_i=positive,
+    J_o=positive,
+    N=positive,
+    xi=positive,
+    K_HD=positive,
+    k2=positive,
+)
 def gear_scales(
     scaling: Scaling = "consistent",
     *,
@@ -138,12 +147,6 @@ def gear_scales(
     >>> f"{scales.inertia:.9g} {scales.damping:.9g} {scales.time:.9g}"
     '0.023915592 1.31222049 0.0182252846'
     """
-    if scaling not in SCALINGS:
-        raise unknown_name("scaling", scaling, SCALINGS)
-    values = {"J_i": J_i, "J_o": J_o, "N": N, "xi": xi, "K_HD": K_HD, "k2": k2}
-    for name, value in values.items():
-        if not (math.isfinite(value) and value > 0):
-            raise ArgumentError(f"{name}: expected a positive number, received {value!r}")
     inertia = N**2 * J_i * J_o / (N**2 * J_i + J_o)
     damping = 2.0 * xi * math.sqrt(inertia * K_HD)
     angle = damping / math.sqrt(k2 * inertia)
@@ -152,6 +155,17 @@ def gear_scales(
     )
 
 
+@takes(
+    scaling=word("scaling", SCALINGS),
+    J_i=positive,
+    J_o=positive,
+    k1=finite,
+    phi=finite,
+    T_m=finite,
+    T_am=finite,
+    omega=finite,
+    D=finite,
+)
 def harmonic_gear_physical(
     scaling: Scaling = "consistent",
     *,

@@ -1,0 +1,299 @@
+"""What an argument may be: a check for each kind, and the decorator that applies them."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import os
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
+from types import FunctionType
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError, unknown_name
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+#: Takes the name of an argument and what was received; returns what the function is given.
+Check = Callable[[str, Any], Any]
+
+#: The longest text of a value that an error quotes.
+QUOTED = 60
+
+#: The kinds of arrays that hold real numbers; "O" may, and is tried.
+_REAL = "iufO"
+
+
+def takes(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Check arguments before a function is entered.
+
+    An argument whose default is None may be None.
+
+    Parameters
+    ----------
+    **checks : callable
+        Argument to its check; that of ``*args`` is applied to each of them, that of
+        ``**kwargs`` to all of them as one mapping.
+
+    Examples
+    --------
+    >>> @takes(eps=positive)
+    ... def step(eps=None):
+    ...     return eps
+    >>> step(eps=-1)
+    Traceback (most recent call last):
+    ...
+    fastslow.errors.ArgumentError: eps = -1; expected a positive number
+    >>> step(2), step()
+    (2.0, None)
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        parameters = inspect.signature(function).parameters
+        unknown = checks.keys() - parameters.keys()
+        assert not unknown, f"{function.__qualname__} has no argument {unknown}"
+        names = tuple(parameters)
+        optional = {name for name in checks if parameters[name].default is None}
+        kinds = {parameters[n].kind: n for n in checks}
+        listed = kinds.get(inspect.Parameter.VAR_POSITIONAL)
+        extra = kinds.get(inspect.Parameter.VAR_KEYWORD)
+
+        def checked(*args: Any, **kwargs: Any) -> Any:
+            given = list(args)
+            for k, value in enumerate(given):
+                name = names[k] if listed is None and k < len(names) else listed
+                if name in checks and not (value is None and name in optional):
+                    given[k] = checks[name](name, value)
+            for name in kwargs.keys() & checks.keys():
+                if not (kwargs[name] is None and name in optional):
+                    kwargs[name] = checks[name](name, kwargs[name])
+            if extra is not None:
+                rest = {n: v for n, v in kwargs.items() if n not in names}
+                kwargs |= checks[extra](extra, rest)
+            return function(*given, **kwargs)
+
+        # with the function's own globals, by which doctest knows where an example belongs
+        own = FunctionType(
+            checked.__code__, function.__globals__, function.__name__, None, checked.__closure__
+        )
+        return wraps(function)(own)
+
+    return decorate
+
+
+def shown(value: object) -> str:
+    """What was received, as an error quotes it: a short value itself, else what it is.
+
+    Examples
+    --------
+    >>> shown("omga"), shown(np.zeros((40, 3)))
+    ("'omga'", 'a ndarray of shape (40, 3)')
+    """
+    if isinstance(value, np.ndarray) and value.size > 4:
+        return f"a ndarray of shape {value.shape}"
+    text = repr(value)
+    return f"a {type(value).__name__}" if len(text) > QUOTED or "\n" in text else text
+
+
+def refusal(name: str, value: object, expected: str) -> ArgumentError:
+    """The error for an argument, to be raised."""
+    return ArgumentError(f"{name} = {shown(value)}; expected {expected}")
+
+
+def real_number(value: object) -> float | None:
+    """A real number as a float, None for anything else: text, a truth value, an array.
+
+    Examples
+    --------
+    >>> real_number(np.float32(0.5)), real_number("0.5"), real_number(True), real_number(1j)
+    (0.5, None, None, None)
+    """
+    if isinstance(value, bool | np.bool_ | str | bytes | bytearray | complex | np.complexfloating):
+        return None
+    if (
+        getattr(value, "ndim", 0)
+        or getattr(getattr(value, "dtype", None), "kind", "f") not in _REAL
+    ):
+        return None
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except OverflowError:
+        return math.inf
+    except (TypeError, ValueError):
+        return None
+
+
+def finite(name: str, value: Any, expected: str = "a finite number") -> float:
+    """One finite number."""
+    result = real_number(value)
+    if result is None or not math.isfinite(result):
+        raise refusal(name, value, expected)
+    return result
+
+
+def positive(name: str, value: Any) -> float:
+    """One finite number above zero."""
+    result = finite(name, value, "a positive number")
+    if result <= 0:
+        raise refusal(name, value, "a positive number")
+    return result
+
+
+def whole(least: int, most: int | None = None) -> Check:
+    """A whole number within bounds."""
+
+    def check(name: str, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int | np.integer):
+            raise refusal(name, value, "a whole number")
+        if value < least or (most is not None and value > most):
+            limits = f"at least {least}" if most is None else f"from {least} to {most}"
+            raise refusal(name, value, limits)
+        return int(value)
+
+    return check
+
+
+def tolerance(name: str, value: Any) -> float:
+    """A tolerance between rounding and 0.1."""
+    result = positive(name, value)
+    if not 1e-16 <= result <= 0.1:
+        raise refusal(name, value, "a number from 1e-16 to 0.1")
+    return result
+
+
+def flag(name: str, value: Any) -> bool:
+    """True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise refusal(name, value, "True or False")
+    return bool(value)
+
+
+def text(name: str, value: Any) -> str:
+    """A string."""
+    if not isinstance(value, str):
+        raise refusal(name, value, "text")
+    return value
+
+
+def formula(name: str, value: Any) -> Any:
+    """A name or an expression: text, or what SymPy makes of it."""
+    if not isinstance(value, str) and not hasattr(value, "free_symbols"):
+        raise refusal(name, value, "a name or an expression, as text or in SymPy")
+    return value
+
+
+def word(kind: str, valid: Iterable[str]) -> Check:
+    """One of some words."""
+    known = tuple(valid)
+
+    def check(name: str, value: Any) -> str:
+        if not isinstance(value, str) or value not in known:
+            raise unknown_name(kind, value if isinstance(value, str) else shown(value), known)
+        return value
+
+    return check
+
+
+def interval(name: str, value: Any) -> tuple[float, float]:
+    """Two finite numbers, the lower one first."""
+    expected = "two finite numbers, the lower one first"
+    try:
+        low, high = (real_number(end) for end in value)
+    except (TypeError, ValueError):
+        raise refusal(name, value, expected) from None
+    if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
+        raise refusal(name, value, expected)
+    if low >= high:
+        hint = f"; did you mean ({high:g}, {low:g})?" if low > high else ""
+        raise refusal(name, value, expected + hint)
+    return low, high
+
+
+def numbers(name: str, value: Any) -> NDArray[np.float64]:
+    """An array of real numbers, of any shape; they need not be finite."""
+    try:
+        raw = np.asarray(value)
+        if raw.dtype.kind not in _REAL or any(
+            isinstance(item, bool | str | bytes) for item in raw.flat if raw.dtype.kind == "O"
+        ):
+            raise TypeError
+        return np.array(raw, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise ArgumentError(f"{name}: expected numbers, received {shown(value)}") from None
+
+
+def finite_numbers(name: str, value: Any) -> NDArray[np.float64]:
+    """An array of finite numbers, of any shape."""
+    values = numbers(name, value)
+    if not np.isfinite(values).all():
+        raise refusal(name, value, "finite numbers")
+    return values
+
+
+def mapping(name: str, value: Any) -> Any:
+    """A mapping, such as a dict."""
+    if not isinstance(value, Mapping):
+        raise refusal(name, value, "a mapping, such as {name: value}")
+    return value
+
+
+def function(name: str, value: Any) -> Any:
+    """Something that can be called."""
+    if not callable(value):
+        raise refusal(name, value, "a function")
+    return value
+
+
+def path(name: str, value: Any) -> Any:
+    """Where a file is: text or a path."""
+    plain = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not isinstance(plain, str) or not plain or "\0" in plain:
+        raise refusal(name, value, "the path of a file")
+    return value
+
+
+def instance(*kinds: type) -> Check:
+    """An object of one of some classes."""
+    names = " or ".join(kind.__name__ for kind in kinds)
+
+    def check(name: str, value: Any) -> Any:
+        if not isinstance(value, kinds):
+            received = shown(value) if value is None else f"a {type(value).__name__}"
+            article = "an" if names[0] in "AEIO" else "a"
+            raise ArgumentError(f"{name}: expected {article} {names}, received {received}")
+        return value
+
+    return check
+
+
+def items(check: Check) -> Check:
+    """Several, each of one kind."""
+
+    def checked(name: str, value: Any) -> tuple[Any, ...]:
+        if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+            raise refusal(name, value, "a sequence")
+        try:
+            return tuple(check(f"{name}[{k}]", item) for k, item in enumerate(value))
+        except TypeError:
+            # an array without dimension says that it can be iterated over
+            raise refusal(name, value, "a sequence") from None
+
+    return checked
+
+
+def either(*checks: Check) -> Check:
+    """What one of several checks accepts; otherwise the error of the last."""
+
+    def checked(name: str, value: Any) -> Any:
+        for check in checks[:-1]:
+            try:
+                return check(name, value)
+            except ArgumentError:
+                continue
+        return checks[-1](name, value)
+
+    return checked
