@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         FileError,
         MissingPackageError,
         ModelError,
+        OutOfRangeError,
         UnknownNameError,
     )
     from fastslow.model.model import Model
@@ -73,6 +74,7 @@ _HOME = {
     "MissingPackageError": "errors",
     "Model": "model.model",
     "ModelError": "errors",
+    "OutOfRangeError": "errors",
     "Overlay": "results.overlays",
     "PointBranch": "results.point_branches",
     "RefinedMap": "results.refined_maps",
@@ -125,6 +127,7 @@ __all__ = [
     "MissingPackageError",
     "Model",
     "ModelError",
+    "OutOfRangeError",
     "Overlay",
     "PointBranch",
     "RefinedMap",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Set
 from functools import wraps
 from types import FunctionType
 from typing import Any, ParamSpec, TypeVar
@@ -13,7 +13,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import ArgumentError, OutOfRangeError, unknown_name
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -135,6 +135,19 @@ def finite(name: str, value: Any, expected: str = "a finite number") -> float:
     return result
 
 
+def within(low: float, high: float) -> Check:
+    """One number between bounds, these included."""
+
+    def check(name: str, value: Any) -> float:
+        expected = f"a number from {low:g} to {high:g}"
+        result = finite(name, value, expected)
+        if not low <= result <= high:
+            raise refusal(name, value, expected)
+        return result
+
+    return check
+
+
 def positive(name: str, value: Any) -> float:
     """One finite number above zero."""
     result = finite(name, value, "a positive number")
@@ -163,6 +176,19 @@ def tolerance(name: str, value: Any) -> float:
     if not 1e-16 <= result <= 0.1:
         raise refusal(name, value, "a number from 1e-16 to 0.1")
     return result
+
+
+def among(*values: Any) -> Check:
+    """One of some numbers, or None where it is among them."""
+    expected = ", ".join(map(repr, values[:-1])) + f" or {values[-1]!r}"
+
+    def check(name: str, value: Any) -> Any:
+        known = value is None or type(value) is int or isinstance(value, np.integer)
+        if not known or value not in values:
+            raise refusal(name, value, expected)
+        return value
+
+    return check
 
 
 def flag(name: str, value: Any) -> bool:
@@ -202,6 +228,8 @@ def interval(name: str, value: Any) -> tuple[float, float]:
     """Two finite numbers, the lower one first."""
     expected = "two finite numbers, the lower one first"
     try:
+        if isinstance(value, str | bytes | Set | Mapping):
+            raise TypeError
         low, high = (real_number(end) for end in value)
     except (TypeError, ValueError):
         raise refusal(name, value, expected) from None
@@ -211,6 +239,21 @@ def interval(name: str, value: Any) -> tuple[float, float]:
         hint = f"; did you mean ({high:g}, {low:g})?" if low > high else ""
         raise refusal(name, value, expected + hint)
     return low, high
+
+
+def position(key: Any, count: int, what: str) -> int:
+    """A place in a sequence by its number, counted from the end where it is negative.
+
+    Raises
+    ------
+    OutOfRangeError
+        For a place that there is not.
+    """
+    place = int(key)
+    if not -count <= place < count:
+        there = f"the last of {count} is {count - 1}" if count else "there is none"
+        raise OutOfRangeError(f"no {what} {shown(place)}; {there}")
+    return place % count
 
 
 def numbers(name: str, value: Any) -> NDArray[np.float64]:
@@ -270,17 +313,20 @@ def instance(*kinds: type) -> Check:
     return check
 
 
-def items(check: Check) -> Check:
-    """Several, each of one kind."""
+def items(check: Check | None = None) -> Check:
+    """Several, each of one kind where a check says which."""
 
     def checked(name: str, value: Any) -> tuple[Any, ...]:
-        if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+        if isinstance(value, str | bytes | Set | Mapping) or not isinstance(value, Iterable):
             raise refusal(name, value, "a sequence")
         try:
-            return tuple(check(f"{name}[{k}]", item) for k, item in enumerate(value))
+            found = tuple(value)
         except TypeError:
             # an array without dimension says that it can be iterated over
             raise refusal(name, value, "a sequence") from None
+        if check is None:
+            return found
+        return tuple(check(f"{name}[{k}]", item) for k, item in enumerate(found))
 
     return checked
 

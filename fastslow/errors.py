@@ -25,6 +25,10 @@ class ArgumentError(FastSlowError, ValueError):
     """An argument has the wrong value, shape or range."""
 
 
+class OutOfRangeError(FastSlowError, IndexError):
+    """A number in a sequence that there is not: of a branch, a row, a special point."""
+
+
 class FileError(FastSlowError, OSError):
     """A file cannot be written or read: it is missing, cut short, foreign or newer."""
 

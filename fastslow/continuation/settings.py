@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
+from fastslow.arguments import positive, whole
 from fastslow.errors import ArgumentError
+
+#: What is counted; everything else is measured.
+COUNTS = {
+    "iterations": whole(1, 10**6),
+    "points": whole(2, 10**9),
+    "starts": whole(0, 10**6),
+    "branches": whole(1, 10**6),
+}
 
 
 @dataclass(frozen=True)
@@ -54,12 +63,8 @@ class Continuation:
 
     def __post_init__(self) -> None:
         for entry in fields(self):
-            value = getattr(self, entry.name)
-            least = 0 if entry.name == "starts" else None
-            if not (value >= 0 if least == 0 else value > 0):
-                raise ArgumentError(
-                    f"Continuation({entry.name}={value!r}): expected a positive number"
-                )
+            check = COUNTS.get(entry.name, positive)
+            object.__setattr__(self, entry.name, check(entry.name, getattr(self, entry.name)))
         if not self.smallest_step <= self.step <= self.largest_step:
             raise ArgumentError(
                 "Continuation: expected smallest_step ≤ step ≤ largest_step, received "

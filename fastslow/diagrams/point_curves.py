@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, formula, instance, interval, items, mapping, takes
+from fastslow.arguments import flag, formula, instance, interval, items, mapping, takes, text
 from fastslow.continuation import curves
 from fastslow.continuation.curves import Frame
 from fastslow.continuation.settings import Continuation
@@ -45,6 +45,7 @@ CURVES = {
     point=instance(SpecialPoint),
     parameters=items(formula),
     over=mapping,
+    code=text,
     settings=instance(Continuation),
     virtual=flag,
 )

@@ -11,7 +11,15 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite_numbers, flag, formula, instance, interval, takes
+from fastslow.arguments import (
+    finite,
+    flag,
+    formula,
+    instance,
+    interval,
+    items,
+    takes,
+)
 from fastslow.continuation.loops import loop
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.assembly import Curve, branch_of, joined, rising
@@ -43,7 +51,7 @@ ADMISSIBLE = Outcome(
     parameter=formula,
     over=interval,
     settings=instance(Continuation),
-    marks=finite_numbers,
+    marks=items(finite),
     virtual=flag,
 )
 def continue_equilibria(

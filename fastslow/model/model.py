@@ -14,7 +14,7 @@ from fastslow.arguments import formula, mapping, real_number, shown, takes
 from fastslow.errors import ModelError, unknown_name
 from fastslow.model.interfaces import Interface, Region, vanishes_on
 from fastslow.model.periods import common_period
-from fastslow.model.structure import TIME, Structure, read_structure, real
+from fastslow.model.structure import TIME, Structure, read_expression, read_structure, real
 from fastslow.results.named import Named
 
 Written = Mapping[Any, Any]
@@ -216,8 +216,7 @@ class Model:
         for key, law in (slow or {}).items():
             if str(key) not in quantities:
                 raise unknown_name("slow quantity", key, quantities)
-            law = sp.sympify(law)
-            path[str(key)] = law.xreplace({s: real(s.name) for s in law.free_symbols})
+            path[str(key)] = read_expression(f"path of {key}", law)
         return self._from(*self.structure.frozen(path, self.parameters))
 
     @takes(name=formula)

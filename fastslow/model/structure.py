@@ -9,6 +9,7 @@ from typing import Any
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
+from fastslow.arguments import shown
 from fastslow.errors import ModelError, unknown_name
 from fastslow.model.geometry import Pattern, affine_rows, possible_patterns
 from fastslow.model.interfaces import Interface, Region
@@ -234,16 +235,46 @@ def read_structure(
     )
 
 
-def _checked(what: str, expression: Any, known: set[str]) -> sp.Expr:
+def _read(given: Any) -> Any:
+    """What SymPy makes of an expression or its text, None where it makes nothing of it."""
     try:
-        written = sp.sympify(expression)
-    except (sp.SympifyError, TypeError, SyntaxError):
-        written = None
-    if not isinstance(written, sp.Expr):
-        raise ModelError(f"{what}: expected an expression, received {expression!r}")
+        return sp.sympify(given)
+    except Exception:
+        # SymPy hands text to Python, and anything may come back
+        return None
+
+
+def sympified(what: str, given: Any) -> sp.Expr:
+    """An expression as SymPy reads it.
+
+    Raises
+    ------
+    ModelError
+        For what is no expression.
+    """
+    expression = _read(given)
+    if not isinstance(expression, sp.Expr):
+        raise ModelError(f"{what}: expected an expression, received {shown(given)}")
+    return expression
+
+
+def read_expression(what: str, expression: Any) -> sp.Expr:
+    """An expression in real symbols.
+
+    Raises
+    ------
+    ModelError
+        For what is no expression, or not finite and real.
+    """
+    written = sympified(what, expression)
     written = written.xreplace({s: real(s.name) for s in written.free_symbols})
     if written.has(sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I):
         raise ModelError(f"{what}: expected a finite real expression, received {written}")
+    return written
+
+
+def _checked(what: str, expression: Any, known: set[str]) -> sp.Expr:
+    written = read_expression(what, expression)
     for symbol in sorted(written.free_symbols, key=lambda s: s.name):
         if symbol.name not in known:
             reason = unknown_name("symbol", symbol.name, sorted(known))
@@ -267,12 +298,9 @@ def _irreducible(name: str, function: sp.Expr, moving: Sequence[sp.Symbol]) -> s
 
 
 def _checked_condition(what: str, condition: Any, known: set[str]) -> Boolean:
-    try:
-        written = sp.sympify(condition)
-    except (sp.SympifyError, TypeError, SyntaxError):
-        written = None
+    written = _read(condition)
     if not isinstance(written, Boolean):
-        raise ModelError(f"{what}: expected a condition such as x > D, received {condition!r}")
+        raise ModelError(f"{what}: expected a condition such as x > D, received {shown(condition)}")
     for symbol in sorted(written.free_symbols, key=lambda s: s.name):
         if symbol.name not in known:
             raise ModelError(f"{what}: {unknown_name('symbol', symbol.name, sorted(known))}")

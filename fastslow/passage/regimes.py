@@ -154,7 +154,12 @@ def _values(
 ) -> Callable[[Floats, Floats], dict[str, Any]]:
     """A function from values along the axes to values of the model's parameters."""
     if callable(parameters):
-        return lambda *arrays: {str(k): v for k, v in parameters(*arrays).items()}
+
+        def given(*arrays: Floats) -> dict[str, Any]:
+            returned = mapping("what parameters returns", parameters(*arrays))
+            return {str(name): values for name, values in returned.items()}
+
+        return given
     laws = {str(name): str(law) for name, law in (parameters or {}).items()}
     for name in laws:
         if name not in model.parameters:

@@ -93,7 +93,7 @@ def slow_load_gap(
     rate, c, k = (
         _positive("omega", omega),
         _positive("damping", damping),
-        _positive("stiffness", stiffness),
+        _positive("stiffness", stiffness, rigid=True),
     )
     mean, swing, rate, c, k = np.broadcast_arrays(mean, swing, rate, c, k)
     result = np.asarray((_exact if exact else _expanded)(mean, swing, rate, c, k))
@@ -290,8 +290,8 @@ def _quotient(B: Floats, C: Floats) -> Floats:
     return np.where(C > B, B / np.where(C > B, C, 1.0), 1.0)
 
 
-def _positive(name: str, given: ArrayLike) -> Floats:
-    values = numbers(name, given)
+def _positive(name: str, given: ArrayLike, rigid: bool = False) -> Floats:
+    values = (numbers if rigid else finite_numbers)(name, given)
     if not np.all(values > 0.0):
         raise ArgumentError(f"{name} = {shown(given)}; expected positive numbers")
     return values

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 from matplotlib.colors import is_color_like
 from matplotlib.lines import Line2D
 
-from fastslow.arguments import refusal, shown
+from fastslow.arguments import finite, items, mapping, numbers, refusal, shown
 from fastslow.errors import ArgumentError, unknown_name
 
 
@@ -30,6 +31,8 @@ def line_style(name: str, value: Mapping[str, Any]) -> Mapping[str, Any]:
         For a value that its property cannot have.
     """
     for key, entry in value.items():
+        if isinstance(entry, float) and not math.isfinite(entry):
+            raise refusal(key, entry, "a finite number")
         try:
             Line2D([], []).set(**{key: entry})
         except AttributeError:
@@ -38,6 +41,42 @@ def line_style(name: str, value: Mapping[str, Any]) -> Mapping[str, Any]:
             if key not in valid:
                 raise unknown_name("property of a line", key, valid) from None
             raise refusal(key, entry, f"a {key} of a line") from None
-        except (TypeError, ValueError, KeyError) as error:
+        except (TypeError, ValueError, KeyError, OverflowError) as error:
             raise ArgumentError(f"{key} = {shown(entry)}: {error}") from None
     return value
+
+
+def levels_of_states(name: str, value: Any) -> Mapping[str, tuple[str, float]]:
+    """Interfaces with the state and the value where each is, as `Diagram.interface_values`."""
+    given = mapping(name, value)
+    return {str(key): _level(f"{name}[{key!r}]", entry) for key, entry in given.items()}
+
+
+def _level(name: str, value: Any) -> tuple[str, float]:
+    if not isinstance(value, tuple | list) or len(value) != 2 or not isinstance(value[0], str):
+        raise refusal(name, value, "a state and its value")
+    return value[0], finite(name, value[1])
+
+
+def points_in_plane(name: str, value: Any) -> Mapping[str, tuple[float, float]]:
+    """Texts with a point each."""
+    return {str(key): _point(f"{name}[{key!r}]", at) for key, at in mapping(name, value).items()}
+
+
+def _point(name: str, value: Any) -> tuple[float, float]:
+    both = items(finite)(name, value)
+    if len(both) != 2:
+        raise refusal(name, value, "two numbers")
+    return both[0], both[1]
+
+
+def lines_in_plane(name: str, value: Any) -> Mapping[str, Any]:
+    """Texts with the two columns of a line each, which may have gaps of NaN."""
+    return {str(key): _line(f"{name}[{key!r}]", line) for key, line in mapping(name, value).items()}
+
+
+def _line(name: str, value: Any) -> tuple[Any, ...]:
+    both = items(numbers)(name, value)
+    if len(both) != 2 or both[0].ndim != 1 or both[0].shape != both[1].shape:
+        raise refusal(name, value, "two columns of equal length")
+    return both

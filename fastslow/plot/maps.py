@@ -16,7 +16,8 @@ from matplotlib.text import Annotation, Text
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import flag, instance, mapping, takes
-from fastslow.plot.arguments import line_style
+from fastslow.errors import unknown_name
+from fastslow.plot.arguments import line_colour, line_style, lines_in_plane, points_in_plane
 from fastslow.plot.labels import key, place, settle, tag
 from fastslow.plot.style import BLACK, GREY, SMALL, VERMILION, Drawing, axes_for, typeset
 from fastslow.results.refined_maps import FAILED, RefinedMap
@@ -73,8 +74,8 @@ class MapDrawing(Drawing):
 @takes(
     result=instance(RefinedMap),
     ax=instance(Axes),
-    curves=mapping,
-    marks=mapping,
+    curves=lines_in_plane,
+    marks=points_in_plane,
     fills=mapping,
     label=flag,
     legend=flag,
@@ -170,6 +171,10 @@ def regime_map(
 
 
 def _colours(result: RefinedMap, fills: Mapping[Any, str]) -> dict[Any, str]:
+    for word, fill in fills.items():
+        if word not in result.labels:
+            raise unknown_name("label", word, result.labels)
+        line_colour(f"fills[{word!r}]", fill)
     known = {**FILLS, **fills}
     others = [word for word in result.labels if word not in known]
     turn = {word: OTHERS[k % len(OTHERS)] for k, word in enumerate(others)}

@@ -13,9 +13,9 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Annotation, Text
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, formula, instance, items, mapping, takes, whole
+from fastslow.arguments import flag, formula, instance, items, takes, whole
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.plot.arguments import line_colour, line_style
+from fastslow.plot.arguments import levels_of_states, line_colour, line_style
 from fastslow.plot.arrows import draw_arrows, length_along
 from fastslow.plot.bands import Bands, Values, draw_bands
 from fastslow.plot.labels import settle
@@ -68,7 +68,7 @@ class MotionDrawing(Drawing):
     x=formula,
     ax=instance(Axes),
     crossings=flag,
-    interfaces=mapping,
+    interfaces=levels_of_states,
     phases=items(instance(Phase)),
     color=line_colour,
     style=line_style,
@@ -137,8 +137,8 @@ def time_series(
     y=formula,
     ax=instance(Axes),
     crossings=flag,
-    interfaces=mapping,
-    arrows=whole(0),
+    interfaces=levels_of_states,
+    arrows=whole(0, 1000),
     color=line_colour,
     style=line_style,
 )

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.patches import Patch
 
-from fastslow.arguments import formula, instance, path, positive, takes, text
+from fastslow.arguments import formula, instance, path, takes, text, within
 from fastslow.errors import unknown_name
 from fastslow.plot.labels import legend_below, place, settle
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
@@ -41,7 +41,7 @@ class PanelDrawing:
     overlay: OverlayDrawing
     legend: Legend
 
-    @takes(path=path, dpi=positive)
+    @takes(path=path, dpi=within(10.0, 10_000.0))
     def save(self, path: str | Path, dpi: float = 300) -> Path:
         """Write the figure, in the format of the suffix, with text kept as text.
 
@@ -62,7 +62,7 @@ class PanelDrawing:
         return self.overlay._repr_png_()
 
 
-@takes(lay=instance(Overlay), state=formula, title=text, width=positive)
+@takes(lay=instance(Overlay), state=formula, title=text, width=within(2.0, 40.0))
 def panel(
     lay: Overlay, state: object = None, *, title: str = "", width: float = FULL
 ) -> PanelDrawing:

@@ -11,7 +11,8 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fastslow.arguments import path, positive, takes
+from fastslow.arguments import path, takes, within, word
+from fastslow.errors import FileError
 
 # M. Okabe and K. Ito, Color Universal Design, 2008
 BLACK, ORANGE, GREEN = "#000000", "#E69F00", "#009E73"
@@ -158,7 +159,7 @@ class Drawing:
         """The figure that holds the axes."""
         return root(self.ax)
 
-    @takes(path=path, dpi=positive)
+    @takes(path=path, dpi=within(10.0, 10_000.0))
     def save(self, path: str | Path, dpi: float = 300) -> Path:
         """Write the figure, in the format of the suffix, with text kept as text.
 
@@ -191,6 +192,13 @@ def root(ax: Axes) -> Figure:
 
 def save(figure: Figure, path: str | Path, dpi: float = 300) -> Path:
     """Write a figure with fonts that editors and journals can read."""
-    with rc_context({"pdf.fonttype": 42, "svg.fonttype": "none"}):
-        figure.savefig(path, dpi=dpi)
-    return Path(path)
+    target = Path(path)
+    word("figure format", sorted(figure.canvas.get_supported_filetypes()))(
+        "path", target.suffix.removeprefix(".").lower()
+    )
+    try:
+        with rc_context({"pdf.fonttype": 42, "svg.fonttype": "none"}):
+            figure.savefig(target, dpi=dpi)
+    except OSError as error:
+        raise FileError(f"{target} cannot be written: {error.strerror or error}") from error
+    return target

@@ -10,7 +10,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, formula, takes, text
+from fastslow.arguments import flag, formula, position, takes, text
 from fastslow.errors import unknown_name
 from fastslow.results import formulas, selecting, stretches
 from fastslow.results.levels import Pieces, asked, chosen, passages, pieces_of, stored
@@ -152,13 +152,13 @@ class Branch(Table, Result):
             For a name that is no state and no parameter.
         ArgumentError
             For text that is no expression, or a slice that holds no row or leaves some out.
-        IndexError
+        OutOfRangeError
             For a row that there is not.
         """
         if isinstance(key, slice):
             return selecting.rows_of(self, key)
-        if isinstance(key, int | np.integer):
-            return stored(self, range(len(self))[key], self.parameters)
+        if isinstance(key, int | np.integer) and not isinstance(key, bool):
+            return stored(self, position(key, len(self), "row"), self.parameters)
         columns = {n: self._state(k) for k, n in enumerate(self.states)}
         columns[self.parameter_name] = lambda: self.parameter
         return formulas.column(key, columns, self.parameters, len(self))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import unknown_name
 from fastslow.results.result import Result
 from fastslow.results.sections import period_of, window_of
 
@@ -63,8 +63,6 @@ def count_hits(
     """Crossings of an interface; see `Trajectory.hits`."""
     if str(interface) not in run.interfaces:
         raise unknown_name("interface", interface, run.interfaces)
-    if direction not in (None, -1, 1):
-        raise ArgumentError(f"direction = {direction!r}; expected -1, 1 or None")
     up, down = _counts(run, window)[run.interfaces.index(str(interface))]
     return int({1: up, -1: down, None: up + down}[direction])
 

@@ -10,7 +10,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, takes, text, whole
+from fastslow.arguments import flag, position, takes, text, whole
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results import formulas, stretches
 from fastslow.results.branches import Branch
@@ -108,11 +108,11 @@ class Diagram(Table, Result):
             For a name that is no state and no parameter.
         ArgumentError
             For text that is no expression.
-        IndexError
+        OutOfRangeError
             For a branch that there is not.
         """
-        if isinstance(key, int | np.integer):
-            return self.branches[key]
+        if isinstance(key, int | np.integer) and not isinstance(key, bool):
+            return self.branches[position(key, len(self), "branch")]
         names = (*self.states, self.parameter)
         columns = {name: partial(self._joined, name) for name in names}
         count = sum(map(len, self.branches))

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import instance
 from fastslow.errors import ArgumentError, unknown_name
 
 Array = NDArray[np.float64]
@@ -33,6 +34,7 @@ class Curve(Protocol):
 
 def intersections(one: Curve, other: Curve, names: tuple[str, str]) -> Array:
     """Points common to two curves in a plane; see `Branch.intersections`."""
+    instance(type(one))("other", other)
     if one is other:
         raise ArgumentError("expected another curve; every point of a curve is common with itself")
     if names[0] == names[1]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastslow.arguments import position
 from fastslow.errors import unknown_name
 from fastslow.results.markup import points_html
 from fastslow.results.point_columns import columns_of_points
@@ -370,7 +371,7 @@ class SpecialPoints(Table, Result, tuple[SpecialPoint, ...]):
 
     def __call__(self, code: str) -> SpecialPoints:
         """Those of one code; UnknownNameError for a code that there is not."""
-        if code not in CODE_NAMES:
+        if not isinstance(code, str) or code not in CODE_NAMES:
             raise unknown_name("special point code", code, CODE_NAMES)
         return SpecialPoints(point for point in self if point.code == code)
 
@@ -378,8 +379,8 @@ class SpecialPoints(Table, Result, tuple[SpecialPoint, ...]):
         """A point by number, some by a slice, or a column by the name of a state or parameter."""
         if isinstance(key, slice):
             return SpecialPoints(tuple.__getitem__(self, key))
-        if hasattr(key, "__index__"):
-            return tuple.__getitem__(self, key)
+        if isinstance(key, int | np.integer) and not isinstance(key, bool):
+            return tuple.__getitem__(self, position(key, len(self), "special point"))
         return np.array([point[key] for point in self], dtype=float)
 
     def to_dict(self) -> dict[str, NDArray[Any]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
-from fastslow.arguments import finite, formula, positive, takes, text, whole
+from fastslow.arguments import among, finite, formula, positive, takes, text, whole
 from fastslow.results.sections import (
     Section,
     poincare_section,
@@ -59,7 +59,14 @@ class Recurrence:
         """
         return stroboscopic_section(self._run, period, phase, since)
 
-    @takes(expression=formula, level=finite, interface=formula, since=finite, until=finite)
+    @takes(
+        expression=formula,
+        level=finite,
+        direction=among(-1, 0, 1, None),
+        interface=formula,
+        since=finite,
+        until=finite,
+    )
     def section(
         self,
         expression: object = None,
@@ -135,7 +142,7 @@ class Recurrence:
         """
         return spectrum_of(self._run, name, since, window, samples)
 
-    @takes(period=positive, tol=positive, most=whole(1))
+    @takes(period=positive, tol=positive, most=whole(1, 10**6))
     def steady(self, period: float | None = None, tol: float = 1e-6, most: int = 16) -> SteadyState:
         """After how many periods the states repeat, and from which time on.
 

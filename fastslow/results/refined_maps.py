@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import function, takes
+from fastslow.arguments import function, items, shown, takes
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.map_boundaries import MapBoundary, MapEdges, boundaries_of
 from fastslow.results.outcome import Outcome
@@ -152,8 +152,8 @@ class RefinedMap(Result):
             For a label that is not in the map.
         """
         for label in (one, other):
-            if label not in self.labels:
-                raise unknown_name("label", label, self.labels)
+            if not isinstance(label, str | bool | int) or label not in self.labels:
+                raise unknown_name("label", shown(label), self.labels)
         found = [b for b in self.boundaries if set(b.labels) == {one, other}]
         return tuple(sorted(found, key=lambda b: -len(b.points)))
 
@@ -206,7 +206,7 @@ class RefinedMap(Result):
             If it returns another number of labels.
         """
         points = self.points
-        predicted = list(predict(points[:, 0], points[:, 1]))
+        predicted = items()("what predict returns", predict(points[:, 0], points[:, 1]))
         if len(predicted) != len(points):
             raise ArgumentError(
                 f"the prediction has {len(predicted)} labels for {len(points)} points"
@@ -328,6 +328,8 @@ def label_of(value: Any) -> tuple[Label, str]:
     """
     if isinstance(value, np.generic):
         value = value.item()
+    if isinstance(value, np.ndarray | Sequence) and not isinstance(value, str):
+        raise ArgumentError(f"{shown(value)} is no label of a map; expected one for each point")
     if value is None or value != value:
         return FAILED, "no outcome"
     if isinstance(value, Exception) or (isinstance(value, Outcome) and not value):

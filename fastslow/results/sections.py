@@ -21,8 +21,6 @@ from fastslow.results.tables import Table
 if TYPE_CHECKING:
     from fastslow.results.trajectories import Trajectory
 
-DIRECTIONS = (None, -1, 0, 1)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Section(Table, Result):
@@ -129,8 +127,6 @@ def poincare_section(
     window: tuple[float, float],
 ) -> Section:
     """Points on a level or an interface; see `Trajectory.section`."""
-    if direction not in DIRECTIONS:
-        raise ArgumentError(f"direction = {direction!r}; expected -1, 0, 1 or None")
     if (expression is None) == (interface is None):
         received = "both" if interface is not None else "neither"
         raise ArgumentError(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import items, real_number, refusal
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.outcome import Outcome
 from fastslow.results.points import CODE_NAMES, SpecialPoints
@@ -102,10 +102,8 @@ def limits_of(between: tuple[float, float]) -> tuple[float, float]:
     ArgumentError
         For anything else.
     """
-    try:
-        low, high = (float(v) for v in between)
-    except (TypeError, ValueError):
-        low = high = math.nan
-    if not low <= high:
-        raise ArgumentError(f"between={between!r}; expected two numbers, the lower one first")
+    ends = [real_number(end) for end in items()("between", between)]
+    low, high = ends if len(ends) == 2 else (None, None)
+    if low is None or high is None or not low <= high:
+        raise refusal("between", between, "two numbers, the lower one first")
     return low, high

@@ -97,12 +97,13 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
     states = section.table[: len(run.states)] / scale[:, None]
     smallest = np.inf
     for multiple in range(1, most + 1):
+        if multiple >= len(section):
+            break
         change = np.abs(states[:, multiple:] - states[:, :-multiple]).max(axis=0)
         wrong = np.flatnonzero(change > tol)
         first = int(wrong[-1]) + 1 if len(wrong) else 0
         agreeing = change[first:]
-        if len(change):
-            smallest = min(smallest, float(change[-max(multiple, 2) :].max()))
+        smallest = min(smallest, float(change[-max(multiple, 2) :].max()))
         # as many repeats as there are points, or the next point might still differ
         if len(agreeing) >= max(multiple, 2):
             length = float(section.times[-1] - section.times[-1 - multiple])

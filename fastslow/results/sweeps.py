@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite, takes
+from fastslow.arguments import takes, within
 from fastslow.errors import ArgumentError
 from fastslow.results.outcome import Outcome
 from fastslow.results.result import Result
@@ -140,7 +140,7 @@ class Sweep(Table, Result):
             if not outcome
         )
 
-    @takes(tol=finite)
+    @takes(tol=within(0.0, 1.0))
     def hysteresis(self, tol: float = 1e-3) -> Array:
         """Intervals of the parameter over which the two passes differ.
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import finite, numbers, positive, takes
+from fastslow.arguments import among, finite, numbers, positive, takes
 from fastslow.results import formulas
 from fastslow.results.contacts import (
     Contacts,
@@ -186,7 +186,7 @@ class Trajectory(Recurrence, Table, Result):
         """The part of the run spent in every region (and in every sliding motion)."""
         return residence_in(self, self.span)
 
-    @takes(since=finite, until=finite)
+    @takes(direction=among(-1, 1, None), since=finite, until=finite)
     def hits(
         self,
         interface: object,

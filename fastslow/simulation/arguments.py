@@ -10,9 +10,12 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.arguments import numbers, positive
+from fastslow.arguments import numbers, positive, whole
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
+
+#: Samples of one run that can be asked for by their number.
+MOST_SAMPLES = 10**8
 
 
 def initial_state(model: Model, start: Any) -> NDArray[np.float64]:
@@ -104,9 +107,7 @@ def sample_times(
     if samples is None:
         return np.empty(0)
     if isinstance(samples, (int, np.integer)) and not isinstance(samples, bool):
-        if samples < 2:
-            raise ArgumentError(f"samples = {samples}; expected at least 2, or an array of times")
-        return np.linspace(*span, int(samples))
+        return np.linspace(*span, whole(2, MOST_SAMPLES)("samples", samples))
     times = np.atleast_1d(numbers("samples", samples))
     if times.ndim != 1 or not np.isfinite(times).all() or np.any(np.diff(times) < 0):
         raise ArgumentError("samples: expected increasing, finite times")

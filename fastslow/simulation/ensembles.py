@@ -82,7 +82,7 @@ _CHUNK = 512
     gap=text,
     max_steps=whole(1, 2**40),
     max_crossings=whole(1, 2**40),
-    threads=whole(1),
+    threads=whole(1, 1024),
     progress=flag,
 )
 def simulate_many(

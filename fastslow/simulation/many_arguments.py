@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import numbers, positive
+from fastslow.arguments import numbers, positive, whole
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.periods import common_periods
 from fastslow.model.structure import TIME, real
+from fastslow.simulation.arguments import MOST_SAMPLES
 
 Floats = NDArray[np.float64]
 
@@ -167,10 +168,9 @@ def times_of(samples: Any, spans: Floats, since: Floats) -> Floats:
         return np.empty((1, 0))
     common = bool(np.all(spans == spans[0]) and np.all(since == since[0]))
     if isinstance(samples, (int, np.integer)) and not isinstance(samples, bool):
-        if samples < 2:
-            raise ArgumentError(f"samples = {samples}; expected at least 2, or an array of times")
+        count = whole(2, MOST_SAMPLES)("samples", samples)
         rows = slice(0, 1) if common else slice(None)
-        times = np.linspace(since[rows], spans[rows, 1], int(samples), axis=1)
+        times = np.linspace(since[rows], spans[rows, 1], count, axis=1)
         return np.ascontiguousarray(times)
     times = np.atleast_1d(numbers("samples", samples))
     if times.ndim != 1 or not np.isfinite(times).all() or np.any(np.diff(times) < 0):

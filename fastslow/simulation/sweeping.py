@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
 from fastslow.arguments import (
+    among,
     finite,
     finite_numbers,
     flag,
@@ -47,6 +48,7 @@ KINDS = ("stroboscopic", "extremes", "section")
     phase=finite,
     section=formula,
     level=finite,
+    direction=among(-1, 0, 1, None),
     back=flag,
     tol=tolerance,
     max_steps=whole(1, 2**40),
@@ -212,8 +214,6 @@ def _rule(settings: _Settings, name: str) -> str:
         raise ArgumentError(f"phase = {settings.phase!r}; expected a part of the period, 0 to 1")
     if settings.what == "section":
         way = {1: " upwards", -1: " downwards", 0: " touching", None: ""}
-        if settings.direction not in way:
-            raise ArgumentError(f"direction = {settings.direction!r}; expected -1, 0, 1 or None")
         passed = f"{settings.section} = {settings.level:g}{way[settings.direction]}"
         return f"{name} where {passed}"
     if settings.what == "extremes":

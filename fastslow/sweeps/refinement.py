@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, function, interval, mapping, positive, takes, whole
+from fastslow.arguments import (
+    flag,
+    function,
+    interval,
+    items,
+    mapping,
+    positive,
+    refusal,
+    takes,
+    whole,
+)
 from fastslow.errors import ArgumentError
 from fastslow.results.map_boundaries import MapEdges
 from fastslow.results.refined_maps import FAILED, Label, RefinedMap, label_of
@@ -87,7 +97,7 @@ def refined_map(
     """
     names, ranges = _ranges(over)
     first = _count("cells", cells, 1)
-    levels, guard = _whole("levels", levels, 0), _whole("guard", guard, 0)
+    levels, guard = whole(0, 60)("levels", levels), whole(0, 10**6)("guard", guard)
     size = 2**levels
     shape = (first[0] * size, first[1] * size)
     if math.prod(shape) > 2**60:
@@ -126,15 +136,11 @@ def _ranges(
 
 
 def _count(what: str, given: Any, least: int) -> tuple[int, int]:
-    try:
-        one, other = given
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{what} = {given!r}; expected two whole numbers") from None
-    return _whole(what, one, least), _whole(what, other, least)
-
-
-def _whole(what: str, given: Any, least: int) -> int:
-    return int(whole(least)(what, given))
+    if not isinstance(given, Sequence | np.ndarray) or len(given) != 2:
+        raise refusal(what, given, "two whole numbers")
+    one, other = given
+    check = whole(least, 2**30)
+    return check(what, one), check(what, other)
 
 
 def _bar(shown: bool) -> Any:
@@ -208,7 +214,7 @@ class _Points:
             raised.append(error)
             self.report(1)
             return [error]
-        values = list(values)
+        values = list(items()("what the function returns", values))
         if len(values) != len(points):
             raise ArgumentError(
                 f"the function returned {len(values)} labels for {len(points)} points"

@@ -9,7 +9,7 @@ import sympy as sp
 
 from fastslow.arguments import mapping, takes
 from fastslow.errors import ArgumentError
-from fastslow.model.structure import real
+from fastslow.model.structure import read_expression, real
 from fastslow.results.named import Named
 from fastslow.symbolic.reading import read_formula
 
@@ -72,8 +72,8 @@ def reduce_to(rates: Mapping[Any, Any], combinations: Mapping[Any, Any]) -> Name
 
 
 def _real(expression: Any) -> sp.Expr:
-    written = read_formula(expression) if isinstance(expression, str) else sp.sympify(expression)
-    return sp.sympify(written.xreplace({s: real(s.name) for s in written.free_symbols}))
+    written = read_formula(expression) if isinstance(expression, str) else expression
+    return read_expression("a formula", written)
 
 
 def _arguments_expanded(expression: sp.Expr) -> sp.Expr:

@@ -8,10 +8,10 @@ from typing import Any
 
 import sympy as sp
 
-from fastslow.arguments import instance, mapping, takes, text
+from fastslow.arguments import formula, instance, items, mapping, refusal, takes, text
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
-from fastslow.model.structure import TIME, real
+from fastslow.model.structure import TIME, real, sympified
 from fastslow.results.named import Named
 from fastslow.symbolic.algebra import light, spread
 from fastslow.symbolic.reading import read_formula
@@ -108,7 +108,7 @@ def nondimensionalise(
     smooth = model.regions[whose].rates
     names = {n: real(n) for n in quantities}
     rows, sides = [], []
-    for state, term in ones:
+    for state, term in items(_pair)("ones", ones):
         if str(state) not in smooth:
             raise unknown_name("state", state, smooth)
         monomial = _formula(term)
@@ -154,8 +154,15 @@ def nondimensionalise(
     )
 
 
+def _pair(name: str, value: Any) -> tuple[Any, ...]:
+    both = items(formula)(name, value)
+    if len(both) != 2:
+        raise refusal(name, value, "a state and a term of its rate")
+    return both
+
+
 def _formula(given: Any) -> sp.Expr:
-    return read_formula(given) if isinstance(given, str) else sp.sympify(given)
+    return read_formula(given) if isinstance(given, str) else sympified("a formula", given)
 
 
 def _coefficient(rate: sp.Expr, monomial: sp.Expr, quantities: Iterable[sp.Symbol]) -> sp.Expr:
@@ -364,7 +371,7 @@ def disagreements(one: Mapping[str, Any], other: Mapping[str, Any]) -> Named[sp.
     for name, value in one.items():
         if name not in other:
             raise unknown_name("entry", name, other)
-        mine, yours = sp.sympify(value), sp.sympify(other[name])
+        mine, yours = sympified(f"entry {name}", value), sympified(f"entry {name}", other[name])
         if not vanishes(mine - yours):
             found[name] = sp.powsimp(sp.cancel(yours / mine))
     return Named("entry", found)

@@ -13,7 +13,7 @@ from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.str import StrPrinter
 
 from fastslow.arguments import instance, mapping, path, takes, text
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import ArgumentError, FileError, unknown_name
 from fastslow.model.interfaces import Region
 from fastslow.model.model import Model, number
 from fastslow.model.structure import TIME, real
@@ -134,9 +134,12 @@ def export(
         files.update(writers[format](model, name, values=values, start=start))
     if path is not None:
         folder = Path(path)
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in files.items():
-            (folder / name).write_text(text, encoding="utf-8")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            for name, text in files.items():
+                (folder / name).write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise FileError(f"{folder} cannot be written: {error.strerror or error}") from error
     return Named("file", files)
 
 

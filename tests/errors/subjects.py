@@ -1,0 +1,372 @@
+"""A good call of every public function: what the tests of bad input spoil, argument by argument."""
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cache
+
+import sympy as sp
+
+import fastslow as fs
+
+#: Data of results: made by functions, and checked there.
+RESULTS = (
+    fs.Branch,
+    fs.DelayScaling,
+    fs.Derivation,
+    fs.Diagram,
+    fs.Ensemble,
+    fs.Equilibrium,
+    fs.Overlay,
+    fs.PointBranch,
+    fs.RefinedMap,
+    fs.Section,
+    fs.SlowLoad,
+    fs.SpecialPoint,
+    fs.Spectrum,
+    fs.SteadyState,
+    fs.Sweep,
+    fs.Trajectory,
+)
+SPECIAL = ("__call__", "__getitem__")
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A public function with a call that is good."""
+
+    name: str
+    function: Callable
+    arguments: dict
+    more: dict = field(default_factory=dict)
+
+    @property
+    def signature(self):
+        return inspect.signature(self.function)
+
+    @property
+    def parameters(self):
+        """The names of its parameters, without those given to **kwargs."""
+        return tuple(self.signature.parameters)
+
+    def call(self, **changes):
+        """Call it with some arguments changed; a single ``*`` or ``**`` parameter counts as one."""
+        given = {**self.arguments, **changes}
+        kinds = {n: p.kind for n, p in self.signature.parameters.items()}
+        positional, named = [], {}
+        for name, kind in kinds.items():
+            if name not in given:
+                if kind is inspect.Parameter.POSITIONAL_ONLY:
+                    positional.append(self.signature.parameters[name].default)
+                continue
+            if kind is inspect.Parameter.VAR_POSITIONAL:
+                positional += given[name]
+            elif kind is inspect.Parameter.VAR_KEYWORD:
+                named |= given[name]
+            elif kind is inspect.Parameter.POSITIONAL_ONLY:
+                positional.append(given[name])
+            else:
+                named[name] = given[name]
+        return self.function(*positional, **named)
+
+
+@cache
+def results():
+    """The smallest result of each kind, by name."""
+    x, p, q, t = sp.symbols("x p q t")
+    full = fs.systems.cusp(omega=0.01)
+    fast = full.frozen()
+    diagram = fs.continue_equilibria(fast, "p", over=(-1, 1))
+    fold = diagram.folds[0]
+    plane = {"p": (-1, 1), "q": (-1, 2)}
+    run = fs.simulate(full, [-1.0], periods=1)
+    gear = fs.systems.harmonic_gear(omega=0.1, C=2.443)
+    gap = fs.simulate(gear, [0.0, 0.0], periods=2)
+    backlash = fs.continue_equilibria(gear.frozen(), "w", over=(-1, 1))
+    turning = fs.continue_equilibria(hopf(), "p", over=(-2, 2))
+    many = fs.simulate_many(gear, [0.0, 0.0], parameters={"C": [2.0, 3.0]}, periods=1, samples=8)
+    return {
+        "full": full,
+        "fast": fast,
+        "diagram": diagram,
+        "branch": diagram[0],
+        "fold": fold,
+        "equilibrium": diagram.at(p=0.0)[0],
+        "curve": fs.continue_points(fold, ("p", "q"), over=plane),
+        "other curve": fs.continue_points(diagram.folds[1], ("p", "q"), over=plane),
+        "run": run,
+        "lay": fs.overlay(diagram, run),
+        "gear": gear,
+        "gap": gap,
+        "corner": backlash.boundary_equilibria[0],
+        "turning": turning,
+        "hopf": turning.special("HB")[0],
+        "many": many,
+        "swept": fs.bifurcation_sweep(gear, "C", [2.0, 2.5], [0, 0], settle=1, keep=1),
+        "map": fs.refined_map(
+            lambda a, b: a > b, {"a": (0, 1), "b": (0, 1)}, cells=(2, 2), levels=1
+        ),
+        "section": gap.stroboscopic(),
+        "spectrum": gap.spectrum("x"),
+        "steady": gap.steady(),
+        "scaling": fs.delay_scaling(fast, fold, [1e-5, 1e-6], level={"x": 0.5}),
+        "load": fs.slow_load_criterion(gear),
+        "law": fs.derive(
+            fs.Model({x: p - q * x}, parameters={q: 1}, forcing={p: sp.sin(t)}).frozen()
+        ),
+    }
+
+
+@cache
+def hopf():
+    """The Hopf normal form over p."""
+    x, y, p = sp.symbols("x y p")
+    size = x**2 + y**2
+    return fs.Model({x: p * x - y - x * size, y: x + p * y - y * size}, parameters={p: 0})
+
+
+@cache
+def logistic():
+    x, r, K = sp.symbols("x r K")
+    return fs.Model({x: r * x * (1 - x / K)}, parameters={r: 2, K: 3})
+
+
+def simulations(r):
+    gear, fold = r["gear"], r["fold"]
+    kept = {"t": (0.0, 1.0)}
+    return {
+        "simulate": {"model": gear, "state": [0.0, 0.0], **kept},
+        "simulate_many": {"model": gear, "states": [0.0, 0.0], **kept},
+        "bifurcation_sweep": {
+            "model": gear,
+            "parameter": "C",
+            "values": [2.0],
+            "state": [0.0, 0.0],
+            "settle": 0,
+            "keep": 1,
+            "back": False,
+        },
+        "regime_map": {
+            "model": gear,
+            "over": {"C": (2.0, 3.0), "D": (0.1, 0.2)},
+            "state": [0.0, 0.0],
+            "cells": (1, 1),
+            "levels": 0,
+            "periods": 1,
+        },
+        "refined_map": {
+            "function": lambda a, b: a > b,
+            "over": {"a": (0, 1), "b": (0, 1)},
+            "cells": (1, 1),
+            "levels": 0,
+        },
+        "delay_scaling": {
+            "model": r["fast"],
+            "point": fold,
+            "rates": [1e-5, 1e-6],
+            "level": {"x": 0.5},
+        },
+        "warm": {"models": []},
+    }
+
+
+def analyses(r):
+    gear, fold, fast = r["gear"], r["fold"], r["fast"]
+    x, k, u, a, b = sp.symbols("x k u a b")
+    return {
+        "equilibria": {"model": fast, "named": {"p": 0.0}},
+        "tangencies": {"model": hopf(), "named": {"p": 0.0}},
+        "continue_equilibria": {"model": fast, "parameter": "p", "over": (-1, 1)},
+        "continue_points": {
+            "point": fold,
+            "parameters": ("p", "q"),
+            "over": {"p": (-1, 1), "q": (-1, 2)},
+        },
+        "derive": {"model": logistic()},
+        "disagreements": {"one": {"A": k}, "other": {"A": k}},
+        "nondimensionalise": {"model": logistic(), "ones": [("x", "x"), ("x", "x**2")]},
+        "reduce_to": {"rates": {a: -k * (a - b), b: k * (a - b)}, "combinations": {u: a - b}},
+        "export": {"model": logistic(), "format": "numpy"},
+        "predict_delay": {"point": fold, "rate": 1e-3},
+        "hopf_exit": {"diagram": r["turning"], "point": r["hopf"], "entry": -1, "rate": 0.05},
+        "overlay": {"diagram": r["diagram"], "run": r["run"]},
+        "slow_load_criterion": {"model": gear},
+        "slow_load_gap": {"B": 2.0, "C": 4.0, "omega": 0.1},
+        "load": {"path": "nothing.npz"},
+        "read_auto": {"path": "b.nothing"},
+        "Model": {"rates": {x: -k * x}, "parameters": {k: 1.0}},
+        "Continuation": {},
+    }
+
+
+def methods(r):
+    """Object, and a good call of each public method that takes an argument."""
+    save = {"path": "unused.npz"}
+    look = {"stable": None}
+    return {
+        "Model": (
+            r["gear"],
+            {
+                "with_parameters": {"named": {"C": 2.0}},
+                "freed": {"name": "C"},
+                "frozen": {},
+                "ramped": {"name": "C", "rate": 0.1},
+            },
+        ),
+        "Branch": (
+            r["branch"],
+            {
+                "__getitem__": {"key": "x"},
+                "at": {"value": {"p": 0.0}, **look},
+                "select": look,
+                "nearest": {"values": {"p": 0.0}},
+                "intersections": {"other": r["turning"][0], "x": "x", "y": "p"},
+                "save": save,
+            },
+        ),
+        "Diagram": (
+            r["diagram"],
+            {
+                "__getitem__": {"key": "x"},
+                "at": {"value": {"p": 0.0}, **look},
+                "select": look,
+                "bistable": {},
+                "nearest": {"values": {"p": 0.0}},
+                "save": save,
+            },
+        ),
+        "Derivation": (r["law"], {"__getitem__": {"region": "S1"}}),
+        "DelayScaling": (r["scaling"], {"save": save}),
+        "Ensemble": (r["many"], {"__getitem__": {"name": "x"}, "save": save}),
+        "Equilibrium": (r["equilibrium"], {"__getitem__": {"name": "x"}, "save": save}),
+        "SpecialPoint": (r["fold"], {"__getitem__": {"name": "x"}, "save": save}),
+        "Overlay": (r["lay"], {"__getitem__": {"expression": "x"}, "save": save}),
+        "PointBranch": (
+            r["curve"],
+            {
+                "__getitem__": {"name": "x"},
+                "intersections": {"other": r["other curve"]},
+                "save": save,
+            },
+        ),
+        "RefinedMap": (
+            r["map"],
+            {
+                "at": {"values": [0.5, 0.2]},
+                "boundary": {"one": True, "other": False},
+                "compare": {"predict": lambda a, b: a > b},
+                "save": save,
+            },
+        ),
+        "Section": (r["section"], {"__getitem__": {"name": "x"}, "save": save}),
+        "SlowLoad": (r["load"], {"save": save}),
+        "Spectrum": (r["spectrum"], {"peaks": {}, "save": save}),
+        "SteadyState": (r["steady"], {"save": save}),
+        "Sweep": (r["swept"], {"hysteresis": {}, "save": save}),
+        "Trajectory": (
+            r["gap"],
+            {
+                "__call__": {"times": 0.0},
+                "__getitem__": {"name": "x"},
+                "dense_columns": {"times": 0.0},
+                "contacts": {},
+                "extremes": {"name": "x"},
+                "hits": {"interface": "x - D"},
+                "section": {"expression": "x"},
+                "spectrum": {"name": "x"},
+                "steady": {},
+                "stroboscopic": {},
+                "save": save,
+            },
+        ),
+    }
+
+
+def figures(r):
+    return {
+        "clarke_path": {"point": r["corner"]},
+        "delay_scaling": {"scaling": r["scaling"]},
+        "diagram": {"diagram": r["diagram"]},
+        "eigenvalue_path": {"source": r["branch"]},
+        "overlay": {"lay": r["lay"]},
+        "panel": {"lay": r["lay"]},
+        "parameter_plane": {"curves": [r["curve"]]},
+        "phase_portrait": {"run": r["gap"]},
+        "regime_map": {"result": r["map"]},
+        "section": {"section": r["section"]},
+        "spectrum": {"spectrum": r["spectrum"]},
+        "sweep": {"sweep": r["swept"]},
+        "time_series": {"run": r["run"]},
+    }
+
+
+def fuller(r):
+    """What more a good call may hold, so that what is inside can be spoiled too."""
+    x, v, k, w, p, t = sp.symbols("x v k w p t")
+    run = {"state": {"x": 0.0, "v": 0.0}}
+    return {
+        "simulate": {**run, "samples": [0.0, 0.5]},
+        "simulate_many": {"states": {"x": [0.0, 0.1], "v": 0.0}, "parameters": {"C": [2.0, 3.0]}},
+        "bifurcation_sweep": {**run, "what": "section", "section": "v"},
+        "regime_map": {
+            "over": {"ratio": (0.9, 1.1), "D": (0.1, 0.2)},
+            "parameters": {"C": "B*ratio"},
+        },
+        "delay_scaling": {"level": {"x": 0.5}},
+        "continue_equilibria": {"marks": [0.1]},
+        "equilibria": {"values": {"q": 1.0}},
+        "tangencies": {"values": {"p": 0.0}},
+        "derive": {"assume": {"r": "positive"}},
+        "nondimensionalise": {"replace": {"r": "r"}},
+        "export": {"values": {"r": 1.0}, "start": {"x": 0.5}},
+        "predict_delay": {"level": {"x": 0.5}},
+        "slow_load_criterion": {"parameters": {"D": [0.1, 0.2]}},
+        "slow_load_gap": {"B": [1.0, 2.0]},
+        "Model": {
+            "rates": {x: v, v: w - k * x - sp.Abs(x)},
+            "forcing": {w: sp.sin(t)},
+            "slow": {p: -p},
+            "interfaces": {"wall": x},
+            "regions": {"right": x > 0},
+        },
+        "Model.frozen": {"slow": {"w": "g"}},
+        "Model.with_parameters": {"changes": {"C": 2.0}},
+        "Branch.select": {"between": (-0.5, 0.5)},
+        "Diagram.select": {"between": (-0.5, 0.5)},
+        "Trajectory.__call__": {"times": [0.0, 1.0]},
+        "plot.time_series": {"interfaces": {"edge": ("x", 0.0)}, "phases": list(r["lay"].phases)},
+        "plot.phase_portrait": {"interfaces": {"edge": ("x", 0.0)}},
+        "plot.regime_map": {
+            "curves": {"line": ([0.0, 1.0], [0.0, 1.0])},
+            "marks": {"here": (0.5, 0.5)},
+            "fills": {True: "black"},
+        },
+        "plot.spectrum": {"over": (0.0, 1.0)},
+    }
+
+
+@cache
+def subjects():
+    """Every public function, by its name in the documentation."""
+    r = results()
+    found = [
+        Subject(name, getattr(fs, name), arguments)
+        for name, arguments in {**simulations(r), **analyses(r)}.items()
+    ]
+    found += [
+        Subject(f"{kind}.{name}", getattr(thing, name), arguments)
+        for kind, (thing, calls) in methods(r).items()
+        for name, arguments in calls.items()
+    ]
+    found += [Subject(f"plot.{n}", getattr(fs.plot, n), a) for n, a in figures(r).items()]
+    drawing = fs.plot.spectrum(r["spectrum"])
+    found.append(Subject("plot.Drawing.save", drawing.save, {"path": "unused.png", "dpi": 20}))
+    panel = fs.plot.panel(r["lay"])
+    found.append(Subject("plot.PanelDrawing.save", panel.save, {"path": "unused.png", "dpi": 20}))
+    found += [
+        Subject(f"systems.{name}", getattr(fs.systems, name), {})
+        for name in fs.systems.__all__
+        if not inspect.isclass(getattr(fs.systems, name))
+    ]
+    more = fuller(r)
+    return {s.name: replace(s, more={**s.arguments, **more.get(s.name, {})}) for s in found}
