@@ -253,7 +253,7 @@ def sympified(what: str, given: Any) -> sp.Expr:
         For what is no expression.
     """
     expression = _read(given)
-    if not isinstance(expression, sp.Expr):
+    if not isinstance(expression, sp.Expr) or expression.is_Matrix:
         raise ModelError(f"{what}: expected an expression, received {shown(given)}")
     return expression
 

@@ -281,6 +281,9 @@ def airy_passage(eta: float) -> float:
 
     if math.isinf(eta):
         return OMEGA_0
+    if eta < -500.0:
+        # the quasi-static sheet, η = −√z − 1/(4 z) with z = −s, where the Airy functions overflow
+        return -((eta + 0.25 / eta**2) ** 2)
 
     def left(s: float) -> float:
         # scaled alike, their ratio counts

@@ -12,6 +12,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from fastslow.arguments import finite
 from fastslow.diagrams.fields import FrozenField
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
@@ -160,10 +161,9 @@ def level_of(site: Site, level: Mapping[Any, float] | None) -> tuple[int, float]
     states = site.field.model.states
     if str(name) not in states:
         raise unknown_name("state of the level", name, states)
-    if not math.isfinite(float(value)):
-        raise ArgumentError(f"level = {level!r}; expected a finite value")
+    value = finite(f"level of {name}", value)
     number = states.index(str(name))
-    return number, float(value) - float(site.u[number])
+    return number, value - float(site.u[number])
 
 
 def named_level(site: Site, level: tuple[int, float] | None) -> dict[str, float] | None:

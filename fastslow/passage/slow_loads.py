@@ -95,7 +95,7 @@ def slow_load_gap(
         _positive("damping", damping),
         _positive("stiffness", stiffness, rigid=True),
     )
-    mean, swing, rate, c, k = np.broadcast_arrays(mean, swing, rate, c, k)
+    mean, swing, rate, c, k = _broadcast(mean, swing, rate, c, k)
     result = np.asarray((_exact if exact else _expanded)(mean, swing, rate, c, k))
     return result if result.ndim else float(result)
 
@@ -197,7 +197,7 @@ def slow_load_criterion(
         if name not in model.parameters:
             raise unknown_name("parameter", name, model.parameters)
     values: dict[str, Any] = {**dict(model.parameters), **swept}
-    shape = np.broadcast_shapes(*(np.shape(v) for v in values.values()))
+    shape = _broadcast(*map(np.asarray, values.values()))[0].shape
     damping, load, omega, edges, stiffness = _gap_motion(model, gap)
 
     def number(expression: sp.Expr, **more: Floats) -> Floats:
@@ -288,6 +288,14 @@ def _gap_motion(
 def _quotient(B: Floats, C: Floats) -> Floats:
     """B/C for B ≥ 0, 1 where it is larger or undefined."""
     return np.where(C > B, B / np.where(C > B, C, 1.0), 1.0)
+
+
+def _broadcast(*given: Floats) -> tuple[Floats, ...]:
+    try:
+        return tuple(np.broadcast_arrays(*given))
+    except ValueError:
+        shapes = ", ".join(str(values.shape) for values in given)
+        raise ArgumentError(f"expected values of one shape, received {shapes}") from None
 
 
 def _positive(name: str, given: ArrayLike, rigid: bool = False) -> Floats:

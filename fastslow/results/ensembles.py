@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,6 +117,9 @@ class Ensemble(Table, Result):
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     _row = "trajectory"
+
+    #: Numbers are no columns, and rows no points: there is nothing to go through one by one.
+    __iter__: ClassVar[None] = None
 
     def __len__(self) -> int:
         return len(self.final)

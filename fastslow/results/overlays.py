@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,6 +90,9 @@ class Overlay(Table, Result):
 
     _row = "t"
     _places = ("t",)
+
+    #: Numbers are no columns, and rows no points: there is nothing to go through one by one.
+    __iter__: ClassVar[None] = None
 
     def __len__(self) -> int:
         return len(self.time)

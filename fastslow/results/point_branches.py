@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +86,9 @@ class PointBranch(Table, Result):
     def outcome(self) -> Outcome:
         """How the tracing ended: the first unsuccessful end, else the last one."""
         return next((o for o in self.outcomes if not o.success), self.outcomes[-1])
+
+    #: Numbers are no columns, and rows no points: there is nothing to go through one by one.
+    __iter__: ClassVar[None] = None
 
     def __len__(self) -> int:
         return len(self.state)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import function, items, shown, takes
+from fastslow.arguments import function, items, numbers, shown, takes
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.map_boundaries import MapBoundary, MapEdges, boundaries_of
 from fastslow.results.outcome import Outcome
@@ -178,7 +178,14 @@ class RefinedMap(Result):
         given = [*values, *(named[n] for n in self.names[len(values) :] if n in named)]
         if len(given) != 2 or len(values) + len(named) != 2:
             raise ArgumentError(f"expected a value for each of {', '.join(self.names)}")
-        place = np.stack(np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in given)), axis=-1)
+        columns = [numbers(name, values) for name, values in zip(self.names, given, strict=True)]
+        shapes = [c.shape for c in columns]
+        if all(shapes) and shapes[0] != shapes[1]:
+            raise ArgumentError(
+                f"{' and '.join(self.names)} have the shapes {shapes[0]} and {shapes[1]}; "
+                "expected numbers, or arrays of one shape"
+            )
+        place = np.stack(np.broadcast_arrays(*columns), axis=-1)
         for k, (name, (low, high)) in enumerate(zip(self.names, self.over, strict=True)):
             outside = ~((place[..., k] >= low) & (place[..., k] <= high))
             if outside.any():

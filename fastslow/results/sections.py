@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,9 @@ class Section(Table, Result):
 
     _row = "t"
     _places = ("t",)
+
+    #: Numbers are no columns, and rows no points: there is nothing to go through one by one.
+    __iter__: ClassVar[None] = None
 
     def __getitem__(self, name: object) -> NDArray[np.float64]:
         """A column, or an expression in columns, at the times of the section, shape (K,)."""

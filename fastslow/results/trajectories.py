@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -105,6 +105,9 @@ class Trajectory(Recurrence, Table, Result):
 
     _row = "t"
     _places = ("t",)
+
+    #: Numbers are no columns, and rows no points: there is nothing to go through one by one.
+    __iter__: ClassVar[None] = None
 
     @cached_property
     def t(self) -> NDArray[np.float64]:

@@ -77,7 +77,7 @@ def _named(values: Mapping[str, float], name: Any, word: Any) -> tuple[sp.Symbol
         raise unknown_name("parameter", name, values)
     if isinstance(word, str) and word in WORDS:
         return real(str(name)), WORDS[word]
-    if word is None or word in (1, -1):
+    if word is None or (type(word) is int and abs(word) == 1):
         return real(str(name)), word
     raise ArgumentError(
         f"assume: {name} is {word!r}; expected 'positive', 'negative', 'real', 1, -1 or None"
