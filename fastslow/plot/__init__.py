@@ -2,6 +2,7 @@
 
 from fastslow.plot.branches import DiagramDrawing, diagram
 from fastslow.plot.delays import DelayDrawing, delay_scaling
+from fastslow.plot.drawings import Drawing
 from fastslow.plot.eigenvalues import EigenvalueDrawing, clarke_path, eigenvalue_path
 from fastslow.plot.maps import MapDrawing, regime_map
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
@@ -11,7 +12,6 @@ from fastslow.plot.planes import PlaneDrawing, parameter_plane
 from fastslow.plot.sections import SectionDrawing, section
 from fastslow.plot.spaces import SpaceDrawing
 from fastslow.plot.spectra import SpectrumDrawing, spectrum
-from fastslow.plot.style import Drawing
 from fastslow.plot.sweeping import SweepDrawing, sweep
 
 __all__ = [

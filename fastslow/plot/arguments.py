@@ -9,8 +9,35 @@ from typing import Any
 from matplotlib.colors import is_color_like
 from matplotlib.lines import Line2D
 
-from fastslow.arguments import finite, items, mapping, numbers, refusal, shown
+from fastslow.arguments import (
+    either,
+    finite,
+    formula,
+    function,
+    items,
+    mapping,
+    numbers,
+    refusal,
+    shown,
+    within,
+    word,
+)
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.plot.style import WIDTHS
+
+#: What an axis shows: a name, an expression, or a function of the columns.
+axis_quantity = either(function, formula)
+
+
+#: Millimetres that can be drawn in.
+_drawable = within(30.0, 2000.0)
+
+
+def figure_width(name: str, value: Any) -> str | float:
+    """The width of a figure: by its name, or in millimetres."""
+    if isinstance(value, str):
+        return word("width", WIDTHS)(name, value)  # type: ignore[no-any-return]
+    return _drawable(name, value)
 
 
 def line_colour(name: str, value: Any) -> Any:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon, Rectangle
+from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from fastslow.plot.style import BANDS, GREY, SMALL
+from fastslow.plot.style import BANDS, DARK, GREY, SMALL
 
 #: Interface to (state, value), for interfaces that are a plain value of one state.
 Values = Mapping[str, tuple[str, float]]
@@ -27,21 +27,24 @@ class Bands:
     ----------
     lines : tuple of Line2D
         The interfaces.
-    fills : tuple of Polygon or Rectangle
+    fills : tuple of Rectangle
         The regions.
     names : tuple of Text
         The regions' names, to be placed by `fastslow.plot.labels.place`.
     spans : tuple of (float, float)
-        Where each named region begins and ends along the axis.
+        Where each named region begins and ends along the axis, infinite beyond all interfaces.
     vertical : bool
         Whether the state is on the horizontal axis.
+    parts : tuple of (float, float)
+        Where each fill begins and ends.
     """
 
     lines: tuple[Line2D, ...] = ()
-    fills: tuple[Polygon | Rectangle, ...] = ()
+    fills: tuple[Rectangle, ...] = ()
     names: tuple[Text, ...] = ()
     spans: tuple[tuple[float, float], ...] = ()
     vertical: bool = False
+    parts: tuple[tuple[float, float], ...] = ()
 
 
 def draw_bands(
@@ -52,6 +55,7 @@ def draw_bands(
     regions: NDArray[np.str_],
     *,
     vertical: bool = False,
+    label: bool = True,
 ) -> Bands:
     """Draw the interfaces at values of one state and tint the regions between them.
 
@@ -60,7 +64,7 @@ def draw_bands(
     Parameters
     ----------
     ax : Axes
-        With its limits final: they are kept.
+        Whose limits are kept; bands reach as far as the axes, also when these change.
     state : str
         The state on the axis.
     values : mapping
@@ -71,42 +75,66 @@ def draw_bands(
         The region of each.
     vertical : bool
         Whether the state is on the horizontal axis.
+    label : bool
+        Whether to name the regions.
     """
-    levels = sorted(value for name, value in values.values() if name == state)
+    levels = {value: name for name, (at, value) in sorted(values.items()) if at == state}
     if not levels:
         return Bands(vertical=vertical)
-    low, high = ax.get_xlim() if vertical else ax.get_ylim()
-    line, fill = (ax.axvline, ax.axvspan) if vertical else (ax.axhline, ax.axhspan)
-    edges = np.clip([low, *levels, high], low, high)
-    fills, names, spans = [], [], []
-    least = (0.13 if vertical else 0.07) * (high - low)  # for a name to fit in
-    margin = 1e-9 * (high - low)
-    for number, (start, stop) in enumerate(zip(edges[-2::-1], edges[:0:-1], strict=True)):
-        if stop > start:
-            fills.append(fill(start, stop, facecolor=BANDS[number % 3], edgecolor="none", zorder=0))
-            inside = (heights > start + margin) & (heights < stop - margin)
-            met = set(regions[inside].tolist())
-            if len(met) == 1 and stop - start > least:
-                names.append(_name(ax, met.pop(), (start + stop) / 2, vertical))
-                spans.append((float(start), float(stop)))
-    lines = tuple(
-        line(level, color=GREY, linewidth=0.5, zorder=1) for level in levels if low < level < high
-    )
-    if vertical:
-        ax.set_xlim(low, high)
-    else:
-        ax.set_ylim(low, high)
-    return Bands(lines, tuple(fills), tuple(names), tuple(spans), vertical)
-
-
-def _name(ax: Axes, text: str, middle: float, vertical: bool) -> Text:
-    at = (middle, 0.95) if vertical else (0.95, middle)
+    edges = np.array([-np.inf, *sorted(levels), np.inf])
     frame = ax.get_xaxis_transform() if vertical else ax.get_yaxis_transform()
-    look: dict[str, Any] = {
-        "ha": "center",
-        "va": "center",
-        "fontsize": SMALL,
-        "color": GREY,
-        "zorder": 1.5,
-    }
-    return ax.text(*at, text, transform=frame, **look)
+    fills, names, parts, spans = [], [], [], []
+    margin = 1e-9 * max(float(np.ptp(heights)) if heights.size else 0.0, 1e-300)
+    for number, (start, stop) in enumerate(zip(edges[-2::-1], edges[:0:-1], strict=True)):
+        fill = Rectangle(
+            (0.0, 0.0), 1.0, 1.0, transform=frame, facecolor=BANDS[number % 3], linewidth=0.0
+        )
+        fill.set(zorder=0, in_layout=False)
+        # added as an artist, so that the limits do not depend on it
+        fills.append(ax.add_artist(fill))
+        parts.append((float(start), float(stop)))
+        inside = (heights > start + margin) & (heights < stop - margin)
+        met = set(regions[inside].tolist())
+        if label and len(met) == 1:
+            names.append(_name(ax, met.pop(), vertical))
+            spans.append((float(start), float(stop)))
+    lines = []
+    for level in sorted(levels):
+        ends = ([level, level], [0.0, 1.0])
+        words = f"interface {levels[level]}"
+        look: dict[str, Any] = {"color": GREY, "linewidth": 0.5, "zorder": 1, "label": words}
+        line = Line2D(*(ends if vertical else ends[::-1]), transform=frame, **look)
+        lines.append(ax.add_artist(line))
+    drawn = Bands(tuple(lines), tuple(fills), tuple(names), tuple(spans), vertical, tuple(parts))
+    fit_bands(ax, drawn)
+    return drawn
+
+
+def fit_bands(ax: Axes, drawn: Bands) -> None:
+    """Let bands reach to the limits of the axes; hide names for which there is no room."""
+    low, high = sorted(ax.get_xlim() if drawn.vertical else ax.get_ylim())
+    for fill, (start, stop) in zip(drawn.fills, drawn.parts, strict=True):
+        first, last = np.clip([start, stop], low, high).tolist()
+        if drawn.vertical:
+            fill.set_bounds(first, 0.0, last - first, 1.0)
+        else:
+            fill.set_bounds(0.0, first, 1.0, last - first)
+    axis = (ax.xaxis if drawn.vertical else ax.yaxis).get_transform()
+    bottom, top = axis.transform([low, high])
+    for name, span in zip(drawn.names, drawn.spans, strict=True):
+        first, last = axis.transform(np.clip(span, low, high))
+        name.set_visible(bool(last - first > (0.13 if drawn.vertical else 0.07) * (top - bottom)))
+        middle = float(axis.inverted().transform([0.5 * (first + last)])[0])
+        name.set_position((middle, SIDE) if drawn.vertical else (SIDE, middle))
+
+
+#: Where a name stands along its band until it is placed, in parts of the axes.
+SIDE = 0.95
+
+
+def _name(ax: Axes, text: str, vertical: bool) -> Text:
+    frame = ax.get_xaxis_transform() if vertical else ax.get_yaxis_transform()
+    look: dict[str, Any] = {"fontsize": SMALL, "color": DARK, "zorder": 1.5}
+    name = ax.text(0.5, 0.5, text, transform=frame, ha="center", va="center", **look)
+    name.set_in_layout(False)
+    return name

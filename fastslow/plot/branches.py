@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,15 +12,27 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.arguments import flag, formula, instance, takes
-from fastslow.plot.arguments import line_colour, line_style
+from fastslow.arguments import (
+    flag,
+    instance,
+    takes,
+)
+from fastslow.plot.arguments import (
+    axis_quantity,
+    figure_width,
+    line_colour,
+    line_style,
+)
 from fastslow.plot.bands import Bands, draw_bands
-from fastslow.plot.heights import along, at_point, expression_of, written
-from fastslow.plot.labels import key, place, settle, tag
-from fastslow.plot.style import BRANCH, LINES, MARKERS, Drawing, axes_for, typeset
-from fastslow.results.branches import Branch
+from fastslow.plot.covering import settle
+from fastslow.plot.drawings import Drawing
+from fastslow.plot.labels import place
+from fastslow.plot.legends import explained
+from fastslow.plot.quantities import Quantity, along_branch, of_diagram
+from fastslow.plot.spaces import SpaceDrawing, draw_space
+from fastslow.plot.stretches import draw_points, runs, worth_a_marker
+from fastslow.plot.style import BRANCH, LINES, axes_for, spatial
 from fastslow.results.diagrams import Diagram
-from fastslow.results.points import CODE_NAMES
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +53,8 @@ class DiagramDrawing(Drawing):
     bands : Bands
         Interfaces and regions.
     legend : Legend or None
+    x : str
+        What the horizontal axis shows.
     """
 
     state: str
@@ -50,6 +63,7 @@ class DiagramDrawing(Drawing):
     labels: tuple[Annotation, ...]
     bands: Bands
     legend: Legend | None
+    x: str = ""
 
     @property
     def handles(self) -> list[Artist]:
@@ -60,8 +74,11 @@ class DiagramDrawing(Drawing):
 
 @takes(
     diagram=instance(Diagram),
-    x=formula,
+    y=axis_quantity,
+    z=axis_quantity,
+    x=axis_quantity,
     ax=instance(Axes),
+    width=figure_width,
     label=flag,
     legend=flag,
     virtual=flag,
@@ -71,16 +88,19 @@ class DiagramDrawing(Drawing):
 )
 def diagram(
     diagram: Diagram,
-    x: object = None,
+    y: object = None,
+    z: object = None,
     *,
+    x: object = None,
     ax: Axes | None = None,
+    width: str | float = "column",
     label: bool = True,
-    legend: bool = True,
+    legend: bool | None = None,
     virtual: bool = True,
     interfaces: bool = True,
     color: str = BRANCH,
     **style: Any,
-) -> DiagramDrawing:
+) -> DiagramDrawing | SpaceDrawing:
     """Draw the branches of equilibria over their parameter.
 
     Stable branches are solid, unstable ones dashed, neutral ones dash-dotted
@@ -89,15 +109,22 @@ def diagram(
     Parameters
     ----------
     diagram : Diagram
-    x : str, Symbol or Expr, optional
-        What the vertical axis shows: a state, by default the first, or an expression
-        in states and parameters.
+    y : str, Symbol, Expr or callable, optional
+        What the vertical axis shows: a state, by default the first, the parameter, an
+        expression in states and parameters, or a function of the columns.
+    z : str, Symbol, Expr or callable, optional
+        With this the view is in space, and ``z`` its vertical axis.
+    x : str, Symbol, Expr or callable, optional
+        What the horizontal axis shows, by default the parameter.
     ax : Axes, optional
-        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+        Axes to draw into (with ``projection="3d"`` for a view in space), in which limits set
+        by hand are kept; new ones otherwise.
+    width : str or float
+        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
-        Whether to write LP1, BE1, … beside special points.
-    legend : bool
-        Whether to draw a legend.
+        Whether to write LP1, BE1, … beside special points and the names of the regions.
+    legend : bool, optional
+        Whether to draw a legend; by default as ``label``.
     virtual : bool
         Whether to draw virtual branches.
     interfaces : bool
@@ -110,35 +137,62 @@ def diagram(
     Returns
     -------
     DiagramDrawing
+        In space a SpaceDrawing.
 
     Raises
     ------
     UnknownNameError
-        If ``x`` is no state of the diagram and no expression in them.
+        For a name that is no state and no parameter; for an expression without any of
+        the states or the parameter of the diagram.
+    ArgumentError
+        For what is no expression, or for a view in space with plane axes.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> model = fs.systems.van_der_pol()
+    >>> found = fs.continue_equilibria(model.frozen(), "w", over=(-2, 2))
+    >>> drawn = fs.plot.diagram(found, "x**2 + y", width="page", legend=False)
+    >>> drawn.ax.get_ylabel(), [text.get_text() for text in drawn.labels]
+    ('$x^{2} + y$', ['HB1', 'HB2'])
+    >>> sorted(drawn.data)
+    ['HB Hopf', 'stable', 'unstable']
+    >>> def energy(columns):
+    ...     return columns["x"] ** 2 / 2
+    >>> fs.plot.diagram(found, energy, x="y").ax.get_ylabel()
+    'energy'
     """
-    state = expression_of(diagram, x)
-    own, ax = ax is None, axes_for(ax)
+    across, up = (
+        of_diagram(diagram, x, diagram.parameter),
+        of_diagram(diagram, y, diagram.states[0]),
+    )
+    if spatial("diagram", ax, z):
+        third = next((s for s in diagram.states if s not in (across.text, up.text)), up.text)
+        shown = across, up, of_diagram(diagram, z, third)
+        return draw_space(
+            diagram, shown, ax, width, label, legend, virtual=virtual, color=color, style=style
+        )
+    own, ax = ax is None, axes_for(ax, width)
     drawn = draw_branches(
         ax,
         diagram,
-        state,
+        (across, up),
         label=label,
         virtual=virtual,
         interfaces=interfaces,
         color=color,
         **style,
     )
-    if legend and drawn.handles:
-        drawn = replace(drawn, legend=key(ax, drawn.handles, own))
+    drawn = replace(drawn, legend=explained(ax, drawn.handles, own, label, legend))
+    place(ax, drawn.labels, [], [drawn.bands])
     settle(ax)
-    place(ax, drawn.labels, [] if drawn.legend is None else [drawn.legend], [drawn.bands])
     return drawn
 
 
 def draw_branches(
     ax: Axes,
     diagram: Diagram,
-    state: str,
+    shown: tuple[Quantity, Quantity],
     *,
     label: bool,
     virtual: bool,
@@ -148,73 +202,29 @@ def draw_branches(
 ) -> DiagramDrawing:
     """Draw a diagram without a legend, its labels not placed yet; arguments as for `diagram`."""
     lines: list[Line2D] = []
-    for branch in diagram.branches:
-        if branch.admissible or virtual:
-            heights = along(diagram, branch, state)
-            for kind, rows in runs(branch):
-                look = {"color": color, "zorder": 2.0, "label": kind, **LINES[kind], **style}
-                lines += ax.plot(branch.parameter[rows], heights[rows], **look)
-    markers, labels = _special_points(ax, diagram, state, virtual, label)
-    ax.set_xlabel(typeset(diagram.parameter))
-    ax.set_ylabel(written(state))
-    ax.set_xlim(diagram.over)
+    branches = [b for b in diagram.branches if b.admissible or virtual]
+    for branch in branches:
+        x, y = along_branch(diagram, branch, *shown)
+        for kind, rows in runs(branch):
+            look = {"color": color, "zorder": 2.0, "label": kind, **LINES[kind], **style}
+            lines += ax.plot(x[rows], y[rows], **look)
+    markers, labels = draw_points(ax, worth_a_marker(branches), shown, label)
+    across, up = shown
+    ax.set_xlabel(across.label)
+    ax.set_ylabel(up.label)
+    if across.column == diagram.parameter and ax.get_autoscalex_on():
+        ax.set_xlim(diagram.over, auto=None)
+    if up.column == diagram.parameter and ax.get_autoscaley_on():
+        ax.set_ylim(diagram.over, auto=None)
     bands = Bands()
     met = [b for b in diagram.branches if b.admissible]
-    if interfaces and met and state in diagram.states:
-        heights = np.concatenate([along(diagram, b, state) for b in met])
-        regions = np.concatenate([b.region for b in met])
-        bands = draw_bands(ax, state, diagram.interface_values, heights, regions)
-    return DiagramDrawing(ax, state, tuple(lines), markers, labels, bands, None)
-
-
-def runs(branch: Branch) -> Iterator[tuple[str, slice]]:
-    """Runs of constant stability, as (kind, rows); neighbours share their joint row."""
-    if not branch.admissible:
-        yield "virtual", slice(0, len(branch))
-        return
-    kinds = branch.stability
-    # a step beside a single neutral row (a fold, a Hopf point) has the stability of its other end
-    steps = np.where(kinds[:-1] == "neutral", kinds[1:], kinds[:-1])
-    breaks = np.flatnonzero(steps[1:] != steps[:-1]) + 1
-    for start, stop in zip([0, *breaks], [*breaks, len(steps)], strict=True):
-        if stop > start:
-            yield str(steps[start]), slice(int(start), int(stop) + 1)
-
-
-def _special_points(
-    ax: Axes, diagram: Diagram, state: str, virtual: bool, label: bool
-) -> tuple[tuple[Line2D, ...], tuple[Annotation, ...]]:
-    markers: list[Line2D] = []
-    labels: list[Annotation] = []
-    branches = [b for b in diagram.branches if b.admissible or virtual]
-    for code in CODE_NAMES:
-        points = [p for b in branches for p in _shown(b) if p.code == code]
-        if not points:
-            continue
-        marker, colour = MARKERS[code]
-        at = [(p[diagram.parameter], at_point(p, state)) for p in points]
-        markers += ax.plot(
-            *zip(*at, strict=True),
-            linestyle="none",
-            marker=marker,
-            markersize=4.5,
-            markerfacecolor=colour,
-            markeredgecolor=colour if marker in "x|" else "white",
-            markeredgewidth=0.9 if marker in "x|" else 0.5,
-            zorder=5,
-            label=f"{code} {CODE_NAMES[code]}",
-        )
-        if label:
-            words = [p.note or p.label if code == "EP" else p.label for p in points]
-            labels += [tag(ax, word, spot) for word, spot in zip(words, at, strict=True)]
-    return tuple(markers), tuple(labels)
-
-
-def _shown(branch: Branch) -> list[Any]:
-    """Special points worth a marker: an end point only where the tracing could not go on."""
-    ends = {0: branch.outcomes[0].success, len(branch) - 1: branch.outcomes[1].success}
-    return [
-        p
-        for p, row in zip(branch.special, branch.special_rows, strict=True)
-        if p.code != "EP" or not ends.get(row, True)
-    ]
+    levelled = {state for state, _ in diagram.interface_values.values()}
+    for quantity, vertical in ((across, True), (up, False)):
+        if interfaces and met and quantity.column in levelled:
+            heights = np.concatenate([b[quantity.column] for b in met])
+            regions = np.concatenate([b.region for b in met])
+            values = diagram.interface_values
+            bands = draw_bands(
+                ax, quantity.column, values, heights, regions, vertical=vertical, label=label
+            )
+    return DiagramDrawing(ax, up.text, tuple(lines), markers, labels, bands, None, across.text)

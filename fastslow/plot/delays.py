@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,10 +13,20 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, instance, takes
+from fastslow.arguments import (
+    flag,
+    instance,
+    takes,
+)
 from fastslow.errors import ArgumentError
-from fastslow.plot.labels import legend_below, legend_inside, settle
-from fastslow.plot.style import BLUE, GREY, MM, SMALL, VERMILION, Drawing, axes_for, typeset
+from fastslow.plot.arguments import (
+    figure_width,
+    line_style,
+)
+from fastslow.plot.covering import settle
+from fastslow.plot.drawings import Drawing
+from fastslow.plot.legends import explained
+from fastslow.plot.style import BLUE, GREY, SMALL, VERMILION, axes_for, typeset
 from fastslow.results.delay_scalings import DelayScaling
 
 Array = NDArray[np.float64]
@@ -54,9 +65,22 @@ class DelayDrawing(Drawing):
     legend: Legend | None
 
 
-@takes(scaling=instance(DelayScaling), ax=instance(Axes), legend=flag)
+@takes(
+    scaling=instance(DelayScaling),
+    ax=instance(Axes),
+    width=figure_width,
+    label=flag,
+    legend=flag,
+    style=line_style,
+)
 def delay_scaling(
-    scaling: DelayScaling, *, ax: Axes | None = None, legend: bool = True
+    scaling: DelayScaling,
+    *,
+    ax: Axes | None = None,
+    width: str | float = "column",
+    label: bool = True,
+    legend: bool | None = None,
+    **style: Any,
 ) -> DelayDrawing:
     """Draw delays over the rate of drift, both logarithmic, beside the law.
 
@@ -64,9 +88,15 @@ def delay_scaling(
     ----------
     scaling : DelayScaling
     ax : Axes, optional
-        Axes to draw into; new ones of a column's width (85 mm) otherwise.
-    legend : bool
-        Whether to explain the lines, with the fitted exponent.
+        Axes to draw into; new ones otherwise.
+    width : str or float
+        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+    label : bool
+        Whether to write the slope beside its triangle.
+    legend : bool, optional
+        Whether to explain the lines, with the fitted exponent; by default as ``label``.
+    **style
+        Properties of the measured points.
 
     Returns
     -------
@@ -81,7 +111,7 @@ def delay_scaling(
     if not good.any():
         raise ArgumentError("no run of this scaling has a delay to draw; see its outcomes")
     own = ax is None
-    ax = axes_for(ax, height=66 * MM)
+    ax = axes_for(ax, width, height=66.0)
     ax.set_xscale("log")
     ax.set_yscale("log")
     eps = scaling.eps
@@ -93,25 +123,22 @@ def delay_scaling(
     (predicted,) = ax.plot(
         eps, scaling.predicted, color=VERMILION, linewidth=1.2, label=_law_words(scaling)
     )
-    (measured,) = ax.plot(
-        eps[good],
-        scaling.delay[good],
-        linestyle="none",
-        marker="o",
-        markersize=4.0,
-        markerfacecolor="none",
-        markeredgecolor=BLUE,
-        markeredgewidth=0.9,
-        label=words,
-        zorder=4,
-    )
+    look: dict[str, Any] = {
+        "linestyle": "none",
+        "marker": "o",
+        "markersize": 4.0,
+        "color": BLUE,
+        "markerfacecolor": "none",
+        "markeredgewidth": 0.9,
+        "label": words,
+        "zorder": 4,
+    }
+    (measured,) = ax.plot(eps[good], scaling.delay[good], **{**look, **style})
     ax.set_xlabel(rf"rate of drift $\varepsilon$ of {typeset(scaling.parameter)}")
     ax.set_ylabel(f"delay past {scaling.point.label} in {typeset(scaling.parameter)}")
-    triangle, texts = _triangle(ax, scaling, good)
+    triangle, texts = _triangle(ax, scaling, good, label)
     drawn = [measured, predicted, *([leading] if leading else [])]
-    shown = None
-    if legend:
-        shown = legend_below(ax, drawn, 1) if own else legend_inside(ax, drawn)
+    shown = explained(ax, drawn, own, label, legend)
     return DelayDrawing(ax, measured, predicted, leading, triangle, texts, shown)
 
 
@@ -142,7 +169,7 @@ def _written(scaling: DelayScaling) -> str:
 
 
 def _triangle(
-    ax: Axes, scaling: DelayScaling, good: NDArray[np.bool_]
+    ax: Axes, scaling: DelayScaling, good: NDArray[np.bool_], label: bool
 ) -> tuple[Line2D | None, tuple[Text, ...]]:
     """A triangle below the points with the slope of the law."""
     power = scaling.law_exponent
@@ -158,6 +185,8 @@ def _triangle(
     base = float(np.interp(left, x[order], y[order])) - BELOW * (high - low)
     corners = np.array([[left, base], [right, base], [right, base + power * width], [left, base]])
     (line,) = ax.plot(*10.0**corners.T, color=GREY, linewidth=0.8)
+    if not label:
+        return line, ()
     texts = [
         ax.annotate(
             words,

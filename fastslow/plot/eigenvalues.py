@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -16,21 +17,21 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, instance, takes
-from fastslow.errors import ArgumentError
-from fastslow.plot.labels import key, place, settle, tag
-from fastslow.plot.style import (
-    GREY,
-    MARKERS,
-    MM,
-    SMALL,
-    TEXT,
-    VERMILION,
-    Drawing,
-    axes_for,
-    root,
-    typeset,
+from fastslow.arguments import (
+    flag,
+    instance,
+    takes,
 )
+from fastslow.errors import ArgumentError
+from fastslow.plot.arguments import (
+    figure_width,
+    line_style,
+)
+from fastslow.plot.covering import settle
+from fastslow.plot.drawings import Drawing
+from fastslow.plot.labels import place, tag
+from fastslow.plot.legends import explained
+from fastslow.plot.style import GREY, MARKERS, SMALL, TEXT, VERMILION, axes_for, root, typeset
 from fastslow.results.branches import Branch
 from fastslow.results.overlays import Overlay
 from fastslow.results.points import CODE_NAMES, SpecialPoint
@@ -71,9 +72,22 @@ class EigenvalueDrawing(Drawing):
     legend: Legend | None
 
 
-@takes(source=instance(Overlay, Branch), ax=instance(Axes), label=flag, legend=flag)
+@takes(
+    source=instance(Overlay, Branch),
+    ax=instance(Axes),
+    width=figure_width,
+    label=flag,
+    legend=flag,
+    style=line_style,
+)
 def eigenvalue_path(
-    source: Overlay | Branch, *, ax: Axes | None = None, label: bool = True, legend: bool = True
+    source: Overlay | Branch,
+    *,
+    ax: Axes | None = None,
+    width: str | float = "column",
+    label: bool = True,
+    legend: bool | None = None,
+    **style: Any,
 ) -> EigenvalueDrawing:
     """Draw the eigenvalues along a branch, coloured by its parameter.
 
@@ -87,11 +101,15 @@ def eigenvalue_path(
         Of an overlay, the parts of the branches between the sheets that are followed,
         as far as the slow quantity goes.
     ax : Axes, optional
-        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+        Axes to draw into; new ones otherwise.
+    width : str or float
+        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
         Whether to write LP1, BE1, … beside the marks.
-    legend : bool
-        Whether to draw a legend.
+    legend : bool, optional
+        Whether to draw a legend; by default as ``label``.
+    **style
+        Properties of the paths, e.g. ``linewidth`` or ``cmap``.
 
     Returns
     -------
@@ -103,7 +121,7 @@ def eigenvalue_path(
         For an overlay in which no sheet is followed.
     """
     parts = [(source, slice(0, len(source)))] if isinstance(source, Branch) else _followed(source)
-    own, ax = ax is None, axes_for(ax, height=78 * MM)
+    own, ax = ax is None, axes_for(ax, width, height=78.0)
     values = np.concatenate([branch.parameter[rows] for branch, rows in parts])
     scale = Normalize(float(values.min()), float(values.max()))
     paths: list[LineCollection] = []
@@ -114,7 +132,7 @@ def eigenvalue_path(
         region, parameter = branch.region[rows], branch.parameter[rows]
         edges = np.flatnonzero(region[1:] != region[:-1]) + 1
         for start, stop in zip([0, *edges], [*edges, len(path)], strict=True):
-            paths.append(_coloured(ax, path[start:stop], parameter[start:stop], scale))
+            paths.append(_coloured(ax, path[start:stop], parameter[start:stop], scale, style))
         for edge in edges:
             for one, other in zip(path[edge - 1], path[edge], strict=True):
                 jumps += ax.plot(
@@ -135,15 +153,28 @@ def eigenvalue_path(
     name = parts[0][0].parameter_name
     bar = _framed(ax, paths, typeset(name))
     handles: list[Artist] = [*markers, *jumps[:1]]
-    shown = key(ax, handles, own) if legend and handles else None
+    shown = explained(ax, handles, own, label, legend)
+    place(ax, labels)
     settle(ax)
-    place(ax, labels, [] if shown is None else [shown])
     return EigenvalueDrawing(ax, tuple(paths), tuple(jumps), markers, labels, bar, shown)
 
 
-@takes(point=instance(SpecialPoint), ax=instance(Axes), legend=flag)
+@takes(
+    point=instance(SpecialPoint),
+    ax=instance(Axes),
+    width=figure_width,
+    label=flag,
+    legend=flag,
+    style=line_style,
+)
 def clarke_path(
-    point: SpecialPoint, *, ax: Axes | None = None, legend: bool = True
+    point: SpecialPoint,
+    *,
+    ax: Axes | None = None,
+    width: str | float = "column",
+    label: bool = True,
+    legend: bool | None = None,
+    **style: Any,
 ) -> EigenvalueDrawing:
     """Draw the eigenvalues of q J₁ + (1 − q) J₂ at a boundary equilibrium for 0 ≤ q ≤ 1.
 
@@ -156,9 +187,15 @@ def clarke_path(
     point : SpecialPoint
         A boundary equilibrium of a continuous model.
     ax : Axes, optional
-        Axes to draw into; new ones of a column's width (85 mm) otherwise.
-    legend : bool
-        Whether to draw a legend.
+        Axes to draw into; new ones otherwise.
+    width : str or float
+        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+    label : bool
+        Whether to write the point and its kind above.
+    legend : bool, optional
+        Whether to draw a legend; by default as ``label``.
+    **style
+        Properties of the path, e.g. ``linewidth`` or ``cmap``.
 
     Returns
     -------
@@ -174,10 +211,10 @@ def clarke_path(
             f"{point.label} has no Clarke path; expected a boundary equilibrium of a model "
             "that is continuous across its interface"
         )
-    own, ax = ax is None, axes_for(ax, height=78 * MM)
+    own, ax = ax is None, axes_for(ax, width, height=78.0)
     q = np.linspace(0.0, 1.0, FINE)
     path = _matched(point.clarke.path(q))
-    paths = (_coloured(ax, path, q, Normalize(0.0, 1.0)),)
+    paths = (_coloured(ax, path, q, Normalize(0.0, 1.0), style),)
     markers: list[Line2D] = []
     first, second = point.clarke.regions
     for at, marker, text in ((1.0, "o", f"q = 1, {first}"), (0.0, "s", f"q = 0, {second}")):
@@ -192,8 +229,9 @@ def clarke_path(
             on = roots[np.abs(roots.real) <= 1e-6 * max(float(size.max()), 1e-300)]
             markers += _dots(ax, on, marker, VERMILION, "black", f"{text}, q = {found:.4g}")
     bar = _framed(ax, paths, typeset("q"))
-    ax.set_title(f"{point.label}: {point.subtype}", fontsize=TEXT)
-    shown = key(ax, markers, own) if legend else None
+    if label:
+        ax.set_title(f"{point.label}: {point.subtype}", fontsize=TEXT)
+    shown = explained(ax, markers, own, label, legend)
     return EigenvalueDrawing(ax, paths, (), tuple(markers), (), bar, shown)
 
 
@@ -230,14 +268,17 @@ def _matched(values: Complex) -> Complex:
     return path
 
 
-def _coloured(ax: Axes, path: Complex, parameter: Array, scale: Normalize) -> LineCollection:
+def _coloured(
+    ax: Axes, path: Complex, parameter: Array, scale: Normalize, style: dict[str, Any]
+) -> LineCollection:
     """Lines of all eigenvalues of one stretch, coloured by the parameter."""
     path, parameter = _through_collisions(path, parameter)
     places = np.stack([path.real, path.imag], axis=-1)
     pieces = np.stack([places[:-1], places[1:]], axis=2).reshape(-1, 2, 2)
     middle = np.repeat(0.5 * (parameter[1:] + parameter[:-1]), path.shape[1])
     good = np.isfinite(pieces).all(axis=(1, 2))
-    lines = LineCollection(list(pieces[good]), cmap=COLOURS, norm=scale, linewidths=2.0, zorder=3.0)
+    look = {"cmap": COLOURS, "linewidth": 2.0, "zorder": 3.0, "label": "eigenvalues", **style}
+    lines = LineCollection(list(pieces[good]), norm=scale, **look)
     lines.set_capstyle("round")
     lines.set_array(middle[good])
     ax.add_collection(lines)

@@ -3,28 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.text import Annotation, Text
-from numpy.typing import NDArray
 
-from fastslow.arguments import flag, formula, instance, items, takes, whole
-from fastslow.errors import ArgumentError, unknown_name
-from fastslow.plot.arguments import levels_of_states, line_colour, line_style
+from fastslow.arguments import (
+    flag,
+    instance,
+    items,
+    takes,
+    whole,
+)
+from fastslow.errors import ArgumentError
+from fastslow.plot.arguments import (
+    axis_quantity,
+    figure_width,
+    levels_of_states,
+    line_colour,
+    line_style,
+)
 from fastslow.plot.arrows import draw_arrows, length_along
 from fastslow.plot.bands import Bands, Values, draw_bands
-from fastslow.plot.labels import settle
+from fastslow.plot.covering import at_draw, settle
+from fastslow.plot.drawings import Drawing
+from fastslow.plot.labels import place
+from fastslow.plot.legends import explained
 from fastslow.plot.phases import draw_phases, fit_words
-from fastslow.plot.style import MM, MOTION, VERMILION, Drawing, axes_for, typeset
+from fastslow.plot.quantities import Array, Quantity, along_run, at_crossings, of_run
+from fastslow.plot.spaces import HEIGHT, dress_space
+from fastslow.plot.style import MOTION, VERMILION, axes_for, spatial
 from fastslow.results.trajectories import Trajectory
 from fastslow.results.transitions import Phase
-
-Array = NDArray[np.float64]
 
 LINE: dict[str, Any] = {"linewidth": 0.8, "zorder": 3.0}
 
@@ -51,6 +67,10 @@ class MotionDrawing(Drawing):
         The strip of phases above a time series.
     words : tuple of Text
         What is written in it.
+    legend : Legend or None
+        Where there is more than the trajectory to explain.
+    z : str
+        What the third axis shows, in space.
     """
 
     x: str
@@ -61,12 +81,22 @@ class MotionDrawing(Drawing):
     bands: tuple[Bands, ...]
     phases: tuple[Rectangle, ...] = ()
     words: tuple[Text, ...] = ()
+    legend: Legend | None = None
+    z: str = ""
+
+    @property
+    def handles(self) -> list[Artist]:
+        """What a legend shows: trajectory, earlier periods, crossings of interfaces."""
+        return [*self.lines[::-1], *([] if self.crossings is None else [self.crossings])]
 
 
 @takes(
     run=instance(Trajectory),
-    x=formula,
+    y=axis_quantity,
     ax=instance(Axes),
+    width=figure_width,
+    label=flag,
+    legend=flag,
     crossings=flag,
     interfaces=levels_of_states,
     phases=items(instance(Phase)),
@@ -75,9 +105,12 @@ class MotionDrawing(Drawing):
 )
 def time_series(
     run: Trajectory,
-    x: object = None,
+    y: object = None,
     *,
     ax: Axes | None = None,
+    width: str | float = "column",
+    label: bool = True,
+    legend: bool | None = None,
     crossings: bool = True,
     interfaces: Values | None = None,
     phases: Sequence[Phase] = (),
@@ -89,10 +122,18 @@ def time_series(
     Parameters
     ----------
     run : Trajectory
-    x : str or Symbol, optional
-        A state or slow quantity, by default the first state.
+    y : str, Symbol, Expr or callable, optional
+        A state or slow quantity, by default the first state, an expression in them and in
+        parameters and t, or a function of the columns.
     ax : Axes, optional
-        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+        Axes to draw into, in which limits set by hand are kept; new ones otherwise.
+    width : str or float
+        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+    label : bool
+        Whether to write the names of regions and phases.
+    legend : bool, optional
+        Whether to draw a legend, where there is more to explain than the trajectory; by
+        default as ``label``.
     crossings : bool
         Whether to mark the crossings of interfaces.
     interfaces : mapping, optional
@@ -112,30 +153,45 @@ def time_series(
     Raises
     ------
     UnknownNameError
-        If ``x`` is no state or slow quantity of the trajectory.
+        If ``y`` is no state or slow quantity of the trajectory.
+    ArgumentError
+        For what is no expression.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> run = fs.simulate(fs.systems.van_der_pol(), [0.5, 0], t=(0, 10))
+    >>> drawn = fs.plot.time_series(run, "x**2", color="black")
+    >>> drawn.y, drawn.ax.get_ylabel(), drawn.legend
+    ('x**2', '$x^{2}$', None)
     """
-    name = quantity(run, x, 0)
-    own, ax = ax is None, axes_for(ax, height=50 * MM)
-    look = {"color": color, "label": "trajectory", **LINE, **style}
-    lines = tuple(ax.plot(run.t, run[name], **look))
-    dots = _dots(ax, run, "t", name) if crossings else None
-    ax.set_xlabel(typeset("t"))
-    ax.set_ylabel(typeset(name))
-    if run.t[-1] > run.t[0]:
-        ax.set_xlim(float(run.t[0]), float(run.t[-1]))
-    strip = draw_phases(ax, phases) if phases else ((), ())
-    bands = _bands(ax, run, (None, name), interfaces)
-    if own and phases:
-        settle(ax)
-        fit_words(*strip)
-    return MotionDrawing(ax, "t", name, lines, dots, (), bands, *strip)
+    shown = of_run(run, "t", "t"), of_run(run, y, run.columns[0])
+    own, ax = ax is None, axes_for(ax, width, height=50.0)
+    time, values = along_run(run, *shown)
+    look = {"color": color, "label": "trajectory", **LINE, **_alone(len(time)), **style}
+    lines = tuple(ax.plot(time, values, **look))
+    dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
+    ax.set_xlabel(shown[0].label)
+    ax.set_ylabel(shown[1].label)
+    if time[-1] > time[0] and ax.get_autoscalex_on():
+        ax.set_xlim(float(time[0]), float(time[-1]), auto=None)
+    strip = draw_phases(ax, phases, label) if phases else ((), ())
+    bands = _bands(ax, run, (None, shown[1]), interfaces, label)
+    drawn = MotionDrawing(ax, "t", shown[1].text, lines, dots, (), bands, *strip)
+    if phases:
+        at_draw(ax, lambda: fit_words(*strip))
+    return _explained(drawn, own, label, legend)
 
 
 @takes(
     run=instance(Trajectory),
-    x=formula,
-    y=formula,
+    x=axis_quantity,
+    y=axis_quantity,
+    z=axis_quantity,
     ax=instance(Axes),
+    width=figure_width,
+    label=flag,
+    legend=flag,
     crossings=flag,
     interfaces=levels_of_states,
     arrows=whole(0, 1000),
@@ -146,29 +202,44 @@ def phase_portrait(
     run: Trajectory,
     x: object = None,
     y: object = None,
+    z: object = None,
     *,
     ax: Axes | None = None,
+    width: str | float = "column",
+    label: bool = True,
+    legend: bool | None = None,
     crossings: bool = True,
     interfaces: Values | None = None,
     arrows: int = 3,
     color: str = MOTION,
     **style: Any,
 ) -> MotionDrawing:
-    """Draw a trajectory in the plane of two of its quantities.
+    """Draw a trajectory in the plane of two of its quantities, or in the space of three.
 
     Parameters
     ----------
     run : Trajectory
-    x, y : str or Symbol, optional
-        States or slow quantities, by default the first two states (for a
-        single state, the state over its slow quantity).
+    x, y : str, Symbol, Expr or callable, optional
+        States or slow quantities, by default the first two states (for a single state, the
+        state over its slow quantity), expressions in them and in parameters and t, or
+        functions of the columns.
+    z : str, Symbol, Expr or callable, optional
+        With this the view is in space; for axes in space the third quantity by default.
     ax : Axes, optional
-        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+        Axes to draw into (with ``projection="3d"`` for a view in space), in which limits set
+        by hand are kept; new ones otherwise.
+    width : str or float
+        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+    label : bool
+        Whether to write the names of regions.
+    legend : bool, optional
+        Whether to draw a legend, where there is more to explain than the trajectory; by
+        default as ``label``.
     crossings : bool
         Whether to mark the crossings of interfaces.
     interfaces : mapping, optional
         Interface to (state, value), as a diagram's ``interface_values``: these
-        are drawn, with the regions between them.
+        are drawn, with the regions between them (in the plane).
     arrows : int
         How many arrow heads show the direction.
     color : str
@@ -183,73 +254,85 @@ def phase_portrait(
     Raises
     ------
     UnknownNameError
-        If ``x`` or ``y`` is no state or slow quantity of the trajectory.
+        For a name in ``x``, ``y`` or ``z`` that is no state or slow quantity.
     ArgumentError
-        If there is only one quantity to draw.
+        If there is only one quantity to draw, for what is no expression, or for a view in
+        space with plane axes.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> run = fs.simulate(fs.systems.van_der_pol(), [0.5, 0], t=(0, 10))
+    >>> fs.plot.phase_portrait(run, "w", "x").ax.get_xlabel()
+    '$w$'
     """
     names = run.columns
-    if len(names) < 2:
+    if len(names) < 2 and (x is None or y is None):
         raise ArgumentError(f"a phase portrait needs two quantities, received {names[0]} alone")
     if len(run.states) == 1 and x is None and y is None:
         x, y = names[1], names[0]
-    across, up = quantity(run, x, 0), quantity(run, y, 1)
-    ax = axes_for(ax)
-    lines = draw_motion(ax, run.t, run[across], run[up], run.period, color, style)
-    dots = _dots(ax, run, across, up) if crossings else None
-    ax.set_xlabel(typeset(across))
-    ax.set_ylabel(typeset(up))
-    bands = _bands(ax, run, (across, up), interfaces)
+    shown = [of_run(run, x, names[0]), of_run(run, y, names[-1 if len(names) < 2 else 1])]
+    space = spatial("phase_portrait", ax, z)
+    if space:
+        third = next((n for n in names if n not in (shown[0].text, shown[1].text)), "t")
+        shown.append(of_run(run, z, third))
+    own, ax = ax is None, axes_for(ax, width, HEIGHT if space else 64.0, space)
+    lines = draw_motion(ax, run.t, along_run(run, *shown), run.period, color, style)
+    dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
+    bands: tuple[Bands, ...] = ()
+    if space:
+        dress_space(ax, [q.label for q in shown])
+        settle(ax)
+    else:
+        ax.set_xlabel(shown[0].label)
+        ax.set_ylabel(shown[1].label)
+        bands = _bands(ax, run, (shown[0], shown[1]), interfaces, label)
     fractions = (np.arange(arrows) + 0.5) / max(arrows, 1)
     heads = draw_arrows(lines[-1], length_along(lines[-1]), fractions.tolist())
-    return MotionDrawing(ax, across, up, lines, dots, heads, bands)
+    across, up, *more = (q.text for q in shown)
+    drawn = MotionDrawing(ax, across, up, lines, dots, heads, bands, z="".join(more))
+    return _explained(drawn, own, label, legend)
 
 
-def quantity(run: Trajectory, name: object, default: int) -> str:
-    """The name of a state or slow quantity, by default by its position."""
-    if name is None:
-        return run.columns[default]
-    if str(name) not in run.columns:
-        raise unknown_name("state or slow quantity", name, run.columns)
-    return str(name)
+def _explained(drawn: MotionDrawing, own: bool, label: bool, legend: bool | None) -> MotionDrawing:
+    """Add a legend where there is more to explain than the trajectory, and place the names."""
+    if len(drawn.handles) > 1:
+        drawn = replace(drawn, legend=explained(drawn.ax, drawn.handles, own, label, legend))
+    place(drawn.ax, bands=drawn.bands)
+    if drawn.bands or drawn.words:
+        settle(drawn.ax)
+    return drawn
 
 
 def draw_motion(
     ax: Axes,
     t: Array,
-    x: Array,
-    y: Array,
+    places: Sequence[Array],
     period: float | None,
     color: str,
     style: dict[str, Any],
 ) -> tuple[Line2D, ...]:
     """Draw a curve in time, what comes before its last period faintly."""
-    look = {"color": color, **LINE, **style}
+    look = {"color": color, **LINE, **_alone(len(t)), **style}
     last = 0
     if period is not None:
         last = max(int(np.searchsorted(t, t[-1] - period, side="right")) - 1, 0)
     earlier = {"label": "earlier periods", **look, "alpha": 0.35, "zorder": 2.9}
-    lines = ax.plot(x[: last + 1], y[: last + 1], **earlier) if last > 0 else []
-    return (*lines, *ax.plot(x[last:], y[last:], **{"label": "trajectory", **look}))
+    lines = ax.plot(*(p[: last + 1] for p in places), **earlier) if last > 0 else []
+    return (*lines, *ax.plot(*(p[last:] for p in places), **{"label": "trajectory", **look}))
 
 
-def at_crossings(run: Trajectory, name: str) -> Array:
-    """Time, a state or a slow quantity at every crossing, shape (number of crossings,)."""
-    times = np.array([c.time for c in run.crossings])
-    if name == "t":
-        return times
-    if name in run.states:
-        index = run.states.index(name)
-        return np.array([c.state[index] for c in run.crossings])
-    return np.interp(times, run.t, run[name])
+def _alone(count: int) -> dict[str, Any]:
+    """A single sample is no line: it is drawn as a dot."""
+    return {"marker": ".", "markersize": 4.0} if count == 1 else {}
 
 
-def draw_dots(ax: Axes, x: Array, y: Array) -> Line2D | None:
+def draw_dots(ax: Any, places: Sequence[Array]) -> Line2D | None:
     """Mark crossings of interfaces by small dots."""
-    if not len(x):
+    if not len(places[0]):
         return None
     (dots,) = ax.plot(
-        x,
-        y,
+        *places,
         linestyle="none",
         marker="o",
         markersize=2.4,
@@ -262,21 +345,21 @@ def draw_dots(ax: Axes, x: Array, y: Array) -> Line2D | None:
     return dots
 
 
-def _dots(ax: Axes, run: Trajectory, x: str, y: str) -> Line2D | None:
-    return draw_dots(ax, at_crossings(run, x), at_crossings(run, y))
-
-
 def _bands(
-    ax: Axes, run: Trajectory, axes: tuple[str | None, str], interfaces: Values | None
+    ax: Axes,
+    run: Trajectory,
+    axes: tuple[Quantity | None, Quantity],
+    interfaces: Values | None,
+    label: bool,
 ) -> tuple[Bands, ...]:
     """Bands across the horizontal and the vertical axis, where these show a state."""
     starts = np.array([segment.start for segment in run.segments])
     names = np.array([segment.region for segment in run.segments])
-    if not len(starts):
+    if not len(starts) or not interfaces:
         return ()
     regions = names[np.maximum(np.searchsorted(starts, run.t, side="right") - 1, 0)]
     return tuple(
-        draw_bands(ax, state, interfaces or {}, run[state], regions, vertical=vertical)
-        for state, vertical in zip(axes, (True, False), strict=True)
-        if state is not None
+        draw_bands(ax, q.column, interfaces, run[q.column], regions, vertical=vertical, label=label)
+        for q, vertical in zip(axes, (True, False), strict=True)
+        if q is not None and q.column in run.columns
     )

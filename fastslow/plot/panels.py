@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.patches import Patch
 
-from fastslow.arguments import formula, instance, path, takes, text, within
-from fastslow.errors import unknown_name
-from fastslow.plot.labels import legend_below, place, settle
+from fastslow.arguments import (
+    flag,
+    formula,
+    instance,
+    items,
+    takes,
+    text,
+)
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.plot.arguments import (
+    figure_width,
+    line_style,
+)
+from fastslow.plot.covering import settle
+from fastslow.plot.drawings import Drawing
+from fastslow.plot.labels import place
+from fastslow.plot.legends import legend_below, legend_inside
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.passages import OverlayDrawing, draw_passage
-from fastslow.plot.phases import fit_words
-from fastslow.plot.style import FULL, MM, PHASES, TEXT, dressed, new_figure, save
+from fastslow.plot.quantities import of_diagram
+from fastslow.plot.style import MM, PHASES, TEXT, dressed, inches, new_figure
 from fastslow.results.overlays import Overlay
 
 #: Figures narrower than this have their three parts one below the other.
@@ -23,48 +38,45 @@ NARROW = 120 * MM
 
 
 @dataclass(frozen=True, eq=False)
-class PanelDrawing:
+class PanelDrawing(Drawing):
     """A drawn panel.
 
     Parameters
     ----------
-    figure : Figure
+    ax : Axes
+        Those of the overlay.
     time_series, phase_portrait : MotionDrawing
     overlay : OverlayDrawing
-    legend : Legend
-        Below the three, for all.
+    legend : Legend or None
+        For all three: below them, or in the overlay's axes if axes were given.
     """
 
-    figure: Figure
     time_series: MotionDrawing
     phase_portrait: MotionDrawing
     overlay: OverlayDrawing
-    legend: Legend
-
-    @takes(path=path, dpi=within(10.0, 10_000.0))
-    def save(self, path: str | Path, dpi: float = 300) -> Path:
-        """Write the figure, in the format of the suffix, with text kept as text.
-
-        Parameters
-        ----------
-        path : str or Path
-            Where to, e.g. ``"panel.pdf"``; its folder must exist.
-        dpi : float
-            Dots per inch of pixel formats.
-
-        Returns
-        -------
-        Path
-        """
-        return save(self.figure, path, dpi)
-
-    def _repr_png_(self) -> bytes:
-        return self.overlay._repr_png_()
+    legend: Legend | None
 
 
-@takes(lay=instance(Overlay), state=formula, title=text, width=within(2.0, 40.0))
+@takes(
+    lay=instance(Overlay),
+    state=formula,
+    ax=items(instance(Axes)),
+    title=text,
+    width=figure_width,
+    label=flag,
+    legend=flag,
+    style=line_style,
+)
 def panel(
-    lay: Overlay, state: object = None, *, title: str = "", width: float = FULL
+    lay: Overlay,
+    state: object = None,
+    *,
+    ax: Sequence[Axes] | None = None,
+    title: str = "",
+    width: str | float = "page",
+    label: bool = True,
+    legend: bool | None = None,
+    **style: Any,
 ) -> PanelDrawing:
     """Draw time series, phase portrait and overlay as one figure, 170 mm wide.
 
@@ -77,10 +89,18 @@ def panel(
     lay : Overlay
     state : str or Symbol, optional
         The state shown over time and over the slow quantity, by default the first.
+    ax : sequence of three Axes, optional
+        Axes for the three; a new figure otherwise.
     title : str
-        Written above, e.g. the parameter values.
-    width : float
-        Width of the figure in inches.
+        Written above a new figure, e.g. the parameter values.
+    width : str or float
+        Of a new figure: ``"page"`` (170 mm), ``"column"`` (85 mm), or millimetres.
+    label : bool
+        Whether to write labels, and the letters (a), (b), (c).
+    legend : bool, optional
+        Whether to draw a legend; by default as ``label``.
+    **style
+        Properties of the trajectory's lines.
 
     Returns
     -------
@@ -90,33 +110,53 @@ def panel(
     ------
     UnknownNameError
         If ``state`` is no state of the diagram.
+    ArgumentError
+        If ``ax`` is not three axes.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> gear = fs.systems.harmonic_gear()
+    >>> diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6))
+    >>> lay = fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=2))
+    >>> drawn = fs.plot.panel(lay, width="column", linewidth=0.6)
+    >>> [round(25.4 * length) for length in drawn.figure.get_size_inches()]
+    [85, 168]
     """
     name = lay.diagram.states[0] if state is None else str(state)
     if name not in lay.diagram.states:
         raise unknown_name("state", name, lay.diagram.states)
+    axes = _new_axes(inches(width), title) if ax is None else list(ax)
+    if len(axes) != 3:
+        raise ArgumentError(f"panel: expected three axes, received {len(axes)}")
+    if label:
+        for one, letter in zip(axes, "abc", strict=True):
+            one.set_title(f"({letter})", loc="left", fontsize=TEXT)
+    values = lay.diagram.interface_values
+    look: dict[str, Any] = {"interfaces": values, "label": label, "legend": False, **style}
+    series = time_series(lay.run, name, ax=axes[0], phases=lay.phases, **look)
+    portrait = phase_portrait(lay.run, ax=axes[1], **look)
+    shown = of_diagram(lay.diagram, None, lay.parameter), of_diagram(lay.diagram, name, name)
+    laid = draw_passage(axes[2], lay, shown, label=label, **style)
+    kinds = {phase.kind for phase in lay.phases}
+    strips = [Patch(label=f"{kind} phase", **PHASES[kind]) for kind in PHASES if kind in kinds]
+    key = None
+    if label if legend is None else legend:
+        draw = legend_below if ax is None else legend_inside
+        key = draw(laid.ax, [*laid.handles, *strips])
+    place(axes[2], laid.diagram.labels, bands=[laid.diagram.bands])
+    settle(laid.ax)
+    return PanelDrawing(laid.ax, series, portrait, laid, key)
+
+
+def _new_axes(width: float, title: str) -> list[Axes]:
+    """Three axes side by side, or one below the other where the figure is narrow."""
     narrow = width < NARROW
     figure = new_figure(width, (168 if narrow else 68) * MM)
     if narrow:
         grid = figure.subplots(3, 1, height_ratios=[1.0, 1.0, 1.3])
     else:
         grid = figure.subplots(1, 3, width_ratios=[1.0, 1.0, 1.3])
-    axes = [dressed(ax) for ax in grid]
-    for ax, letter in zip(axes, "abc", strict=True):
-        ax.set_title(f"({letter})", loc="left", fontsize=TEXT)
     if title:
         figure.suptitle(title, fontsize=TEXT)
-    values = lay.diagram.interface_values
-    series = time_series(lay.run, name, ax=axes[0], interfaces=values, phases=lay.phases)
-    portrait = phase_portrait(lay.run, ax=axes[1], interfaces=values)
-    laid = draw_passage(axes[2], lay, name)
-    kinds = {phase.kind for phase in lay.phases}
-    shown = [Patch(label=f"{kind} phase", **PHASES[kind]) for kind in PHASES if kind in kinds]
-    handles = [*laid.handles, *shown]
-    columns = 2 if narrow else 4 if len(handles) <= 8 else 5
-    legend = legend_below(laid.ax, handles, columns)
-    settle(laid.ax)
-    fit_words(series.phases, series.words)
-    place(axes[0], bands=series.bands)
-    place(axes[1], bands=portrait.bands)
-    place(axes[2], laid.diagram.labels, bands=[laid.diagram.bands])
-    return PanelDrawing(figure, series, portrait, laid, legend)
+    return [dressed(ax) for ax in grid]

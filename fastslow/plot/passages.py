@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,22 +11,29 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
-from numpy.typing import NDArray
 
-from fastslow.arguments import flag, formula, instance, takes
-from fastslow.errors import ArgumentError
-from fastslow.plot.arguments import line_colour, line_style
+from fastslow.arguments import (
+    flag,
+    instance,
+    takes,
+)
+from fastslow.plot.arguments import (
+    axis_quantity,
+    figure_width,
+    line_colour,
+    line_style,
+)
 from fastslow.plot.arrows import draw_heads, points
 from fastslow.plot.branches import DiagramDrawing, draw_branches
-from fastslow.plot.heights import expression_of
-from fastslow.plot.labels import key, place, settle
+from fastslow.plot.covering import settle
+from fastslow.plot.drawings import Drawing
+from fastslow.plot.labels import place
+from fastslow.plot.legends import explained
 from fastslow.plot.motions import draw_dots, draw_motion
+from fastslow.plot.quantities import Array, Quantity, along_overlay, at_times, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
-from fastslow.plot.style import MM, MOTION, TRANSITIONS, Drawing, axes_for, typeset
-from fastslow.results.formulas import evaluated
+from fastslow.plot.style import MOTION, TRANSITIONS, axes_for, spatial, typeset
 from fastslow.results.overlays import Overlay
-
-Array = NDArray[np.float64]
 
 #: Shares of the slow quantity's travel over a period at which an arrow head sits: uneven, so that
 #: the way up and the way down of a harmonic load do not meet.
@@ -56,6 +62,8 @@ class OverlayDrawing(Drawing):
     arrows : tuple of Annotation
         Sense of direction, along the sheets and in the jumps.
     legend : Legend or None
+    x : str
+        What the horizontal axis shows.
     """
 
     state: str
@@ -66,6 +74,7 @@ class OverlayDrawing(Drawing):
     turning: Line2D | None
     arrows: tuple[Annotation, ...]
     legend: Legend | None
+    x: str = ""
 
     @property
     def handles(self) -> list[Artist]:
@@ -76,9 +85,11 @@ class OverlayDrawing(Drawing):
 
 @takes(
     lay=instance(Overlay),
-    x=formula,
-    y=formula,
+    y=axis_quantity,
+    z=axis_quantity,
+    x=axis_quantity,
     ax=instance(Axes),
+    width=figure_width,
     label=flag,
     legend=flag,
     crossings=flag,
@@ -90,12 +101,14 @@ class OverlayDrawing(Drawing):
 )
 def overlay(
     lay: Overlay,
-    x: object = None,
     y: object = None,
+    z: object = None,
     *,
+    x: object = None,
     ax: Axes | None = None,
+    width: str | float = "column",
     label: bool = True,
-    legend: bool = True,
+    legend: bool | None = None,
     crossings: bool = True,
     turning: bool = True,
     interfaces: bool = True,
@@ -112,18 +125,23 @@ def overlay(
     Parameters
     ----------
     lay : Overlay
-    x : str, Symbol or Expr, optional
-        What the vertical axis shows: a state, by default the first, or an expression in
-        states and parameters such as ``"x**2 + v"``.
-    y : str, Symbol or Expr, optional
-        With this the view is in space, over the plane of the slow quantity and ``x``.
+    y : str, Symbol, Expr or callable, optional
+        What the vertical axis shows: a state, by default the first, the slow quantity, an
+        expression in states and parameters such as ``"x**2 + v"``, or a function of the
+        columns.
+    z : str, Symbol, Expr or callable, optional
+        With this the view is in space, and ``z`` its vertical axis.
+    x : str, Symbol, Expr or callable, optional
+        What the horizontal axis shows, by default the slow quantity.
     ax : Axes, optional
-        Axes to draw into (with ``projection="3d"`` for a view in space); new ones of a
-        column's width (85 mm) otherwise.
+        Axes to draw into (with ``projection="3d"`` for a view in space), in which limits set
+        by hand are kept; new ones otherwise.
+    width : str or float
+        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
-        Whether to write LP1, BE1, … beside special points.
-    legend : bool
-        Whether to draw a legend.
+        Whether to write LP1, BE1, … beside special points and the names of the regions.
+    legend : bool, optional
+        Whether to draw a legend; by default as ``label``.
     crossings : bool
         Whether to mark the crossings of interfaces.
     turning : bool
@@ -145,25 +163,36 @@ def overlay(
     Raises
     ------
     UnknownNameError
-        For a name in ``x`` or ``y`` that is no state, slow quantity or parameter.
+        For a name in ``x``, ``y`` or ``z`` that is no state, slow quantity or parameter.
     ArgumentError
         For what is no expression, or for a view in space with plane axes.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> gear = fs.systems.harmonic_gear()
+    >>> diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6))
+    >>> lay = fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=2))
+    >>> drawn = fs.plot.overlay(lay, "v", linewidth=0.5)
+    >>> drawn.x, drawn.state, len(drawn.crossings.get_xdata())
+    ('w', 'v', 8)
     """
-    name = expression_of(lay.diagram, x)
-    spatial = ax is not None and ax.name == "3d"
-    if y is not None or spatial:
-        if ax is not None and not spatial:
-            raise ArgumentError('a view in space needs axes with projection="3d"')
-        other = y if y is not None else next((s for s in lay.diagram.states if s != name), None)
-        if other is None:
-            raise ArgumentError(f"a view in space needs two states, received {name} alone")
-        up = expression_of(lay.diagram, other)
-        return draw_space(lay, name, up, ax, label=label, legend=legend, color=color, **style)
-    own, ax = ax is None, axes_for(ax, height=78 * MM)
+    diagram = lay.diagram
+    across, up = (
+        of_diagram(diagram, x, diagram.parameter),
+        of_diagram(diagram, y, diagram.states[0]),
+    )
+    if spatial("overlay", ax, z):
+        third = next((s for s in diagram.states if s not in (across.text, up.text)), up.text)
+        shown = across, up, of_diagram(diagram, z, third)
+        look = {"virtual": virtual, "color": color, "style": style}
+        motion = along_overlay(lay, *shown)
+        return draw_space(diagram, shown, ax, width, label, legend, motion=motion, **look)
+    own, ax = ax is None, axes_for(ax, width, height=78.0)
     drawn = draw_passage(
         ax,
         lay,
-        name,
+        (across, up),
         label=label,
         crossings=crossings,
         turning=turning,
@@ -172,18 +201,16 @@ def overlay(
         color=color,
         **style,
     )
-    if legend:
-        drawn = replace(drawn, legend=key(ax, drawn.handles, own))
-    below, taken = drawn.diagram, [] if drawn.legend is None else [drawn.legend]
+    drawn = replace(drawn, legend=explained(ax, drawn.handles, own, label, legend))
+    place(ax, drawn.diagram.labels, [], [drawn.diagram.bands])
     settle(ax)
-    place(ax, below.labels, taken, [below.bands])
     return drawn
 
 
 def draw_passage(
     ax: Axes,
     lay: Overlay,
-    name: str,
+    shown: tuple[Quantity, Quantity],
     *,
     label: bool = True,
     crossings: bool = True,
@@ -194,19 +221,18 @@ def draw_passage(
     **style: Any,
 ) -> OverlayDrawing:
     """Draw an overlay without a legend, its labels not placed yet; arguments as for `overlay`."""
-    values = lay[name]
-    lines = draw_motion(ax, lay.time, lay.slow, values, lay.run.period, color, style)
+    across, up = along_overlay(lay, *shown)
+    lines = draw_motion(ax, lay.time, (across, up), lay.run.period, color, style)
     dots = None
     met = lay.run.crossings
     if crossings and met:
         times, state = np.array([c.time for c in met]), np.array([c.state for c in met])
-        slow = np.interp(times, lay.time, lay.slow)
-        dots = draw_dots(ax, slow, _heights(lay, name, times, slow, lay.run.states, state))
-    changes = _transitions(ax, lay, name)
-    turns = _turning(ax, lay, name) if turning else None
+        dots = draw_dots(ax, at_times(lay, times, lay.run.states, state, *shown))
+    changes = _transitions(ax, lay, shown)
+    turns = _turning(ax, lay, shown) if turning else None
     # after the trajectory, so that the bands take its limits in
     below = draw_branches(
-        ax, lay.diagram, name, label=label, virtual=virtual, interfaces=interfaces
+        ax, lay.diagram, shown, label=label, virtual=virtual, interfaces=interfaces
     )
     for line in below.lines:
         if line.get_label() == "stable":
@@ -215,35 +241,27 @@ def draw_passage(
         elif any(phase.kind == "spiking" for phase in lay.phases):
             # spikes would cover it
             line.set_zorder(3.5)
-    heads = draw_heads(lines[-1], _heads(lay, values, points(lines[-1])[:, 0]))
-    return OverlayDrawing(ax, name, below, lines, dots, changes, turns, heads, None)
+    drawn = len(points(lines[-1]))
+    heads = draw_heads(lines[-1], _heads(lay, up, lay.slow[len(lay) - drawn :]))
+    text = shown[1].text
+    return OverlayDrawing(ax, text, below, lines, dots, changes, turns, heads, None, shown[0].text)
 
 
-def _heights(
-    lay: Overlay, expression: str, times: Array, slow: Array, names: Sequence[str], state: Array
-) -> Array:
-    """An expression at times between samples, where some states are known, shape (N, states)."""
-    columns = {n: np.interp(times, lay.time, lay.run[n]) for n in lay.run.columns}
-    columns |= {name: state[:, k] for k, name in enumerate(names)}
-    known = {**lay.run.parameters, **lay.diagram.parameters, **columns, lay.parameter: slow}
-    return np.broadcast_to(evaluated(expression, known), times.shape)
+def _at_moments(lay: Overlay, shown: tuple[Quantity, Quantity], moments: Any) -> list[Array]:
+    """Quantities at moments, which know their fast states and the slow quantity."""
+    state = np.array([[*m.state, m.value] for m in moments])
+    names = (*lay.diagram.states, lay.parameter)
+    return at_times(lay, np.array([m.time for m in moments]), names, state, *shown)
 
 
-def _at_moments(lay: Overlay, expression: str, moments: Sequence[Any]) -> tuple[Array, Array]:
-    """The slow quantity and an expression at moments that know their fast states."""
-    times, slow = (np.array([getattr(m, n) for m in moments]) for n in ("time", "value"))
-    state = np.array([m.state for m in moments])
-    return slow, _heights(lay, expression, times, slow, lay.diagram.states, state)
-
-
-def _transitions(ax: Axes, lay: Overlay, name: str) -> tuple[Line2D, ...]:
+def _transitions(ax: Axes, lay: Overlay, shown: tuple[Quantity, Quantity]) -> tuple[Line2D, ...]:
     drawn: list[Line2D] = []
     for kind, (marker, colour, text) in TRANSITIONS.items():
         met = [t for t in lay.transitions if t.kind == kind]
         if met:
             filled = marker in "*PX"
             drawn += ax.plot(
-                *_at_moments(lay, name, met),
+                *_at_moments(lay, shown, met),
                 linestyle="none",
                 marker=marker,
                 markersize=7.0 if marker == "*" else 5.5,
@@ -256,12 +274,12 @@ def _transitions(ax: Axes, lay: Overlay, name: str) -> tuple[Line2D, ...]:
     return tuple(drawn)
 
 
-def _turning(ax: Axes, lay: Overlay, name: str) -> Line2D | None:
+def _turning(ax: Axes, lay: Overlay, shown: tuple[Quantity, Quantity]) -> Line2D | None:
     """Bars where the slow quantity turns back."""
     if not lay.turning:
         return None
     (line,) = ax.plot(
-        *_at_moments(lay, name, lay.turning),
+        *_at_moments(lay, shown, lay.turning),
         linestyle="none",
         marker="|",
         markersize=9.0,

@@ -16,7 +16,7 @@ HEIGHT, WORDS = 10.0, 6.0
 
 
 def draw_phases(
-    ax: Axes, phases: Sequence[Phase]
+    ax: Axes, phases: Sequence[Phase], label: bool = True
 ) -> tuple[tuple[Rectangle, ...], tuple[Text, ...]]:
     """Draw phases as a strip along the upper edge of a time series.
 
@@ -25,6 +25,8 @@ def draw_phases(
     ax : Axes
         With time on the horizontal axis; room is made above what is drawn.
     phases : sequence of Phase
+    label : bool
+        Whether to write into the strip.
 
     Returns
     -------
@@ -37,7 +39,7 @@ def draw_phases(
     whole = ax.get_window_extent().height * 72.0 / root(ax).dpi
     height = min(HEIGHT / whole, 0.5)
     low, high = ax.get_ylim()
-    ax.set_ylim(low, high + height / (1.0 - height) * (high - low))
+    ax.set_ylim(low, high + height / (1.0 - height) * (high - low), auto=None)
     frame = ax.get_xaxis_transform()
     boxes, words = [], []
     for phase in phases:
@@ -52,6 +54,8 @@ def draw_phases(
         )
         ax.add_patch(box)
         boxes.append(box)
+        if not label:
+            continue
         words.append(
             ax.text(
                 0.5 * (phase.start + phase.end),
@@ -71,7 +75,8 @@ def draw_phases(
 
 def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text]) -> None:
     """Hide the words that are wider than their boxes, in axes with their final places."""
-    for box, word in zip(boxes, words, strict=True):
+    # without labels there are no words
+    for box, word in zip(boxes, words, strict=False):
         word.set_visible(word.get_window_extent().width <= box.get_window_extent().width)
 
 

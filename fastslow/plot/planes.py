@@ -1,25 +1,43 @@
-"""Curves of special points in the plane of two parameters."""
+"""Curves of special points over two parameters, in their plane or with a state above it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, instance, takes
+from fastslow.arguments import (
+    flag,
+    instance,
+    takes,
+)
 from fastslow.errors import ArgumentError
-from fastslow.plot.arguments import line_style
-from fastslow.plot.labels import key, place, settle, tag
-from fastslow.plot.style import CURVES, MARKERS, Drawing, axes_for, typeset
+from fastslow.plot.areas import draw_areas, samples
+from fastslow.plot.arguments import (
+    axis_quantity,
+    figure_width,
+    line_style,
+)
+from fastslow.plot.covering import settle
+from fastslow.plot.drawings import Drawing
+from fastslow.plot.labels import place, tag
+from fastslow.plot.legends import explained
+from fastslow.plot.quantities import Quantity, at_points, quantity_of
+from fastslow.plot.spaces import HEIGHT, dress_space
+from fastslow.plot.style import CURVES, axes_for, dot_look, spatial
 from fastslow.results.point_branches import PointBranch
-from fastslow.results.points import CODE_NAMES
+from fastslow.results.points import CODE_NAMES, SpecialPoint
+from fastslow.results.refined_maps import RefinedMap
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,17 +54,30 @@ class PlaneDrawing(Drawing):
     labels : tuple of Annotation
         CP1, BT1, … beside the points.
     legend : Legend or None
+    x, y, z : str
+        What the axes show; ``z`` is empty in the plane.
+    fills : dict of PolyCollection
+        The area of each label of the regions beneath.
     """
 
     lines: tuple[Line2D, ...]
     markers: tuple[Line2D, ...]
     labels: tuple[Annotation, ...]
     legend: Legend | None
+    x: str = ""
+    y: str = ""
+    z: str = ""
+    fills: dict[Any, PolyCollection] = field(default_factory=dict)
 
 
 @takes(
     curves=instance(PointBranch),
+    x=axis_quantity,
+    y=axis_quantity,
+    z=axis_quantity,
+    regions=instance(RefinedMap),
     ax=instance(Axes),
+    width=figure_width,
     label=flag,
     legend=flag,
     virtual=flag,
@@ -54,9 +85,14 @@ class PlaneDrawing(Drawing):
 )
 def parameter_plane(
     *curves: PointBranch,
+    x: object = None,
+    y: object = None,
+    z: object = None,
+    regions: RefinedMap | None = None,
     ax: Axes | None = None,
+    width: str | float = "column",
     label: bool = True,
-    legend: bool = True,
+    legend: bool | None = None,
     virtual: bool = True,
     **style: Any,
 ) -> PlaneDrawing:
@@ -69,12 +105,22 @@ def parameter_plane(
     ----------
     *curves : PointBranch
         Over the same two parameters.
+    x, y : str, Symbol, Expr or callable, optional
+        What the axes show, by default the two parameters: parameters, states, expressions
+        in them, or functions of the columns.
+    z : str, Symbol, Expr or callable, optional
+        With this the view is in space, e.g. a state over the plane; for axes in space the
+        first state by default.
+    regions : RefinedMap, optional
+        Over the same two parameters: its areas lie beneath the curves, in light colours.
     ax : Axes, optional
-        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+        Axes to draw into (with ``projection="3d"`` for a view in space); new ones otherwise.
+    width : str or float
+        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
         Whether to write CP1, BT1, … beside codimension-two points.
-    legend : bool
-        Whether to draw a legend.
+    legend : bool, optional
+        Whether to draw a legend; by default as ``label``.
     virtual : bool
         Whether to draw the virtual parts.
     **style
@@ -86,32 +132,76 @@ def parameter_plane(
 
     Raises
     ------
+    UnknownNameError
+        For a name in ``x``, ``y`` or ``z`` that is no state and no parameter.
     ArgumentError
-        If there is no curve, or they are over different parameters.
+        If there is no curve, or they are over different parameters, or the regions are; for
+        what is no expression; for a view in space with plane axes.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> import sympy as sp
+    >>> x, p, q = sp.symbols("x p q")
+    >>> model = fs.Model({x: p + q * x - x**3}, parameters={p: 0, q: 1})
+    >>> fold = fs.continue_equilibria(model, "p", over=(-1, 1)).folds[0]
+    >>> curve = fs.continue_points(fold, ("p", "q"), over={"p": (-1, 1), "q": (-1, 2)})
+    >>> [text.get_text() for text in fs.plot.parameter_plane(curve).labels]
+    ['CP1']
+    >>> fs.plot.parameter_plane(curve, z=x).ax.get_zlabel()
+    '$x$'
     """
     names = {curve.parameter_names for curve in curves}
     if len(names) != 1:
         shown = "; ".join(", ".join(n) for n in sorted(names)) or "none"
         raise ArgumentError(f"parameter_plane: expected curves over one plane, received {shown}")
-    ((first, second),) = names
-    own, ax = ax is None, axes_for(ax)
+    space = spatial("parameter_plane", ax, z)
+    quantities = _axes(curves[0], (x, y, z) if space else (x, y))
+    shown_names = tuple(q.column for q in quantities)
+    if regions is not None and shown_names != regions.names:
+        raise ArgumentError(
+            f"parameter_plane: regions over {', '.join(regions.names)} cannot lie beneath axes "
+            f"of {', '.join(q.text for q in quantities)}"
+        )
+    own, ax = ax is None, axes_for(ax, width, HEIGHT if space else 64.0, space)
+    fills = {} if regions is None else draw_areas(ax, regions)
     lines: list[Line2D] = []
     for curve in curves:
+        places = [q.of(_columns(curve), len(curve)) for q in quantities]
         for code, real, rows in _runs(curve):
             if not (real or virtual):
                 continue
             look = {**CURVES[code], "zorder": 2.0, "label": f"{code} {CODE_NAMES[code]}"}
             if not real:
                 look |= {**CURVES["virtual"], "label": "virtual"}
-            lines += ax.plot(curve[first][rows], curve[second][rows], **{**look, **style})
-    markers, labels = _special_points(ax, curves, (first, second), virtual, label)
-    ax.set_xlabel(typeset(first))
-    ax.set_ylabel(typeset(second))
-    handles = {str(line.get_label()): line for line in (*lines, *markers)}
-    shown_key = key(ax, list(handles.values()), own) if legend and handles else None
+            lines += ax.plot(*(place[rows] for place in places), **{**look, **style})
+    markers, labels = _special_points(ax, curves, quantities, virtual, label)
+    if space:
+        dress_space(ax, [q.label for q in quantities])
+    else:
+        ax.set_xlabel(quantities[0].label)
+        ax.set_ylabel(quantities[1].label)
+    seen: dict[str, Artist] = {str(line.get_label()): line for line in (*lines, *markers)}
+    key = explained(ax, [*seen.values(), *samples(fills)], own, label, legend)
+    place(ax, labels)
     settle(ax)
-    place(ax, labels, [] if shown_key is None else [shown_key])
-    return PlaneDrawing(ax, tuple(lines), tuple(markers), tuple(labels), shown_key)
+    across, up, *above = (q.text for q in quantities)
+    drawn = tuple(lines), tuple(markers), tuple(labels), key
+    return PlaneDrawing(ax, *drawn, across, up, "".join(above), fills)
+
+
+def _axes(curve: PointBranch, given: tuple[object, ...]) -> list[Quantity]:
+    """What the axes show, by default the parameters and the first state."""
+    defaults = (*curve.parameter_names, curve.states[0])
+    names = curve.point_names
+    return [
+        quantity_of(one, default, names, curve.parameters, "parameter or state")
+        for one, default in zip(given, defaults, strict=False)
+    ]
+
+
+def _columns(curve: PointBranch) -> dict[str, Any]:
+    return {**curve.parameters, **{name: curve[name] for name in curve.point_names}}
 
 
 def _runs(curve: PointBranch) -> list[tuple[str, bool, slice]]:
@@ -126,41 +216,33 @@ def _runs(curve: PointBranch) -> list[tuple[str, bool, slice]]:
 
 
 def _special_points(
-    ax: Axes,
-    curves: tuple[PointBranch, ...],
-    names: tuple[str, str],
+    ax: Any,
+    curves: Sequence[PointBranch],
+    shown: Sequence[Quantity],
     virtual: bool,
     label: bool,
 ) -> tuple[list[Line2D], list[Annotation]]:
     markers: list[Line2D] = []
     labels: list[Annotation] = []
-    seen: list[tuple[str, NDArray[np.float64]]] = []
+    names = curves[0].parameter_names
     spans = np.ptp(np.concatenate([c.parameter for c in curves]), axis=0) + 1e-300
     for code in CODE_NAMES:
-        points: list[tuple[NDArray[np.float64], str]] = []
+        met: list[SpecialPoint] = []
+        seen: list[NDArray[np.float64]] = []
         for point in (p for curve in curves for p in curve.special(code)):
             at = np.array([point.parameters[n] for n in names])
             # one point may stand on two of the curves
-            again = any(c == code and np.all(np.abs(at - o) < 1e-6 * spans) for c, o in seen)
+            again = any(np.all(np.abs(at - other) < 1e-6 * spans) for other in seen)
             if again or not (point.admissible or virtual):
                 continue
-            seen.append((code, at))
-            # numbered over all curves, which number their own points each
-            points.append((at, f"{code}{len(points) + 1}"))
-        if not points:
+            seen.append(at)
+            met.append(point)
+        if not met:
             continue
-        marker, colour = MARKERS[code]
-        markers += ax.plot(
-            *np.transpose([at for at, _ in points]),
-            linestyle="none",
-            marker=marker,
-            markersize=5,
-            markerfacecolor=colour,
-            markeredgecolor="white",
-            markeredgewidth=0.5,
-            zorder=5,
-            label=f"{code} {CODE_NAMES[code]}",
-        )
+        places = np.column_stack(at_points(met, *shown))
+        look = {"zorder": 5, "label": f"{code} {CODE_NAMES[code]}"}
+        markers += ax.plot(*places.T, **dot_look(code, 5.0), **look)
         if label:
-            labels += [tag(ax, word, (at[0], at[1])) for at, word in points]
+            # numbered over all curves, which number their own points each
+            labels += [tag(ax, f"{code}{k}", at) for k, at in enumerate(places, start=1)]
     return markers, labels

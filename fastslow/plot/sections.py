@@ -9,11 +9,22 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
-from fastslow.arguments import formula, instance, positive, takes
+from fastslow.arguments import (
+    flag,
+    instance,
+    positive,
+    takes,
+)
 from fastslow.errors import ArgumentError
-from fastslow.plot.arguments import line_style
-from fastslow.plot.labels import key
-from fastslow.plot.style import BLACK, BLUE, VERMILION, Drawing, axes_for, typeset, widen
+from fastslow.plot.arguments import (
+    axis_quantity,
+    figure_width,
+    line_style,
+)
+from fastslow.plot.drawings import Drawing
+from fastslow.plot.legends import explained
+from fastslow.plot.quantities import quantity_of
+from fastslow.plot.style import BLACK, BLUE, VERMILION, axes_for, widen
 from fastslow.results.sections import Section
 
 #: Marker, colour and words by direction.
@@ -47,9 +58,12 @@ class SectionDrawing(Drawing):
 
 @takes(
     section=instance(Section),
-    x=formula,
-    y=formula,
+    x=axis_quantity,
+    y=axis_quantity,
     ax=instance(Axes),
+    width=figure_width,
+    label=flag,
+    legend=flag,
     size=positive,
     style=line_style,
 )
@@ -59,6 +73,9 @@ def section(
     y: object = None,
     *,
     ax: Axes | None = None,
+    width: str | float = "column",
+    label: bool = True,
+    legend: bool | None = None,
     size: float = 2.4,
     **style: Any,
 ) -> SectionDrawing:
@@ -68,10 +85,16 @@ def section(
     ----------
     section : Section
         From `Trajectory.section` or `Trajectory.stroboscopic`.
-    x, y : str or Symbol, optional
-        Columns, or ``"t"``; by default the first two.
+    x, y : str, Symbol, Expr or callable, optional
+        Columns or ``"t"``, by default the first two, expressions in them, or functions of
+        the columns.
     ax : Axes, optional
-        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+        Axes to draw into; new ones otherwise.
+    width : str or float
+        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+    label, legend : bool, optional
+        Whether to draw a legend, where there is more than one direction; ``legend``, by
+        default as ``label``, decides.
     size : float
         Size of the markers in points.
     **style
@@ -86,17 +109,26 @@ def section(
     UnknownNameError
         If ``x`` or ``y`` is no column of the section.
     ArgumentError
-        If there is only one column and none was named.
+        If there is only one column and none was named; for what is no expression.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> run = fs.simulate(fs.systems.van_der_pol(), [0.5, 0], t=(0, 60))
+    >>> found = run.section("y", direction=1)
+    >>> fs.plot.section(found, "t", "x**2").ax.get_ylabel()
+    '$x^{2}$'
     """
     if len(section.names) < 2 and (x is None or y is None):
         raise ArgumentError(
             f'a section of {section.names[0]} alone has no plane; draw it over "t", or name x and y'
         )
-    across = section.names[0] if x is None else str(x)
-    up = section.names[1] if y is None else str(y)
-    horizontal, vertical = section[across], section[up]
-    own = ax is None
-    ax = axes_for(ax)
+    names = (*section.names, "t")
+    across = quantity_of(x, names[0], names, (), "column")
+    up = quantity_of(y, names[1], names, (), "column")
+    columns = {name: section[name] for name in names}
+    horizontal, vertical = (q.of(columns, len(section)) for q in (across, up))
+    own, ax = ax is None, axes_for(ax, width)
     points = []
     kinds = [d for d in LOOKS if (section.directions == d).any()]
     for direction in kinds:
@@ -113,7 +145,7 @@ def section(
         look |= {"linestyle": "none", "label": words, **style}
         points += ax.plot(horizontal[mine], vertical[mine], **look)
     widen(ax)
-    ax.set_xlabel(typeset(across))
-    ax.set_ylabel(typeset(up))
-    legend = key(ax, points, own) if len(points) > 1 else None
-    return SectionDrawing(ax, across, up, tuple(points), legend)
+    ax.set_xlabel(across.label)
+    ax.set_ylabel(up.label)
+    key = explained(ax, points, own, label, legend) if len(points) > 1 else None
+    return SectionDrawing(ax, across.text, up.text, tuple(points), key)

@@ -1,130 +1,129 @@
-"""A trajectory over its branches in space: the slow quantity and two states."""
+"""Branches and trajectories in space."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
 
-from fastslow.plot.branches import runs
-from fastslow.plot.heights import along, at_point, written
-from fastslow.plot.labels import legend_below
-from fastslow.plot.style import (
-    BRANCH,
-    COLUMN,
-    LINES,
-    MARKERS,
-    MM,
-    SMALL,
-    TEXT,
-    Drawing,
-    new_figure,
-    typeset,
-)
-from fastslow.results.overlays import Overlay
-from fastslow.results.points import CODE_NAMES
+from fastslow.plot.arrows import draw_arrows, length_along
+from fastslow.plot.covering import settle
+from fastslow.plot.drawings import Drawing
+from fastslow.plot.labels import place
+from fastslow.plot.legends import explained
+from fastslow.plot.quantities import Array, Quantity, along_branch
+from fastslow.plot.stretches import draw_points, runs, worth_a_marker
+from fastslow.plot.style import BRANCH, LINES, SMALL, TEXT, axes_for
+from fastslow.results.diagrams import Diagram
+
+#: Height of a figure in space, in millimetres.
+HEIGHT = 84.0
+
+#: Shares of the length of a trajectory at which an arrow head sits.
+ARROWS = (0.2, 0.45, 0.7, 0.95)
 
 
 @dataclass(frozen=True, eq=False)
 class SpaceDrawing(Drawing):
-    """An overlay drawn in space.
+    """A diagram or an overlay drawn in space.
 
     Parameters
     ----------
     ax : Axes
         With the projection "3d".
     x, y : str
-        What stands over the slow quantity, along the second and the vertical axis.
+        What the second and the vertical axis show.
     branches : tuple of Line2D
         One for each run of constant stability.
     markers : tuple of Line2D
         One for each code of special points.
-    line : Line2D
+    line : Line2D or None
         The trajectory.
     legend : Legend or None
+    labels : tuple of Annotation
+        LP1, BE1, … beside the points.
+    arrows : tuple of Annotation
+        Sense of direction.
+    along : str
+        What the first axis shows.
     """
 
     x: str
     y: str
     branches: tuple[Line2D, ...]
     markers: tuple[Line2D, ...]
-    line: Line2D
+    line: Line2D | None
     legend: Legend | None
+    labels: tuple[Annotation, ...] = ()
+    arrows: tuple[Annotation, ...] = ()
+    along: str = ""
 
 
 def draw_space(
-    lay: Overlay,
-    x: str,
-    y: str,
-    ax: Axes | None = None,
-    *,
-    label: bool = True,
-    legend: bool = True,
-    **style: Any,
-) -> SpaceDrawing:
-    """Draw an overlay in space; see `fastslow.plot.overlay`."""
-    own = ax is None
-    if ax is None:
-        ax = new_figure(COLUMN, 84 * MM).add_subplot(projection="3d")
-    return _drawn(lay, x, y, ax, own, label, legend, style)
-
-
-def _drawn(
-    lay: Overlay,
-    x: str,
-    y: str,
-    ax: Any,  # axes in space, which Matplotlib does not type
-    own: bool,
+    diagram: Diagram,
+    shown: tuple[Quantity, Quantity, Quantity],
+    ax: Axes | None,
+    width: str | float,
     label: bool,
-    legend: bool,
+    legend: bool | None,
+    *,
+    virtual: bool,
+    motion: Sequence[Array] | None = None,
+    color: str = BRANCH,
     style: dict[str, Any],
 ) -> SpaceDrawing:
-    diagram = lay.diagram
-    branches: list[Any] = []
-    for branch in diagram.branches:
-        if branch.admissible:
-            across, up = along(diagram, branch, x), along(diagram, branch, y)
-            for kind, rows in runs(branch):
-                look = {**LINES[kind], "color": BRANCH, "label": kind}
-                look["linewidth"] = 2.0 if kind == "stable" else look["linewidth"]
-                branches += ax.plot(branch.parameter[rows], across[rows], up[rows], **look)
-    (line,) = ax.plot(
-        lay.slow, lay[x], lay[y], **{"linewidth": 0.6, "label": "trajectory", **style}
-    )
-    markers: list[Any] = []
-    for code in CODE_NAMES:
-        met = [p for p in diagram.special if p.code == code and p.admissible and code != "EP"]
-        if met:
-            marker, colour = MARKERS[code]
-            places = [(p[lay.parameter], at_point(p, x), at_point(p, y)) for p in met]
-            markers += ax.plot(
-                *zip(*places, strict=True),
-                linestyle="none",
-                marker=marker,
-                markersize=4.5,
-                markerfacecolor=colour,
-                markeredgecolor="white",
-                markeredgewidth=0.5,
-                label=f"{code} {CODE_NAMES[code]}",
-            )
-            if label:
-                for point, at in zip(met, places, strict=True):
-                    ax.text(*at, f"  {point.label}", fontsize=SMALL)
-    for set_label, text in (
-        (ax.set_xlabel, typeset(lay.parameter)),
-        (ax.set_ylabel, written(x)),
-        (ax.set_zlabel, written(y)),
-    ):
+    """Draw a diagram in space, and over it a trajectory; see `fastslow.plot.diagram`.
+
+    Parameters
+    ----------
+    shown : tuple of Quantity
+        Along the three axes.
+    motion : sequence of ndarray, optional
+        The trajectory along the three axes.
+    color, style
+        Of the trajectory, else of the branches.
+    """
+    own, space = ax is None, axes_for(ax, width, HEIGHT, space=True)
+    of_branches = {"color": color, **style} if motion is None else {"color": BRANCH}
+    branches: list[Line2D] = []
+    drawn = [b for b in diagram.branches if b.admissible or virtual]
+    for branch in drawn:
+        places = along_branch(diagram, branch, *shown)
+        for kind, rows in runs(branch):
+            look = {**LINES[kind], "label": kind, **of_branches}
+            if motion is not None and kind == "stable":
+                # wide enough to be seen beneath a trajectory that follows it
+                look["linewidth"] = 2.0
+            branches += space.plot(*(p[rows] for p in places), **look)
+    line, heads = None, ()
+    if motion is not None:
+        look = {"linewidth": 0.7, "color": color, "label": "trajectory", **style}
+        (line,) = space.plot(*motion, **look)
+    markers, labels = draw_points(space, worth_a_marker(drawn), shown, label)
+    dress_space(space, [q.label for q in shown])
+    seen: dict[str, Artist] = {str(h.get_label()): h for h in [*branches, *markers]}
+    handles = [*seen.values(), *([] if line is None else [line])]
+    key = explained(space, handles, own, label, legend)
+    place(space, labels)
+    settle(space)
+    if line is not None:
+        heads = draw_arrows(line, length_along(line), ARROWS)
+        settle(space)
+    along, x, y = (q.text for q in shown)
+    return SpaceDrawing(space, x, y, tuple(branches), markers, line, key, labels, heads, along)
+
+
+def dress_space(space: Any, names: Sequence[str]) -> None:
+    """Names and small ticks for axes in space."""
+    setters = (space.set_xlabel, space.set_ylabel, space.set_zlabel)
+    for set_label, text in zip(setters, names, strict=True):
         set_label(text, fontsize=TEXT, labelpad=-4)
-    ax.tick_params(labelsize=SMALL, pad=-3)
-    ax.tick_params(axis="z", pad=1)
-    ax.locator_params(nbins=5)
-    key = None
-    if legend:
-        shown: dict[str, Line2D] = {str(h.get_label()): h for h in [*branches, *markers, line]}
-        handles = list(shown.values())
-        key = legend_below(ax, handles, 2) if own else ax.legend(handles=handles, fontsize=SMALL)
-    return SpaceDrawing(ax, x, y, tuple(branches), tuple(markers), line, key)
+    space.tick_params(labelsize=SMALL, pad=-3)
+    space.tick_params(axis="z", pad=1)
+    space.locator_params(nbins=5)

@@ -7,14 +7,28 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.arguments import flag, instance, interval, takes, whole
+from fastslow.arguments import (
+    flag,
+    instance,
+    interval,
+    takes,
+    whole,
+)
 from fastslow.errors import ArgumentError
-from fastslow.plot.arguments import line_colour, line_style
-from fastslow.plot.labels import settle, tag
-from fastslow.plot.style import MM, MOTION, VERMILION, Drawing, axes_for, root, typeset
+from fastslow.plot.arguments import (
+    figure_width,
+    line_colour,
+    line_style,
+)
+from fastslow.plot.covering import settle
+from fastslow.plot.drawings import Drawing
+from fastslow.plot.labels import tag
+from fastslow.plot.legends import explained
+from fastslow.plot.style import MOTION, VERMILION, axes_for, root, typeset
 from fastslow.results.spectra import Spectrum
 
 #: Amplitudes below this part of the largest are not looked for when the axes are chosen.
@@ -42,16 +56,22 @@ class SpectrumDrawing(Drawing):
         The largest lines, interpolated between bins.
     labels : tuple of Annotation
         Their frequencies.
+    legend : Legend or None
+        Only where one was asked for.
     """
 
     line: Line2D
     peaks: Line2D | None
     labels: tuple[Annotation, ...]
+    legend: Legend | None = None
 
 
 @takes(
     spectrum=instance(Spectrum),
     ax=instance(Axes),
+    width=figure_width,
+    label=flag,
+    legend=flag,
     angular=flag,
     over=interval,
     peaks=whole(0),
@@ -62,6 +82,9 @@ def spectrum(
     spectrum: Spectrum,
     *,
     ax: Axes | None = None,
+    width: str | float = "column",
+    label: bool = True,
+    legend: bool = False,
     angular: bool = False,
     over: tuple[float, float] | None = None,
     peaks: int = 3,
@@ -74,13 +97,19 @@ def spectrum(
     ----------
     spectrum : Spectrum
     ax : Axes, optional
-        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+        Axes to draw into; new ones otherwise.
+    width : str or float
+        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+    label : bool
+        Whether to write the frequencies of the largest lines.
+    legend : bool
+        Whether to draw a legend; the axes explain the curve without one.
     angular : bool
         Whether to show angular frequency.
     over : (float, float), optional
         Frequencies to show; by default up to the last that is worth it.
     peaks : int
-        How many lines to mark with their frequencies.
+        How many lines to mark.
     color : str
         Colour of the curve.
     **style
@@ -94,6 +123,13 @@ def spectrum(
     ------
     ArgumentError
         For an empty range.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> run = fs.simulate(fs.systems.van_der_pol(), [2, 0], t=(0, 200))
+    >>> fs.plot.spectrum(run.spectrum("x"), peaks=1).ax.get_xlabel()
+    'frequency'
     """
     unit = 2.0 * np.pi if angular else 1.0
     frequency, amplitude = unit * spectrum.frequency[1:], spectrum.amplitude[1:]
@@ -103,8 +139,8 @@ def spectrum(
         over = 0.0, float(frequency[min(int(1.15 * last) + 8, len(frequency) - 1)])
     if not over[0] < over[1]:
         raise ArgumentError(f"over = {over!r}; expected a range of frequencies, low < high")
-    ax = axes_for(ax, height=54 * MM)
-    look = {"color": color, "linewidth": 0.8, **style}
+    own, ax = ax is None, axes_for(ax, width, height=54.0)
+    look = {"color": color, "linewidth": 0.8, "label": "amplitude", **style}
     # an exact zero has no place on a logarithmic axis
     (line,) = ax.plot(frequency, np.maximum(amplitude, 1e-300), **look)
     ax.set_yscale("log")
@@ -114,7 +150,7 @@ def spectrum(
     ax.set_ylabel(f"amplitude of {typeset(spectrum.name)}")
     found = [p for p in spectrum.peaks(peaks) if over[0] <= unit * p.frequency <= over[1]]
     if not found:
-        return SpectrumDrawing(ax, line, None, ())
+        return SpectrumDrawing(ax, line, None, (), explained(ax, [line], own, label, legend))
     (marks,) = ax.plot(
         [unit * p.frequency for p in found],
         [p.amplitude for p in found],
@@ -125,9 +161,12 @@ def spectrum(
         markeredgecolor=VERMILION,
         markeredgewidth=0.7,
         zorder=4,
+        label="largest lines",
     )
-    labels = _labels(ax, largest, [(unit * p.frequency, p.amplitude) for p in found])
-    return SpectrumDrawing(ax, line, marks, labels)
+    points = [(unit * p.frequency, p.amplitude) for p in found]
+    labels = _labels(ax, largest, points) if label else ()
+    key = explained(ax, [line, marks], own, label, legend)
+    return SpectrumDrawing(ax, line, marks, labels, key)
 
 
 def _leave_room(ax: Axes, largest: float, part: float) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +9,13 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fastslow.arguments import path, takes, within, word
-from fastslow.errors import FileError
+from fastslow.arguments import word
+from fastslow.errors import ArgumentError, FileError, unknown_name
 
 # M. Okabe and K. Ito, Color Universal Design, 2008
 BLACK, ORANGE, GREEN = "#000000", "#E69F00", "#009E73"
 BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
-GREY = "#8A8A8A"
+GREY, DARK = "#8A8A8A", "#5A5A5A"
 
 BRANCH, MOTION = BLACK, BLUE
 
@@ -29,7 +27,7 @@ LINES: dict[str, dict[str, Any]] = {
     "virtual": {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.45},
 }
 
-#: Marker and colour of a special point by code.
+#: Marker and colour of a special point by code; no two codes share a marker.
 MARKERS: dict[str, tuple[str, str]] = {
     "LP": ("o", VERMILION),
     "HB": ("s", GREEN),
@@ -39,20 +37,28 @@ MARKERS: dict[str, tuple[str, str]] = {
     "UZ": ("x", BLACK),
     "EP": ("|", BLACK),
     "CP": ("v", VERMILION),
-    "BT": ("o", BLACK),
-    "GH": ("s", BLUE),
-    "ZH": ("D", BLACK),
-    "HH": ("P", BLACK),
-    "BF": ("^", PURPLE),
-    "BH": ("^", GREEN),
+    "BT": ("p", BLACK),
+    "GH": ("h", BLUE),
+    "ZH": ("<", BLACK),
+    "HH": (">", BLACK),
+    "BF": ("d", PURPLE),
+    "BH": ("X", GREEN),
+    "LPC": ("8", VERMILION),
+    "PD": ("*", BLUE),
+    "TR": ("H", GREEN),
+    "GR": ("1", BLACK),
+    "BPC": ("+", ORANGE),
 }
+
+#: Markers that are strokes, without a face.
+STROKES = "x|1+"
 
 #: Colour and line of a curve of special points by code, and of its virtual parts.
 CURVES: dict[str, dict[str, Any]] = {
     "LP": {"color": VERMILION, "linestyle": "-", "linewidth": 1.5},
     "HB": {"color": GREEN, "linestyle": (0, (6, 1.5)), "linewidth": 1.5},
     "BE": {"color": PURPLE, "linestyle": (0, (5, 1.5, 1, 1.5)), "linewidth": 1.5},
-    "BP": {"color": ORANGE, "linestyle": "-", "linewidth": 1.2},
+    "BP": {"color": ORANGE, "linestyle": (0, (6, 1.5, 1, 1.5, 1, 1.5)), "linewidth": 1.3},
     "NSD": {"color": GREY, "linestyle": "-", "linewidth": 0.7},
     "virtual": {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.6},
 }
@@ -62,10 +68,10 @@ TRANSITIONS: dict[str, tuple[str, str, str]] = {
     "jump": ("*", VERMILION, "jump at a fold"),
     "Hopf": ("P", GREEN, "leaves past Hopf"),
     "crossing": ("D", ORANGE, "passage of BE"),
-    "transit": ("D", PURPLE, "transit of the gap"),
+    "transit": (">", PURPLE, "transit of the gap"),
     "steep": ("X", BLACK, "steep slope"),
     "grazing": ("h", ORANGE, "grazing"),
-    "end of spiking": ("X", VERMILION, "end of spiking"),
+    "end of spiking": ("v", VERMILION, "end of spiking"),
     "excursion": ("p", GREY, "excursion"),
     "change": ("s", GREY, "other change"),
 }
@@ -87,6 +93,9 @@ BANDS = ("#E4F1FA", "#FFFFFF", "#FBF0DC")
 MM = 1 / 25.4
 COLUMN, FULL = 85 * MM, 170 * MM
 TEXT, SMALL = 8.0, 7.0
+
+#: Widths of figures by name, in millimetres.
+WIDTHS = {"column": 85.0, "page": 170.0}
 
 
 GREEK = (
@@ -128,9 +137,92 @@ def dressed(ax: Axes) -> Axes:
     return ax
 
 
-def axes_for(ax: Axes | None, width: float = COLUMN, height: float = 64 * MM) -> Axes:
-    """The axes given, or new ones in a figure of a column's width."""
-    return dressed(new_figure(width, height).add_subplot()) if ax is None else ax
+def inches(width: str | float) -> float:
+    """The width of a figure in inches.
+
+    Parameters
+    ----------
+    width : str or float
+        ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+
+    Raises
+    ------
+    UnknownNameError
+        For another name.
+    ArgumentError
+        For no width to draw in.
+
+    Examples
+    --------
+    >>> round(inches("page"), 3), inches(127)
+    (6.693, 5.0)
+    """
+    if isinstance(width, str):
+        if width not in WIDTHS:
+            raise unknown_name("width", width, WIDTHS)
+        return WIDTHS[width] * MM
+    if not 30.0 <= width <= 2000.0:
+        raise ArgumentError(
+            f'width = {width!r}; expected "column", "page", or 30 to 2000 (millimetres)'
+        )
+    return float(width) * MM
+
+
+def axes_for(
+    ax: Axes | None, width: str | float = "column", height: float = 64.0, space: bool = False
+) -> Any:
+    """The axes given, or new ones.
+
+    Parameters
+    ----------
+    ax : Axes or None
+    width : str or float
+        Of a new figure, as for `inches`.
+    height : float
+        Of a figure of a column's width, in millimetres; wider ones are somewhat higher.
+    space : bool
+        Whether new axes are in space.
+
+    Returns
+    -------
+    Axes
+        Typed loosely, since Matplotlib does not type axes in space.
+    """
+    if ax is not None:
+        return ax
+    across = inches(width)
+    figure = new_figure(across, height * MM * (across / COLUMN) ** 0.4)
+    if space:
+        return figure.add_subplot(projection="3d")
+    return dressed(figure.add_subplot())
+
+
+def spatial(function: str, ax: Axes | None, z: object) -> bool:
+    """Whether to draw in space.
+
+    Raises
+    ------
+    ArgumentError
+        For a third quantity and axes of the plane.
+    """
+    given = ax is not None and ax.name == "3d"
+    if z is not None and ax is not None and not given:
+        raise ArgumentError(f'{function}: z in space needs axes with projection="3d"')
+    return given or z is not None
+
+
+def dot_look(code: str, size: float = 4.5) -> dict[str, Any]:
+    """Properties of the marker of a special point."""
+    marker, colour = MARKERS[code]
+    stroke = marker in STROKES
+    return {
+        "linestyle": "none",
+        "marker": marker,
+        "markersize": size + (1.0 if marker in "*dp8hH" else 0.0),
+        "markerfacecolor": colour,
+        "markeredgecolor": colour if stroke else "white",
+        "markeredgewidth": 0.9 if stroke else 0.5,
+    }
 
 
 def widen(ax: Axes) -> None:
@@ -140,46 +232,6 @@ def widen(ax: Axes) -> None:
         size = max(abs(low), abs(high))
         if 0.0 < size < float("inf") and high - low <= 1e-6 * size:
             set_limits(0.5 * (low + high) - 0.1 * size, 0.5 * (low + high) + 0.1 * size)
-
-
-@dataclass(frozen=True, eq=False)
-class Drawing:
-    """What was drawn, and where.
-
-    Parameters
-    ----------
-    ax : Axes
-        The axes drawn into.
-    """
-
-    ax: Axes
-
-    @property
-    def figure(self) -> Figure:
-        """The figure that holds the axes."""
-        return root(self.ax)
-
-    @takes(path=path, dpi=within(10.0, 10_000.0))
-    def save(self, path: str | Path, dpi: float = 300) -> Path:
-        """Write the figure, in the format of the suffix, with text kept as text.
-
-        Parameters
-        ----------
-        path : str or Path
-            Where to, e.g. ``"overlay.pdf"``; its folder must exist.
-        dpi : float
-            Dots per inch of pixel formats.
-
-        Returns
-        -------
-        Path
-        """
-        return save(self.figure, path, dpi)
-
-    def _repr_png_(self) -> bytes:
-        stream = BytesIO()
-        self.figure.savefig(stream, format="png", dpi=150)
-        return stream.getvalue()
 
 
 def root(ax: Axes) -> Figure:

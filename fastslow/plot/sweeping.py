@@ -10,10 +10,19 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
-from fastslow.arguments import flag, instance, positive, takes
-from fastslow.plot.arguments import line_style
-from fastslow.plot.labels import key
-from fastslow.plot.style import BLACK, BLUE, GREY, VERMILION, Drawing, axes_for, typeset, widen
+from fastslow.arguments import (
+    flag,
+    instance,
+    positive,
+    takes,
+)
+from fastslow.plot.arguments import (
+    figure_width,
+    line_style,
+)
+from fastslow.plot.drawings import Drawing
+from fastslow.plot.legends import explained
+from fastslow.plot.style import BLACK, BLUE, GREY, VERMILION, axes_for, typeset, widen
 from fastslow.results.sweeps import Sweep, SweepPass
 
 #: More points than this are stored as pixels, in files of vectors too.
@@ -50,13 +59,23 @@ class SweepDrawing(Drawing):
     legend: Legend | None
 
 
-@takes(sweep=instance(Sweep), ax=instance(Axes), size=positive, legend=flag, style=line_style)
+@takes(
+    sweep=instance(Sweep),
+    ax=instance(Axes),
+    width=figure_width,
+    label=flag,
+    legend=flag,
+    size=positive,
+    style=line_style,
+)
 def sweep(
     sweep: Sweep,
     *,
     ax: Axes | None = None,
+    width: str | float = "column",
+    label: bool = True,
+    legend: bool | None = None,
     size: float | None = None,
-    legend: bool = True,
     **style: Any,
 ) -> SweepDrawing:
     """Draw a bifurcation diagram by simulation, both passes over each other.
@@ -65,21 +84,35 @@ def sweep(
     ----------
     sweep : Sweep
     ax : Axes, optional
-        Axes to draw into; new ones of a column's width (85 mm) otherwise.
+        Axes to draw into; new ones otherwise.
+    width : str or float
+        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+    label, legend : bool, optional
+        Whether to draw a legend that says which pass is which; ``legend``, by default as
+        ``label``, decides.
     size : float, optional
         Diameter of the dots in points; by default smaller for more points.
-    legend : bool
-        Whether to say which pass is which.
     **style
         Properties of the points of both passes.
 
     Returns
     -------
     SweepDrawing
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> import sympy as sp
+    >>> x, c, t = sp.symbols("x c t")
+    >>> model = fs.Model({x: c * sp.cos(t) - x}, parameters={c: 1})
+    >>> found = fs.bifurcation_sweep(model, "c", [1, 2], [0], settle=5, keep=1)
+    >>> drawn = fs.plot.sweep(found, width=120)
+    >>> drawn.ax.get_ylabel(), sorted(drawn.data)
+    ('$x$ (stroboscopic)', ['swept down', 'swept up'])
     """
     own = ax is None
-    ax = axes_for(ax)
-    most = max(len(p.x) for p in sweep.passes)
+    ax = axes_for(ax, width)
+    most = max((len(p.x) for p in sweep.passes), default=0)
     if size is None:
         size = 1.6 if most <= MANY / 10 else 0.8
     one = len(sweep.passes) == 1
@@ -105,9 +138,8 @@ def sweep(
     ax.set_xlabel(typeset(sweep.parameter_name))
     ax.set_ylabel(f"{typeset(sweep.name)} ({sweep.what})")
     drawn = [line for line in (up, down, crosses) if line is not None]
-    words = None
-    if legend and len(drawn) > 1:
-        words = key(ax, [_sample(line) for line in drawn], own)
+    samples = [_sample(line) for line in drawn]
+    words = explained(ax, samples, own, label, legend) if len(samples) > 1 else None
     return SweepDrawing(ax, sweep.parameter_name, sweep.name, up, down, crosses, words)
 
 

@@ -61,5 +61,5 @@ def test_one_quantity_alone_has_no_phase_portrait():
 def test_unknown_quantities(gear_run):
     with pytest.raises(fs.UnknownNameError, match="unknown state or slow quantity 'ww'; did you"):
         fs.plot.time_series(gear_run, "ww")
-    with pytest.raises(fs.UnknownNameError, match=r"\(known: x, v, w\)"):
+    with pytest.raises(fs.UnknownNameError, match=r"\(known: x, v, w, t\)"):
         fs.plot.phase_portrait(gear_run, "x", "theta")

@@ -42,8 +42,8 @@ def test_each_thing_once_in_the_legend(folded_lay):
 def test_another_state(gear_lay):
     drawn = fs.plot.overlay(gear_lay, "v", legend=False)
     assert (drawn.state, drawn.legend) == ("v", None)
-    with pytest.raises(fs.UnknownNameError, match="unknown state 'w'"):
-        fs.plot.overlay(gear_lay, "w")
+    with pytest.raises(fs.UnknownNameError, match="unknown state or parameter 'u'"):
+        fs.plot.overlay(gear_lay, "u")
 
 
 def test_the_legend_of_a_column_wide_figure_fits(folded_lay):
@@ -88,7 +88,7 @@ def test_an_expression_on_the_vertical_axis(folded_lay):
     assert not drawn.diagram.bands.lines
     with pytest.raises(fs.UnknownNameError, match="unknown name in an expression 'y'"):
         fs.plot.overlay(folded_lay, "x + y")
-    with pytest.raises(fs.UnknownNameError, match="unknown state 'A'"):
+    with pytest.raises(fs.UnknownNameError, match="unknown state or parameter 'A'"):
         fs.plot.overlay(folded_lay, "A")
 
 
@@ -137,7 +137,7 @@ def test_the_phases_stand_above_the_time_series(folded_lay):
 
 
 def test_a_panel_of_a_columns_width(folded_lay):
-    drawn = fs.plot.panel(folded_lay, width=85 / 25.4)
+    drawn = fs.plot.panel(folded_lay, width="column")
     drawn.figure.draw_without_rendering()
     frames = [ax.get_window_extent() for ax in drawn.figure.axes]
     assert len({round(f.x0) for f in frames}) == 1

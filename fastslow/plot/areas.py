@@ -1,0 +1,128 @@
+"""Areas of a refined map as polygons in light colours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from fastslow.plot.style import GREY
+from fastslow.results.refined_maps import FAILED, RefinedMap
+
+Floats = NDArray[np.float64]
+
+#: Fills of the regimes of a gap; tints of the Okabe-Ito colours, apart in lightness too.
+FILLS: dict[Any, str] = {
+    "bilateral": "#8FC3E6",
+    "unilateral upper": "#F7DFA8",
+    "unilateral lower": "#EBC5DA",
+    "meshed upper": "#F4F4F4",
+    "meshed lower": "#BFE3D5",
+    "free": "#FFFFFF",
+    "no gap": "#D0D0D0",
+    FAILED: "#6E6E6E",
+}
+
+#: Fills of other labels, in turn.
+OTHERS = ("#F4F4F4", "#8FC3E6", "#F7DFA8", "#BFE3D5", "#EBC5DA", "#C9B79C", "#7FA7A0", "#B0A8D9")
+
+
+def draw_areas(
+    ax: Axes, result: RefinedMap, fills: Mapping[Any, str] | None = None
+) -> dict[Any, PolyCollection]:
+    """Draw the area of each label; the limits of the axes do not depend on it.
+
+    Parameters
+    ----------
+    ax : Axes
+    result : RefinedMap
+    fills : mapping, optional
+        Label to colour, where another than the default is wanted.
+
+    Returns
+    -------
+    dict
+        Label to its area.
+    """
+    colours, shapes = _colours(result, fills or {}), _polygons(result)
+    drawn = {}
+    for code, word in enumerate(result.labels):
+        colour = colours[word]
+        look: dict[str, Any] = {"facecolor": colour, "edgecolor": colour, "label": str(word)}
+        drawn[word] = PolyCollection(shapes[code], linewidth=0.3, zorder=0.5, **look)
+        ax.add_collection(drawn[word], autolim=False)
+    return drawn
+
+
+def samples(fills: Mapping[Any, PolyCollection]) -> list[Patch]:
+    """What a legend shows of areas."""
+    return [
+        Patch(facecolor=area.get_facecolor()[0], edgecolor=GREY, linewidth=0.5, label=str(word))
+        for word, area in fills.items()
+    ]
+
+
+def _colours(result: RefinedMap, fills: Mapping[Any, str]) -> dict[Any, str]:
+    known = {**FILLS, **fills}
+    others = [word for word in result.labels if word not in known]
+    turn = {word: OTHERS[k % len(OTHERS)] for k, word in enumerate(others)}
+    return {word: known.get(word, turn.get(word, "")) for word in result.labels}
+
+
+def _polygons(result: RefinedMap) -> list[list[Floats]]:
+    """The area of each label: whole cells, and the parts of those that a boundary cuts."""
+    found: list[list[Floats]] = [[] for _ in result.labels]
+    low = np.array([r[0] for r in result.over])
+    steps, mixed = result.steps, result.mixed
+    crossings = {
+        tuple(place): float(np.mean(bracket))
+        for place, bracket in zip(result.edges.places.tolist(), result.edges.brackets, strict=True)
+    }
+    for cell, codes, cut in zip(result.cells, result.corner_codes, mixed, strict=True):
+        i, j, size = cell.tolist()
+        corners = [(i, j), (i + size, j), (i + size, j + size), (i, j + size)]
+        if not cut:
+            found[codes[0, 0]].append(low + steps * np.array(corners))
+            continue
+        around = [int(codes[a, b]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        sides = [(i, j, 0), (i + 1, j, 1), (i, j + 1, 0), (i, j, 1)]
+        points = [_crossing(side, crossings) for side in sides]
+        for code, outline in _parts(corners, around, points, (i + 0.5, j + 0.5)):
+            found[code].append(low + steps * np.array(outline))
+    return found
+
+
+Point = tuple[float, float]
+
+
+def _crossing(side: tuple[int, int, int], crossings: Mapping[Any, float]) -> Point:
+    i, j, axis = side
+    along = crossings.get(side, 0.5)
+    return (i + along, float(j)) if axis == 0 else (float(i), j + along)
+
+
+def _parts(
+    corners: list[tuple[int, int]], around: list[int], points: list[Point], middle: Point
+) -> list[tuple[int, list[Point]]]:
+    """Outlines of the labels within a cell that a boundary cuts."""
+    changes = [k for k in range(4) if around[k] != around[(k + 1) % 4]]
+    if len(changes) == 2:
+        first, second = changes
+        one: list[Point] = [points[first], *corners[first + 1 : second + 1], points[second]]
+        rest = [corners[k % 4] for k in range(second + 1, first + 5)]
+        return [(around[second], one), (around[first], [points[second], *rest, points[first]])]
+    for k in (0, 1):
+        # equal labels at opposite corners are joined, of two such pairs the earlier one
+        mine, others = around[k], (around[k + 1], around[k - 1])
+        if len(changes) == 4 and mine == around[k + 2] and not others[0] == others[1] < mine:
+            joined: list[Point] = []
+            for corner in (k, k + 2):
+                joined += [points[corner - 1], corners[corner], points[corner]]
+            cut = [(around[j], [points[j - 1], corners[j], points[j]]) for j in (k - 1, k + 1)]
+            return [(mine, joined), *cut]
+    return [(around[k], [corners[k], points[k], middle, points[k - 1]]) for k in range(4)]

@@ -1,0 +1,122 @@
+"""What every plot function returns: the axes, what was drawn into them, and its data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from fastslow.arguments import path, takes, within
+from fastslow.plot.style import root, save
+
+#: Dots per inch of a figure shown in a notebook.
+SHOWN = 150
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """What was drawn, and where.
+
+    Parameters
+    ----------
+    ax : Axes
+        The axes drawn into.
+    """
+
+    ax: Axes
+
+    @property
+    def figure(self) -> Figure:
+        """The figure that holds the axes."""
+        return root(self.ax)
+
+    @property
+    def artists(self) -> tuple[Artist, ...]:
+        """Every artist of the drawing: lines, markers, labels, the legend."""
+        return tuple(dict.fromkeys(_artists(self)))
+
+    @property
+    def data(self) -> dict[str, tuple[NDArray[np.float64], ...]]:
+        """The points drawn, by what the legend calls them.
+
+        For each kind one array for each curve, shape (N, 2), or (N, 3) in space.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import fastslow as fs
+        >>> from fastslow.results.spectra import Spectrum
+        >>> lines = Spectrum("x", "hann", (0.0, 1.0), np.arange(4.0), np.array([0, 1, 0.5, 0]))
+        >>> fs.plot.spectrum(lines).data["amplitude"][0][:2].tolist()
+        [[1.0, 1.0], [2.0, 0.5]]
+        """
+        found: dict[str, list[NDArray[np.float64]]] = {}
+        for artist in self.artists:
+            curves = _curves(artist)
+            if curves:
+                found.setdefault(str(artist.get_label()), []).extend(curves)
+        return {kind: tuple(curves) for kind, curves in found.items()}
+
+    @takes(path=path, dpi=within(10.0, 10_000.0))
+    def save(self, path: str | Path, dpi: float = 300) -> Path:
+        """Write the figure, in the format of the suffix, with text kept as text.
+
+        Fonts are embedded in PDF as Type 42 (TrueType), SVG keeps text as text.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to, e.g. ``"overlay.pdf"``; its folder must exist.
+        dpi : float
+            Dots per inch of pixel formats.
+
+        Returns
+        -------
+        Path
+        """
+        return save(self.figure, path, dpi)
+
+    def _repr_png_(self) -> bytes:
+        stream = BytesIO()
+        self.figure.savefig(stream, format="png", dpi=SHOWN)
+        return stream.getvalue()
+
+
+def _artists(value: Any) -> Iterator[Artist]:
+    """The artists in the fields of a drawing, and in what these hold."""
+    if isinstance(value, Axes):
+        return
+    if isinstance(value, Artist):
+        yield value
+    elif isinstance(value, Mapping):
+        for part in value.values():
+            yield from _artists(part)
+    elif isinstance(value, tuple | list):
+        for part in value:
+            yield from _artists(part)
+    elif hasattr(value, "__dataclass_fields__"):
+        for field in fields(value):
+            yield from _artists(getattr(value, field.name))
+
+
+def _curves(artist: Artist) -> list[NDArray[np.float64]]:
+    """The data of one artist, nothing for what is no curve."""
+    if isinstance(artist, Line2D):
+        if hasattr(artist, "get_data_3d"):
+            return [np.column_stack([np.asarray(d, dtype=float) for d in artist.get_data_3d()])]
+        return [np.asarray(artist.get_xydata(), dtype=float)]
+    if isinstance(artist, LineCollection):
+        return [np.asarray(segment, dtype=float) for segment in artist.get_segments()]
+    if isinstance(artist, PolyCollection):
+        return [np.asarray(path.vertices, dtype=float) for path in artist.get_paths()]
+    return []

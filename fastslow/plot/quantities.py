@@ -1,0 +1,231 @@
+"""What an axis shows: a column, an expression in columns, or a function of them."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.plot.style import typeset
+from fastslow.results.branches import Branch
+from fastslow.results.diagrams import Diagram
+from fastslow.results.formulas import evaluated, names_in
+from fastslow.results.overlays import Overlay
+from fastslow.results.points import SpecialPoint
+from fastslow.results.trajectories import Trajectory
+
+Array = NDArray[np.float64]
+
+
+class Columns(dict[str, Any]):
+    """Numbers and arrays by name, which says what it holds when asked for something else."""
+
+    def __missing__(self, name: object) -> Any:
+        raise unknown_name("column", name, self)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What an axis shows.
+
+    Parameters
+    ----------
+    text : str
+        A name or an expression; of a function its name.
+    function : callable, optional
+        Given the columns, by name, it returns the values.
+    """
+
+    text: str
+    function: Callable[[Columns], Any] | None = None
+
+    def of(self, columns: Mapping[str, Any], count: int) -> Array:
+        """Values for columns of a length, shape (count,).
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no column.
+        ArgumentError
+            For what is no expression; for a function with values of another shape.
+        """
+        if self.function is None:
+            return np.broadcast_to(evaluated(self.text, columns), (count,))
+        values = np.asarray(self.function(Columns(columns)), dtype=float)
+        if values.shape not in ((), (count,)):
+            raise ArgumentError(
+                f"{self.text} returned values of shape {values.shape}; expected ({count},), "
+                "one for each row of the columns it was given"
+            )
+        return np.broadcast_to(values, (count,))
+
+    @property
+    def column(self) -> str:
+        """The name or expression, empty for a function."""
+        return self.text if self.function is None else ""
+
+    @property
+    def label(self) -> str:
+        """The label of the axis."""
+        if self.function is not None:
+            return "$f$" if self.text == "<lambda>" else self.text.replace("_", " ")
+        return written(self.text)
+
+
+def quantity_of(
+    given: object, default: str, varying: Sequence[str], fixed: Iterable[str], kind: str
+) -> Quantity:
+    """Read what an axis is to show.
+
+    Parameters
+    ----------
+    given : str, Symbol, Expr, callable or None
+    default : str
+        Shown if nothing is given.
+    varying : sequence of str
+        Columns; at least one must stand in an expression.
+    fixed : iterable of str
+        Names of constants that may stand in an expression too.
+    kind : str
+        What the columns are, for the error.
+
+    Raises
+    ------
+    UnknownNameError
+        For an unknown name; for an expression in constants alone.
+    ArgumentError
+        For what is no expression.
+    """
+    # symbols of SymPy are callable too
+    if callable(given) and not hasattr(given, "free_symbols"):
+        return Quantity(getattr(given, "__name__", type(given).__name__), given)
+    text = default if given is None else str(given)
+    if text not in varying:
+        known = dict.fromkeys((*varying, *fixed), 0.0)
+        if text.isidentifier() or not names_in(text, known) & set(varying):
+            raise unknown_name(kind, text, varying)
+    return Quantity(text)
+
+
+def of_diagram(diagram: Diagram, given: object, default: str) -> Quantity:
+    """What an axis of a diagram shows: states, its parameter, expressions, functions."""
+    names = (*diagram.states, diagram.parameter)
+    return quantity_of(given, default, names, diagram.parameters, "state or parameter")
+
+
+def of_run(run: Trajectory, given: object, default: str) -> Quantity:
+    """What an axis of a trajectory shows: time, states, slow quantities, expressions, functions."""
+    names = (*run.columns, "t")
+    return quantity_of(given, default, names, run.parameters, "state or slow quantity")
+
+
+def along_branch(diagram: Diagram, branch: Branch, *shown: Quantity) -> list[Array]:
+    """Quantities at the rows of a branch, each of shape (N,)."""
+    columns = {name: branch[name] for name in (*branch.states, diagram.parameter)}
+    return [q.of({**diagram.parameters, **columns}, len(branch)) for q in shown]
+
+
+def at_points(points: Sequence[SpecialPoint], *shown: Quantity) -> list[Array]:
+    """Quantities at special points, each of shape (number of points,)."""
+    if not points:
+        return [np.empty(0) for _ in shown]
+    rows = [{**p.parameters, **dict(zip(p.states, p.state, strict=True))} for p in points]
+    columns = {name: np.array([row[name] for row in rows], dtype=float) for name in rows[0]}
+    return [q.of(columns, len(points)) for q in shown]
+
+
+def along_run(run: Trajectory, *shown: Quantity) -> list[Array]:
+    """Quantities at the samples of a trajectory, each of shape (N,)."""
+    columns = {name: run[name] for name in ("t", *run.columns)}
+    return [q.of({**run.parameters, **columns}, len(run.t)) for q in shown]
+
+
+def at_crossings(run: Trajectory, *shown: Quantity) -> list[Array]:
+    """Quantities where a trajectory crosses interfaces, each of shape (number of crossings,)."""
+    met = run.crossings
+    times = np.array([c.time for c in met])
+    columns = {name: np.interp(times, run.t, run[name]) for name in run.columns}
+    state = np.reshape([c.state for c in met], (-1, len(run.states)))
+    columns |= dict(zip(run.states, state.T, strict=True))
+    return [q.of({**run.parameters, **columns, "t": times}, len(met)) for q in shown]
+
+
+def along_overlay(lay: Overlay, *shown: Quantity) -> list[Array]:
+    """Quantities at the times of an overlay, each of shape (N,)."""
+    columns = {name: lay.run[name] for name in lay.run.columns}
+    return [q.of({**_fixed(lay), **columns, lay.parameter: lay.slow}, len(lay)) for q in shown]
+
+
+def at_times(
+    lay: Overlay, times: Array, names: Sequence[str], state: Array, *shown: Quantity
+) -> list[Array]:
+    """Quantities at times between samples, where some states are known, shape (K, states)."""
+    columns = {n: np.interp(times, lay.time, lay.run[n]) for n in lay.run.columns}
+    columns[lay.parameter] = np.interp(times, lay.time, lay.slow)
+    columns |= dict(zip(names, state.reshape(len(times), -1).T, strict=True))
+    return [q.of({**_fixed(lay), **columns}, len(times)) for q in shown]
+
+
+def _fixed(lay: Overlay) -> dict[str, Any]:
+    return {**lay.run.parameters, **lay.diagram.parameters}
+
+
+def written(expression: str) -> str:
+    r"""An expression as the label of an axis, in mathematics.
+
+    Examples
+    --------
+    >>> written("x**2 + 2*v*omega_0"), written("sqrt((a + x)/2)"), written("load")
+    ('$x^{2} + 2\\,v\\,\\omega_{0}$', '$\\sqrt{(a + x)/2}$', '$\\mathrm{load}$')
+    """
+    try:
+        tree = ast.parse(expression, mode="eval").body
+    except SyntaxError:  # a name need not be an identifier
+        return typeset(expression)
+    return f"${_mathematics(tree)[0]}$"
+
+
+#: Functions that mathematics has commands for.
+COMMANDS = ("cos", "cosh", "exp", "log", "max", "min", "sin", "sinh", "tan", "tanh")
+
+#: How operators are written, and how tightly they bind.
+SIGNS: dict[type[ast.operator], tuple[str, int]] = {
+    ast.Add: (" + ", 1),
+    ast.Sub: (" - ", 1),
+    ast.Mult: (r"\,", 2),
+    ast.Div: ("/", 2),
+}
+
+
+def _mathematics(node: ast.expr) -> tuple[str, int]:
+    """A part of an expression in mathematics, and how tightly it binds."""
+    if isinstance(node, ast.Name):
+        return typeset(node.id).strip("$"), 4
+    if isinstance(node, ast.UnaryOp):
+        return f"-{_bound(node.operand, 2)}", 1
+    if isinstance(node, ast.BinOp):
+        if isinstance(node.op, ast.Pow):
+            return f"{_bound(node.left, 4)}^{{{_mathematics(node.right)[0]}}}", 3
+        sign, level = SIGNS[type(node.op)]
+        # a − (b − c) and a/(b c) keep their brackets
+        after = level + isinstance(node.op, ast.Sub | ast.Div)
+        return f"{_bound(node.left, level)}{sign}{_bound(node.right, after)}", level
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        name, inside = node.func.id.lower(), ", ".join(_mathematics(a)[0] for a in node.args)
+        if name == "sqrt":
+            return rf"\sqrt{{{inside}}}", 4
+        if name == "abs":
+            return f"|{inside}|", 4
+        command = f"\\{name}" if name in COMMANDS else rf"\mathrm{{{name}}}"
+        return f"{command}({inside})", 4
+    return ast.unparse(node), 4
+
+
+def _bound(node: ast.expr, level: int) -> str:
+    text, own = _mathematics(node)
+    return f"({text})" if own < level else text

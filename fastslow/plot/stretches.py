@@ -1,0 +1,63 @@
+"""The parts of a branch that are drawn alike, and its special points, in the plane or in space."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
+
+from fastslow.plot.labels import tag
+from fastslow.plot.quantities import Quantity, at_points
+from fastslow.plot.style import dot_look
+from fastslow.results.branches import Branch
+from fastslow.results.points import CODE_NAMES, SpecialPoint
+
+
+def runs(branch: Branch) -> Iterator[tuple[str, slice]]:
+    """Runs of constant stability, as (kind, rows); neighbours share their joint row."""
+    kinds = branch.stability
+    if not branch.admissible or len(kinds) < 2:
+        yield str(kinds[0]) if branch.admissible and len(kinds) else "virtual", slice(0, len(kinds))
+        return
+    # a step beside a single neutral row (a fold, a Hopf point) has the stability of its other end
+    steps = np.where(kinds[:-1] == "neutral", kinds[1:], kinds[:-1])
+    breaks = np.flatnonzero(steps[1:] != steps[:-1]) + 1
+    for start, stop in zip([0, *breaks], [*breaks, len(steps)], strict=True):
+        if stop > start:
+            yield str(steps[start]), slice(int(start), int(stop) + 1)
+
+
+def draw_points(
+    ax: Any, points: Sequence[SpecialPoint], shown: Sequence[Quantity], label: bool
+) -> tuple[tuple[Line2D, ...], tuple[Annotation, ...]]:
+    """Draw special points in the plane or in space, one marker for each code, and label them."""
+    markers: list[Line2D] = []
+    labels: list[Annotation] = []
+    for code in CODE_NAMES:
+        same = [p for p in points if p.code == code]
+        if not same:
+            continue
+        at = np.column_stack(at_points(same, *shown))
+        look = {"zorder": 5, "label": f"{code} {CODE_NAMES[code]}"}
+        markers += ax.plot(*at.T, **dot_look(code), **look)
+        if label:
+            words = [p.note or p.label if code == "EP" else p.label for p in same]
+            labels += [tag(ax, word, spot) for word, spot in zip(words, at, strict=True)]
+    return tuple(markers), tuple(labels)
+
+
+def worth_a_marker(branches: Sequence[Branch]) -> list[SpecialPoint]:
+    """Special points worth a marker: an end point only where the tracing could not go on."""
+    return [p for branch in branches for p in _shown(branch)]
+
+
+def _shown(branch: Branch) -> list[SpecialPoint]:
+    ends = {0: branch.outcomes[0].success, len(branch) - 1: branch.outcomes[1].success}
+    return [
+        p
+        for p, row in zip(branch.special, branch.special_rows, strict=True)
+        if p.code != "EP" or not ends.get(row, True)
+    ]
