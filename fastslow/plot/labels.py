@@ -31,9 +31,12 @@ REACH = (7.0, 10.0, 14.0, 19.0, 25.0, 33.0, 43.0, 55.0)
 #: Labels further away than this are joined to their points by a thin line.
 FAR = 20.0
 
+#: What a text keeps from the edges of the axes, in points.
+AIR = 1.5
+
 #: Where the name of a region may stand: across its band, and along it in parts of the axes.
 DEPTHS = (0.5, 0.25, 0.75)
-SIDES = (0.95, 0.05, 0.8, 0.2, 0.65, 0.35, 0.5)
+SIDES = (0.95, 0.05, 0.9, 0.1, 0.8, 0.2, 0.65, 0.35, 0.5)
 
 #: From here on a place is no place: over another text, or out of the axes.
 TAKEN = 1e3
@@ -100,7 +103,9 @@ def _place(
 ) -> None:
     for drawn in bands:
         fit_bands(ax, drawn)
-    frame, ink, scale = ax.get_window_extent(), covered(ax), root(ax).dpi / 72.0
+    ink, scale = covered(ax), root(ax).dpi / 72.0
+    whole = ax.get_window_extent()
+    frame = whole.padded(-AIR * scale)
     boxes = _others(ax, [*tags, *(name for drawn in bands for name in drawn.names)], taken)
     anchors = _anchors(ax, tags)
     reach = np.repeat(REACH, len(TURNS))
@@ -109,7 +114,7 @@ def _place(
     offsets = np.column_stack([1.3 * reach * np.cos(turns), reach * np.sin(turns)])
     joined: list[Points] = []
     for label, anchor in zip(tags, anchors, strict=True):
-        shown = bool(frame.padded(1.0).contains(*anchor))
+        shown = bool(whole.padded(1.0).contains(*anchor))
         label.set_visible(shown)
         if not shown:
             continue
@@ -134,7 +139,7 @@ def _place(
     for drawn in bands:
         for name, span in zip(drawn.names, drawn.spans, strict=True):
             if name.get_visible():
-                boxes = _move(ax, name, span, drawn.vertical, ink, boxes)
+                boxes = _move(ax, name, span, drawn.vertical, frame, ink, boxes)
 
 
 def _nearest_in(box: Points, point: Points) -> Points:
@@ -160,10 +165,15 @@ def _anchors(ax: Axes, tags: Sequence[Annotation]) -> Points:
 
 
 def _move(
-    ax: Axes, name: Text, span: tuple[float, float], vertical: bool, ink: Points, boxes: Points
+    ax: Axes,
+    name: Text,
+    span: tuple[float, float],
+    vertical: bool,
+    frame: Bbox,
+    ink: Points,
+    boxes: Points,
 ) -> Points:
     """Move the name of a region to a free place in its band, at an edge of the axes if it can."""
-    frame: Bbox = ax.get_window_extent()
     low, high = sorted(ax.get_xlim() if vertical else ax.get_ylim())
     start, stop = max(span[0], low), min(span[1], high)
     axis = (ax.xaxis if vertical else ax.yaxis).get_transform()

@@ -35,7 +35,7 @@ from fastslow.plot.covering import at_draw, settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place
 from fastslow.plot.legends import explained
-from fastslow.plot.phases import draw_phases, fit_words
+from fastslow.plot.phases import draw_phases, fit_words, strip_height
 from fastslow.plot.quantities import Array, Quantity, along_run, at_crossings, of_run
 from fastslow.plot.spaces import HEIGHT, dress_space
 from fastslow.plot.style import MOTION, VERMILION, axes_for, spatial
@@ -180,7 +180,9 @@ def time_series(
     drawn = MotionDrawing(ax, "t", shown[1].text, lines, dots, (), bands, *strip)
     if phases:
         at_draw(ax, lambda: fit_words(*strip))
-    return _explained(drawn, own, label, legend)
+    # a legend stays below the strip
+    top = 1.0 - strip_height(ax) if phases else 1.0
+    return _explained(drawn, own, label, legend, top)
 
 
 @takes(
@@ -294,10 +296,12 @@ def phase_portrait(
     return _explained(drawn, own, label, legend)
 
 
-def _explained(drawn: MotionDrawing, own: bool, label: bool, legend: bool | None) -> MotionDrawing:
+def _explained(
+    drawn: MotionDrawing, own: bool, label: bool, legend: bool | None, top: float = 1.0
+) -> MotionDrawing:
     """Add a legend where there is more to explain than the trajectory, and place the names."""
     if len(drawn.handles) > 1:
-        drawn = replace(drawn, legend=explained(drawn.ax, drawn.handles, own, label, legend))
+        drawn = replace(drawn, legend=explained(drawn.ax, drawn.handles, own, label, legend, top))
     place(drawn.ax, bands=drawn.bands)
     if drawn.bands or drawn.words:
         settle(drawn.ax)

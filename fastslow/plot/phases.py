@@ -36,8 +36,7 @@ def draw_phases(
         What each is called: the sheets that a quiescent phase follows, the number of
         spikes. `fit_words` hides those without room.
     """
-    whole = ax.get_window_extent().height * 72.0 / root(ax).dpi
-    height = min(HEIGHT / whole, 0.5)
+    height = strip_height(ax)
     low, high = ax.get_ylim()
     ax.set_ylim(low, high + height / (1.0 - height) * (high - low), auto=None)
     frame = ax.get_xaxis_transform()
@@ -71,6 +70,12 @@ def draw_phases(
             )
         )
     return tuple(boxes), tuple(words)
+
+
+def strip_height(ax: Axes) -> float:
+    """Height of the strip in parts of the axes."""
+    whole = ax.get_window_extent().height * 72.0 / root(ax).dpi
+    return min(HEIGHT / whole, 0.5)
 
 
 def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text]) -> None:

@@ -165,6 +165,8 @@ def parameter_plane(
         )
     own, ax = ax is None, axes_for(ax, width, HEIGHT if space else 64.0, space)
     fills = {} if regions is None else draw_areas(ax, regions)
+    if regions is not None and ax.get_autoscalex_on() and ax.get_autoscaley_on():
+        ax.set(xlim=regions.over[0], ylim=regions.over[1])
     lines: list[Line2D] = []
     for curve in curves:
         places = [q.of(_columns(curve), len(curve)) for q in quantities]

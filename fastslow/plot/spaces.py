@@ -22,6 +22,9 @@ from fastslow.plot.stretches import draw_points, runs, worth_a_marker
 from fastslow.plot.style import BRANCH, LINES, SMALL, TEXT, axes_for
 from fastslow.results.diagrams import Diagram
 
+#: Size of the box of axes in space, which leaves room for the names of its axes.
+ZOOM = 0.86
+
 #: Height of a figure in space, in millimetres.
 HEIGHT = 84.0
 
@@ -127,3 +130,5 @@ def dress_space(space: Any, names: Sequence[str]) -> None:
     space.tick_params(labelsize=SMALL, pad=-3)
     space.tick_params(axis="z", pad=1)
     space.locator_params(nbins=5)
+    # the name of the vertical axis stands outside of what the layout allows for
+    space.set_box_aspect(None, zoom=ZOOM)

@@ -26,9 +26,9 @@ from fastslow.plot.arguments import (
 )
 from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.labels import tag
+from fastslow.plot.labels import place, tag
 from fastslow.plot.legends import explained
-from fastslow.plot.style import MOTION, VERMILION, axes_for, root, typeset
+from fastslow.plot.style import MOTION, VERMILION, axes_for, typeset
 from fastslow.results.spectra import Spectrum
 
 #: Amplitudes below this part of the largest are not looked for when the axes are chosen.
@@ -37,11 +37,8 @@ FLOOR = 1e-4
 #: The lower edge of the axes in parts of the largest amplitude.
 LOWEST = 1e-7
 
-#: The part of the axes above the largest line: at least, and at most for its frequency.
-LEAST, MOST = 0.06, 0.6
-
-#: What a frequency keeps from its line and from the edges of the axes, in points.
-APART = 4.0
+#: The part of the axes above the largest line, for its frequency.
+ABOVE = 0.12
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +142,7 @@ def spectrum(
     (line,) = ax.plot(frequency, np.maximum(amplitude, 1e-300), **look)
     ax.set_yscale("log")
     ax.set_xlim(*over)
-    _leave_room(ax, largest, LEAST)
+    ax.set_ylim(LOWEST * largest, largest * LOWEST ** (-ABOVE / (1.0 - ABOVE)))
     ax.set_xlabel("angular frequency" if angular else "frequency")
     ax.set_ylabel(f"amplitude of {typeset(spectrum.name)}")
     found = [p for p in spectrum.peaks(peaks) if over[0] <= unit * p.frequency <= over[1]]
@@ -163,40 +160,11 @@ def spectrum(
         zorder=4,
         label="largest lines",
     )
-    points = [(unit * p.frequency, p.amplitude) for p in found]
-    labels = _labels(ax, largest, points) if label else ()
+    labels: tuple[Annotation, ...] = ()
+    if label:
+        at = [(unit * p.frequency, p.amplitude) for p in found]
+        labels = tuple(tag(ax, f"{spot[0]:.4g}", spot) for spot in at)
     key = explained(ax, [line, marks], own, label, legend)
-    return SpectrumDrawing(ax, line, marks, labels, key)
-
-
-def _leave_room(ax: Axes, largest: float, part: float) -> None:
-    """Choose the vertical range so that a part of the axes is above the largest amplitude."""
-    ax.set_ylim(LOWEST * largest, largest * LOWEST ** (-part / (1.0 - part)))
-
-
-def _labels(ax: Axes, largest: float, points: list[tuple[float, float]]) -> tuple[Annotation, ...]:
-    """Frequencies above their lines; one that would cover a larger line's is left out."""
-    labels = []
-    for point in points:
-        label = tag(ax, f"{point[0]:.4g}", point)
-        label.set(position=(0.0, APART), rotation=90, verticalalignment="bottom")
-        # what stands out of the axes until there is room must not make them smaller
-        label.set_in_layout(False)
-        labels.append(label)
+    place(ax, labels)
     settle(ax)
-    frame, pixels = ax.get_window_extent(), root(ax).dpi / 72.0
-    height = max(label.get_window_extent().height for label in labels)
-    _leave_room(ax, largest, min((height + 2.0 * APART * pixels) / frame.height, MOST))
-    kept: list[Annotation] = []
-    for label in labels:
-        box = label.get_window_extent()
-        # a line at an edge of the axes has its frequency beside it
-        right = max(frame.x0 + APART * pixels - box.x0, 0.0)
-        left = max(box.x1 - frame.x1 + APART * pixels, 0.0)
-        label.set_position(((right - left) / pixels, APART))
-        box = box.translated(right - left, 0.0)
-        if any(box.overlaps(other.get_window_extent()) for other in kept):
-            label.remove()
-        else:
-            kept.append(label)
-    return tuple(kept)
+    return SpectrumDrawing(ax, line, marks, labels, key)

@@ -132,6 +132,8 @@ def dressed(ax: Axes) -> Axes:
     ax.tick_params(labelsize=SMALL, width=0.6, length=2.5)
     ax.xaxis.label.set_fontsize(TEXT)
     ax.yaxis.label.set_fontsize(TEXT)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.get_offset_text().set_fontsize(SMALL)
     for spine in ax.spines.values():
         spine.set_linewidth(0.6)
     return ax
@@ -194,7 +196,9 @@ def axes_for(
     figure = new_figure(across, height * MM * (across / COLUMN) ** 0.4)
     if space:
         return figure.add_subplot(projection="3d")
-    return dressed(figure.add_subplot())
+    axes = dressed(figure.add_subplot())
+    axes.locator_params(axis="x", nbins=6 if across < 1.5 * COLUMN else 10)
+    return axes
 
 
 def spatial(function: str, ax: Axes | None, z: object) -> bool:
@@ -228,10 +232,15 @@ def dot_look(code: str, size: float = 4.5) -> dict[str, Any]:
 def widen(ax: Axes) -> None:
     """Keep points that agree to rounding from filling the axes with their noise."""
     limits = ((ax.dataLim.intervalx, ax.set_xlim), (ax.dataLim.intervaly, ax.set_ylim))
-    for (low, high), set_limits in limits:
-        size = max(abs(low), abs(high))
-        if 0.0 < size < float("inf") and high - low <= 1e-6 * size:
-            set_limits(0.5 * (low + high) - 0.1 * size, 0.5 * (low + high) + 0.1 * size)
+    sizes = [max(abs(low), abs(high)) for (low, high), _ in limits]
+    if not max(sizes) < float("inf"):
+        return
+    for ((low, high), set_limits), size in zip(limits, sizes, strict=True):
+        if size <= 1e-12 * max(sizes):  # nothing but the rounding of zero
+            size = max(sizes)
+        if size > 0.0 and high - low <= 1e-6 * size:
+            middle = 0.5 * (low + high)
+            set_limits(middle - 0.1 * size, middle + 0.1 * size)
 
 
 def root(ax: Axes) -> Figure:

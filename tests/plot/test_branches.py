@@ -138,7 +138,9 @@ def test_a_column_wide(s_curve):
 
 
 def test_unknown_state(gear_diagram):
-    with pytest.raises(fs.UnknownNameError, match="unknown state or parameter 'vv'; did you mean 'v'"):
+    with pytest.raises(
+        fs.UnknownNameError, match="unknown state or parameter 'vv'; did you mean 'v'"
+    ):
         fs.plot.diagram(gear_diagram, "vv")
 
 

@@ -1,0 +1,275 @@
+"""One call of every plot function, and the results that they draw."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+import fastslow as fs
+from fastslow.results.branches import Branch
+from fastslow.results.delay_scalings import DelayScaling
+from fastslow.results.delays import FoldDelay
+from fastslow.results.outcome import Outcome
+from fastslow.results.points import SpecialPoint
+from fastslow.results.sweeps import Sweep, SweepPass
+
+END = Outcome("end of range", "reached the end of the range.", True)
+
+
+@dataclass(frozen=True)
+class Case:
+    """How a plot function is called.
+
+    Parameters
+    ----------
+    args : callable
+        From the results by name to the arguments.
+    style : dict
+        One keyword of style, and ...
+    styled : callable
+        ... from the drawing the values that show that it was obeyed.
+    more : dict
+        Further keywords.
+    space : dict
+        Keywords of a view in space; none if there is no such view.
+    axes : int
+        How many axes the function draws into.
+    """
+
+    args: Callable[[dict[str, Any]], tuple]
+    style: dict[str, Any]
+    styled: Callable[[Any], list]
+    more: Callable[[dict[str, Any]], dict[str, Any]] = lambda r: {}
+    space: dict[str, Any] = field(default_factory=dict)
+    axes: int = 1
+
+
+THICK = {"linewidth": 3.0}
+
+
+def widths(lines):
+    return [line.get_linewidth() for line in lines]
+
+
+CASES = {
+    "clarke_path": Case(
+        lambda r: (r["diagram"].boundary_equilibria[0],),
+        THICK,
+        lambda d: [path.get_linewidth()[0] for path in d.paths],
+    ),
+    "delay_scaling": Case(
+        lambda r: (r["scaling"],), {"markersize": 3.0}, lambda d: [d.measured.get_markersize()]
+    ),
+    "diagram": Case(lambda r: (r["crowd"],), THICK, lambda d: widths(d.lines), space={"z": "x**2"}),
+    "eigenvalue_path": Case(
+        lambda r: (r["lay"],), THICK, lambda d: [path.get_linewidth()[0] for path in d.paths]
+    ),
+    "overlay": Case(lambda r: (r["lay"],), THICK, lambda d: widths(d.lines), space={"z": "v"}),
+    "panel": Case(
+        lambda r: (r["lay"],),
+        THICK,
+        lambda d: widths([*d.overlay.lines, *d.time_series.lines, *d.phase_portrait.lines]),
+        axes=3,
+    ),
+    "parameter_plane": Case(
+        lambda r: r["curves"],
+        THICK,
+        lambda d: widths(d.lines),
+        more=lambda r: {"regions": r["wedge"]},
+        space={"z": "x"},
+    ),
+    "phase_portrait": Case(
+        lambda r: (r["lay"].run,),
+        THICK,
+        lambda d: widths(d.lines),
+        more=lambda r: {"interfaces": r["lay"].diagram.interface_values},
+        space={"z": "w"},
+    ),
+    "regime_map": Case(
+        lambda r: (r["map"],),
+        THICK,
+        lambda d: widths(d.lines),
+        more=lambda r: {
+            "marks": {"here": (0.3, 0.9)},
+            "curves": {"law": (np.linspace(0, 1, 9), np.linspace(0, 1, 9) ** 2)},
+        },
+    ),
+    "section": Case(
+        lambda r: (r["section"], "x", "v"),
+        {"marker": "s"},
+        lambda d: [line.get_marker() == "s" and 3.0 for line in d.points],
+    ),
+    "spectrum": Case(lambda r: (r["spectrum"],), THICK, lambda d: widths([d.line])),
+    "sweep": Case(
+        lambda r: (r["sweep"],),
+        {"markeredgewidth": 3.0},
+        lambda d: [line.get_markeredgewidth() for line in (d.up, d.down)],
+    ),
+    "time_series": Case(
+        lambda r: (r["lay"].run,),
+        THICK,
+        lambda d: widths(d.lines),
+        more=lambda r: {
+            "phases": r["lay"].phases,
+            "interfaces": r["lay"].diagram.interface_values,
+        },
+    ),
+}
+
+
+def crowd(amplitude=1.2, turns=6.0):
+    """The equilibria p = x + a sin(b x) of x' = p − x − a sin(b x): a fold at every turn."""
+    x = np.linspace(-4, 4, 2001)
+    slope = 1 + amplitude * turns * np.cos(turns * x)
+    p = x + amplitude * np.sin(turns * x)
+    rows = np.flatnonzero(np.diff(np.sign(slope))) + 1
+    special = tuple(
+        SpecialPoint(
+            "LP",
+            f"LP{k}",
+            ("x",),
+            x[[row]],
+            {"p": p[row]},
+            ("S1",),
+            np.zeros(1, dtype=complex),
+            np.array([1.0, 0.0]),
+            0.0,
+            True,
+        )
+        for k, row in enumerate(rows, start=1)
+    )
+    tangents = np.column_stack([np.ones_like(x), slope])
+    branch = Branch(
+        ("x",),
+        "p",
+        x[:, None],
+        p,
+        tangents / np.linalg.norm(tangents, axis=1, keepdims=True),
+        -slope[:, None].astype(complex),
+        np.full(len(x), "S1"),
+        special,
+        tuple(rows),
+        (END, END),
+    )
+    return fs.Diagram(("x",), "p", (-5.5, 5.5), {}, (branch,), "found", (), ("S1",), {}, "x' = …")
+
+
+def scaling():
+    """Delays past a fold at seven rates, two parts in a hundred off the law."""
+    eps = np.logspace(-2, -5, 7)
+    point = SpecialPoint(
+        "LP",
+        "LP1",
+        ("x",),
+        np.zeros(1),
+        {"p": 0.0},
+        ("S1",),
+        np.zeros(1, dtype=complex),
+        np.array([1.0, 0.0]),
+        0.0,
+        True,
+    )
+    delay = 2.04 * eps ** (2 / 3)
+    laws = tuple(
+        FoldDelay(
+            point=point,
+            parameter="p",
+            validity="by hand",
+            rate=e,
+            delay=2 * e ** (2 / 3) + e,
+            quadratic=1.0,
+            slope=1.0,
+            cubic=0.0,
+            mixed=0.0,
+            coefficients=(2.0, 0.0, 1.0),
+        )
+        for e in eps
+    )
+    return DelayScaling(
+        point,
+        "p",
+        1,
+        "x = 1",
+        eps,
+        delay,
+        laws,
+        0.0,
+        ("eps^(2/3)", "eps"),
+        np.array([2.04, 0.0]),
+        np.array([2.0, 1.0]),
+        0.667,
+        0.001,
+        np.full(6, 2 / 3),
+        2 / 3,
+        (END,) * 7,
+    )
+
+
+def swept():
+    """The logistic map beyond its first period doublings, up and down."""
+    values = np.linspace(2.8, 3.7, 181)
+    passes = []
+    for direction in (1, -1):
+        found, x = [], 0.5
+        for value in values[::direction]:
+            for _ in range(300):
+                x = value * x * (1 - x)
+            kept = []
+            for _ in range(16):
+                x = value * x * (1 - x)
+                kept.append(x)
+            found.append(kept)
+        passes.append(
+            SweepPass(
+                direction,
+                values[::direction],
+                np.full(len(values), 16),
+                np.repeat(values[::direction], 16),
+                np.ravel(found),
+                np.zeros((len(values), 1)),
+                (END,) * len(values),
+            )
+        )
+    return Sweep("r", "x", "stroboscopic", "…", tuple(passes))
+
+
+def cusp():
+    """Both folds of x' = p + q x − x³, which meet in a cusp, and where there are three roots."""
+    x, p, q = sp.symbols("x p q")
+    model = fs.Model({x: p + q * x - x**3}, parameters={p: 0, q: 1})
+    folds = fs.continue_equilibria(model, "p", over=(-1, 1)).folds
+    over = {"p": (-1, 1), "q": (-0.5, 1.5)}
+    curves = tuple(fs.continue_points(fold, ("p", "q"), over=over) for fold in folds)
+
+    def number(p, q):
+        return np.where(4 * q**3 > 27 * p**2, "three equilibria", "one equilibrium")
+
+    return curves, fs.refined_map(number, over, levels=4)
+
+
+def three_areas():
+    def label(x, y):
+        return np.where(
+            y > 0.5 + 0.3 * np.sin(4 * x), "bilateral", np.where(x > 0.6, "new", "free")
+        )
+
+    return fs.refined_map(label, {"x": (0, 1), "y": (0, 1)}, levels=4, tol=1e-6)
+
+
+def results_by_name(diagram, lay):
+    """Every result that is drawn; ``diagram`` with boundary equilibria, ``lay`` over folds."""
+    curves, wedge = cusp()
+    return {
+        "diagram": diagram,
+        "lay": lay,
+        "crowd": crowd(),
+        "scaling": scaling(),
+        "curves": curves,
+        "wedge": wedge,
+        "map": three_areas(),
+        "section": lay.run.section("x"),
+        "spectrum": lay.run.spectrum("x"),
+        "sweep": swept(),
+    }
