@@ -39,7 +39,7 @@ class Ensemble(Table, Result):
     Parameters
     ----------
     states : tuple of str
-        States, then slow states: the columns of `start`, `final`, `minimum` and `maximum`.
+        States, then slow states: the columns of ``start``, ``final``, ``minimum``, ``maximum``.
     forcing, interfaces : tuple of str
         Names in the model's order.
     modes : tuple of str

@@ -48,6 +48,7 @@ class Named(Mapping[str, V], Generic[V]):
             raise unknown_name(self.kind, key, self._items) from None
 
     def get(self, key: object, default: V | None = None) -> V | None:  # type: ignore[override]
+        """The value of a name, or the default."""
         return self._items.get(str(key), default)
 
     def __contains__(self, key: object) -> bool:

@@ -71,7 +71,7 @@ def nondimensionalise(
     region : str, optional
         Whose rates are meant; the first region by default.
     replace : mapping, optional
-        Parameters to expressions that may hold scales (`scale_symbol`), to study
+        Parameters to expressions that may hold scales (``theta_s`` for theta), to study
         what a wrongly scaled factor does.
 
     Returns

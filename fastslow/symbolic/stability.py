@@ -73,7 +73,7 @@ class Stability:
 
     @property
     def verdict(self) -> str:
-        """``"stable"``, ``"unstable"``, ``"neutral"``, or ``"depends"`` (see `conditions`)."""
+        """``"stable"``, ``"unstable"``, ``"neutral"``, or ``"depends"`` (see ``conditions``)."""
         if all(s == 1 for s in self.signs):
             return "stable"
         if -1 in self.signs:

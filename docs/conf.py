@@ -1,0 +1,97 @@
+"""How the documentation is built: `sphinx-build -W --keep-going -n -q docs build/docs`."""
+
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from sphinx.application import Sphinx
+from sphinx.util.nodes import make_refnode
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+
+# the sources beside these pages are documented and run, whatever is installed
+sys.path.insert(0, str(ROOT))
+os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+# figures of the pages are vectors: settings of the kernel that pages need not repeat
+os.environ["IPYTHONDIR"] = str(HERE / "_ipython")
+
+import fastslow  # noqa: E402
+
+ABSOLUTE = re.compile(r"(``.*?``)|(?<!\\)\|")
+
+project = "fastslow"
+author = "the fastslow developers"
+copyright = "2026, the fastslow developers"
+version = release = fastslow.__version__
+
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon"]
+exclude_patterns = ["_ipython"]
+source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
+default_role = "py:obj"
+
+html_theme = "furo"
+html_title = f"fastslow {version}"
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
+
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+nb_execution_mode = "force"
+# stored with their output; a test executes them
+nb_execution_excludepatterns = ["notebooks/*"]
+nb_execution_raise_on_error = True
+nb_execution_timeout = 180
+nb_merge_streams = True
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # the docstrings give types, with shapes
+maximum_signature_line_length = 88
+napoleon_google_docstring = False
+napoleon_use_param = False
+napoleon_use_rtype = False
+# classes of these packages have pages of their own elsewhere, and nothing is fetched to link them
+nitpick_ignore_regex = [(r"py:.*", r"(abc|collections|enum|matplotlib|numpy|sympy|typing)\..*")]
+
+
+def prepare(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+    """Make a docstring ready for reStructuredText: |x| is an absolute value in it."""
+    in_example = False
+    for row, line in enumerate(lines):
+        in_example = line.lstrip().startswith(">>>") or (in_example and bool(line.strip()))
+        if not in_example:
+            lines[row] = ABSOLUTE.sub(lambda m: m[1] or r"\|", line)
+    if what == "property":
+        lines[:0] = [
+            "..",
+            "",
+        ]  # an empty comment; else Napoleon takes words before a colon for a type
+
+
+def by_last_name(app: Sphinx, env: Any, node: Any, child: Any) -> Any:
+    """Resolve `Ensemble.regime` in a docstring of any module, a field by its class."""
+    if node.get("refdomain") != "py":
+        return None
+    objects = env.get_domain("py").objects
+    target = node["reftarget"]
+    for wanted in (target, target.rpartition(".")[0]):
+        ends = [
+            name
+            for name, place in objects.items()
+            if wanted and name.endswith(f".{wanted}") and not place.aliased
+        ]
+        if len(ends) == 1:
+            place = objects[ends[0]]
+            return make_refnode(
+                app.builder, node["refdoc"], place.docname, place.node_id, child, ends[0]
+            )
+    return None
+
+
+def setup(app: Sphinx) -> None:
+    """Add what the pages need beside the extensions."""
+    app.connect("autodoc-process-docstring", prepare, priority=400)  # before Napoleon
+    app.connect("missing-reference", by_last_name)
