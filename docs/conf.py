@@ -9,14 +9,11 @@ from typing import Any
 from sphinx.application import Sphinx
 from sphinx.util.nodes import make_refnode
 
-HERE = Path(__file__).parent
-ROOT = HERE.parent
+ROOT = Path(__file__).parent.parent
 
 # the sources beside these pages are documented and run, whatever is installed
 sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
-# figures of the pages are vectors: settings of the kernel that pages need not repeat
-os.environ["IPYTHONDIR"] = str(HERE / "_ipython")
 
 import fastslow  # noqa: E402
 
@@ -28,7 +25,6 @@ copyright = "2026, the fastslow developers"
 version = release = fastslow.__version__
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon"]
-exclude_patterns = ["_ipython"]
 source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
 default_role = "py:obj"
 
@@ -41,6 +37,7 @@ myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 nb_execution_mode = "force"
+nb_execution_in_temp = True  # pages may write files
 # stored with their output; a test executes them
 nb_execution_excludepatterns = ["notebooks/*"]
 nb_execution_raise_on_error = True
