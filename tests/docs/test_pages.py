@@ -1,0 +1,85 @@
+"""The pages of the documentation: nothing is missing, all code is run, numbers in the text hold."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import fastslow as fs
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted(page for page in DOCS.rglob("*.md"))
+CELL = re.compile(r"^```\{code-cell\}.*?\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
+ENTRY = re.compile(r"^\.\. auto\w+:: (\S+)$", flags=re.MULTILINE)
+HEAD = "---\nfile_format: mystnb\nkernelspec:\n  name: python3\n---\n"
+
+
+def public_names():
+    for name in fs.__all__:
+        if name not in ("__version__", "plot", "systems"):
+            yield f"fastslow.{name}"
+    for module in (fs.plot, fs.systems):
+        for name in module.__all__:
+            yield f"{module.__name__}.{name}"
+
+
+def test_every_public_name_is_in_the_reference_once():
+    pages = (DOCS / "reference").glob("*.md")
+    entries = [entry for page in pages for entry in ENTRY.findall(page.read_text("utf-8"))]
+    assert sorted(set(public_names()) - set(entries)) == []
+    assert len(entries) == len(set(entries))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(DOCS).as_posix())
+def test_all_python_of_a_page_is_run(page):
+    text = page.read_text("utf-8")
+    assert not re.search(r"^[`~:]{3,}\s*(\{code-block\}\s*)?(i?python|py)", text, re.MULTILINE)
+    # without this head the cells would be shown and not run
+    assert text.startswith(HEAD) == bool(CELL.search(text))
+
+
+def test_the_gallery_shows_every_figure_of_the_claims_and_its_script():
+    gallery = (DOCS / "gallery.md").read_text("utf-8")
+    shown = re.findall(r"^:::\{figure\} (\S+)$", gallery, flags=re.MULTILINE)
+    claims = (DOCS / "claims.md").read_text("utf-8")
+    assert sorted(shown) == sorted(set(re.findall(r"!\[.*?\]\((.*?)\)", claims)))
+    scripts = re.findall(r"<\.\./(analyses/\w+\.py)>", gallery)
+    assert len(scripts) == len(shown)
+    for figure, script in zip(shown, scripts, strict=True):
+        assert (DOCS / figure).is_file()
+        assert (ROOT / script).is_file()
+
+
+def test_the_readme_links_to_pages():
+    links = re.findall(r"\]\((docs/[^)]*)\)", (ROOT / "README.md").read_text("utf-8"))
+    assert "docs/tutorial.md" in links
+    for link in links:
+        assert (ROOT / link).exists(), link
+
+
+def test_the_tutorial(tmp_path, monkeypatch, capsys):
+    """Its cells run as they stand, and give what the text says about them."""
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for cell in CELL.findall((DOCS / "tutorial.md").read_text("utf-8")):
+        exec(compile(cell, "tutorial.md", "exec"), names)
+    printed = capsys.readouterr().out
+
+    assert list(names["gear"].regions) == ["S1", "S2", "S3"]
+    assert [str(form.admissible) for form in names["law"].folds].count("A < -D**2") == 2
+    assert names["diagram"].coverage == "complete"
+    assert [p.subtype for p in names["diagram"].boundary_equilibria] == ["degenerate"] * 2
+    assert len(names["run"].crossings) == 41
+    assert names["run"].regime == "bilateral"
+    assert {t.kind for t in names["lay"].transitions} == {"transit"}
+    assert "the diagram has no fold" in printed
+    assert len(names["soft_diagram"].folds) == 2
+    (bistable,) = names["soft_diagram"].bistable()
+    assert bistable == pytest.approx([-0.0894402097712473, 0.0894402097712473], abs=1e-12)
+    assert names["soft_lay"].bursting.name.startswith("relaxation oscillation")
+    assert {t.kind for t in names["soft_lay"].transitions} == {"jump"}
+    assert names["again"].delays == pytest.approx(names["soft_lay"].delays, rel=1e-12)
+
+    box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+)", (tmp_path / "overlay.pdf").read_bytes())
+    assert float(box[1]) * 25.4 / 72 == pytest.approx(85, abs=0.01)
