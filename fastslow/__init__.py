@@ -25,6 +25,8 @@ if TYPE_CHECKING:
         OutOfRangeError,
         UnknownNameError,
     )
+    from fastslow.interactive.explorers import explore
+    from fastslow.interactive.pointers import inspect
     from fastslow.model.model import Model
     from fastslow.passage.delay_laws import predict_delay
     from fastslow.passage.hopf_delays import hopf_exit
@@ -93,8 +95,10 @@ _HOME = {
     "derive": "symbolic.derivation",
     "disagreements": "symbolic.scaling",
     "equilibria": "diagrams.solving",
+    "explore": "interactive.explorers",
     "export": "symbolic.sources",
     "hopf_exit": "passage.hopf_delays",
+    "inspect": "interactive.pointers",
     "load": "results.files",
     "nondimensionalise": "symbolic.scaling",
     "overlay": "passage.overlays",
@@ -147,8 +151,10 @@ __all__ = [
     "derive",
     "disagreements",
     "equilibria",
+    "explore",
     "export",
     "hopf_exit",
+    "inspect",
     "load",
     "nondimensionalise",
     "overlay",

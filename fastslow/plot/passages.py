@@ -247,7 +247,7 @@ def draw_passage(
     return OverlayDrawing(ax, text, below, lines, dots, changes, turns, heads, None, shown[0].text)
 
 
-def _at_moments(lay: Overlay, shown: tuple[Quantity, Quantity], moments: Any) -> list[Array]:
+def at_moments(lay: Overlay, shown: tuple[Quantity, Quantity], moments: Any) -> list[Array]:
     """Quantities at moments, which know their fast states and the slow quantity."""
     state = np.array([[*m.state, m.value] for m in moments])
     names = (*lay.diagram.states, lay.parameter)
@@ -261,7 +261,7 @@ def _transitions(ax: Axes, lay: Overlay, shown: tuple[Quantity, Quantity]) -> tu
         if met:
             filled = marker in "*PX"
             drawn += ax.plot(
-                *_at_moments(lay, shown, met),
+                *at_moments(lay, shown, met),
                 linestyle="none",
                 marker=marker,
                 markersize=7.0 if marker == "*" else 5.5,
@@ -279,7 +279,7 @@ def _turning(ax: Axes, lay: Overlay, shown: tuple[Quantity, Quantity]) -> Line2D
     if not lay.turning:
         return None
     (line,) = ax.plot(
-        *_at_moments(lay, shown, lay.turning),
+        *at_moments(lay, shown, lay.turning),
         linestyle="none",
         marker="|",
         markersize=9.0,

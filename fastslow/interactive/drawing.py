@@ -1,0 +1,98 @@
+"""A view drawn into a figure: time series, phase portrait and overlay."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fastslow.interactive.picking import Curve, curves_of
+from fastslow.interactive.views import View
+from fastslow.plot.branches import diagram
+from fastslow.plot.motions import phase_portrait, time_series
+from fastslow.plot.passages import overlay
+from fastslow.plot.style import GREY, MOTION, SMALL, TEXT, VERMILION, dressed, typeset
+
+#: Size of a figure of our own, in inches, and places of its axes in it.
+SIZE = (10.0, 5.2)
+PLACES = ((0.065, 0.6, 0.36, 0.34), (0.065, 0.115, 0.36, 0.34), (0.5, 0.235, 0.485, 0.705))
+
+
+def new_canvas() -> Figure:
+    """A figure of our own, outside pyplot."""
+    return Figure(figsize=SIZE, dpi=100)
+
+
+def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:
+    """Draw a view in place of what the figure shows.
+
+    Returns
+    -------
+    tuple of Curve
+        What can be picked.
+    """
+    figure.clear()
+    series, portrait, main = (dressed(figure.add_axes(place)) for place in PLACES)
+    name, run, lay = view.setup.state, view.run, view.overlay
+    values: Mapping[str, Any] = {} if view.diagram is None else view.diagram.interface_values
+    curves: list[Curve] = []
+    if run is not None:
+        phases = () if lay is None else lay.phases
+        over_time = time_series(run, name, ax=series, interfaces=values, phases=phases)
+        curves += curves_of(over_time, run)
+        if len(run.columns) > 1:
+            other = None if len(run.states) == 1 else _other(run.states, name)
+            plane = phase_portrait(
+                run, None if other is None else name, other, ax=portrait, interfaces=values
+            )
+            curves += curves_of(plane, run)
+        else:
+            portrait.set_axis_off()
+    else:
+        _empty(series, "no trajectory")
+        _empty(portrait, "no trajectory")
+    handles: list[Any] = []
+    if lay is not None:
+        laid = overlay(lay, name, ax=main, legend=False)
+        handles = laid.handles  # type: ignore[union-attr]
+        curves += curves_of(laid, lay)
+    elif view.diagram is not None:
+        below = diagram(view.diagram, name, ax=main, legend=False)
+        handles = below.handles
+        curves += curves_of(below, view.diagram)
+        _mark_value(main, view)
+    else:
+        _empty(main, "no diagram")
+    if handles:
+        figure.legend(
+            handles=handles,
+            loc="lower center",
+            bbox_to_anchor=(0.74, 0.05),
+            ncols=4,
+            fontsize=SMALL,
+            frameon=False,
+            columnspacing=1.2,
+        )
+    words = "  ".join(str(outcome) for outcome in view.outcomes)
+    figure.text(0.01, 0.012, words, fontsize=SMALL, color=VERMILION, wrap=True)
+    return tuple(curves)
+
+
+def _other(states: tuple[str, ...], name: str) -> str:
+    return next(s for s in states if s != name)
+
+
+def _empty(ax: Axes, words: str) -> None:
+    ax.set_axis_off()
+    ax.text(0.5, 0.5, words, ha="center", va="center", fontsize=TEXT, color=GREY)
+
+
+def _mark_value(ax: Axes, view: View) -> None:
+    """Where the run stands on a diagram over a parameter of its own."""
+    assert view.diagram is not None
+    name = view.diagram.parameter
+    value = view.model.parameters.get(name)
+    if value is not None:
+        ax.axvline(value, color=MOTION, linewidth=0.8, zorder=1.8, label=f"{typeset(name)} now")

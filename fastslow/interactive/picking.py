@@ -1,0 +1,265 @@
+"""Which point of a drawing is meant by a place on the screen, and what is known of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError
+from fastslow.interactive.tooltips import Instant, text_of
+from fastslow.plot.branches import DiagramDrawing
+from fastslow.plot.heights import along, at_point
+from fastslow.plot.motions import MotionDrawing, at_crossings
+from fastslow.plot.panels import PanelDrawing
+from fastslow.plot.passages import OverlayDrawing, at_moments, heights_at
+from fastslow.results.branches import Branch
+from fastslow.results.crossings import regions_at
+from fastslow.results.diagrams import Diagram
+from fastslow.results.overlays import Overlay
+from fastslow.results.points import Equilibrium
+from fastslow.results.trajectories import Trajectory
+
+Array = NDArray[np.float64]
+
+#: What is drawn farther away than this, in points (1/72 inch), is not meant.
+REACH = 12.0
+
+#: A marker counts as nearer than a line by this many points.
+LEAD = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class Pick:
+    """The point of a drawing that is meant.
+
+    Parameters
+    ----------
+    point : Equilibrium, SpecialPoint, Crossing, Transition or Instant
+    ax : Axes
+    x, y : float
+        Where it is drawn.
+    distance : float
+        From the place asked for, in points (1/72 inch).
+    text : str
+        What is known of it, line by line.
+    call : str
+        Python source that gives it, of results named diagram, run and lay.
+    """
+
+    point: Any
+    ax: Axes
+    x: float
+    y: float
+    distance: float
+    text: str
+    call: str
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Points in axes, and what a place along them stands for.
+
+    Parameters
+    ----------
+    ax : Axes
+    xy : ndarray, shape (N, 2)
+        In data coordinates.
+    joined : bool
+        Whether a line joins them; markers otherwise.
+    found : callable
+        (row, part of the step after it) -> (point, source text).
+    parameter : str
+        What the horizontal axis of a diagram shows.
+    """
+
+    ax: Axes
+    xy: Array
+    joined: bool
+    found: Callable[[int, float], tuple[Any, str]]
+    parameter: str = ""
+
+
+def curves_of(drawing: Any, result: Diagram | Trajectory | Overlay) -> tuple[Curve, ...]:
+    """Everything in a drawing that can be picked.
+
+    Parameters
+    ----------
+    drawing : DiagramDrawing, MotionDrawing, OverlayDrawing or PanelDrawing
+        As `fastslow.plot` returned it.
+    result : Diagram, Trajectory or Overlay
+        What was drawn.
+
+    Raises
+    ------
+    ArgumentError
+        For another drawing, or a result that does not belong to it.
+    """
+    if isinstance(drawing, PanelDrawing) and isinstance(result, Overlay):
+        parts = (drawing.time_series, drawing.phase_portrait)
+        motions = [curve for part in parts for curve in curves_of(part, result.run)]
+        return (*motions, *curves_of(drawing.overlay, result))
+    if isinstance(drawing, OverlayDrawing) and isinstance(result, Overlay):
+        below = _diagram_curves(drawing.diagram, result.diagram)
+        return (*below, *_overlay_curves(drawing, result))
+    if isinstance(drawing, DiagramDrawing) and isinstance(result, Diagram):
+        return tuple(_diagram_curves(drawing, result))
+    if isinstance(drawing, MotionDrawing) and isinstance(result, Trajectory):
+        return tuple(_motion_curves(drawing, result))
+    raise ArgumentError(
+        f"cannot pick in a {type(drawing).__name__} of a {type(result).__name__}; expected the "
+        "drawing of a diagram, a trajectory or an overlay, with what was drawn"
+    )
+
+
+def pick(curves: Iterable[Curve], ax: Axes, x: float, y: float) -> Pick | None:
+    """The drawn point nearest to a place on the screen.
+
+    Parameters
+    ----------
+    curves : iterable of Curve
+    ax : Axes
+        Where the place is.
+    x, y : float
+        The place in pixels, as a Matplotlib event has it.
+
+    Returns
+    -------
+    Pick or None
+        None where nothing is drawn near.
+    """
+    place = np.array([x, y])
+    points = 72.0 / ax.get_figure(root=True).dpi  # type: ignore[union-attr]
+    best: tuple[float, float, Curve, int, float] | None = None
+    for curve in curves:
+        if curve.ax is not ax or not len(curve.xy):
+            continue
+        distance, row, part = _nearest(ax.transData.transform(curve.xy), place, curve.joined)
+        distance *= points
+        rank = distance if curve.joined else distance - LEAD
+        if distance <= REACH and (best is None or rank < best[0]):
+            best = rank, distance, curve, row, part
+    if best is None:
+        return None
+    _, distance, curve, row, part = best
+    point, call = curve.found(row, part)
+    at = curve.xy[row] if part == 0 else (1 - part) * curve.xy[row] + part * curve.xy[row + 1]
+    return Pick(point, ax, float(at[0]), float(at[1]), distance, text_of(point, curve.parameter), call)
+
+
+def _nearest(pixels: Array, place: Array, joined: bool) -> tuple[float, int, float]:
+    """Distance, row and part of the step after it, of the nearest drawn point."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        if not joined or len(pixels) == 1:
+            away = np.nan_to_num(np.hypot(*(pixels - place).T), nan=np.inf)
+            row = int(np.argmin(away))
+            return float(away[row]), row, 0.0
+        step = np.diff(pixels, axis=0)
+        square = (step**2).sum(axis=1)
+        part = ((place - pixels[:-1]) * step).sum(axis=1) / np.where(square > 0, square, 1.0)
+        part = np.clip(np.nan_to_num(part), 0.0, 1.0)
+        away = np.hypot(*(pixels[:-1] + part[:, None] * step - place).T)
+    away = np.nan_to_num(away, nan=np.inf)
+    row = int(np.argmin(away))
+    if part[row] == 1.0:
+        return float(away[row]), row + 1, 0.0
+    return float(away[row]), row, float(part[row])
+
+
+def _diagram_curves(drawing: DiagramDrawing, diagram: Diagram) -> Iterable[Curve]:
+    virtual = any(line.get_label() == "virtual" for line in drawing.lines)
+    special = list(diagram.special)
+    for branch in diagram.branches:
+        if branch.admissible or virtual:
+            heights = along(diagram, branch, drawing.state)
+            yield Curve(
+                drawing.ax,
+                np.column_stack([branch.parameter, heights]),
+                True,
+                _on_branch(diagram, branch),
+                diagram.parameter,
+            )
+    marked = {str(line.get_label()).split()[0] for line in drawing.markers}
+    numbers = [
+        k
+        for k, point in enumerate(special)
+        if point.code in marked and (point.admissible or virtual)
+    ]
+    at = [(special[k][diagram.parameter], at_point(special[k], drawing.state)) for k in numbers]
+    yield Curve(
+        drawing.ax,
+        np.reshape(at, (-1, 2)),
+        False,
+        lambda row, _: (special[numbers[row]], f"diagram.special[{numbers[row]}]"),
+        diagram.parameter,
+    )
+
+
+def _on_branch(diagram: Diagram, branch: Branch) -> Callable[[int, float], tuple[Any, str]]:
+    """The equilibrium at a place along a branch, corrected where the model is attached."""
+
+    def found(row: int, part: float) -> tuple[Equilibrium, str]:
+        table = branch.points
+        place = table[row] if part == 0 else (1 - part) * table[row] + part * table[row + 1]
+        values = dict(zip(branch.point_names, place.tolist(), strict=True))
+        words = ", ".join(f"{name}={value!r}" for name, value in values.items())
+        return diagram.nearest(**values), f"diagram.nearest({words})"
+
+    return found
+
+
+def _motion_curves(drawing: MotionDrawing, run: Trajectory) -> Iterable[Curve]:
+    across = run.t if drawing.x == "t" else run[drawing.x]
+    up = run[drawing.y]
+    yield Curve(drawing.ax, np.column_stack([across, up]), True, _on_run(run))
+    if drawing.crossings is not None:
+        at = np.column_stack([at_crossings(run, drawing.x), at_crossings(run, drawing.y)])
+        yield _at_crossings(drawing.ax, at, run)
+
+
+def _overlay_curves(drawing: OverlayDrawing, lay: Overlay) -> Iterable[Curve]:
+    name, run = drawing.state, lay.run
+    yield Curve(drawing.ax, np.column_stack([lay.slow, lay[name]]), True, _on_run(run))
+    if drawing.crossings is not None:
+        times = np.array([c.time for c in run.crossings])
+        state = np.array([c.state for c in run.crossings])
+        slow = np.interp(times, lay.time, lay.slow)
+        heights = heights_at(lay, name, times, slow, run.states, state)
+        yield _at_crossings(drawing.ax, np.column_stack([slow, heights]), run)
+    if lay.transitions:
+        at = np.column_stack(at_moments(lay, name, lay.transitions))
+        yield Curve(
+            drawing.ax,
+            at,
+            False,
+            lambda row, _: (lay.transitions[row], f"lay.transitions[{row}]"),
+            lay.parameter,
+        )
+
+
+def _at_crossings(ax: Axes, at: Array, run: Trajectory) -> Curve:
+    return Curve(ax, at, False, lambda row, _: (run.crossings[row], f"run.crossings[{row}]"))
+
+
+def _on_run(run: Trajectory) -> Callable[[int, float], tuple[Any, str]]:
+    """The state at a place along a trajectory: of its series where it kept them."""
+
+    def found(row: int, part: float) -> tuple[Instant, str]:
+        times = run.t
+        time = float(times[row] if part == 0 else (1 - part) * times[row] + part * times[row + 1])
+        if run.series is not None and len(run.steps):
+            columns, call = run.dense_columns(time), f"run({time!r})"
+        else:
+            rows = [run[name] for name in run.columns]
+            columns = np.array([np.interp(time, times, values) for values in rows])
+            call = f"np.array([np.interp({time!r}, run.t, run[s]) for s in run.states])"
+        n = len(run.states)
+        slow = dict(zip(run.forcing, columns[n:].tolist(), strict=True))
+        region = str(regions_at(run, np.array([time]))[0])
+        return Instant(time, run.states, columns[:n].copy(), slow, region), call
+
+    return found

@@ -1,0 +1,189 @@
+"""Hover and click on a drawing: what is near is shown, and given back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.backend_bases import Event, FigureCanvasBase, MouseEvent
+from matplotlib.figure import Figure
+from matplotlib.text import Annotation
+
+from fastslow.interactive.picking import Curve, Pick, curves_of, pick
+from fastslow.plot.style import BLACK, GREY, SMALL
+from fastslow.results.diagrams import Diagram
+from fastslow.results.overlays import Overlay
+from fastslow.results.trajectories import Trajectory
+
+
+def inspect(
+    drawing: Any,
+    result: Diagram | Trajectory | Overlay,
+    *,
+    on_click: Callable[[Pick], object] | None = None,
+) -> Pointer:
+    """Show what a drawn point is when the pointer is near, and give it back on a click.
+
+    Works on every interactive backend of Matplotlib. Equilibria between the rows
+    of a branch are solved for where the model is attached.
+
+    Parameters
+    ----------
+    drawing : DiagramDrawing, MotionDrawing, OverlayDrawing or PanelDrawing
+        As `fastslow.plot` returned it.
+    result : Diagram, Trajectory or Overlay
+        What was drawn.
+    on_click : callable, optional
+        Called with the Pick of every click, which is `Pointer.selected` too.
+
+    Returns
+    -------
+    Pointer
+        To be kept: hovering ends with it.
+
+    Raises
+    ------
+    ArgumentError
+        For another drawing, or a result that does not belong to it.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> from matplotlib.backend_bases import MouseEvent
+    >>> gear = fs.systems.harmonic_gear(A=-0.6).frozen()
+    >>> diagram = fs.continue_equilibria(gear, "w", over=(-0.5, 0.5))
+    >>> drawing = fs.plot.diagram(diagram)
+    >>> pointer = fs.inspect(drawing, diagram)
+    >>> place = drawing.ax.transData.transform((diagram.folds[0]["w"], diagram.folds[0]["x"]))
+    >>> click = MouseEvent("button_press_event", drawing.figure.canvas, *place, button=1)
+    >>> drawing.figure.canvas.callbacks.process(click.name, click)
+    >>> pointer.selected.point.label
+    'LP1'
+    """
+    curves = curves_of(drawing, result)
+    return Pointer(drawing.figure, curves, on_click)
+
+
+class Pointer:
+    """Hover and click on a figure.
+
+    Parameters
+    ----------
+    figure : Figure
+    curves : sequence of Curve
+        What can be meant; may be replaced when the figure is drawn anew.
+    on_click : callable, optional
+        Called with every pick.
+
+    Attributes
+    ----------
+    selected : Pick or None
+        What was clicked last.
+    near : Pick or None
+        What the pointer is near to.
+    """
+
+    def __init__(
+        self,
+        figure: Figure,
+        curves: Sequence[Curve] = (),
+        on_click: Callable[[Pick], object] | None = None,
+    ) -> None:
+        self.figure = figure
+        self.curves = tuple(curves)
+        self.selected: Pick | None = None
+        self.near: Pick | None = None
+        self._on_click = on_click
+        self._box: Annotation | None = None
+        self._beneath: Any = None
+        self._connected = [
+            figure.canvas.mpl_connect("motion_notify_event", self._moved),
+            figure.canvas.mpl_connect("button_press_event", self._clicked),
+            figure.canvas.mpl_connect("draw_event", self._drawn),
+        ]
+
+    def release(self) -> None:
+        """Stop listening."""
+        for number in self._connected:
+            self.figure.canvas.mpl_disconnect(number)
+        self._connected = []
+        self._hide()
+
+    def _moved(self, event: Event) -> None:
+        found = self._found(event)
+        if found is None:
+            if self.near is not None:
+                self._hide()
+                self._show()
+        elif self.near is None or found.text != self.near.text:
+            self._hide()
+            self._box = box_for(found)
+            self._show()
+        self.near = found
+
+    def _clicked(self, event: Event) -> None:
+        assert isinstance(event, MouseEvent)
+        toolbar = getattr(self.figure.canvas, "toolbar", None)
+        found = self._found(event)
+        # a drag of the toolbar's zoom or pan is no click on a point
+        if found is None or event.button != 1 or getattr(toolbar, "mode", ""):
+            return
+        self.selected = found
+        if self._on_click is not None:
+            self._on_click(found)
+
+    def _found(self, event: Event) -> Pick | None:
+        assert isinstance(event, MouseEvent)
+        ax = event.inaxes
+        return pick(self.curves, ax, event.x, event.y) if isinstance(ax, Axes) else None
+
+    def _hide(self) -> None:
+        if self._box is not None and self._box.axes is not None:
+            self._box.remove()
+        self._box = None
+
+    def _drawn(self, _: Event) -> None:
+        """Keep what was drawn, without the box: to lay the next one over it is quick."""
+        canvas: Any = self.figure.canvas
+        self._beneath = canvas.copy_from_bbox(self.figure.bbox) if _blits(canvas) else None
+        if self._box is not None and self._box.axes is not None:
+            self.figure.draw_artist(self._box)
+
+    def _show(self) -> None:
+        canvas: Any = self.figure.canvas
+        if self._beneath is None:
+            canvas.draw_idle()
+            return
+        canvas.restore_region(self._beneath)
+        if self._box is not None:
+            self.figure.draw_artist(self._box)
+        canvas.blit(self.figure.bbox)
+
+
+def _blits(canvas: FigureCanvasBase) -> bool:
+    return bool(canvas.supports_blit)
+
+
+def box_for(found: Pick) -> Annotation:
+    """A box with what is known of a point, beside it and inside the figure."""
+    ax = found.ax
+    frame = ax.get_window_extent()
+    x, y = ax.transData.transform((found.x, found.y))
+    right = x < 0.5 * (frame.x0 + frame.x1)
+    upper = y < 0.5 * (frame.y0 + frame.y1)
+    return ax.annotate(
+        found.text,
+        (found.x, found.y),
+        xytext=(10 if right else -10, 10 if upper else -10),
+        textcoords="offset points",
+        ha="left" if right else "right",
+        va="bottom" if upper else "top",
+        fontsize=SMALL + 1,
+        color=BLACK,
+        bbox={"boxstyle": "round,pad=0.4", "facecolor": "white", "edgecolor": GREY, "alpha": 0.95},
+        arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.8},
+        zorder=20,
+        animated=True,
+        annotation_clip=False,
+    )

@@ -1,0 +1,333 @@
+"""What an explorer shows at one set of values: diagram, trajectory and overlay."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from fastslow.diagrams.tracing import continue_equilibria
+from fastslow.errors import ArgumentError, FastSlowError, unknown_name
+from fastslow.model.model import Model
+from fastslow.passage.overlays import overlay
+from fastslow.results.diagrams import Diagram
+from fastslow.results.outcome import Outcome
+from fastslow.results.overlays import Overlay
+from fastslow.results.trajectories import Trajectory
+from fastslow.simulation.arguments import initial_state, time_span, tolerance
+from fastslow.simulation.trajectories import period_of, simulate
+
+R = TypeVar("R")
+Range = tuple[float, float]
+
+#: A diagram goes beyond what its slow quantity covers by this part of it.
+MARGIN = 0.2
+
+#: Length of a run of a model without a period.
+LONG = 100.0
+
+
+@dataclass(frozen=True)
+class Setup:
+    """How the views of a model are computed.
+
+    Parameters
+    ----------
+    parameter : str or None
+        What the diagram is over; None for a model without slow quantity and parameter.
+    over : tuple of float or None
+        The range of the diagram; None for a little more than the run covers.
+    start : tuple of float
+        Initial states, then slow states.
+    t : tuple of float or None
+    periods : float or None
+        Length of the run; one of the two.
+    tol : float
+        Tolerance of the run.
+    state : str
+        What stands over time and over the parameter.
+    """
+
+    parameter: str | None
+    over: Range | None
+    start: tuple[float, ...]
+    t: Range | None
+    periods: float | None
+    tol: float
+    state: str
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Diagram, trajectory and overlay of a model at one set of values.
+
+    What could not be computed is None, and ``outcomes`` says why.
+
+    Parameters
+    ----------
+    model : Model
+    setup : Setup
+    changes : mapping
+        The parameters that differ from those of the model that was given.
+    diagram : Diagram or None
+    run : Trajectory or None
+    overlay : Overlay or None
+        None too where the diagram is not over a slow quantity.
+    held : mapping
+        Values at which the diagram holds further slow quantities.
+    outcomes : tuple of Outcome
+        What failed, or did not go all the way.
+    """
+
+    model: Model
+    setup: Setup
+    changes: Mapping[str, float]
+    diagram: Diagram | None
+    run: Trajectory | None
+    overlay: Overlay | None
+    held: Mapping[str, float]
+    outcomes: tuple[Outcome, ...]
+
+    def call(self) -> str:
+        """Python source that computes and draws the same, of a model named ``model``.
+
+        Examples
+        --------
+        >>> import fastslow as fs
+        >>> gear = fs.systems.harmonic_gear()
+        >>> view = view_of(gear, setup_of(gear, over=(-2, 6)), {"D": 0.3})
+        >>> print(view.call())
+        import fastslow as fs
+        <BLANKLINE>
+        model = model.with_parameters({'D': 0.3})
+        run = fs.simulate(model, {'x': 0.0, 'v': 0.0}, periods=2.0, tol=1e-09)
+        diagram = fs.continue_equilibria(model.frozen(), 'w', over=(-2.0, 6.0))
+        lay = fs.overlay(diagram, run)
+        fs.plot.panel(lay, 'x')
+        """
+        setup, names = self.setup, (*self.model.states, *self.model.slow_states)
+        lines = ["import fastslow as fs", ""]
+        if self.changes:
+            lines.append(f"model = model.with_parameters({dict(self.changes)!r})")
+        length = f"t={setup.t!r}" if setup.t is not None else f"periods={setup.periods!r}"
+        if self.run is not None:
+            start = dict(zip(names, setup.start, strict=True))
+            lines.append(f"run = fs.simulate(model, {start!r}, {length}, tol={setup.tol!r})")
+        if self.diagram is not None:
+            frozen = "model.frozen()"
+            if self.held:
+                frozen += f".with_parameters({dict(self.held)!r})"
+            lines.append(
+                f"diagram = fs.continue_equilibria({frozen}, {self.diagram.parameter!r}, "
+                f"over={self.diagram.over!r})"
+            )
+        if self.overlay is not None:
+            lines += ["lay = fs.overlay(diagram, run)", f"fs.plot.panel(lay, {setup.state!r})"]
+        else:
+            if self.diagram is not None:
+                lines.append(f"fs.plot.diagram(diagram, {setup.state!r})")
+            if self.run is not None:
+                lines.append(f"fs.plot.time_series(run, {setup.state!r})")
+        lines += [f"# {' '.join(str(outcome).split())}" for outcome in self.outcomes]
+        return "\n".join(lines)
+
+
+def setup_of(
+    model: Model,
+    *,
+    parameter: object = None,
+    over: Sequence[float] | None = None,
+    start: Any = None,
+    t: Sequence[float] | None = None,
+    periods: float | None = None,
+    tol: float = 1e-9,
+    state: object = None,
+) -> Setup:
+    """Check how views are to be computed, and fill in what is not given.
+
+    Parameters are those of `fastslow.explore`.
+
+    Raises
+    ------
+    UnknownNameError
+        For a parameter or state that is not in the model.
+    ArgumentError
+        For a range, start, time span or tolerance that is none.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> setup_of(fs.systems.hindmarsh_rose()).parameter, setup_of(fs.systems.stick_slip()).over
+    ('z', (0.0, 2.0))
+    """
+    slow = (*model.forcing, *model.slow_states)
+    known = tuple(dict.fromkeys((*slow, *model.free, *model.parameters)))
+    name = str(parameter) if parameter is not None else next(iter(known), None)
+    if name is not None and name not in known:
+        raise unknown_name("slow quantity or parameter", name, known)
+    shown = model.states[0] if state is None else str(state)
+    if shown not in model.states:
+        raise unknown_name("state", shown, model.states)
+    names = (*model.states, *model.slow_states)
+    begin = initial_state(model, np.zeros(len(names)) if start is None else start)
+    if t is None and periods is None:
+        t, periods = ((0.0, LONG), None) if period_of(model) is None else (None, 2.0)
+    time_span(t, periods, 0.0, None, lambda: period_of(model))
+    limits = None if over is None else _limits(name, over)
+    if limits is None and name is not None and name not in slow:
+        limits = around(model.parameters.get(name, 0.0))
+    return Setup(
+        name,
+        limits,
+        tuple(begin.tolist()),
+        None if t is None else (float(t[0]), float(t[1])),
+        None if periods is None else float(periods),
+        tolerance(tol),
+        shown,
+    )
+
+
+def view_of(model: Model, setup: Setup, changes: Mapping[str, float] | None = None) -> View:
+    """Compute a view; what fails is left out and said.
+
+    Parameters
+    ----------
+    model : Model
+        As it was given.
+    setup : Setup
+    changes : mapping, optional
+        Parameters and their values, where they differ.
+
+    Returns
+    -------
+    View
+
+    Raises
+    ------
+    UnknownNameError
+        For a name that is no parameter of the model.
+    ModelError
+        For a value that is not a finite number.
+    """
+    changes = dict(changes or {})
+    here = model.with_parameters(changes) if changes else model
+    failures: list[Outcome] = []
+    run = _tried(
+        failures,
+        "trajectory",
+        lambda: simulate(here, setup.start, t=setup.t, periods=setup.periods, tol=setup.tol),
+    )
+    diagram, held = None, _held(here, setup, run)
+    if setup.parameter is not None:
+        diagram = _tried(failures, "diagram", lambda: _diagram(here, setup, run, held))
+    lay = None
+    if run is not None and diagram is not None and diagram.parameter in _slow(here):
+        lay = _tried(failures, "overlay", lambda: overlay(diagram, run))
+    reached = [result.outcome for result in (run, diagram, lay) if result is not None]
+    return View(
+        here,
+        setup,
+        {name: float(value) for name, value in changes.items()},
+        diagram,
+        run,
+        lay,
+        held,
+        (*failures, *(outcome for outcome in reached if not outcome)),
+    )
+
+
+def around(value: float) -> Range:
+    """A range about a value: from zero to twice the value, for zero from −1 to 1.
+
+    Examples
+    --------
+    >>> around(0.25), around(-3.0), around(0.0)
+    ((0.0, 0.5), (-6.0, 0.0), (-1.0, 1.0))
+    """
+    if value == 0:
+        return -1.0, 1.0
+    return (0.0, 2.0 * value) if value > 0 else (2.0 * value, 0.0)
+
+
+def at_start(setup: Setup, model: Model, states: Mapping[str, float]) -> Setup:
+    """The setup with other initial values of some states."""
+    names = (*model.states, *model.slow_states)
+    begin = {**dict(zip(names, setup.start, strict=True)), **states}
+    return replace(setup, start=tuple(initial_state(model, begin).tolist()))
+
+
+def _tried(failures: list[Outcome], what: str, compute: Callable[[], R]) -> R | None:
+    """A result, or None and why there is none."""
+    try:
+        return compute()
+    except FastSlowError as error:
+        failures.append(Outcome(what, f"no {what}: {error}", False))
+        return None
+
+
+def _slow(model: Model) -> tuple[str, ...]:
+    return (*model.forcing, *model.slow_states)
+
+
+def _held(model: Model, setup: Setup, run: Trajectory | None) -> dict[str, float]:
+    """Slow quantities that the diagram is not over, in the middle of what the run covers."""
+    others = [name for name in _slow(model) if name != setup.parameter]
+    covered = {name: _covered(run, name) for name in others}
+    return {name: 0.0 if c is None else 0.5 * (c[0] + c[1]) for name, c in covered.items()}
+
+
+def _covered(run: Trajectory | None, name: str) -> Range | None:
+    """Least and greatest finite value of a column of a run."""
+    values = np.empty(0) if run is None else run[name]
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if len(values) else None
+
+
+def _diagram(
+    model: Model, setup: Setup, run: Trajectory | None, held: Mapping[str, float]
+) -> Diagram:
+    assert setup.parameter is not None
+    frozen = model.frozen()
+    if held:
+        frozen = frozen.with_parameters(held)
+    over = setup.over
+    if over is None:
+        covered = _covered(run, setup.parameter)
+        if covered is None:
+            raise ArgumentError(
+                f"without a trajectory there is no range of {setup.parameter}; give it as over="
+            )
+        over = widened(*covered)
+    return continue_equilibria(frozen, setup.parameter, over)
+
+
+def widened(low: float, high: float) -> Range:
+    """A range with a margin, its ends rounded outwards.
+
+    Examples
+    --------
+    >>> widened(-1.174, 5.918), widened(2.0, 2.0)
+    ((-3.0, 8.0), (1.0, 3.0))
+    """
+    margin = MARGIN * (high - low) or 0.4 * max(abs(high), 1.0)
+    unit = 10.0 ** math.floor(math.log10(high - low + 2.0 * margin))
+    unit = unit if high - low + 2.0 * margin >= 5.0 * unit else 0.5 * unit
+    return (
+        float(unit * math.floor((low - margin) / unit)),
+        float(unit * math.ceil((high + margin) / unit)),
+    )
+
+
+def _limits(name: str | None, over: Sequence[float]) -> Range:
+    try:
+        low, high = (float(v) for v in over)
+    except (TypeError, ValueError):
+        low = high = math.nan
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise ArgumentError(
+            f"over={over!r}: expected a pair (low, high) of finite numbers, the range of {name}"
+        )
+    return low, high
