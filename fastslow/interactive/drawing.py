@@ -34,10 +34,24 @@ def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:
         What can be picked.
     """
     figure.clear()
-    series, portrait, main = (dressed(figure.add_axes(place)) for place in PLACES)
     name, run, lay = view.setup.state, view.run, view.overlay
     values: Mapping[str, Any] = {} if view.diagram is None else view.diagram.interface_values
     curves: list[Curve] = []
+    # alone at first: its labels are placed in a figure that is drawn for it
+    main = dressed(figure.add_axes(PLACES[2]))
+    handles: list[Any] = []
+    if lay is not None:
+        laid = overlay(lay, name, ax=main, legend=False)
+        handles = laid.handles  # type: ignore[union-attr]
+        curves += curves_of(laid, lay)
+    elif view.diagram is not None:
+        below = diagram(view.diagram, name, ax=main, legend=False)
+        handles = below.handles
+        curves += curves_of(below, view.diagram)
+        handles += _mark_value(main, view)
+    else:
+        _empty(main, "no diagram")
+    series, portrait = (dressed(figure.add_axes(place)) for place in PLACES[:2])
     if run is not None:
         phases = () if lay is None else lay.phases
         over_time = time_series(run, name, ax=series, interfaces=values, phases=phases)
@@ -53,18 +67,6 @@ def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:
     else:
         _empty(series, "no trajectory")
         _empty(portrait, "no trajectory")
-    handles: list[Any] = []
-    if lay is not None:
-        laid = overlay(lay, name, ax=main, legend=False)
-        handles = laid.handles  # type: ignore[union-attr]
-        curves += curves_of(laid, lay)
-    elif view.diagram is not None:
-        below = diagram(view.diagram, name, ax=main, legend=False)
-        handles = below.handles
-        curves += curves_of(below, view.diagram)
-        _mark_value(main, view)
-    else:
-        _empty(main, "no diagram")
     if handles:
         figure.legend(
             handles=handles,
@@ -89,10 +91,12 @@ def _empty(ax: Axes, words: str) -> None:
     ax.text(0.5, 0.5, words, ha="center", va="center", fontsize=TEXT, color=GREY)
 
 
-def _mark_value(ax: Axes, view: View) -> None:
+def _mark_value(ax: Axes, view: View) -> list[Any]:
     """Where the run stands on a diagram over a parameter of its own."""
     assert view.diagram is not None
     name = view.diagram.parameter
     value = view.model.parameters.get(name)
-    if value is not None:
-        ax.axvline(value, color=MOTION, linewidth=0.8, zorder=1.8, label=f"{typeset(name)} now")
+    if value is None:
+        return []
+    label = f"{typeset(name)} of the run"
+    return [ax.axvline(value, color=MOTION, linewidth=0.8, zorder=1.8, label=label)]

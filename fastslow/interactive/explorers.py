@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -123,6 +124,8 @@ class Explorer:
         self.pointer = Pointer(figure, (), self._clicked)
         self._widget: Any = None
         self.view = view_of(model, setup)
+        if self.view.diagram is not None:
+            self.setup = replace(setup, otherwise=self.view.diagram.over)
         self._draw()
 
     @property

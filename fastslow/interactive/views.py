@@ -49,6 +49,8 @@ class Setup:
         Tolerance of the run.
     state : str
         What stands over time and over the parameter.
+    otherwise : tuple of float, optional
+        The range of the diagram where there is no run to go by.
     """
 
     parameter: str | None
@@ -58,6 +60,7 @@ class Setup:
     periods: float | None
     tol: float
     state: str
+    otherwise: Range | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +95,8 @@ class View:
     outcomes: tuple[Outcome, ...]
 
     def call(self) -> str:
-        """Python source that computes and draws the same, of a model named ``model``.
+        """Python source that computes and draws the same, of a model named ``model``
+        (and ``import fastslow as fs``).
 
         Examples
         --------
@@ -100,8 +104,6 @@ class View:
         >>> gear = fs.systems.harmonic_gear()
         >>> view = view_of(gear, setup_of(gear, over=(-2, 6)), {"D": 0.3})
         >>> print(view.call())
-        import fastslow as fs
-        <BLANKLINE>
         model = model.with_parameters({'D': 0.3})
         run = fs.simulate(model, {'x': 0.0, 'v': 0.0}, periods=2.0, tol=1e-09)
         diagram = fs.continue_equilibria(model.frozen(), 'w', over=(-2.0, 6.0))
@@ -109,7 +111,7 @@ class View:
         fs.plot.panel(lay, 'x')
         """
         setup, names = self.setup, (*self.model.states, *self.model.slow_states)
-        lines = ["import fastslow as fs", ""]
+        lines = []
         if self.changes:
             lines.append(f"model = model.with_parameters({dict(self.changes)!r})")
         length = f"t={setup.t!r}" if setup.t is not None else f"periods={setup.periods!r}"
@@ -296,11 +298,11 @@ def _diagram(
     over = setup.over
     if over is None:
         covered = _covered(run, setup.parameter)
-        if covered is None:
-            raise ArgumentError(
-                f"without a trajectory there is no range of {setup.parameter}; give it as over="
-            )
-        over = widened(*covered)
+        over = setup.otherwise if covered is None else widened(*covered)
+    if over is None:
+        raise ArgumentError(
+            f"without a trajectory there is no range of {setup.parameter}; give it as over="
+        )
     return continue_equilibria(frozen, setup.parameter, over)
 
 
@@ -315,10 +317,9 @@ def widened(low: float, high: float) -> Range:
     margin = MARGIN * (high - low) or 0.4 * max(abs(high), 1.0)
     unit = 10.0 ** math.floor(math.log10(high - low + 2.0 * margin))
     unit = unit if high - low + 2.0 * margin >= 5.0 * unit else 0.5 * unit
-    return (
-        float(unit * math.floor((low - margin) / unit)),
-        float(unit * math.ceil((high + margin) / unit)),
-    )
+    ends = unit * math.floor((low - margin) / unit), unit * math.ceil((high + margin) / unit)
+    # a tenth is no binary number: 23 of them are to be 2.3
+    return float(f"{ends[0]:.12g}"), float(f"{ends[1]:.12g}")
 
 
 def _limits(name: str | None, over: Sequence[float]) -> Range:

@@ -1,0 +1,335 @@
+"""What a page shows at one set of values, as plain data."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Iterable, Sequence
+from typing import Any
+from unicodedata import lookup
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.interactive.tooltips import text_of
+from fastslow.interactive.views import View
+from fastslow.plot.branches import runs, special_shown
+from fastslow.plot.motions import at_crossings
+from fastslow.plot.style import (
+    BANDS,
+    BRANCH,
+    GREEK,
+    GREY,
+    LINES,
+    MARKERS,
+    MOTION,
+    TRANSITIONS,
+    VERMILION,
+)
+from fastslow.results.branches import Branch
+from fastslow.results.crossings import regions_at
+from fastslow.results.points import CODE_NAMES, type_of
+from fastslow.results.trajectories import Trajectory
+
+Array = NDArray[np.float64]
+
+#: A page keeps about this many samples of a run, and every turning point.
+SAMPLES = 2500
+
+
+class Store:
+    """Arrays as text, each once.
+
+    Examples
+    --------
+    >>> store = Store()
+    >>> store.add(np.eye(2)), store.add(np.zeros((2, 2))), store.add(np.eye(2))
+    (0, 1, 0)
+    """
+
+    def __init__(self) -> None:
+        self.arrays: list[dict[str, Any]] = []
+        self._known: dict[str, int] = {}
+
+    def add(self, table: Array) -> int:
+        """Keep a table (N, k) column by column, in 32 bits from its first row on; its number."""
+        first = np.where(np.isfinite(table[0]), table[0], 0.0)
+        with np.errstate(over="ignore"):
+            small = np.ascontiguousarray((table - first).T, dtype="<f4")
+        kept = {"first": first.tolist(), "rows": len(table), "text": b64encode(small).decode()}
+        key = repr(kept)
+        if key not in self._known:
+            self._known[key] = len(self.arrays)
+            self.arrays.append(kept)
+        return self._known[key]
+
+
+def looks() -> dict[str, dict[str, Any]]:
+    """How everything in a page is drawn: the style of the figures.
+
+    Examples
+    --------
+    >>> looks()["LP"]["label"], looks()["unstable"]["dash"]
+    ('LP fold', [3.5, 1.8])
+    """
+    made: dict[str, dict[str, Any]] = {}
+    for kind, look in LINES.items():
+        dash = [] if look["linestyle"] == "-" else list(look["linestyle"][1])
+        opacity = look.get("alpha", 1.0)
+        made[kind] = {"color": BRANCH, "width": look["linewidth"], "dash": dash, "opacity": opacity}
+        made[kind]["label"] = kind
+    # wide enough to be seen beneath a trajectory that follows it
+    made["followed"] = {**made["stable"], "width": 2.2}
+    motion = {"color": MOTION, "width": 0.9, "dash": [], "opacity": 1.0}
+    made["earlier"] = {**motion, "opacity": 0.4, "label": "earlier periods"}
+    made["trajectory"] = {**motion, "label": "trajectory"}
+    made["now"] = {**motion, "label": "value of the run"}
+    for code, (marker, colour) in MARKERS.items():
+        made[code] = {"marker": marker, "color": colour, "filled": True, "size": 4.5}
+        made[code]["label"] = f"{code} {CODE_NAMES[code]}"
+    for kind, (marker, colour, label) in TRANSITIONS.items():
+        filled = marker in "*PX"
+        made[kind] = {"marker": marker, "color": colour, "filled": filled, "size": 6.0}
+        made[kind]["label"] = label
+    made["contact"] = {"marker": "o", "color": VERMILION, "filled": False, "size": 2.4}
+    made["contact"]["label"] = "interface crossing"
+    made["bands"] = {"fills": list(BANDS), "color": GREY}
+    return made
+
+
+def frame_of(view: View, store: Store) -> dict[str, Any]:
+    """A view as plain data: its call, its tables, and three panels that draw them.
+
+    Parameters
+    ----------
+    view : View
+    store : Store
+        Where the numbers go.
+    """
+    tables: list[dict[str, Any]] = []
+    panels: list[dict[str, Any]] = []
+    run, diagram, lay = view.run, view.diagram, view.overlay
+    names = [] if run is None else list(run.columns)
+    state = view.setup.state
+    if run is not None:
+        rows = kept_rows(run)
+        columns = np.column_stack([run.t, *(run[name] for name in names)])[rows]
+        tables.append(_run_table(run, columns, store))
+        planes = [("t", state)]
+        if len(names) > 1:
+            other = names[1] if len(run.states) == 1 else next(s for s in names if s != state)
+            planes.append((other, state) if len(run.states) == 1 else (state, other))
+        for x, y in planes:
+            panels.append(_panel(x, y, _bands(view, x, y)))
+            last = _last_period(run, columns[:, 0]) if x != "t" else 0
+            panels[-1]["lines"] = _motion_lines(names, x, y, last, len(columns))
+            points = np.column_stack([at_crossings(run, x), at_crossings(run, y)])
+            panels[-1]["marks"] = [_contacts(run, points)]
+    if diagram is not None:
+        main = _panel(diagram.parameter, state, _bands(view, diagram.parameter, state))
+        main["over"] = list(diagram.over)
+        for branch in diagram.branches:
+            if branch.admissible:
+                tables.append(_branch_table(branch, store))
+                index = 1 + branch.states.index(state)
+                main["lines"] += [
+                    _line(kind, len(tables) - 1, 0, index, rows.start, rows.stop)
+                    for kind, rows in runs(branch)
+                ]
+        if lay is not None and run is not None:
+            last = _last_period(run, columns[:, 0])
+            main["lines"] += _motion_lines(names, diagram.parameter, state, last, len(columns))
+            slow = at_crossings(run, diagram.parameter)
+            main["marks"].append(
+                _contacts(run, np.column_stack([slow, at_crossings(run, state)]))
+            )
+            main["marks"] += _transition_marks(view)
+            for line in main["lines"]:
+                if line["look"] == "stable":
+                    line["look"] = "followed"
+        elif diagram.parameter in view.model.parameters:
+            main["now"] = view.model.parameters[diagram.parameter]
+        main["marks"] += _special_marks(view)
+        panels.append(main)
+    for panel in panels:
+        panel["marks"] = [mark for mark in panel["marks"] if mark["points"]]
+    return {
+        "call": view.call(),
+        "outcomes": [str(outcome) for outcome in view.outcomes],
+        "tables": tables,
+        "panels": panels,
+    }
+
+
+def kept_rows(run: Trajectory) -> NDArray[np.intp]:
+    """Samples that a page keeps: evenly many, all turning points, all changes of region."""
+    count = len(run.t)
+    every = np.arange(0, count, max(count // SAMPLES, 1))
+    region = regions_at(run, run.t)
+    kept = [every, [count - 1], np.flatnonzero(region[1:] != region[:-1]) + 1]
+    for name in run.columns:
+        step = np.sign(np.diff(run[name]))
+        kept.append(np.flatnonzero(step[1:] * step[:-1] < 0) + 1)
+    return np.unique(np.concatenate(kept)).astype(np.intp)
+
+
+def _run_table(run: Trajectory, columns: Array, store: Store) -> dict[str, Any]:
+    states = list(range(1, 1 + len(run.states)))
+    slow = list(range(1 + len(run.states), 1 + len(run.columns)))
+    return {
+        "kind": "run",
+        "array": store.add(columns),
+        "names": ["t", *run.columns],
+        "lines": [group for group in ([0], states, slow) if group],
+        "eigenvalues": 0,
+        "words": _changes(regions_at(run, columns[:, 0])),
+    }
+
+
+def _branch_table(branch: Branch, store: Store) -> dict[str, Any]:
+    n = len(branch.states)
+    values = branch.eigenvalues
+    table = np.column_stack([branch.parameter, branch.state, values.real, values.imag])
+    kinds = zip(branch.region, branch.stability, map(type_of, values), strict=True)
+    words = [
+        f"{region}, {type_ if type_ == 'non-hyperbolic' else f'{stability} {type_}'}"
+        for region, stability, type_ in kinds
+    ]
+    names = [branch.parameter_name, *branch.states]
+    return {
+        "kind": "branch",
+        "array": store.add(table),
+        "names": names,
+        "quoted": [repr(name) for name in names],
+        "lines": [[0], list(range(1, 1 + n))],
+        "eigenvalues": n,
+        "words": _changes(words),
+    }
+
+
+def _changes(words: Iterable[Any]) -> list[tuple[int, str]]:
+    """Rows at which a word changes, with the word from there on.
+
+    Examples
+    --------
+    >>> _changes(["S1", "S1", "S2"])
+    [(0, 'S1'), (2, 'S2')]
+    """
+    found: list[tuple[int, str]] = []
+    for row, word in enumerate(words):
+        if not found or found[-1][1] != word:
+            found.append((row, str(word)))
+    return found
+
+
+def _panel(x: str, y: str, bands: list[dict[str, Any]]) -> dict[str, Any]:
+    names = [letters(x), letters(y)]
+    return {"x": x, "y": y, "names": names, "lines": [], "marks": [], "bands": bands}
+
+
+def letters(name: str) -> str:
+    """A name with the Greek letter that it spells.
+
+    Examples
+    --------
+    >>> letters("omega"), letters("Omega_1"), letters("x")
+    ('ω', 'Ω_1', 'x')
+    """
+    head, *below = name.split("_")
+    if head in GREEK.split():
+        size = "CAPITAL" if head[0].isupper() else "SMALL"
+        # Unicode spells the letter so
+        word = head.upper().replace("LAMBDA", "LAMDA")
+        head = lookup(f"GREEK {size} LETTER {word}")
+    return "_".join([head, *below])
+
+
+def _line(look: str, table: int, x: int, y: int, start: int, stop: int) -> dict[str, Any]:
+    return {"look": look, "table": table, "x": x, "y": y, "start": start, "stop": stop}
+
+
+def _motion_lines(
+    names: Sequence[str], x: str, y: str, last: int, count: int
+) -> list[dict[str, Any]]:
+    """The run, the first table, what comes before its last period faintly."""
+    across, up = (["t", *names].index(name) for name in (x, y))
+    lines = [_line("earlier", 0, across, up, 0, last + 1)] if last else []
+    return [*lines, _line("trajectory", 0, across, up, last, count)]
+
+
+def _last_period(run: Trajectory, times: Array) -> int:
+    if run.period is None:
+        return 0
+    return max(int(np.searchsorted(times, times[-1] - run.period, side="right")) - 1, 0)
+
+
+def _contacts(run: Trajectory, points: Array) -> dict[str, Any]:
+    return {
+        "look": "contact",
+        "points": [
+            [*map(float, at), text_of(crossing), f"run.crossings[{k}]"]
+            for k, (at, crossing) in enumerate(zip(points, run.crossings, strict=True))
+        ],
+    }
+
+
+def _special_marks(view: View) -> list[dict[str, Any]]:
+    assert view.diagram is not None
+    diagram, found = view.diagram, {}
+    numbers = {id(point): k for k, point in enumerate(diagram.special)}
+    for branch in diagram.branches:
+        for point in special_shown(branch) if branch.admissible else ():
+            k = numbers[id(point)]
+            found.setdefault(point.code, []).append(
+                [
+                    point[diagram.parameter],
+                    point[view.setup.state],
+                    text_of(point, diagram.parameter),
+                    f"diagram.special[{k}]",
+                    point.label,
+                ]
+            )
+    return [{"look": code, "points": points} for code, points in found.items()]
+
+
+def _transition_marks(view: View) -> list[dict[str, Any]]:
+    assert view.overlay is not None
+    lay, found = view.overlay, {}
+    place = lay.diagram.states.index(view.setup.state)
+    for k, change in enumerate(lay.transitions):
+        at = [change.value, float(change.state[place])]
+        found.setdefault(change.kind, []).append(
+            [*at, text_of(change, lay.parameter), f"lay.transitions[{k}]"]
+        )
+    return [{"look": kind, "points": points} for kind, points in found.items()]
+
+
+def _bands(view: View, x: str, y: str) -> list[dict[str, Any]]:
+    """Interfaces that are a value of a state on an axis, and the regions between them."""
+    made = []
+    values = {} if view.diagram is None else dict(view.diagram.interface_values)
+    for axis, name in (("x", x), ("y", y)):
+        levels = sorted(value for state, value in values.values() if state == name)
+        if levels:
+            made.append({"axis": axis, "levels": levels, "names": _regions(view, name, levels)})
+    return made
+
+
+def _regions(view: View, state: str, levels: list[float]) -> list[str]:
+    """The region between each two levels where all that is drawn agrees, else ""."""
+    heights, regions = [], []
+    if view.run is not None and state in view.run.columns:
+        heights.append(view.run[state])
+        regions.append(regions_at(view.run, view.run.t))
+    for branch in () if view.diagram is None else view.diagram.branches:
+        heights.append(branch[state])
+        regions.append(branch.region)
+    if not heights:
+        return [""] * (len(levels) + 1)
+    along, names = np.concatenate(heights), np.concatenate(regions)
+    edges = np.array([-np.inf, *levels, np.inf])
+    margin = 1e-9 * (1.0 + np.ptp(levels))
+    met = [
+        set(names[(along > low + margin) & (along < high - margin)].tolist())
+        for low, high in zip(edges[:-1], edges[1:], strict=True)
+    ]
+    return [str(next(iter(found))) if len(found) == 1 else "" for found in met]

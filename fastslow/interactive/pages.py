@@ -1,0 +1,152 @@
+"""An explorer as a page of HTML: computed beforehand, drawn by the browser."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+from collections.abc import Mapping
+from html import escape
+from importlib.resources import files
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tqdm import tqdm
+
+from fastslow.errors import ArgumentError, FastSlowError, FileError, unknown_name
+from fastslow.interactive.frames import Store, frame_of, letters, looks
+from fastslow.interactive.sliders import VALUES, Slider
+from fastslow.interactive.views import View, at_start, view_of
+
+if TYPE_CHECKING:
+    from fastslow.interactive.explorers import Explorer
+
+#: Stands for the source of a model that is not given.
+SOURCE = """import fastslow as fs
+
+# model: the fs.Model with the equations above"""
+
+
+def write_page(
+    explorer: Explorer,
+    path: Path,
+    sliders: Mapping[Any, Any] | None,
+    title: str,
+    source: str,
+    most: int,
+    progress: bool,
+) -> Path:
+    """Compute all frames and write the page; see `Explorer.export`."""
+    data = page_data(explorer, sliders, source, most, progress)
+    heading = title or f"Model of {', '.join(explorer.model.states)}"
+    _write(path, page_text(heading, data))
+    return path
+
+
+def page_data(
+    explorer: Explorer,
+    sliders: Mapping[Any, Any] | None,
+    source: str = "",
+    most: int = 500,
+    progress: bool = False,
+) -> dict[str, Any]:
+    """Everything that a page shows; a frame for every combination of values."""
+    chosen = _chosen(explorer.sliders, sliders)
+    values = {slider.name: slider.values(wanted).tolist() for slider, wanted in chosen}
+    count = math.prod(map(len, values.values()))
+    if count > most:
+        each = " × ".join(f"{len(v)} of {name}" for name, v in values.items())
+        raise ArgumentError(
+            f"the page would hold {count} frames ({each}), more than most={most}; give fewer "
+            "values, as in sliders={'" + next(iter(values)) + "': 5}, or raise most="
+        )
+    store = Store()
+    frames = []
+    for numbers in tqdm(product(*values.values()), total=count, disable=not progress, unit="frame"):
+        frames.append(_frame(explorer, dict(zip(values, numbers, strict=True)), store))
+    shown = explorer.view
+    now = {**shown.model.parameters, **_begin(explorer, shown)}
+    return {
+        "equations": explorer.model.equations,
+        "source": source or SOURCE,
+        "sliders": [
+            {
+                "label": letters(slider.label),
+                "values": values[slider.name],
+                "at": _closest(values[slider.name], now[slider.name]),
+            }
+            for slider, _ in chosen
+        ],
+        "looks": looks(),
+        "frames": frames,
+        "arrays": store.arrays,
+    }
+
+
+def page_text(title: str, data: Mapping[str, Any]) -> str:
+    """The page as HTML, nothing in it taken from elsewhere.
+
+    Examples
+    --------
+    >>> "<title>a &lt; b</title>" in page_text("a < b", {})
+    True
+    """
+    folder = files("fastslow.interactive")
+    parts = {
+        "title": escape(title),
+        # in a script no text may look like a tag
+        "data": json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
+        "script": (folder / "page.js").read_text(encoding="utf-8"),
+    }
+    template = (folder / "page.html").read_text(encoding="utf-8")
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], template)
+
+
+def _chosen(
+    sliders: tuple[Slider, ...], wanted: Mapping[Any, Any] | None
+) -> list[tuple[Slider, Any]]:
+    """The sliders that the page has, with what is wanted of each."""
+    if wanted is None:
+        return [(slider, VALUES) for slider in sliders[:1]]
+    known = {slider.name: slider for slider in sliders}
+    for name in wanted:
+        if str(name) not in known:
+            raise unknown_name("slider", name, known)
+    return [(known[str(name)], values) for name, values in wanted.items()]
+
+
+def _begin(explorer: Explorer, view: View) -> dict[str, float]:
+    names = (*explorer.model.states, *explorer.model.slow_states)
+    return dict(zip(names, view.setup.start, strict=True))
+
+
+def _frame(explorer: Explorer, values: Mapping[str, float], store: Store) -> dict[str, Any]:
+    """A frame at some values, beside those that the explorer shows."""
+    begin = _begin(explorer, explorer.view)
+    starts = {name: value for name, value in values.items() if name in begin}
+    changes = {**explorer.view.changes}
+    changes |= {name: value for name, value in values.items() if name not in begin}
+    setup = at_start(explorer.setup, explorer.model, {**begin, **starts})
+    try:
+        return frame_of(view_of(explorer.model, setup, changes), store)
+    except FastSlowError as error:
+        # a model that does not exist at these values: the page says so there
+        return {"call": "", "outcomes": [str(error)], "tables": [], "panels": []}
+
+
+def _closest(values: list[float], value: float) -> int:
+    return min(range(len(values)), key=lambda k: abs(values[k] - value))
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file whole or not at all."""
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        beside.write_text(text, encoding="utf-8")
+        beside.replace(path)
+    except OSError as error:
+        raise FileError(f"{path} cannot be written: {error.strerror or error}") from error
+    finally:
+        beside.unlink(missing_ok=True)
