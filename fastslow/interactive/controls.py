@@ -6,6 +6,8 @@ from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from matplotlib.figure import Figure
+
 from fastslow.errors import FastSlowError, MissingPackageError
 
 if TYPE_CHECKING:
@@ -31,6 +33,16 @@ def package(name: str) -> Any:
         ) from None
 
 
+def live_canvas(figure: Figure) -> Any:
+    """A canvas of ipympl for a figure, in place of the one that it has."""
+    backend = package("ipympl.backend_nbagg")
+    canvas = backend.Canvas(figure)
+    # shows itself as part of the canvas
+    backend.FigureManager(canvas, 0)
+    canvas.header_visible = False
+    return canvas
+
+
 class Controls:
     """Sliders, figure, and what was clicked, of an explorer.
 
@@ -48,15 +60,10 @@ class Controls:
 
     def __init__(self, explorer: Explorer) -> None:
         widgets = package("ipywidgets")
-        backend = package("ipympl.backend_nbagg")
         self._explorer = explorer
-        self.canvas = backend.Canvas(explorer.figure)
-        # shows itself as part of the canvas
-        self.manager = backend.FigureManager(self.canvas, 0)
-        self.canvas.header_visible = False
-        shown = {**explorer.view.model.parameters}
-        states = (*explorer.model.states, *explorer.model.slow_states)
-        shown |= dict(zip(states, explorer.view.setup.start, strict=True))
+        self._following = False
+        self.canvas = live_canvas(explorer.figure)
+        shown = explorer.values
         self.sliders = {
             slider.name: widgets.FloatSlider(
                 value=shown[slider.name],
@@ -73,24 +80,32 @@ class Controls:
         for slider in self.sliders.values():
             slider.observe(self._moved, names="value")
         self.words = widgets.HTML()
-        self.tell(explorer.call())
+        self.tell()
         rows = widgets.Box(
             tuple(self.sliders.values()), layout=widgets.Layout(flex_flow="row wrap")
         )
         self.box = widgets.VBox((rows, self.canvas, self.words))
 
-    def tell(self, call: str, text: str = "") -> None:
-        """Show the call that reproduces the view, and what was clicked."""
+    def tell(self, text: str = "") -> None:
+        """Show what was clicked, or what went wrong, and the call that reproduces the view."""
         above = f"<pre>{escape(text)}</pre>" if text else ""
-        self.words.value = f"{above}<pre>{escape(call)}</pre>"
+        self.words.value = f"{above}<pre>{escape(self._explorer.call())}</pre>"
 
-    def _moved(self, _: Any) -> None:
-        values = {name: slider.value for name, slider in self.sliders.items()}
-        shown = self._explorer.view
-        states = (*shown.model.states, *shown.model.slow_states)
-        now = {**shown.model.parameters, **dict(zip(states, shown.setup.start, strict=True))}
-        moved = {name: value for name, value in values.items() if value != now[name]}
+    def follow(self) -> None:
+        """Put the sliders where the explorer is."""
+        self._following = True
         try:
-            self._explorer.set(moved)
+            for name, slider in self.sliders.items():
+                slider.value = self._explorer.values[name]
+        finally:
+            self._following = False
+        self.tell()
+
+    def _moved(self, change: Any) -> None:
+        if self._following:
+            return
+        (name,) = (name for name, slider in self.sliders.items() if slider is change.owner)
+        try:
+            self._explorer.set({name: change.new})
         except FastSlowError as error:
-            self.tell("", str(error))
+            self.tell(str(error))

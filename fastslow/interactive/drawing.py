@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from fastslow.interactive.picking import Curve, curves_of
@@ -20,9 +21,11 @@ SIZE = (10.0, 5.2)
 PLACES = ((0.065, 0.6, 0.36, 0.34), (0.065, 0.115, 0.36, 0.34), (0.5, 0.235, 0.485, 0.705))
 
 
-def new_canvas() -> Figure:
+def own_figure() -> Figure:
     """A figure of our own, outside pyplot."""
-    return Figure(figsize=SIZE, dpi=100)
+    figure = Figure(figsize=SIZE, dpi=100)
+    FigureCanvasAgg(figure)
+    return figure
 
 
 def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:

@@ -5,16 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
 from fastslow.errors import MissingPackageError, unknown_name
-from fastslow.interactive.drawing import draw_view, new_canvas
+from fastslow.interactive.drawing import draw_view, own_figure
 from fastslow.interactive.picking import Pick
-from fastslow.interactive.pointers import Pointer
+from fastslow.interactive.pointers import Pointer, picture
 from fastslow.interactive.sliders import Slider, sliders_of
 from fastslow.interactive.views import Setup, View, at_start, setup_of, view_of
 from fastslow.model.model import Model
@@ -94,7 +93,7 @@ def explore(
     )
     names = (*model.states, *model.slow_states)
     made = sliders_of(model, dict(zip(names, setup.start, strict=True)), sliders)
-    return Explorer(model, setup, made, new_canvas() if figure is None else figure)
+    return Explorer(model, setup, made, own_figure() if figure is None else figure)
 
 
 class Explorer:
@@ -123,6 +122,7 @@ class Explorer:
         self.figure = figure
         self.pointer = Pointer(figure, (), self._clicked)
         self._widget: Any = None
+        self._picked_in: View | None = None
         self.view = view_of(model, setup)
         if self.view.diagram is not None:
             self.setup = replace(setup, otherwise=self.view.diagram.over)
@@ -155,7 +155,7 @@ class Explorer:
             For a value that is not a finite number.
         """
         given = {str(name): value for name, value in {**(values or {}), **named}.items()}
-        begin = dict(zip(self._states, self.view.setup.start, strict=True))
+        begin = {name: self.values[name] for name in self._states}
         changes = dict(self.view.changes)
         for name, value in given.items():
             if name in begin:
@@ -170,13 +170,21 @@ class Explorer:
         return self.view
 
     @property
+    def values(self) -> dict[str, float]:
+        """Parameters and initial states as they are shown."""
+        begin = zip(self._states, self.view.setup.start, strict=True)
+        return {**self.view.model.parameters, **dict(begin)}
+
+    @property
     def _states(self) -> tuple[str, ...]:
         return (*self.model.states, *self.model.slow_states)
 
     def call(self) -> str:
-        """Python source that reproduces what is shown, and the point selected."""
+        """Python source that reproduces what is shown, with the point if one was clicked in it."""
         text = self.view.call()
-        return text if self.selected is None else f"{text}\npoint = {self.selected.call}"
+        if self.selected is None or self._picked_in is not self.view:
+            return text
+        return f"{text}\npoint = {self.selected.call}"
 
     def export(
         self,
@@ -246,22 +254,20 @@ class Explorer:
         self.pointer.near = None
         self.figure.canvas.draw_idle()
         if self._widget is not None:
-            self._widget.tell(self.call())
+            self._widget.follow()
 
     def _clicked(self, found: Pick) -> None:
-        text = f"{self.view.call()}\npoint = {found.call}"
+        self._picked_in = self.view
         if self._widget is None:
-            print(text)
+            print(self.call())
         else:
-            self._widget.tell(text, found.text)
+            self._widget.tell(found.text)
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         try:
             return self.widget._repr_mimebundle_(**kwargs)
         except MissingPackageError as error:
-            stream = BytesIO()
-            self.figure.savefig(stream, format="png")
-            return {"text/plain": f"{self!r}\n{error}", "image/png": stream.getvalue()}
+            return picture(self.figure, f"{self!r}\n{error}")
 
     def __repr__(self) -> str:
         names = ", ".join(slider.label for slider in self.sliders)

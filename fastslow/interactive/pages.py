@@ -18,7 +18,7 @@ from tqdm import tqdm
 from fastslow.errors import ArgumentError, FastSlowError, FileError, unknown_name
 from fastslow.interactive.frames import Store, frame_of, letters, looks
 from fastslow.interactive.sliders import VALUES, Slider
-from fastslow.interactive.views import View, at_start, view_of
+from fastslow.interactive.views import at_start, view_of
 
 if TYPE_CHECKING:
     from fastslow.interactive.explorers import Explorer
@@ -66,8 +66,7 @@ def page_data(
     frames = []
     for numbers in tqdm(product(*values.values()), total=count, disable=not progress, unit="frame"):
         frames.append(_frame(explorer, dict(zip(values, numbers, strict=True)), store))
-    shown = explorer.view
-    now = {**shown.model.parameters, **_begin(explorer, shown)}
+    now = explorer.values
     return {
         "equations": explorer.model.equations,
         "source": source or SOURCE,
@@ -117,14 +116,10 @@ def _chosen(
     return [(known[str(name)], values) for name, values in wanted.items()]
 
 
-def _begin(explorer: Explorer, view: View) -> dict[str, float]:
-    names = (*explorer.model.states, *explorer.model.slow_states)
-    return dict(zip(names, view.setup.start, strict=True))
-
-
 def _frame(explorer: Explorer, values: Mapping[str, float], store: Store) -> dict[str, Any]:
     """A frame at some values, beside those that the explorer shows."""
-    begin = _begin(explorer, explorer.view)
+    names = (*explorer.model.states, *explorer.model.slow_states)
+    begin = {name: explorer.values[name] for name in names}
     starts = {name: value for name, value in values.items() if name in begin}
     changes = {**explorer.view.changes}
     changes |= {name: value for name, value in values.items() if name not in begin}

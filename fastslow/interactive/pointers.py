@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from io import BytesIO
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -10,6 +11,7 @@ from matplotlib.backend_bases import Event, FigureCanvasBase, MouseEvent
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 
+from fastslow.errors import MissingPackageError
 from fastslow.interactive.picking import Curve, Pick, curves_of, pick
 from fastslow.plot.style import BLACK, GREY, SMALL
 from fastslow.results.diagrams import Diagram
@@ -25,8 +27,10 @@ def inspect(
 ) -> Pointer:
     """Show what a drawn point is when the pointer is near, and give it back on a click.
 
-    Works on every interactive backend of Matplotlib. Equilibria between the rows
-    of a branch are solved for where the model is attached.
+    Works on every interactive backend of Matplotlib, in axes of ``plt.figure()``;
+    other figures become live in a notebook where the pointer is the last line of a
+    cell (extra ``interactive``). Equilibria between the rows of a branch are solved
+    for where the model is attached.
 
     Parameters
     ----------
@@ -95,6 +99,7 @@ class Pointer:
         self.selected: Pick | None = None
         self.near: Pick | None = None
         self._on_click = on_click
+        self._live: Any = None
         self._box: Annotation | None = None
         self._beneath: Any = None
         self._connected = [
@@ -109,6 +114,16 @@ class Pointer:
             self.figure.canvas.mpl_disconnect(number)
         self._connected = []
         self._hide()
+
+    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        from fastslow.interactive.controls import live_canvas
+
+        if self._live is None:
+            try:
+                self._live = live_canvas(self.figure)
+            except MissingPackageError as error:
+                return picture(self.figure, f"{self!r}\n{error}")
+        return self._live._repr_mimebundle_(**kwargs)
 
     def _moved(self, event: Event) -> None:
         found = self._found(event)
@@ -159,6 +174,13 @@ class Pointer:
         if self._box is not None:
             self.figure.draw_artist(self._box)
         canvas.blit(self.figure.bbox)
+
+
+def picture(figure: Figure, text: str) -> dict[str, Any]:
+    """How a figure is shown where there are no widgets."""
+    stream = BytesIO()
+    figure.savefig(stream, format="png")
+    return {"text/plain": text, "image/png": stream.getvalue()}
 
 
 def _blits(canvas: FigureCanvasBase) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,9 @@ from numpy.typing import NDArray
 from fastslow.results.crossings import Crossing
 from fastslow.results.points import Equilibrium, SpecialPoint
 from fastslow.results.transitions import Transition
+
+#: Letters in a line of a sentence.
+WIDTH = 44
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +77,7 @@ def text_of(point: Any, parameter: str = "") -> str:
             numbers(point.states, point.state),
             spectrum(point.eigenvalues),
             " | ".join(point.regions),
+            fill(point.note, WIDTH),
         ]
     elif isinstance(point, Crossing):
         way = {1: "upwards", -1: "downwards", 0: "touched"}[point.direction]

@@ -15,6 +15,9 @@ from fastslow.plot.style import dot_look
 from fastslow.results.branches import Branch
 from fastslow.results.points import CODE_NAMES, SpecialPoint
 
+#: What is written beside an end point is no longer than this; a sentence is for the hover.
+WORDY = 24
+
 
 def runs(branch: Branch) -> Iterator[tuple[str, slice]]:
     """Runs of constant stability, as (kind, rows); neighbours share their joint row."""
@@ -44,9 +47,14 @@ def draw_points(
         look = {"zorder": 5, "label": f"{code} {CODE_NAMES[code]}"}
         markers += ax.plot(*at.T, **dot_look(code), **look)
         if label:
-            words = [p.note or p.label if code == "EP" else p.label for p in same]
+            words = [_words(p) for p in same]
             labels += [tag(ax, word, spot) for word, spot in zip(words, at, strict=True)]
     return tuple(markers), tuple(labels)
+
+
+def _words(point: SpecialPoint) -> str:
+    brief = point.code == "EP" and 0 < len(point.note) <= WORDY
+    return point.note if brief else point.label
 
 
 def worth_a_marker(branches: Sequence[Branch]) -> list[SpecialPoint]:

@@ -1,0 +1,163 @@
+"""Hover and click on figures, by Matplotlib's own mouse events."""
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+import fastslow as fs
+from fastslow.interactive.tooltips import text_of
+
+
+@pytest.fixture(scope="module")
+def lay(folded):
+    diagram = fs.continue_equilibria(folded.frozen(), "w", over=(-0.5, 0.5))
+    return fs.overlay(diagram, fs.simulate(folded, [0, 0], periods=1))
+
+
+@pytest.fixture(scope="module")
+def panel(lay):
+    drawing = fs.plot.panel(lay)
+    drawing.figure.canvas.draw()
+    return drawing
+
+
+def drawn(result, *names):
+    """A diagram in a figure that can be drawn."""
+    ax = FigureCanvasAgg(Figure()).figure.add_subplot()
+    return fs.plot.diagram(result, *names, ax=ax, legend=False)
+
+
+def given(lay, call):
+    return eval(call, {"np": np, "lay": lay, "diagram": lay.diagram, "run": lay.run})
+
+
+def test_a_click_beside_a_branch_gives_the_equilibrium_there(lay, mouse):
+    drawing = drawn(lay.diagram)
+    picks = []
+    pointer = fs.inspect(drawing, lay.diagram, on_click=picks.append)
+    # on the stable branch in S1, between rows: x³ − D x² − 0.6 x + 0.6 D = w
+    (near,) = lay.diagram.at(w=0.3217, stable=True)
+    mouse("button_press_event", drawing.ax, 0.3217, near["x"])
+    point = pointer.selected.point
+    assert picks == [pointer.selected]
+    assert point["w"] == pytest.approx(0.3217, abs=2e-3)
+    x = point["x"]
+    assert x**3 - 0.25 * x**2 - 0.6 * x + 0.15 == pytest.approx(point["w"], abs=1e-12)
+    assert (point.region, point.stability) == ("S1", "stable")
+    assert given(lay, pointer.selected.call).state.tolist() == point.state.tolist()
+    assert pointer.selected.distance < 1.0
+
+
+def test_a_marker_goes_before_the_line_it_lies_on(lay, mouse):
+    drawing = drawn(lay.diagram)
+    pointer = fs.inspect(drawing, lay.diagram)
+    fold = lay.diagram.folds[0]
+    mouse("button_press_event", drawing.ax, fold["w"], fold["x"])
+    assert pointer.selected.point is fold
+    assert given(lay, pointer.selected.call) is fold
+    mouse("motion_notify_event", drawing.ax, fold["w"], fold["x"])
+    assert pointer.near.text.splitlines()[:2] == [f"{fold.label}, fold", f"w = {fold['w']:.6g}"]
+
+
+def test_hover_shows_a_box_and_takes_it_away(lay, mouse):
+    drawing = drawn(lay.diagram)
+    drawing.figure.canvas.draw()
+    clean = np.array(drawing.figure.canvas.buffer_rgba())
+    pointer = fs.inspect(drawing, lay.diagram)
+    drawing.figure.canvas.draw()
+    (at,) = lay.diagram.at(w=0.3, stable=True)
+    mouse("motion_notify_event", drawing.ax, 0.3, at["x"])
+    assert "S1, stable focus" in pointer.near.text
+    over = np.array(drawing.figure.canvas.buffer_rgba())
+    assert (over != clean).any(axis=2).sum() > 500
+    mouse("motion_notify_event", drawing.ax, -0.4, 0.9)
+    assert pointer.near is None
+    np.testing.assert_array_equal(np.array(drawing.figure.canvas.buffer_rgba()), clean)
+    mouse("motion_notify_event", drawing.ax, 0.3, at["x"])
+    pointer.release()
+    drawing.figure.canvas.draw()
+    np.testing.assert_array_equal(np.array(drawing.figure.canvas.buffer_rgba()), clean)
+
+
+def test_far_from_everything_nothing_is_meant(lay, mouse):
+    drawing = drawn(lay.diagram)
+    pointer = fs.inspect(drawing, lay.diagram)
+    mouse("button_press_event", drawing.ax, -0.4, 0.9)
+    mouse("button_press_event", drawing.ax, 0.0, 0.0, button=3)
+    assert pointer.selected is None
+
+
+def test_every_part_of_a_panel_answers(lay, panel, mouse):
+    pointer = fs.inspect(panel, lay)
+    run = lay.run
+    time = 0.37 * run.span[1]
+    mouse("button_press_event", panel.time_series.ax, time, run(time)[0])
+    instant = pointer.selected.point
+    assert instant.time == pytest.approx(time, rel=2e-3)
+    np.testing.assert_array_equal(instant.state, run(instant.time))
+    np.testing.assert_array_equal(given(lay, pointer.selected.call), instant.state)
+    assert instant.slow["w"] == pytest.approx(0.4 * np.sin(0.02 * instant.time), abs=1e-9)
+    again = fs.simulate(
+        fs.systems.harmonic_gear(A=-0.6, B=0.0, C=0.4, omega=0.02),
+        instant.state,
+        t=(instant.time, run.span[1]),
+    )
+    np.testing.assert_allclose(again.end, run.end, atol=1e-7)
+
+    mouse("button_press_event", panel.phase_portrait.ax, *run(time))
+    np.testing.assert_allclose(pointer.selected.point.state, run(time), atol=0.02)
+
+    change = lay.transitions[0]
+    mouse("button_press_event", panel.overlay.ax, change.value, change.state[0])
+    assert pointer.selected.point is change
+    assert given(lay, pointer.selected.call) is change
+    assert pointer.selected.text.startswith(change.kind)
+
+
+def test_crossings_are_given_back(lay, panel, mouse):
+    pointer = fs.inspect(panel, lay)
+    crossing = run_crossing = lay.run.crossings[0]
+    mouse("button_press_event", panel.phase_portrait.ax, *crossing.state)
+    found = pointer.selected.point
+    assert found.interface == run_crossing.interface
+    np.testing.assert_allclose(found.state, crossing.state, atol=0.02)
+    assert given(lay, pointer.selected.call) is found
+    assert "→" in pointer.selected.text
+
+
+def test_a_run_without_series_is_read_between_its_samples(folded, mouse):
+    run = fs.simulate(folded, [0, 0], periods=1, dense=False, samples=400)
+    drawing = fs.plot.time_series(run, "v", crossings=False)
+    pointer = fs.inspect(drawing, run)
+    mouse("button_press_event", drawing.ax, run.t[200], run["v"][200])
+    instant = pointer.selected.point
+    expected = [np.interp(instant.time, run.t, run[name]) for name in run.states]
+    np.testing.assert_allclose(instant.state, expected, rtol=1e-12)
+    np.testing.assert_array_equal(
+        eval(pointer.selected.call, {"np": np, "run": run}), instant.state
+    )
+
+
+def test_a_diagram_from_a_file_answers(lay, tmp_path, mouse):
+    lay.diagram.save(tmp_path / "gear.npz")
+    loaded = fs.load(tmp_path / "gear.npz")
+    drawing = drawn(loaded, "x - 0.1")
+    pointer = fs.inspect(drawing, loaded)
+    (at,) = lay.diagram.at(w=0.3, stable=True)
+    mouse("button_press_event", drawing.ax, 0.3, at["x"] - 0.1)
+    found = pointer.selected.point
+    (exact,) = lay.diagram.at(w=found["w"], stable=True)
+    assert found["x"] == pytest.approx(exact["x"], abs=1e-4)
+
+
+def test_what_does_not_belong_together_is_refused(lay):
+    with pytest.raises(fs.ArgumentError, match="DiagramDrawing of a Trajectory"):
+        fs.inspect(fs.plot.diagram(lay.diagram), lay.run)
+
+
+def test_pseudo_equilibria_have_their_infinite_eigenvalue_in_words():
+    model = fs.systems.stick_slip(delta=0.0)
+    found = fs.equilibria(model)
+    (point,) = [p for p in found if not p.pseudo]
+    assert "λ = " in text_of(point, "F_s")
