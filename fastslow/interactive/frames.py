@@ -51,9 +51,12 @@ class Store:
         self._known: dict[str, int] = {}
 
     def add(self, table: Array) -> int:
-        """Keep a table (N, k) column by column, in 32 bits from its first row on; its number."""
-        first = np.where(np.isfinite(table[0]), table[0], 0.0)
-        with np.errstate(over="ignore"):
+        """Keep a table (N, k) column by column, in 32 bits; its number.
+
+        A column that varies little beside its size is kept as what it adds to its first value.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            first = np.where(np.ptp(table, axis=0) < 0.5 * np.abs(table[0]), table[0], 0.0)
             small = np.ascontiguousarray((table - first).T, dtype="<f4")
         kept = {"first": first.tolist(), "rows": len(table), "text": b64encode(small).decode()}
         key = repr(kept)

@@ -9,7 +9,7 @@ const element = (id) => document.getElementById(id);
 
 // --- numbers -------------------------------------------------------------------------------
 
-// Columns of a stored table: 32-bit steps from the first row.
+// Columns of a stored table: what 32 bits add to the first value.
 const arrays = data.arrays.map((stored) => {
   let columns = null;
   return () => {
@@ -23,7 +23,7 @@ const arrays = data.arrays.map((stored) => {
   };
 });
 
-const shown = (value, digits = 6) => String(Number(value.toPrecision(digits))).replace("-", "−");
+const shown = (value, digits = 6) => String(Number(value.toPrecision(digits))).replaceAll("-", "−");
 
 // Ticks at 1, 2 or 5 times a power of ten, about as many as fit.
 function ticks(low, high, room) {
