@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Callable, Mapping
 from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -9,12 +11,16 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from fastslow.errors import FastSlowError, MissingPackageError
+from fastslow.interactive.sliders import Slider
 
 if TYPE_CHECKING:
     from fastslow.interactive.explorers import Explorer
 
 #: Steps of a slider over its range.
 STEPS = 100
+
+#: A slider rests that has not moved for this long, in seconds.
+REST = 0.4
 
 
 def package(name: str) -> Any:
@@ -43,6 +49,19 @@ def live_canvas(figure: Figure) -> Any:
     return canvas
 
 
+def step_of(slider: Slider) -> float:
+    """About a hundredth of a slider, such that its value lies on a step.
+
+    Examples
+    --------
+    >>> round(step_of(Slider("D", 0.1, 0.5, 0.25)), 12), step_of(Slider("x", 0.0, 2.0, 0.0))
+    (0.003947368421, 0.02)
+    """
+    step = (slider.high - slider.low) / STEPS
+    below = slider.value - slider.low
+    return below / max(round(below / step), 1) if below > 0 else step
+
+
 class Controls:
     """Sliders, figure, and what was clicked, of an explorer.
 
@@ -62,6 +81,7 @@ class Controls:
         widgets = package("ipywidgets")
         self._explorer = explorer
         self._following = False
+        self._later: asyncio.TimerHandle | None = None
         self.canvas = live_canvas(explorer.figure)
         shown = explorer.values
         self.sliders = {
@@ -69,7 +89,7 @@ class Controls:
                 value=shown[slider.name],
                 min=slider.low,
                 max=slider.high,
-                step=(slider.high - slider.low) / STEPS,
+                step=step_of(slider),
                 description=slider.label,
                 readout_format=".4g",
                 continuous_update=True,
@@ -105,7 +125,22 @@ class Controls:
         if self._following:
             return
         (name,) = (name for name, slider in self.sliders.items() if slider is change.owner)
+        if abs(change.new - self._explorer.values[name]) < 0.5 * change.owner.step:
+            # the browser's own rounding
+            return
         try:
-            self._explorer.set({name: change.new})
+            loop = asyncio.get_running_loop()
+        except RuntimeError:
+            self._show(self._explorer.set, {name: change.new})
+            return
+        # while the slider moves without the measurement, which follows when it rests
+        if self._later is not None:
+            self._later.cancel()
+        self._show(self._explorer.glance, {name: change.new})
+        self._later = loop.call_later(REST, self._show, self._explorer.set, {})
+
+    def _show(self, how: Callable[[Mapping[str, float]], object], values: dict[str, float]) -> None:
+        try:
+            how(values)
         except FastSlowError as error:
             self.tell(str(error))

@@ -9,15 +9,15 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from fastslow.interactive.picking import Curve, curves_of
+from fastslow.interactive.picking import Curve, curves_of, run_curve
 from fastslow.interactive.views import View
-from fastslow.plot.branches import diagram
-from fastslow.plot.motions import phase_portrait, time_series
-from fastslow.plot.passages import overlay
+from fastslow.plot.branches import draw_branches
+from fastslow.plot.motions import draw_motion, phase_portrait, time_series
+from fastslow.plot.passages import draw_passage
 from fastslow.plot.style import GREY, MOTION, SMALL, TEXT, VERMILION, dressed, typeset
 
 #: Size of a figure of our own, in inches, and places of its axes in it.
-SIZE = (10.0, 5.2)
+SIZE = (9.0, 5.0)
 PLACES = ((0.065, 0.6, 0.36, 0.34), (0.065, 0.115, 0.36, 0.34), (0.5, 0.235, 0.485, 0.705))
 
 
@@ -40,21 +40,24 @@ def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:
     name, run, lay = view.setup.state, view.run, view.overlay
     values: Mapping[str, Any] = {} if view.diagram is None else view.diagram.interface_values
     curves: list[Curve] = []
-    # alone at first: its labels are placed in a figure that is drawn for it
-    main = dressed(figure.add_axes(PLACES[2]))
+    series, portrait, main = (dressed(figure.add_axes(place)) for place in PLACES)
     handles: list[Any] = []
     if lay is not None:
-        laid = overlay(lay, name, ax=main, legend=False)
-        handles = laid.handles  # type: ignore[union-attr]
+        # labels stand beside their points, to place them freely takes as long as all the rest
+        laid = draw_passage(main, lay, name)
+        handles = laid.handles
         curves += curves_of(laid, lay)
     elif view.diagram is not None:
-        below = diagram(view.diagram, name, ax=main, legend=False)
-        handles = below.handles
+        below = draw_branches(main, view.diagram, name, label=True, virtual=True, interfaces=True)
+        handles = [*below.handles]
         curves += curves_of(below, view.diagram)
+        across = view.diagram.parameter
+        if run is not None and across in run.columns:
+            handles += draw_motion(main, run.t, run[across], run[name], run.period, MOTION, {})
+            curves.append(run_curve(main, run, across, name))
         handles += _mark_value(main, view)
     else:
         _empty(main, "no diagram")
-    series, portrait = (dressed(figure.add_axes(place)) for place in PLACES[:2])
     if run is not None:
         phases = () if lay is None else lay.phases
         over_time = time_series(run, name, ax=series, interfaces=values, phases=phases)

@@ -154,7 +154,10 @@ class Explorer:
         ModelError
             For a value that is not a finite number.
         """
-        given = {str(name): value for name, value in {**(values or {}), **named}.items()}
+        return self._shown({**(values or {}), **named})
+
+    def _shown(self, values: Mapping[Any, float], measured: bool = True) -> View:
+        given = {str(name): value for name, value in values.items()}
         begin = {name: self.values[name] for name in self._states}
         changes = dict(self.view.changes)
         for name, value in given.items():
@@ -165,9 +168,13 @@ class Explorer:
             else:
                 raise unknown_name("parameter or state", name, [*self.model.parameters, *begin])
         setup = at_start(self.setup, self.model, begin)
-        self.view = view_of(self.model, setup, changes)
+        self.view = view_of(self.model, setup, changes, measured=measured)
         self._draw()
         return self.view
+
+    def glance(self, values: Mapping[Any, float]) -> View:
+        """As `set`, without measuring the run against the diagram: for a slider that moves."""
+        return self._shown(values, measured=False)
 
     @property
     def values(self) -> dict[str, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from typing import Any
 from unicodedata import lookup
 
@@ -58,7 +59,11 @@ class Store:
         with np.errstate(over="ignore", invalid="ignore"):
             first = np.where(np.ptp(table, axis=0) < 0.5 * np.abs(table[0]), table[0], 0.0)
             small = np.ascontiguousarray((table - first).T, dtype="<f4")
-        kept = {"first": first.tolist(), "rows": len(table), "text": b64encode(small).decode()}
+        kept = {
+            "first": first.tolist(),
+            "rows": len(table),
+            "text": b64encode(small.tobytes()).decode(),
+        }
         key = repr(kept)
         if key not in self._known:
             self._known[key] = len(self.arrays)
@@ -142,9 +147,7 @@ def frame_of(view: View, store: Store) -> dict[str, Any]:
             last = _last_period(run, columns[:, 0])
             main["lines"] += _motion_lines(names, diagram.parameter, state, last, len(columns))
             slow = at_crossings(run, diagram.parameter)
-            main["marks"].append(
-                _contacts(run, np.column_stack([slow, at_crossings(run, state)]))
-            )
+            main["marks"].append(_contacts(run, np.column_stack([slow, at_crossings(run, state)])))
             main["marks"] += _transition_marks(view)
             for line in main["lines"]:
                 if line["look"] == "stable":
@@ -168,7 +171,7 @@ def kept_rows(run: Trajectory) -> NDArray[np.intp]:
     count = len(run.t)
     every = np.arange(0, count, max(count // SAMPLES, 1))
     region = regions_at(run, run.t)
-    kept = [every, [count - 1], np.flatnonzero(region[1:] != region[:-1]) + 1]
+    kept = [every, np.array([count - 1]), np.flatnonzero(region[1:] != region[:-1]) + 1]
     for name in run.columns:
         step = np.sign(np.diff(run[name]))
         kept.append(np.flatnonzero(step[1:] * step[:-1] < 0) + 1)
@@ -277,7 +280,8 @@ def _contacts(run: Trajectory, points: Array) -> dict[str, Any]:
 
 def _special_marks(view: View) -> list[dict[str, Any]]:
     assert view.diagram is not None
-    diagram, found = view.diagram, {}
+    diagram = view.diagram
+    found: dict[str, list[list[Any]]] = {}
     numbers = {id(point): k for k, point in enumerate(diagram.special)}
     for branch in diagram.branches:
         for point in special_shown(branch) if branch.admissible else ():
@@ -296,7 +300,8 @@ def _special_marks(view: View) -> list[dict[str, Any]]:
 
 def _transition_marks(view: View) -> list[dict[str, Any]]:
     assert view.overlay is not None
-    lay, found = view.overlay, {}
+    lay = view.overlay
+    found: dict[str, list[list[Any]]] = {}
     place = lay.diagram.states.index(view.setup.state)
     for k, change in enumerate(lay.transitions):
         at = [change.value, float(change.state[place])]
@@ -333,6 +338,6 @@ def _regions(view: View, state: str, levels: list[float]) -> list[str]:
     margin = 1e-9 * (1.0 + np.ptp(levels))
     met = [
         set(names[(along > low + margin) & (along < high - margin)].tolist())
-        for low, high in zip(edges[:-1], edges[1:], strict=True)
+        for low, high in pairwise(edges)
     ]
     return [str(next(iter(found))) if len(found) == 1 else "" for found in met]

@@ -148,7 +148,9 @@ def pick(curves: Iterable[Curve], ax: Axes, x: float, y: float) -> Pick | None:
     _, distance, curve, row, part = best
     point, call = curve.found(row, part)
     at = curve.xy[row] if part == 0 else (1 - part) * curve.xy[row] + part * curve.xy[row + 1]
-    return Pick(point, ax, float(at[0]), float(at[1]), distance, text_of(point, curve.parameter), call)
+    return Pick(
+        point, ax, float(at[0]), float(at[1]), distance, text_of(point, curve.parameter), call
+    )
 
 
 def _nearest(pixels: Array, place: Array, joined: bool) -> tuple[float, int, float]:
@@ -212,10 +214,13 @@ def _on_branch(diagram: Diagram, branch: Branch) -> Callable[[int, float], tuple
     return found
 
 
+def run_curve(ax: Axes, run: Trajectory, x: str, y: str) -> Curve:
+    """A run drawn over time or in the plane of two of its columns."""
+    return Curve(ax, np.column_stack([run[x], run[y]]), True, _on_run(run))
+
+
 def _motion_curves(drawing: MotionDrawing, run: Trajectory) -> Iterable[Curve]:
-    across = run.t if drawing.x == "t" else run[drawing.x]
-    up = run[drawing.y]
-    yield Curve(drawing.ax, np.column_stack([across, up]), True, _on_run(run))
+    yield run_curve(drawing.ax, run, drawing.x, drawing.y)
     if drawing.crossings is not None:
         at = np.column_stack([at_crossings(run, drawing.x), at_crossings(run, drawing.y)])
         yield _at_crossings(drawing.ax, at, run)

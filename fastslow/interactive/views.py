@@ -78,7 +78,7 @@ class View:
     diagram : Diagram or None
     run : Trajectory or None
     overlay : Overlay or None
-        None too where the diagram is not over a slow quantity.
+        None too where the diagram is not over a slow quantity, or nothing was measured.
     held : mapping
         Values at which the diagram holds further slow quantities.
     outcomes : tuple of Outcome
@@ -95,8 +95,7 @@ class View:
     outcomes: tuple[Outcome, ...]
 
     def call(self) -> str:
-        """Python source that computes and draws the same, of a model named ``model``
-        (and ``import fastslow as fs``).
+        """Python source that computes and draws the same, of a model named ``model``.
 
         Examples
         --------
@@ -180,7 +179,7 @@ def setup_of(
     time_span(t, periods, 0.0, None, lambda: period_of(model))
     limits = None if over is None else _limits(name, over)
     if limits is None and name is not None and name not in slow:
-        limits = around(model.parameters.get(name, 0.0))
+        limits = around(dict(model.parameters).get(name, 0.0))
     return Setup(
         name,
         limits,
@@ -192,7 +191,13 @@ def setup_of(
     )
 
 
-def view_of(model: Model, setup: Setup, changes: Mapping[str, float] | None = None) -> View:
+def view_of(
+    model: Model,
+    setup: Setup,
+    changes: Mapping[str, float] | None = None,
+    *,
+    measured: bool = True,
+) -> View:
     """Compute a view; what fails is left out and said.
 
     Parameters
@@ -202,6 +207,8 @@ def view_of(model: Model, setup: Setup, changes: Mapping[str, float] | None = No
     setup : Setup
     changes : mapping, optional
         Parameters and their values, where they differ.
+    measured : bool
+        Whether to measure the run against the diagram, which takes longest.
 
     Returns
     -------
@@ -226,7 +233,8 @@ def view_of(model: Model, setup: Setup, changes: Mapping[str, float] | None = No
     if setup.parameter is not None:
         diagram = _tried(failures, "diagram", lambda: _diagram(here, setup, run, held))
     lay = None
-    if run is not None and diagram is not None and diagram.parameter in _slow(here):
+    slow = diagram is not None and diagram.parameter in _slow(here)
+    if measured and slow and run is not None and diagram is not None:
         lay = _tried(failures, "overlay", lambda: overlay(diagram, run))
     reached = [result.outcome for result in (run, diagram, lay) if result is not None]
     return View(

@@ -1,5 +1,6 @@
 """Explorers: sliders change the figure, with widgets and without."""
 
+import asyncio
 import subprocess
 import sys
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 import fastslow as fs
-
+from fastslow.interactive.controls import REST
 
 #: ipympl 0.10 makes its toolbar in a way that traitlets will refuse one day
 IPYMPL = pytest.mark.filterwarnings("ignore:Passing unrecognized arguments:DeprecationWarning")
@@ -137,6 +138,34 @@ def test_widgets_move_the_figure(explorer):
     assert (pixels(explorer.figure) != before).any()
     assert "&#x27;D&#x27;: 0.4" in controls.words.value
     assert "application/vnd.jupyter.widget-view+json" in explorer._repr_mimebundle_()
+
+
+@IPYMPL
+def test_a_slider_that_moves_is_followed_at_once_and_measured_when_it_rests(explorer):
+    explorer.widget  # noqa: B018
+    slider = explorer._widget.sliders["D"]
+    seen = []
+
+    async def drag():
+        for value in (0.3, 0.35, 0.4):
+            slider.value = value
+            seen.append((explorer.view.changes["D"], explorer.view.overlay))
+            await asyncio.sleep(0.01)
+        await asyncio.sleep(2 * REST)
+
+    asyncio.run(drag())
+    assert seen == [(0.3, None), (0.35, None), (0.4, None)]
+    assert explorer.view.changes == {"D": 0.4}
+    assert explorer.view.overlay.diagram.parameters["D"] == 0.4
+
+
+@IPYMPL
+def test_the_value_of_the_model_lies_on_a_step(folded):
+    explorer = fs.explore(folded, periods=1, sliders={"D": (0.1, 0.5), "C": (-1, 1)})
+    explorer.widget  # noqa: B018
+    for slider in explorer._widget.sliders.values():
+        steps = (slider.value - slider.min) / slider.step
+        assert steps == pytest.approx(round(steps), abs=1e-9)
 
 
 @IPYMPL

@@ -97,8 +97,7 @@ def explorer(folded):
 def page_file(explorer, tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "gear.html"
     source = (
-        "import fastslow as fs\n"
-        "model = fs.systems.harmonic_gear(A=-0.6, B=0.0, C=0.4, omega=0.02)"
+        "import fastslow as fs\nmodel = fs.systems.harmonic_gear(A=-0.6, B=0.0, C=0.4, omega=0.02)"
     )
     values = {"D": [0.25, 0.4], "omega": 3}
     assert explorer.export(path, sliders=values, source=source, progress=False) == path
