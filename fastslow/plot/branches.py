@@ -35,7 +35,7 @@ from fastslow.plot.style import BRANCH, LINES, axes_for, spatial
 from fastslow.results.diagrams import Diagram
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class DiagramDrawing(Drawing):
     """A drawn equilibrium diagram.
 

@@ -38,7 +38,7 @@ FRACTIONS = {2.0 / 3.0: "2/3", 0.5: "1/2", 1.0: "1"}
 WIDTH, BELOW, TEXT_OFF = 0.26, 0.10, 3.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class DelayDrawing(Drawing):
     """Drawn delays.
 

@@ -23,7 +23,7 @@ from fastslow.plot.style import root, save
 SHOWN = 150
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Drawing:
     """What was drawn, and where.
 
@@ -85,6 +85,11 @@ class Drawing:
         Path
         """
         return save(self.figure, path, dpi)
+
+    def __repr__(self) -> str:
+        # not the artists with their addresses, which would fill a page
+        x, y = (label.replace("$", "") for label in (self.ax.get_xlabel(), self.ax.get_ylabel()))
+        return f"{type(self).__name__}({y} over {x})"
 
     def _repr_png_(self) -> bytes:
         stream = BytesIO()

@@ -46,7 +46,7 @@ COLOURS = "viridis"
 FINE = 801
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class EigenvalueDrawing(Drawing):
     """Eigenvalues drawn in the complex plane.
 

@@ -38,7 +38,7 @@ from fastslow.results.refined_maps import RefinedMap
 HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----", "||||")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MapDrawing(Drawing):
     """A drawn map.
 

@@ -45,7 +45,7 @@ from fastslow.results.transitions import Phase
 LINE: dict[str, Any] = {"linewidth": 0.8, "zorder": 3.0}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MotionDrawing(Drawing):
     """A drawn trajectory.
 

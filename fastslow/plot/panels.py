@@ -37,7 +37,7 @@ from fastslow.results.overlays import Overlay
 NARROW = 120 * MM
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PanelDrawing(Drawing):
     """A drawn panel.
 
@@ -55,6 +55,9 @@ class PanelDrawing(Drawing):
     phase_portrait: MotionDrawing
     overlay: OverlayDrawing
     legend: Legend | None
+
+    def __repr__(self) -> str:
+        return f"PanelDrawing({self.time_series}, {self.phase_portrait}, {self.overlay})"
 
 
 @takes(

@@ -40,7 +40,7 @@ from fastslow.results.overlays import Overlay
 ARROWS = (0.08, 0.36, 0.58, 0.86)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OverlayDrawing(Drawing):
     """A drawn overlay.
 

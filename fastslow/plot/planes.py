@@ -40,7 +40,7 @@ from fastslow.results.points import CODE_NAMES, SpecialPoint
 from fastslow.results.refined_maps import RefinedMap
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PlaneDrawing(Drawing):
     """Drawn curves of special points.
 

@@ -35,7 +35,7 @@ LOOKS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SectionDrawing(Drawing):
     """A drawn section.
 

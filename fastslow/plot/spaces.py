@@ -32,7 +32,7 @@ HEIGHT = 84.0
 ARROWS = (0.2, 0.45, 0.7, 0.95)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SpaceDrawing(Drawing):
     """A diagram or an overlay drawn in space.
 

@@ -41,7 +41,7 @@ LOWEST = 1e-7
 ABOVE = 0.12
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SpectrumDrawing(Drawing):
     """A drawn spectrum.
 

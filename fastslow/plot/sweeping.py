@@ -35,7 +35,7 @@ LOOKS: dict[int, dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SweepDrawing(Drawing):
     """A drawn sweep.
 

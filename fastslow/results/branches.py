@@ -351,8 +351,8 @@ class Branch(Table, Result):
 
     def __repr__(self) -> str:
         low, high = self.range
-        codes = " ".join(p.label for p in self.special)
+        codes = "".join(f" {p.label}" for p in self.special)
         return (
             f"Branch({len(self)} points, {self.parameter_name} from {low:.6g} to {high:.6g}, "
-            f"regions {' → '.join(self.regions)}; {codes})"
+            f"regions {' → '.join(self.regions)}" + (f";{codes})" if codes else ")")
         )

@@ -85,6 +85,7 @@ def bifurcation_sweep(
     ----------
     model : Model
     parameter : str or Symbol
+        A parameter, or the slow quantity of a frozen model.
     values : array_like, shape (m,)
         Rising or falling; the first pass takes them in this order.
     state : sequence of float, shape (n,), or mapping
@@ -137,8 +138,9 @@ def bifurcation_sweep(
     >>> swept.x.round(9)
     array([0.5, 1. ])
     """
-    if str(parameter) not in model.parameters:
-        raise unknown_name("parameter", parameter, model.parameters)
+    known = dict.fromkeys([*model.parameters, *model.free])
+    if str(parameter) not in known:
+        raise unknown_name("parameter", parameter, known)
     order = _values(values)
     columns = (*model.states, *model.slow_states, *model.forcing)
     name = columns[0] if column is None else str(column)

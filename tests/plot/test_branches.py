@@ -28,6 +28,13 @@ def test_runs_of_constant_stability():
     assert found[2][1].stop == len(branch)
 
 
+def test_a_drawing_prints_as_what_it_shows_without_addresses(s_curve):
+    drawn = fs.plot.diagram(s_curve, "x**2")
+    assert "0x" not in repr(drawn)
+    y = drawn.ax.get_ylabel().strip("$")
+    assert repr(drawn) == f"DiagramDrawing({y} over p)"
+
+
 def test_a_line_for_each_run_and_a_marker_for_each_code(s_curve):
     drawn = fs.plot.diagram(s_curve)
     assert [line.get_label() for line in drawn.lines] == ["stable", "unstable", "stable"]

@@ -150,6 +150,17 @@ def test_values_are_not_compiled(pair):
     assert one.address == other.address
 
 
+def test_the_slow_quantity_of_a_frozen_model_is_swept():
+    """x' = w − x − x³ settles at w = x + x³."""
+    w, t = sp.symbols("w t")
+    fast = fs.Model({x: w - x - x**3}, forcing={w: sp.sin(t)}).frozen()
+    values = [0.0, 2.0, 10.0]
+    swept = fs.bifurcation_sweep(fast, w, values, [1.0], settle=40, keep=1, period=1.0, back=False)
+    np.testing.assert_allclose(swept.x, [0, 1, 2], atol=1e-9)
+    with pytest.raises(fs.UnknownNameError, match="known: w"):
+        fs.bifurcation_sweep(fast, "u", values, [1.0], period=1.0)
+
+
 @pytest.mark.parametrize(
     ("changes", "error", "text"),
     [
