@@ -45,11 +45,16 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.6g}"
 
 
-def points_html(points: Sequence[SpecialPoint], title: str = "") -> str:
-    """Special points, one row each: what, where, and in which region."""
+def points_html(
+    points: Sequence[SpecialPoint], title: str = "", varied: tuple[str, ...] = ()
+) -> str:
+    """Special points, one row each: what, where, and in which region.
+
+    Without ``varied``, the parameters shown are those that differ between the points.
+    """
     states = tuple(dict.fromkeys(n for p in points for n in p.states))
     values = [p.parameters for p in points]
-    varied = tuple(
+    varied = varied or tuple(
         n
         for n in dict.fromkeys(n for v in values for n in v)
         if len({v.get(n) for v in values}) > 1 or len(values) == 1

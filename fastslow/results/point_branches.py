@@ -140,7 +140,7 @@ class PointBranch(Table, Result):
         }
 
     def _repr_html_(self) -> str:
-        return points_html(self.special, repr(self).split("\n")[0])
+        return points_html(self.special, repr(self).split("\n")[0], self.parameter_names)
 
     def __repr__(self) -> str:
         first, second = self.parameter_names

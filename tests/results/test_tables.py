@@ -137,7 +137,10 @@ def test_a_curve_of_points_in_a_notebook():
     model = fs.Model({x: p + q * x - x**3}, parameters={p: 0, q: 1})
     fold = fs.continue_equilibria(model, "p", (-1, 1)).folds[0]
     curve = fs.continue_points(fold, ("p", "q"), over={"p": (-1, 1), "q": (-1, 2)})
-    assert "CP1" in cells(curve).cells
+    parsed = cells(curve).cells
+    assert "CP1" in parsed
+    # the two parameters in the order in which they were asked for, whatever else varies
+    assert parsed[:5] == ["point", "kind", "p", "q", "x"]
     # p² = 4 q³ / 27
     assert np.abs(curve["27*p**2 - 4*q**3"]).max() < 1e-9
     assert curve.to_dict()["label"].tolist().count("CP1") == 1
