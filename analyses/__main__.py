@@ -58,23 +58,25 @@ def write(rows: Sequence[Row | regime_maps.MapRow], path: Path) -> None:
         writer.writerows(asdict(row) for row in rows)
 
 
-def steps(folder: Path) -> list[tuple[str, Callable[[], object]]]:
+def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
     """Everything that is drawn and computed, by name; what several use is computed once."""
     found: list[tuple[str, Callable[[], object]]] = [
-        ("dead zone", partial(dead_zone.main, folder)),
-        ("physical route", partial(physical_route.main, folder)),
+        ("dead zone", partial(dead_zone.main, into)),
+        ("physical route", partial(physical_route.main, into)),
     ]
     for figure in equilibria.FIGURES:
         for scaling in SCALINGS:
-            found.append((f"{figure} {scaling}", partial(draw, figure, scaling, folder)))
+            found.append((f"{figure} {scaling}", partial(draw, figure, scaling, into)))
     found += [
-        ("gap region", partial(gap_region.draw, folder)),
-        ("contact frequency", partial(stiffness.draw_frequencies, folder)),
-        ("responses", partial(responses.main, folder)),
-        ("equilibria", partial(equilibria.main, folder)),
-        ("negative stiffness", partial(negative_stiffness.main, folder)),
+        ("gap region", partial(gap_region.draw, into)),
+        ("resonances", partial(resonances.draw, into)),
+        ("passages of the gap", partial(stories.draw_passages, into)),
+        ("contact frequency", partial(stiffness.draw_frequencies, into)),
+        ("responses", partial(responses.main, into)),
+        ("equilibria", partial(equilibria.main, into)),
+        ("negative stiffness", partial(negative_stiffness.main, into)),
     ]
-    found += [(plane.name, partial(case_maps.draw, plane, folder)) for plane in case_maps.MAPS]
+    found += [(plane.name, partial(case_maps.draw, plane, into)) for plane in case_maps.MAPS]
     found += [(f"claims: {s.__name__.split('.')[-1]}", s.claims) for s in SOURCES]
     return found
 

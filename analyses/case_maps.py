@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,16 +24,16 @@ import fastslow as fs
 from analyses.cases import (
     FASTEST,
     GAP,
-    SHOWN,
     STIFFNESSES,
     TORQUES,
     WIDTHS,
     gear,
 )
+from analyses.output import Output
 from analyses.passages import OMEGA
 from analyses.regime_maps import critical_ratio
 from fastslow.plot.maps import FILLS
-from fastslow.plot.style import FULL, MM, SMALL, TEXT, VERMILION, dressed, new_figure, save
+from fastslow.plot.style import FULL, MM, SMALL, TEXT, VERMILION, dressed, new_figure
 from fastslow.results.refined_maps import MapComparison
 from fastslow.systems.gears import SCALINGS
 
@@ -187,7 +186,7 @@ def _dress(ax: Axes, plane: CaseMap) -> None:
                 axis.set_ticks(np.log10(ticks), [f"{tick:g}" for tick in ticks])
 
 
-def draw(plane: CaseMap, folder: Path) -> None:
+def draw(plane: CaseMap, into: Output) -> None:
     """Draw a plane under both scalings, with the cases and the criterion."""
     sheet = new_figure(FULL, 78 * MM)
     axes = [dressed(ax) for ax in sheet.subplots(1, 2)]
@@ -224,11 +223,10 @@ def draw(plane: CaseMap, folder: Path) -> None:
         fontsize=SMALL,
         frameon=False,
     )
-    for suffix in ("png", "pdf"):
-        save(sheet, folder / f"{plane.name}.{suffix}", SHOWN)
+    into.save(sheet, plane.name)
 
 
-def main(folder: Path) -> None:
-    """Draw the maps into a folder."""
+def main(into: Output) -> None:
+    """Draw the maps."""
     for plane in MAPS:
-        draw(plane, folder)
+        draw(plane, into)

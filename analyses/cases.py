@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import fastslow as fs
+from analyses.output import Output
 from analyses.passages import OMEGA, PERIODS, Case, Setting, laid
 from fastslow.plot.labels import place
-from fastslow.plot.style import FULL, MM, SMALL, TEXT, dressed, new_figure, save
+from fastslow.plot.style import FULL, MM, SMALL, TEXT, dressed, new_figure
 from fastslow.systems.gears import Scaling, gear_scales
 
 #: Gap of figure 5; the source leaves it out.
@@ -34,9 +34,6 @@ STATED = {
 
 #: The gap of figure 4.
 NARROW = 0.1
-
-#: Dots per inch of the figures that the pages show.
-SHOWN = 150
 
 #: Upper limit of the load's frequency in the source, 1 rad/s, in dimensionless units.
 FASTEST = gear_scales().time
@@ -95,7 +92,7 @@ def peak_to_peak(case: Case, name: str = "x") -> float:
     return high - low
 
 
-def draw(figure: str, scaling: str, folder: Path) -> None:
+def draw(figure: str, scaling: str, into: Output) -> None:
     """Draw three cases: time series, phase portraits and overlays, one column each."""
     sheet = new_figure(FULL, 150 * MM)
     # the places are known; finding them anew for every panel would take most of the time
@@ -130,19 +127,22 @@ def draw(figure: str, scaling: str, folder: Path) -> None:
         rf"{scaling} scaling, $\omega_\mathrm{{o}} = {OMEGA:g}$, {PERIODS} periods from rest",
         fontsize=TEXT,
     )
-    for suffix in ("png", "pdf"):
-        save(sheet, folder / f"{figure}_{scaling}.{suffix}", SHOWN)
+    into.save(sheet, f"{figure}_{scaling}")
+
+
+def starts(D: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """Five starts (x, v): at rest, on either flank, moving up or down."""
+    return np.array([[0, 0], [D + 0.5, 0], [-D - 0.5, 0], [0, 1], [0, -1]], dtype=float)
 
 
 def scan(
     scaling: str, frequencies: np.ndarray[tuple[int], np.dtype[np.float64]], **values: float
 ) -> list[str]:
-    """Regimes over frequencies of the load and starts: at rest, on either flank, moving."""
+    """Regimes over frequencies of the load and starts."""
     model = gear(scaling, **values)
-    D = model.parameters["D"]
-    starts = np.array([[0, 0], [D + 0.5, 0], [-D - 0.5, 0], [0, 1], [0, -1]], dtype=float)
-    rows = np.repeat(np.arange(len(starts)), len(frequencies))
+    begin = starts(model.parameters["D"])
+    rows = np.repeat(np.arange(len(begin)), len(frequencies))
     many = fs.simulate_many(
-        model, starts[rows], parameters={"omega": np.tile(frequencies, len(starts))}, periods=3
+        model, begin[rows], parameters={"omega": np.tile(frequencies, len(begin))}, periods=PERIODS
     )
     return [str(regime) for regime in many.regime]

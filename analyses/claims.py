@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 Verdict = Literal["holds", "does not hold", "holds only where", "beyond the paper"]
 VERDICTS: tuple[str, ...] = get_args(Verdict)
+
+#: The hyphen in front of a number that is no exponent.
+MINUS = re.compile(r"(?<!\w)-(?=\d)")
 
 #: A change by less than a half counts as little.
 LITTLE = 1.5
@@ -41,7 +45,7 @@ class Finding:
     @property
     def words(self) -> str:
         """The evidence, with U+2212 as minus sign in front of numbers."""
-        return self.template.format(**self.numbers).replace(" -", " −")
+        return MINUS.sub("−", self.template.format(**self.numbers))
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -11,19 +12,24 @@ from PIL import Image
 from analyses import (
     dead_zone,
     equilibria,
+    gap_effects,
     gap_width,
     load_amplitude,
     negative_stiffness,
     physical_route,
     responses,
     stiffness,
+    stories,
 )
 from analyses.claims import VERDICTS, Claim, table
+from analyses.output import SHOWN
 
 SOURCES = (
     dead_zone,
     physical_route,
+    stories,
     gap_width,
+    gap_effects,
     stiffness,
     load_amplitude,
     responses,
@@ -49,6 +55,12 @@ CAPTIONS = {
     "map_frequency_width": "Regimes over ω_o and D at T_am = 15 N m, with the cases of Fig. 3.",
     "map_stiffness_torque": "Regimes over k1 and T_am at D = 0.25, ω_o = 0.01, near the lightest "
     "case of Fig. 5; the others, and those of Fig. 4 at 15 N m, lie above.",
+    "resonances": "Loads about as fast as the vibration in contact, at T_am = 15 N m: regimes over "
+    "ω_o and D under the consistent scaling, and at the three widths under the printed one. Bars "
+    "below: where all three are as Fig. 3 states; at (a) the longest such band.",
+    "passages": "The last period of every case beside the gap: the overlays of Figs. 3 to 5, "
+    "enlarged. Black: the frozen equilibria. The gear leaves each side where the load changes "
+    "sign, arrives late on the other, and vibrates there.",
     "stiffness_consistent": "Fig. 4 under the consistent scaling.",
     "stiffness_printed": "Fig. 4 under the printed scaling.",
     "contact_frequency": "Frequency in contact over the load: lines, √(3x² − 2Dx + A − 1/4); "
@@ -79,10 +91,59 @@ Claims B1 to B4 are results beyond the paper. The page is written by `python -m 
 """
 
 
+#: What stands in plain words, and its mathematics.
+MATH = {
+    "√(3x² − 2Dx + A − 1/4)": r"\sqrt{3x^2 - 2Dx + A - 1/4}",
+    "√(A + D² − 1/4)": r"\sqrt{A + D^2 - 1/4}",
+    "3x² − 2Dx + A = 1/4": r"3x^2 - 2Dx + A = 1/4",
+    "t²/2 − t + 1 − e^(−t) = 2D/s": r"t^2/2 - t + 1 - \mathrm{e}^{-t} = 2D/s",
+    "√(4D/s) + 1": r"\sqrt{4D/s} + 1",
+    "1/(4(A + D²))": r"1/(4(A + D^2))",
+    "1/(A + D²)": r"1/(A + D^2)",
+    "A < 1/4 − D²": r"A < 1/4 - D^2",
+    "A = J k1/C_eq²": r"A = J_\mathrm{eq} k_1/C_\mathrm{eq}^2",
+    "f_h(θ) = θ_s f(x)": r"f_\mathrm{h}(\theta) = \theta_\mathrm{s} f(x)",
+    "φ/θ_s": r"\varphi/\theta_\mathrm{s}",
+    "C sin(ω t)": r"C\sin(\omega t)",
+    "A < −D²": r"A < -D^2",
+    "A = −D²": r"A = -D^2",
+    "A + D²": r"A + D^2",
+    "−D²": r"-D^2",
+    "√A": r"\sqrt{A}",
+    "C/B − 1": r"C/B - 1",
+    "C/B": r"C/B",
+    "det J": r"\det J",
+    "ω_o": r"\omega_\mathrm{o}",
+    "θ_s": r"\theta_\mathrm{s}",
+    "T_am": r"T_\mathrm{am}",
+    "T_om": r"T_\mathrm{om}",
+    "T_m": r"T_\mathrm{m}",
+    "k1": r"k_1",
+    "ω": r"\omega",
+}
+
+#: Those, and powers of ten; none of them inside a word or a file's name.
+SYMBOLS = re.compile(
+    r"(?<![\w$\\])(?:" + "|".join(map(re.escape, MATH)) + r"|\d(?:\.\d+)?e-\d+)(?![\w$])"
+)
+
+
 @cache
 def all_claims() -> tuple[Claim, ...]:
     """Every claim with its findings, in order."""
     return tuple(claim for source in SOURCES for claim in source.claims())
+
+
+def typeset(text: str) -> str:
+    """Text with its symbols and formulas as mathematics between dollar signs."""
+    return SYMBOLS.sub(lambda found: _math(found[0]), text)
+
+
+def _math(symbol: str) -> str:
+    if symbol in MATH:
+        return f"${MATH[symbol]}$"
+    digits, power = symbol.split("e-")
+    return rf"${digits}\times10^{{-{int(power)}}}$" if digits != "1" else f"$10^{{-{int(power)}}}$"
 
 
 def page(claims: Sequence[Claim], figures: str) -> str:
@@ -105,16 +166,18 @@ def page(claims: Sequence[Claim], figures: str) -> str:
         for finding in claim.findings:
             lines.append(f"- {finding.scaling}: **{finding.verdict}.** {finding.words}")
         lines.append("")
+        again = []
         for name in claim.figures:
             if name in shown:
+                again.append(f"[{name}]({figures}{name}.png)")
                 continue
             shown.add(name)
             caption = CAPTIONS[name]
-            lines += [f"![{caption}]({figures}{name}.png)", "", f"*{name}*: {caption}", ""]
-        seen = [f"[{name}]({figures}{name}.png)" for name in claim.figures]
-        if seen:
-            lines += [f"Figures: {', '.join(seen)}.", ""]
-    return "\n".join(lines).rstrip() + "\n"
+            lines += [f"![{name}]({figures}{name}.png)", "", f"*{name}*: {caption}", ""]
+            lines += stories.told(stories.stories()[name]) if name in stories.TOLD else []
+        if again:
+            lines += [f"See also {', '.join(again)}.", ""]
+    return typeset("\n".join(lines).rstrip() + "\n")
 
 
 def write_docs(drawn: Path, docs: Path) -> None:
@@ -132,6 +195,7 @@ def write_docs(drawn: Path, docs: Path) -> None:
     (docs / "claims.md").write_text(page(claims, "figures/"), encoding="utf-8")
     for name in dict.fromkeys(name for claim in claims for name in claim.figures):
         with Image.open(drawn / f"{name}.png") as image:
-            image.thumbnail((1000, 1000))
+            scale = SHOWN / image.info.get("dpi", (SHOWN,))[0]
+            image.thumbnail((round(scale * image.width), round(scale * image.height)))
             few = image.convert("RGB").quantize(200)
             few.save(docs / "figures" / f"{name}.png", optimize=True)

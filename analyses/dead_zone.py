@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import fastslow as fs
 from analyses.claims import Claim, Finding
+from analyses.output import Output
 from fastslow.plot.bands import draw_bands
 from fastslow.plot.style import BRANCH, LINES, axes_for, typeset
 
@@ -77,18 +78,35 @@ def claims() -> tuple[Claim, ...]:
             ),
             ("dead_zone",),
         ),
+        Claim(
+            "1b",
+            'The "two interfaces" divide the system "into three subregions S1, S2 and S3".',
+            "Interfaces and regions, read off the equations.",
+            (_regions(),),
+            ("dead_zone",),
+        ),
     )
 
 
-def main(folder: Path) -> dict[str, float]:
-    """Draw the dead zone into a folder and return f at −1, 0 and 1."""
-    folder.mkdir(parents=True, exist_ok=True)
+def _regions() -> Finding:
+    gear = fs.systems.harmonic_gear(D=GAP)
+    counts = {"interfaces": len(gear.interfaces), "regions": len(gear.regions)}
+    return Finding(
+        "either",
+        "holds" if counts == {"interfaces": 2, "regions": 3} else "does not hold",
+        "{interfaces} interfaces, x = D and x = −D, and {regions} regions: S1 is x > D, S2 the "
+        "gap, S3 x < −D.",
+        counts,
+    )
+
+
+def main(into: Output) -> dict[str, float]:
+    """Draw the dead zone and return f at −1, 0 and 1."""
     drawing = draw()
-    for suffix in ("png", "pdf"):
-        drawing.save(folder / f"dead_zone.{suffix}")
+    into.save(drawing.figure, "dead_zone")
     at = np.array([-1.0, 0.0, 1.0])
     return {f"f({x:g})": float(f) for x, f in zip(at, transmitted(at), strict=True)}
 
 
 if __name__ == "__main__":
-    print(main(Path("figures")))
+    print(main(Output(Path("figures"))))

@@ -6,15 +6,15 @@ This is the fast-slow analysis that the source's title names and its text does n
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 import fastslow as fs
-from analyses.cases import GAP, SHOWN, gear, laid_cases
+from analyses.cases import GAP, gear, laid_cases
 from analyses.claims import Claim, Finding
+from analyses.output import Output
 from analyses.passages import Case
 from fastslow.plot.style import (
     BLACK,
@@ -28,7 +28,6 @@ from fastslow.plot.style import (
     VERMILION,
     dressed,
     new_figure,
-    save,
 )
 from fastslow.systems.gears import SCALINGS, gear_scales
 
@@ -180,7 +179,7 @@ def _draw_cases(ax: Axes, figure: str, scaling: str) -> None:
     ax.set_ylabel("$x$")
 
 
-def draw_equilibria(folder: Path) -> None:
+def draw_equilibria(into: Output) -> None:
     """Draw the equilibria of every case."""
     sheet = new_figure(FULL, 105 * MM)
     grid = sheet.subplots(2, 3)
@@ -190,11 +189,10 @@ def draw_equilibria(folder: Path) -> None:
             _draw_cases(ax, figure, scaling)
             letter = "abcdef"[3 * row + column]
             ax.set_title(f"({letter}) Fig. {3 + column}, {scaling}", loc="left", fontsize=TEXT)
-    for suffix in ("png", "pdf"):
-        save(sheet, folder / f"equilibria.{suffix}", SHOWN)
+    into.save(sheet, "equilibria")
 
 
-def draw_eigenvalues(folder: Path) -> None:
+def draw_eigenvalues(into: Output) -> None:
     """Draw the eigenvalues along two curves: that of the source, and one with nodes."""
     sheet = new_figure(FULL, 62 * MM)
     axes = [dressed(ax) for ax in sheet.subplots(1, 2)]
@@ -237,11 +235,10 @@ def draw_eigenvalues(folder: Path) -> None:
         ax.set_xlabel("$x$ of the equilibrium")
         ax.set_ylabel("eigenvalues")
         ax.set_title(f"({letter}) {title}, $D = {GAP}$", loc="left", fontsize=TEXT)
-    for suffix in ("png", "pdf"):
-        save(sheet, folder / f"eigenvalues.{suffix}", SHOWN)
+    into.save(sheet, "eigenvalues")
 
 
-def main(folder: Path) -> None:
-    """Draw the figures into a folder."""
-    draw_equilibria(folder)
-    draw_eigenvalues(folder)
+def main(into: Output) -> None:
+    """Draw the figures."""
+    draw_equilibria(into)
+    draw_eigenvalues(into)

@@ -8,16 +8,16 @@ for D = 0.5 and for D = 0.25, between which the statement is to hold.
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 import fastslow as fs
-from analyses.cases import FASTEST, SHOWN, WIDTHS, gear
+from analyses.cases import FASTEST, WIDTHS, gear
+from analyses.output import Output
 from analyses.regime_maps import critical_ratio
-from fastslow.plot.style import FULL, MM, TEXT, dressed, new_figure, save
+from fastslow.plot.style import FULL, MM, TEXT, dressed, new_figure
 from fastslow.systems.gears import SCALINGS
 
 Floats = NDArray[np.float64]
@@ -83,7 +83,7 @@ def distance(scaling: str) -> float:
     return worst
 
 
-def draw(folder: Path) -> None:
+def draw(into: Output) -> None:
     """Draw the region under both scalings."""
     sheet = new_figure(FULL, 70 * MM)
     axes = [dressed(ax) for ax in sheet.subplots(1, 2)]
@@ -103,5 +103,4 @@ def draw(folder: Path) -> None:
         ticks = [m * 10.0**n for n in range(-4, 0) for m in (1, 2, 5)]
         ax.set_yticks([t for t in np.log10(ticks) if low <= t <= high])
         ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{10**y:.2g}"))
-    for suffix in ("png", "pdf"):
-        save(sheet, folder / f"gap_region.{suffix}", SHOWN)
+    into.save(sheet, "gap_region")

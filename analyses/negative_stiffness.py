@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fastslow as fs
-from analyses.cases import SHOWN, gear
+from analyses.cases import gear
 from analyses.claims import Claim, Finding
+from analyses.output import Output
 from analyses.passages import OMEGA, Case, Setting, draw, laid
 from analyses.physical_route import within
-from fastslow.plot.style import FULL, MM, SMALL, TEXT, dressed, new_figure, save
+from fastslow.plot.style import FULL, MM, SMALL, TEXT, dressed, new_figure
 from fastslow.systems.gears import SCALINGS
 
 Floats = NDArray[np.float64]
@@ -117,7 +118,7 @@ def claims() -> tuple[Claim, ...]:
     )
 
 
-def draw_plane(folder: Path) -> None:
+def draw_plane(into: Output) -> None:
     """Draw the folds over load and stiffness, and where relaxation oscillations begin."""
     sheet = new_figure(FULL, 72 * MM)
     left, right = (dressed(ax) for ax in sheet.subplots(1, 2))
@@ -137,17 +138,15 @@ def draw_plane(folder: Path) -> None:
         fontsize=SMALL,
     )
     right.set_title("(b)", loc="left", fontsize=TEXT)
-    for suffix in ("png", "pdf"):
-        save(sheet, folder / f"relaxation.{suffix}", SHOWN)
+    into.save(sheet, "relaxation")
 
 
-def main(folder: Path) -> None:
-    """Draw the figures into a folder."""
+def main(into: Output) -> None:
+    """Draw the figures."""
     drawing = draw(case())
-    for suffix in ("png", "pdf"):
-        drawing.save(folder / f"negative_stiffness.{suffix}")
-    draw_plane(folder)
+    into.save(drawing.figure, "negative_stiffness", 300)
+    draw_plane(into)
 
 
 if __name__ == "__main__":
-    main(Path("figures"))
+    main(Output(Path("figures")))

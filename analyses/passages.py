@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -127,13 +126,3 @@ def draw(case: Case) -> fs.plot.PanelDrawing:
     """The panel of a case: time series, phase portrait, overlay."""
     load = rf"$\omega_\mathrm{{o}} = {OMEGA:g}$, {PERIODS} periods from rest"
     return fs.plot.panel(case.lay, title=f"{case.setting.title}, {load}")
-
-
-def saved(setting: Setting, folder: Path) -> Row:
-    """Compute a setting, write its panel as PNG and PDF, and return its numbers."""
-    folder.mkdir(parents=True, exist_ok=True)
-    case = laid(setting)
-    drawing = draw(case)
-    for suffix in ("png", "pdf"):
-        drawing.save(folder / f"{setting.name}.{suffix}")
-    return row(case)

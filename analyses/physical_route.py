@@ -10,15 +10,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
 import fastslow as fs
-from analyses.cases import FASTEST, SHOWN, gear
+from analyses.cases import FASTEST, WIDTHS, gear
 from analyses.claims import Claim, Finding
+from analyses.output import Output
 from fastslow.model.structure import real
 from fastslow.plot.style import (
     BLACK,
@@ -31,9 +31,8 @@ from fastslow.plot.style import (
     VERMILION,
     dressed,
     new_figure,
-    save,
 )
-from fastslow.systems.gears import gear_scales
+from fastslow.systems.gears import SCALINGS, Scaling, gear_scales
 from fastslow.systems.geartrain import (
     dimensionless_model,
     gear_scaling,
@@ -148,13 +147,12 @@ def claims() -> tuple[Claim, ...]:
     ratios = {name: float(value.subs(_physical())) for name, value in law.ratios.items()}
     reduces = law.reduced and found.spread <= AGREEMENT
     separations = {
-        scaling: _separation(scaling, gear(scaling, FASTEST, D=0.25))
-        for scaling in ("consistent", "printed")
+        scaling: _separation(scaling, gear(scaling, FASTEST, D=0.25)) for scaling in SCALINGS
     }
     return (
         Claim(
             "2",
-            'Equations (2) of two inertias "can be simplified into" equation (5) of the twist.',
+            'Figure 2 and (2): two inertias, which "can be simplified into" the twist (5).',
             "(5) derived from (2) by elimination; both simulated from rest over three periods at "
             "ω = 1 rad/s; the rigid-body motion against its closed form.",
             (
@@ -195,6 +193,12 @@ def claims() -> tuple[Claim, ...]:
             ("physical_route",),
         ),
         Claim(
+            "3b",
+            'The widths studied, "D = 0.1, 0.25, 0.5", are those of a gap "φ = 1.75 × 10⁻²" rad.',
+            "D = φ/θ_s of the gap given, and the gaps that the widths are.",
+            tuple(map(_width, SCALINGS)),
+        ),
+        Claim(
             "4",
             'Excitation and natural frequency: this "involves a magnitude difference" (fast-slow).',
             "Natural frequency at the corner, √(A + D² − 1/4), over ω_o at ω = 1 rad/s, D = 0.25.",
@@ -211,6 +215,24 @@ def claims() -> tuple[Claim, ...]:
     )
 
 
+def _width(scaling: Scaling) -> Finding:
+    scales = gear_scales(scaling)
+    D = gear(scaling).parameters["D"]
+    return Finding(
+        scaling,
+        "holds" if WIDTHS[0] <= D <= WIDTHS[-1] else "does not hold",
+        "The gap given is D = {D:.4g}. The widths studied are gaps of ±{narrow:.3g}, ±{middle:.3g} "
+        "and ±{wide:.3g} mrad.",
+        {
+            "D": D,
+            **{
+                name: 1e3 * width * scales.angle
+                for name, width in zip(("narrow", "middle", "wide"), WIDTHS, strict=True)
+            },
+        },
+    )
+
+
 def _separation(scaling: str, model: fs.Model) -> float:
     p = model.parameters
     return float(np.sqrt(p["A"] + p["D"] ** 2 - 0.25) / p["omega"])
@@ -222,8 +244,8 @@ def _physical() -> dict[sp.Symbol, float]:
     return {real(name): value for name, value in given.items()}
 
 
-def main(folder: Path) -> Route:
-    """Draw the motion in four models into a folder and return it."""
+def main(into: Output) -> Route:
+    """Draw the motion in four models and return it."""
     found = route()
     sheet = new_figure(FULL, 60 * MM)
     left, middle, right = (dressed(ax) for ax in sheet.subplots(1, 3))
@@ -262,6 +284,5 @@ def main(folder: Path) -> Route:
         ax.set_title(f"({letter})", loc="left", fontsize=TEXT)
         ax.set_xlabel(r"$t_0$ (s)")
         ax.set_xlim(0, found.time[-1])
-    for suffix in ("png", "pdf"):
-        save(sheet, folder / f"physical_route.{suffix}", SHOWN)
+    into.save(sheet, "physical_route")
     return found

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fastslow as fs
+from analyses.output import Output
 from analyses.passages import OMEGA, REST
 
 Floats = NDArray[np.float64]
@@ -202,20 +203,18 @@ def draw(plane: Plane, found: fs.RefinedMap) -> fs.plot.MapDrawing:
     return drawing
 
 
-def saved(plane: Plane, folder: Path) -> MapRow:
-    """Compute a map, write it as PNG and PDF, and return its numbers."""
-    folder.mkdir(parents=True, exist_ok=True)
+def saved(plane: Plane, into: Output) -> MapRow:
+    """Compute a map, write it, and return its numbers."""
     found = simulated(plane)
     drawing = draw(plane, found)
-    for suffix in ("png", "pdf"):
-        drawing.save(folder / f"{plane.name}.{suffix}")
+    into.save(drawing.figure, plane.name)
     return row(plane, found)
 
 
-def main(folder: Path) -> list[MapRow]:
-    """Draw the maps into a folder and return their numbers."""
-    return [saved(plane, folder) for plane in PLANES]
+def main(into: Output) -> list[MapRow]:
+    """Draw the maps and return their numbers."""
+    return [saved(plane, into) for plane in PLANES]
 
 
 if __name__ == "__main__":
-    print(*main(Path("figures")), sep="\n")
+    print(*main(Output(Path("figures"))), sep="\n")

@@ -16,7 +16,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -25,8 +24,9 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 import fastslow as fs
-from analyses.cases import GAP, NARROW, SHOWN, STIFFNESSES, TORQUES, WIDTHS, gear
+from analyses.cases import GAP, NARROW, STIFFNESSES, TORQUES, WIDTHS, gear
 from analyses.claims import Claim, Finding
+from analyses.output import Output
 from analyses.passages import OMEGA, REST
 from analyses.stiffness import flank
 from fastslow.plot.style import (
@@ -39,7 +39,6 @@ from fastslow.plot.style import (
     VERMILION,
     dressed,
     new_figure,
-    save,
 )
 from fastslow.systems.gears import SCALINGS
 
@@ -163,7 +162,7 @@ def claims() -> tuple[Claim, ...]:
     )
 
 
-def main(folder: Path) -> None:
+def main(into: Output) -> None:
     """Draw both responses over the three parameters."""
     sheet = new_figure(FULL, 110 * MM)
     grid = sheet.subplots(2, 3, sharex="col")
@@ -214,5 +213,4 @@ def main(folder: Path) -> None:
         fontsize=SMALL,
         frameon=False,
     )
-    for suffix in ("png", "pdf"):
-        save(sheet, folder / f"responses.{suffix}", SHOWN)
+    into.save(sheet, "responses")

@@ -1,0 +1,134 @@
+"""Fast loads: where resonances make figure 3 of the source as stated, at its own torques.
+
+A load that changes sign as far as that of figure 3 carries the teeth across gaps of these widths,
+whatever its frequency within the source's range. Loads nearly as fast as the vibration in
+contact do not: the gap is too wide for the time that they leave.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+import fastslow as fs
+from analyses.cases import WIDTHS, gear
+from analyses.gap_region import STATED
+from analyses.output import Output
+from fastslow.plot.maps import FILLS
+from fastslow.plot.style import FULL, GREY, MM, SMALL, TEXT, dressed, new_figure
+
+Floats = NDArray[np.float64]
+
+#: Frequencies scanned.
+SCANNED = {"consistent": np.arange(0.02, 6.01, 0.02), "printed": np.arange(0.25, 60.01, 0.25)}
+
+#: Runs are at least so long: the start is forgotten as e^(−t/2).
+LENGTH = 40.0
+
+#: The plane.
+OVER = {"omega": (0.25, 6.25), "D": (0.05, 0.65)}
+
+
+def regimes(scaling: str, omega: Floats, width: Floats) -> list[str]:
+    """Regimes at the torques of figure 3, from rest."""
+    found = np.empty(len(omega), dtype=object)
+    periods = np.maximum(3, 2 ** np.ceil(np.log2(LENGTH * omega / (2 * np.pi))))
+    for count in np.unique(periods):
+        rows = periods == count
+        given = {"omega": omega[rows], "D": width[rows]}
+        many = fs.simulate_many(gear(scaling), [0.0, 0.0], parameters=given, periods=int(count))
+        found[rows] = [str(regime) for regime in many.regime]
+    return list(found)
+
+
+@cache
+def scanned(scaling: str) -> tuple[list[str], ...]:
+    """Regimes over the frequencies, one list for each width of figure 3."""
+    omega = SCANNED[scaling]
+    return tuple(regimes(scaling, omega, np.full_like(omega, D)) for D in WIDTHS)
+
+
+@cache
+def bands(scaling: str) -> list[tuple[float, float]]:
+    """Runs of frequencies at which figure 3 is as stated, the longest first."""
+    omega = SCANNED[scaling]
+    stated = [tuple(column) == STATED for column in zip(*scanned(scaling), strict=True)]
+    edges = [0, *(k for k in range(1, len(stated)) if stated[k] != stated[k - 1]), len(stated)]
+    runs = [(a, b - 1) for a, b in pairwise(edges) if stated[a]]
+    runs.sort(key=lambda ends: ends[0] - ends[1])
+    return [(float(omega[a]), float(omega[b])) for a, b in runs]
+
+
+@cache
+def refined() -> fs.RefinedMap:
+    """The regimes over frequency and width under the consistent scaling, boundaries refined."""
+
+    def words(omega: Floats, width: Floats) -> list[str]:
+        # which side the impacts are on matters less than that there is one
+        return [_side(word) for word in regimes("consistent", omega, width)]
+
+    return fs.refined_map(words, OVER, cells=(24, 12), levels=3, tol=1e-2)
+
+
+def _side(regime: str) -> str:
+    return "unilateral" if regime.startswith("unilateral") else regime
+
+
+@cache
+def longest(scaling: str) -> tuple[float, float]:
+    """Ends of the longest of those runs, by bisection of its neighbouring frequencies."""
+    omega = SCANNED[scaling]
+    step = float(omega[1] - omega[0])
+    ends = []
+    for inside, outward in zip(bands(scaling)[0], (-step, step), strict=True):
+        outside = inside + outward
+        for _ in range(12):
+            middle = 0.5 * (inside + outside)
+            as_stated = tuple(regimes(scaling, np.full(3, middle), np.array(WIDTHS))) == STATED
+            inside, outside = (middle, outside) if as_stated else (inside, middle)
+        ends.append(inside)
+    return ends[0], ends[1]
+
+
+def draw(into: Output) -> None:
+    """Draw the plane under the consistent scaling, and the three widths under the printed one."""
+    sheet = new_figure(FULL, 78 * MM)
+    left, right = (dressed(ax) for ax in sheet.subplots(1, 2, width_ratios=(1.35, 1)))
+    fills = {**FILLS, "unilateral": FILLS["unilateral upper"], "free": "#BDBDBD"}
+    fs.plot.regime_map(refined(), ax=left, fills=fills, legend=False, linewidth=0.5)
+    for width in WIDTHS:
+        left.axhline(width, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)))
+    left.plot(longest("consistent"), [0.06, 0.06], color="black", linewidth=3)
+    omega = SCANNED["printed"]
+    step = omega[1] - omega[0]
+    for row, found in enumerate(scanned("printed")):
+        for word in dict.fromkeys(map(_side, found)):
+            starts = [
+                (w - step / 2, step) for w, r in zip(omega, found, strict=True) if _side(r) == word
+            ]
+            colour = fills[word]
+            right.broken_barh(starts, (row - 0.35, 0.7), facecolor=colour, linewidth=0)
+    for band in bands("printed"):
+        right.plot(band, [-0.45, -0.45], color="black", linewidth=3, solid_capstyle="butt")
+    right.set_xlim(0, omega[-1])
+    right.set_ylim(-0.6, 2.5)
+    right.set_yticks(range(3), [f"{D:g}" for D in WIDTHS])
+    for ax, title in ((left, "(a) consistent scaling"), (right, "(b) printed scaling")):
+        ax.set_xlabel(r"$\omega_\mathrm{o}$")
+        ax.set_ylabel("$D$")
+        ax.set_title(title, loc="left", fontsize=TEXT)
+    handles = [
+        *(Patch(facecolor=fills[w], edgecolor=GREY, linewidth=0.5, label=w)
+          for w in ("bilateral", "unilateral", "free")),
+        Line2D([], [], color=GREY, linestyle=(0, (4, 2)), label="widths of Fig. 3"),
+        Line2D([], [], color="black", linewidth=3, label="as Fig. 3 states"),
+    ]  # fmt: skip
+    sheet.legend(
+        handles=handles, loc="outside lower center", ncols=5, fontsize=SMALL, frameon=False
+    )
+    into.save(sheet, "resonances")
