@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from tqdm import tqdm
 
@@ -24,11 +25,14 @@ from analyses import (
     negative_stiffness,
     physical_route,
     regime_maps,
+    resonances,
     responses,
     stiffness,
+    stories,
 )
 from analyses.cases import draw, laid_cases
 from analyses.claims_page import SOURCES, all_claims, page, write_docs
+from analyses.output import FORMATS, Output
 from analyses.passages import OMEGA, PERIODS, Row, row
 from fastslow.systems.gears import SCALINGS
 
@@ -81,33 +85,73 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
     return found
 
 
-def main(arguments: Sequence[str] | None = None) -> list[Row]:
-    """Draw every figure into a folder, write the index page, and return the rows of all cases."""
-    parser = argparse.ArgumentParser(prog="python -m analyses", description=__doc__)
-    parser.add_argument("folder", nargs="?", type=Path, default=Path("figures"))
+def chosen(arguments: Sequence[str] | None) -> tuple[Output, bool]:
+    """Where to write, made if it is not there, and whether to write the documentation too."""
+    parser = argparse.ArgumentParser(
+        prog="python -m analyses",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "folder", nargs="?", type=Path, default=Path("figures"), help="default: %(default)s"
+    )
+    parser.add_argument(
+        "--png", action="store_true", help="figures for the screen only, without those for print"
+    )
     parser.add_argument(
         "--docs", action="store_true", help="also write docs/claims.md and its figures"
     )
-    chosen = parser.parse_args(arguments)
-    folder: Path = chosen.folder
-    folder.mkdir(parents=True, exist_ok=True)
-    maps: list[regime_maps.MapRow] = []
-    work = steps(folder)
-    with tqdm(total=len(work) + len(regime_maps.PLANES), unit="step") as bar:
+    found = parser.parse_args(arguments)
+    try:
+        found.folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=found.folder):
+            pass
+    except OSError as error:
+        parser.error(f"cannot write into {found.folder}: {error.strerror}")
+    return Output(found.folder, FORMATS[:1] if found.png else FORMATS), found.docs
+
+
+def run(work: Sequence[tuple[str, Callable[[], object]]], folder: Path) -> None:
+    """Take every step, under a progress bar.
+
+    Raises
+    ------
+    SystemExit
+        With status 130 when interrupted; figures that are finished stay.
+    """
+    with tqdm(total=len(work), unit="step") as bar:
         for name, step in work:
             bar.set_description(name)
-            step()
+            try:
+                step()
+            except KeyboardInterrupt:
+                bar.close()
+                print(
+                    f"\nInterrupted at step {bar.n + 1} of {len(work)}, {name}. The figures "
+                    f"finished so far are in {folder}; index.md and the tables were not written."
+                )
+                raise SystemExit(130) from None
             bar.update()
-        for plane in regime_maps.PLANES:
-            bar.set_description(plane.name)
-            maps.append(regime_maps.saved(plane, folder))
-            bar.update()
+
+
+def main(arguments: Sequence[str] | None = None) -> list[Row]:
+    """Draw every figure into a folder, write the index page, and return the rows of all cases."""
+    into, docs = chosen(arguments)
+    folder = into.folder
+    maps: list[regime_maps.MapRow] = []
+    work = steps(into)
+
+    def mapped(plane: regime_maps.Plane) -> None:
+        maps.append(regime_maps.saved(plane, into))
+
+    work += [(plane.name, partial(mapped, plane)) for plane in regime_maps.PLANES]
+    run(work, folder)
     cases = [c for f in equilibria.FIGURES for s in SCALINGS for c in laid_cases(f, s)]
     rows = [row(case) for case in (*cases, negative_stiffness.case())]
     write(rows, folder / "summary.csv")
     write(maps, folder / "regime_maps.csv")
     (folder / "index.md").write_text(page(all_claims(), ""), encoding="utf-8")
-    if chosen.docs:
+    if docs:
         write_docs(folder, DOCS)
     print(f"\n{table(rows)}\n\n{table(maps)}\n")
     print(f"Load of angular frequency {OMEGA:g} (dimensionless), {PERIODS} periods from rest.")

@@ -76,18 +76,35 @@ CAPTIONS = {
     "(b) Where a load C sin(ω t) makes relaxation oscillations (bilateral).",
 }
 
-HEAD = """\
-# The paper, claim by claim
+HEAD = r"""# The paper, claim by claim
 
 M. Ding, "Fast-slow Dynamical Analysis in Harmonic Gear Transmission System with Non-smooth Gear
 Clearance Condition", Current Journal of Applied Science and Technology 42(7), 66-75, 2023,
-doi 10.9734/CJAST/2023/v42i74082 (CC BY 4.0).
+doi [10.9734/CJAST/2023/v42i74082](https://doi.org/10.9734/CJAST/2023/v42i74082) (CC BY 4.0).
 
-The paper leaves out the load's frequency ω (0 < ω < 1 is given), initial states and time spans,
-and its parameters do not follow from its equations: a factor θ_s was forgotten. Every claim is
-tested under the scaling that follows (*consistent*) and under the one printed (*printed*), over
-frequencies and starts where those matter; single runs have ω_o = 0.01 and three periods from rest.
-Claims B1 to B4 are results beyond the paper. The page is written by `python -m analyses --docs`.
+Each figure of the paper and each of its sentences that can be tested stands here with what was
+computed for it, a verdict, and the numbers. Quotations are the paper's words. Claims B1 to B4 are
+results that it does not have.
+
+The dimensionless gear is $\ddot x + \dot x + (x^2 + A) f(x) = w$ with the load
+$w = B + C\sin(\omega_\mathrm{o} t)$ and the dead zone $f$ of half-width $D$; S1 is contact on
+the upper side, $x > D$, S2 the gap, S3 contact on the lower side, $x < -D$.
+
+- *Two scalings.* The paper's $A$, $B$ and $C$ do not follow from its equations: a factor
+  θ_s was forgotten. Every claim is tested with the values that follow (*consistent*) and with
+  those printed (*printed*).
+- *What is left out.* The paper gives no frequency of the load but $0 < \omega < 1$ rad/s, no
+  initial states and no time spans. They are scanned where they matter; single runs have
+  ω_o = 0.01 and three periods from rest.
+- *Impacts* are bilateral if both sides are met in the last period, unilateral if contact is lost
+  and found on one side only; meshed is contact that is never lost.
+- *The frozen gear* has its load held fixed. Its equilibria over the load are what a slow load
+  drags the gear along; laying a run over them shows what is followed, and what comes late.
+- *The slow-load criterion*: the far side is met if $D$ is not larger than
+  $D^* = [\sqrt{C^2 - B^2} - B\arccos(B/C)]/\omega_\mathrm{o} - \dots$, how far the load pushes
+  the gear while it is negative.
+
+The page is written by `python -m analyses --docs`.
 """
 
 

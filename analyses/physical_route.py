@@ -32,7 +32,7 @@ from fastslow.plot.style import (
     dressed,
     new_figure,
 )
-from fastslow.systems.gears import SCALINGS, Scaling, gear_scales
+from fastslow.systems.gears import SCALINGS, gear_scales
 from fastslow.systems.geartrain import (
     dimensionless_model,
     gear_scaling,
@@ -215,8 +215,8 @@ def claims() -> tuple[Claim, ...]:
     )
 
 
-def _width(scaling: Scaling) -> Finding:
-    scales = gear_scales(scaling)
+def _width(scaling: str) -> Finding:
+    scales = gear_scales("printed" if scaling == "printed" else "consistent")
     D = gear(scaling).parameters["D"]
     return Finding(
         scaling,

@@ -8,6 +8,7 @@ where the cubic part of the stiffness prevails.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
 
@@ -203,7 +204,7 @@ def _absorbs(scaling: str) -> Finding:
         yielding.append(1 / (p["A"] + p["D"] ** 2))
         (point,) = case.diagram.at(w=p["B"])
         rates.append(float(point.eigenvalues.real.max()))
-    less, same = yielding[1] < yielding[0], np.isclose(*rates, rtol=1e-9)
+    less, same = yielding[1] < yielding[0], math.isclose(*rates, rel_tol=1e-9)
     return Finding(
         scaling,
         "holds only where" if less and same else "holds" if less else "does not hold",

@@ -138,7 +138,9 @@ def told(found: Sequence[Story]) -> list[str]:
             for value in (s.down, s.up, s.measured, s.law)
         )
         what = f"{s.count} × {s.kind}" if s.count else "none"
-        cells = (s.case, f"{s.upper:.1%}", f"{s.lower:.1%}", f"{s.behind:.2g}", what, *numbers)
+        # GitHub would take the backslash from \, and leave the comma
+        case = s.case.replace("\\,", "\\ ")
+        cells = (case, f"{s.upper:.1%}", f"{s.lower:.1%}", f"{s.behind:.2g}", what, *numbers)
         lines.append("| " + " | ".join(cells) + " |")
     rhythms = dict.fromkeys(s.rhythm for s in found if s.rhythm)
     if rhythms:
