@@ -197,10 +197,19 @@ def draw(plane: CaseMap, into: Output) -> None:
         drawn = fs.plot.regime_map(found, ax=ax, curves=curve, marks=plane.marks, legend=False)
         unnamed |= {w: drawn.fills[w] for w in found.labels if w not in drawn.names}
         _dress(ax, plane)
+        for mark in drawn.marks:
+            # above the points of one row, else beside each, away from the limit of the frequency
+            row = sum(other.xy[1] == mark.xy[1] for other in drawn.marks)
+            side = -6 if "omega" in plane.over else 6
+            mark.set_position((side, 0) if row == 1 else (0, 8))
+            if row == 1:
+                mark.set_horizontalalignment("left" if side > 0 else "right")
         ax.set_title(f"({letter}) {scaling} scaling", loc="left", fontsize=TEXT)
         if plane.name == "map_frequency_width":
             limit = np.log10(FASTEST)
             ax.axvline(limit, color="black", linewidth=0.8, linestyle=":")
+            for word, name in drawn.names.items():
+                name.set_bbox({"facecolor": FILLS[word], "edgecolor": "none", "pad": 1.5})
             ax.annotate(
                 r"$\omega = 1\,\mathrm{rad/s}$",
                 (limit, 0.03),

@@ -94,17 +94,17 @@ def peak_to_peak(case: Case, name: str = "x") -> float:
 
 def draw(figure: str, scaling: str, into: Output) -> None:
     """Draw three cases: time series, phase portraits and overlays, one column each."""
-    sheet = new_figure(FULL, 150 * MM)
+    sheet = new_figure(FULL, 154 * MM)
     # the places are known; finding them anew for every panel would take most of the time
     sheet.set_layout_engine("none")
-    edges = {"left": 0.085, "right": 0.99, "bottom": 0.135, "top": 0.915}
-    ratios = {"height_ratios": [1.0, 1.15, 1.3], "wspace": 0.36, "hspace": 0.42}
+    edges = {"left": 0.095, "right": 0.98, "bottom": 0.135, "top": 0.89}
+    ratios = {"height_ratios": [1.0, 1.15, 1.3], "wspace": 0.24, "hspace": 0.42}
     grid = sheet.subplots(3, 3, gridspec_kw={**edges, **ratios})
     overlays = []
     for column, case in enumerate(laid_cases(figure, scaling)):
         axes = [dressed(ax) for ax in grid[:, column]]
         values = case.diagram.interface_values
-        axes[0].set_title(case.setting.title, fontsize=TEXT)
+        axes[0].set_title(f"{case.setting.title}\n{case.run.regime}", fontsize=TEXT)
         look: dict[str, Any] = {"crossings": False, "interfaces": values, "linewidth": 0.8}
         series = fs.plot.time_series(case.run, "x", ax=axes[0], **look)
         portrait = fs.plot.phase_portrait(case.run, ax=axes[1], **look)
@@ -114,6 +114,9 @@ def draw(figure: str, scaling: str, into: Output) -> None:
         place(axes[0], bands=series.bands)
         place(axes[1], bands=portrait.bands)
         for number, ax in enumerate(axes):
+            ax.yaxis.labelpad = 1.0
+            if column:
+                ax.set_ylabel("")
             ax.set_title(f"({'abcdefghi'[3 * number + column]})", loc="left", fontsize=TEXT)
     # the case with most kinds of marks explains them for all
     sheet.legend(

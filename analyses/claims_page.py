@@ -211,8 +211,13 @@ def write_docs(drawn: Path, docs: Path) -> None:
     (docs / "figures").mkdir(parents=True, exist_ok=True)
     (docs / "claims.md").write_text(page(claims, "figures/"), encoding="utf-8")
     for name in dict.fromkeys(name for claim in claims for name in claim.figures):
-        with Image.open(drawn / f"{name}.png") as image:
-            scale = SHOWN / image.info.get("dpi", (SHOWN,))[0]
-            image.thumbnail((round(scale * image.width), round(scale * image.height)))
-            few = image.convert("RGB").quantize(200)
-            few.save(docs / "figures" / f"{name}.png", optimize=True)
+        few = shrunk(drawn / f"{name}.png").quantize(200)
+        few.save(docs / "figures" / f"{name}.png", optimize=True)
+
+
+def shrunk(path: Path) -> Image.Image:
+    """A figure as pages show it: all in one scale, so that their text is equally large."""
+    with Image.open(path) as image:
+        scale = SHOWN / image.info.get("dpi", (SHOWN,))[0]
+        image.thumbnail((round(scale * image.width), round(scale * image.height)))
+        return image.convert("RGB")

@@ -6,9 +6,11 @@ This is the fast-slow analysis that the source's title names and its text does n
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 import fastslow as fs
@@ -22,6 +24,8 @@ from fastslow.plot.style import (
     FULL,
     GREEN,
     GREY,
+    LINES,
+    MARKERS,
     MM,
     SMALL,
     TEXT,
@@ -165,7 +169,16 @@ def _draw_cases(ax: Axes, figure: str, scaling: str) -> None:
         (branch,) = case.diagram.branches
         # three equal curves would hide each other: the loads reach differently far
         width = 1.2 + (1.4 * (2 - k) if figure == "load_amplitude" else 0.0)
-        ax.plot(branch.parameter, branch["x"], color=colour, linewidth=width, zorder=2 + k)
+        for region in ("S1", "S2", "S3"):
+            rows = np.flatnonzero(branch.region == region)
+            rows = np.r_[max(rows[0] - 1, 0), rows, min(rows[-1] + 1, len(branch) - 1)]
+            look: dict[str, Any] = {"color": colour, "linewidth": width, "zorder": 2 + k}
+            if region == "S2":
+                look |= {"linestyle": LINES["neutral"]["linestyle"], "linewidth": 0.9}
+            ax.plot(branch.parameter[rows], branch["x"][rows], **look)
+        for point in case.diagram.boundary_equilibria:
+            marker, fill = MARKERS["BE"]
+            ax.plot(point["w"], point["x"], marker, color=fill, markersize=4, zorder=6)
         value = case.setting.name.split("_")[-2]
         ax.annotate(
             f"${words[figure]} = {value}$",
@@ -181,7 +194,7 @@ def _draw_cases(ax: Axes, figure: str, scaling: str) -> None:
 
 def draw_equilibria(into: Output) -> None:
     """Draw the equilibria of every case."""
-    sheet = new_figure(FULL, 105 * MM)
+    sheet = new_figure(FULL, 110 * MM)
     grid = sheet.subplots(2, 3)
     for row, scaling in enumerate(SCALINGS):
         for column, figure in enumerate(FIGURES):
@@ -189,6 +202,17 @@ def draw_equilibria(into: Output) -> None:
             _draw_cases(ax, figure, scaling)
             letter = "abcdef"[3 * row + column]
             ax.set_title(f"({letter}) Fig. {3 + column}, {scaling}", loc="left", fontsize=TEXT)
+    marker, fill = MARKERS["BE"]
+    handles = [
+        Line2D([], [], color=BLACK, linewidth=1.2, label="stable"),
+        Line2D([], [], color=BLACK, linewidth=0.9, linestyle=LINES["neutral"]["linestyle"],
+               label="neutral: every twist in the gap"),
+        Line2D([], [], color=fill, marker=marker, markersize=4, linestyle="none",
+               label="boundary equilibrium"),
+    ]  # fmt: skip
+    sheet.legend(
+        handles=handles, loc="outside lower center", ncols=3, fontsize=SMALL, frameon=False
+    )
     into.save(sheet, "equilibria")
 
 

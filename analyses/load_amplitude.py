@@ -178,10 +178,11 @@ def _speed(scaling: str) -> Finding:
         scaling,
         "holds" if speeds == sorted(speeds) else "does not hold",
         "What the twist adds to the output speed, peak to peak: {light:.2g}, {middle:.2f} and "
-        "{heavy:.2f} rad/s, more than a hundredfold once there are impacts. The load itself makes "
+        "{heavy:.2f} rad/s, {jump:.0f}-fold once there are impacts. The load itself makes "
         "that speed swing slowly by {slow:.1f}, {slower:.1f} and {slowest:.1f} rad/s.",
         {
             **dict(zip(("light", "middle", "heavy"), speeds, strict=True)),
+            "jump": speeds[1] / speeds[0],
             **dict(zip(("slow", "slower", "slowest"), (s for _, s in found), strict=True)),
         },
     )

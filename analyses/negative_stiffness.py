@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 STIFFNESS, GAP, SWING = -0.6, 0.25, 0.4
 
 #: The plane in which relaxation oscillations are looked for.
-OVER = {"A": (-1.0, -0.07), "C": (0.005, 0.4)}
+OVER = {"A": (-1.0, -0.2), "C": (0.005, 0.45)}
 
 
 def settings() -> list[Setting]:
@@ -123,11 +123,15 @@ def draw_plane(into: Output) -> None:
     sheet = new_figure(FULL, 72 * MM)
     left, right = (dressed(ax) for ax in sheet.subplots(1, 2))
     fs.plot.parameter_plane(*fold_curves(), ax=left, legend=False)
-    left.annotate("folds", (0.5, 0.35), xycoords="axes fraction", fontsize=SMALL, ha="center")
+    left.annotate(
+        "three equilibria", (0.5, 0.3), xycoords="axes fraction", fontsize=SMALL, ha="center"
+    )
+    left.annotate("fold", (0.24, 0.42), xycoords="axes fraction", fontsize=SMALL, ha="right")
+    left.annotate("fold", (0.76, 0.42), xycoords="axes fraction", fontsize=SMALL)
     left.set_title("(a)", loc="left", fontsize=TEXT)
     A = np.linspace(*OVER["A"], 200)
     curves = {"load of the fold": (A, fold_load(A))}
-    marks = {"case drawn": (STIFFNESS, 0.99 * SWING)}
+    marks = {"case drawn": (STIFFNESS, SWING)}
     fs.plot.regime_map(relaxation(), ax=right, curves=curves, marks=marks, legend=False)
     right.annotate(
         "load of the fold",

@@ -25,7 +25,7 @@ from fastslow.plot.style import FULL, GREY, MM, SMALL, TEXT, dressed, new_figure
 Floats = NDArray[np.float64]
 
 #: Frequencies scanned.
-SCANNED = {"consistent": np.arange(0.02, 6.01, 0.02), "printed": np.arange(0.25, 60.01, 0.25)}
+SCANNED = {"consistent": np.arange(0.1, 6.01, 0.02), "printed": np.arange(2.0, 60.01, 0.5)}
 
 #: Runs are at least so long: the start is forgotten as e^(−t/2).
 LENGTH = 40.0
@@ -72,7 +72,7 @@ def refined() -> fs.RefinedMap:
         # which side the impacts are on matters less than that there is one
         return [_side(word) for word in regimes("consistent", omega, width)]
 
-    return fs.refined_map(words, OVER, cells=(24, 12), levels=3, tol=1e-2)
+    return fs.refined_map(words, OVER, cells=(24, 12), levels=2, tol=1e-2)
 
 
 def _side(regime: str) -> str:
@@ -87,7 +87,7 @@ def longest(scaling: str) -> tuple[float, float]:
     ends = []
     for inside, outward in zip(bands(scaling)[0], (-step, step), strict=True):
         outside = inside + outward
-        for _ in range(12):
+        for _ in range(8):
             middle = 0.5 * (inside + outside)
             as_stated = tuple(regimes(scaling, np.full(3, middle), np.array(WIDTHS))) == STATED
             inside, outside = (middle, outside) if as_stated else (inside, middle)
@@ -115,7 +115,7 @@ def draw(into: Output) -> None:
             right.broken_barh(starts, (row - 0.35, 0.7), facecolor=colour, linewidth=0)
     for band in bands("printed"):
         right.plot(band, [-0.45, -0.45], color="black", linewidth=3, solid_capstyle="butt")
-    right.set_xlim(0, omega[-1])
+    right.set_xlim(omega[0], omega[-1])
     right.set_ylim(-0.6, 2.5)
     right.set_yticks(range(3), [f"{D:g}" for D in WIDTHS])
     for ax, title in ((left, "(a) consistent scaling"), (right, "(b) printed scaling")):

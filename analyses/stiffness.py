@@ -329,7 +329,7 @@ def draw_frequencies(into: Output) -> None:
         )
         ax.set_xscale("log")
         ax.set_xlim(loads[0], loads[-1])
-        ax.set_xlabel("$w$")
+        ax.set_xlabel("load $w$")
         ax.set_ylabel("angular frequency in contact")
         ax.set_title(f"({letter}) {scaling} scaling", loc="left", fontsize=TEXT)
     into.save(sheet, "contact_frequency")

@@ -11,8 +11,9 @@ from matplotlib.image import imread
 from PIL import Image
 
 from analyses import __main__ as everything
-from analyses import claims_page, dead_zone, negative_stiffness
+from analyses import claims_page, dead_zone, negative_stiffness, output
 from analyses.cases import laid_cases
+from analyses.output import Output
 from analyses.passages import OMEGA
 from fastslow.systems.gears import SCALINGS
 
@@ -22,7 +23,7 @@ DOCS = Path(everything.__file__).parents[1] / "docs"
 @pytest.fixture(scope="module")
 def everything_drawn(tmp_path_factory):
     folder = tmp_path_factory.mktemp("figures")
-    return folder, {row.case: row for row in everything.main([str(folder)])}
+    return folder, {row.case: row for row in everything.main([str(folder), "--png"])}
 
 
 @pytest.fixture(scope="module")
@@ -38,8 +39,9 @@ def folded():
 def test_every_figure_is_written(everything_drawn):
     folder, rows = everything_drawn
     for name in claims_page.CAPTIONS:
-        for suffix in ("png", "pdf"):
-            assert (folder / f"{name}.{suffix}").stat().st_size > 5000
+        assert (folder / f"{name}.png").stat().st_size > 5000
+    assert not list(folder.glob("*.pdf"))
+    assert not list(folder.glob(".*"))
     with (folder / "summary.csv").open(encoding="utf-8") as file:
         assert [line["case"] for line in csv.DictReader(file)] == list(rows)
     assert len(rows) == 19
@@ -56,9 +58,7 @@ def test_the_index_shows_every_figure_with_its_claim(everything_drawn):
 def test_the_figures_of_the_docs_are_those_drawn(everything_drawn):
     folder, _ = everything_drawn
     for name in claims_page.CAPTIONS:
-        with Image.open(folder / f"{name}.png") as image:
-            image.thumbnail((1000, 1000))
-            drawn = np.asarray(image.convert("RGB"), dtype=float)
+        drawn = np.asarray(claims_page.shrunk(folder / f"{name}.png"), dtype=float)
         with Image.open(DOCS / "figures" / f"{name}.png") as image:
             shown = np.asarray(image.convert("RGB"), dtype=float)
         assert shown.shape == drawn.shape, name
@@ -107,6 +107,66 @@ def test_the_regime_maps_agree_with_slow_load_theory(everything_drawn):
     assert width["change_from"] == pytest.approx(1.010829, abs=4e-6)
     assert width["change_to"] == pytest.approx(1.017209, abs=4e-6)
     assert math.isnan(frequency["change_from"])
+
+
+def test_figures_for_screen_and_print(tmp_path):
+    folder = tmp_path / "not there" / "yet"
+    dead_zone.main(Output(folder))
+    assert (folder / "dead_zone.pdf").read_bytes().startswith(b"%PDF")
+    assert (folder / "dead_zone.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_an_interrupted_figure_leaves_the_one_before(tmp_path, monkeypatch):
+    dead_zone.main(Output(tmp_path, ("png",)))
+    before = (tmp_path / "dead_zone.png").read_bytes()
+
+    def interrupted(_figure, path, _dpi):
+        path.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(output, "save", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        dead_zone.main(Output(tmp_path, ("png",)))
+    assert (tmp_path / "dead_zone.png").read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["dead_zone.png"]
+
+
+def test_an_interruption_says_what_is_kept(tmp_path, capsys):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    done = []
+    work = [("first", lambda: done.append(1)), ("second", interrupted), ("third", interrupted)]
+    with pytest.raises(SystemExit) as ending:
+        everything.run(work, tmp_path)
+    assert ending.value.code == 130
+    assert done == [1]
+    assert f"Interrupted at step 2 of 3, second. The figures finished so far are in {tmp_path}" in (
+        capsys.readouterr().out
+    )
+
+
+def test_a_folder_that_cannot_be_written_is_named_at_once(tmp_path, capsys):
+    taken = tmp_path / "taken"
+    taken.write_text("a file", encoding="utf-8")
+    for folder in (taken, taken / "below"):
+        with pytest.raises(SystemExit) as ending:
+            everything.main([str(folder)])
+        assert ending.value.code == 2
+        assert f"cannot write into {folder}: " in capsys.readouterr().err
+
+
+def test_options(capsys):
+    with pytest.raises(SystemExit) as ending:
+        everything.main(["--pdf"])
+    assert ending.value.code == 2
+    assert "unrecognized arguments: --pdf" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as ending:
+        everything.main(["--help"])
+    assert ending.value.code == 0
+    told = capsys.readouterr().out
+    assert "python -m analyses [-h] [--png] [--docs] [folder]" in told
+    assert "`index.md`" in told
 
 
 def test_dead_zone():
