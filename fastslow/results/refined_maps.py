@@ -153,7 +153,9 @@ class RefinedMap(Result):
         """
         for label in (one, other):
             if not isinstance(label, str | bool | int) or label not in self.labels:
-                raise unknown_name("label", shown(label), self.labels)
+                raise unknown_name(
+                    "label", label if isinstance(label, str) else shown(label), self.labels
+                )
         found = [b for b in self.boundaries if set(b.labels) == {one, other}]
         return tuple(sorted(found, key=lambda b: -len(b.points)))
 

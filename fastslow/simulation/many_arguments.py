@@ -102,7 +102,7 @@ def periods_of(model: Model, period: Any, count: int, swept: Mapping[str, Floats
         if given.ndim > 1 or given.size not in (1, count):
             raise ArgumentError(f"period has shape {given.shape}; expected one, or ({count},)")
         for value in given.reshape(-1):
-            positive("period", value)
+            positive("period", float(value))
         return np.broadcast_to(given, count).astype(float)
     laws = [e for e in (*model.forcing.values(), *model.rates.values()) if e.has(TIME)]
     if not any(real(name) in law.free_symbols for name in swept for law in laws):

@@ -15,7 +15,11 @@ class Odd:
     """Something that no argument can be."""
 
 
-def hostile():
+#: What a figure may well be given: it is drawn then, which takes time.
+DRAWN = (True, False, 0, 0.5, "5")
+
+
+def hostile(drawn=False):
     """Values that are wrong almost everywhere."""
     r = results()
     numbers = [-1, 0, 0.5, np.nan, np.inf, -np.inf, 1j, True, False, 10**400, sp.oo]
@@ -23,11 +27,14 @@ def hostile():
     arrays = [np.zeros(3), np.zeros((2, 3, 4)), np.array([np.nan, 1.0]), np.array(["a"])]
     symbols = [sp.Symbol("omga"), sp.Symbol("x") > 0, sp.nan, sp.I, sp.Matrix([[1, 2]])]
     others = [None, [], (), {}, {"omga": 1.0}, {1, 2}, (1, -1), [[1], [2, 3]], [None, None]]
-    return [
+    found = [
         *(*numbers, *texts, *arrays, *symbols, *others),
         *(Odd(), slice(None), range(3), lambda *given: 1),
         *(r["equilibrium"], r["diagram"], r["fast"], r["section"], r["map"]),
     ]
+    if drawn:
+        return [v for v in found if not isinstance(v, bool | int | float | str) or v not in DRAWN]
+    return found
 
 
 def spoilt(value, wrong):
@@ -57,8 +64,9 @@ def keys_spoilt(value, wrong):
 
 def calls(subject):
     """Every call with one thing wrong, as changes to the good one."""
+    wrongs = hostile(subject.name.startswith("plot."))
     for name, parameter in subject.signature.parameters.items():
-        for wrong in hostile():
+        for wrong in wrongs:
             if parameter.kind is inspect.Parameter.VAR_POSITIONAL:
                 yield {name: [wrong]}
             elif parameter.kind is inspect.Parameter.VAR_KEYWORD:
@@ -67,7 +75,7 @@ def calls(subject):
             else:
                 yield {name: wrong}
     for name, value in subject.more.items():
-        for wrong in hostile():
+        for wrong in wrongs:
             for other in spoilt(value, wrong):
                 yield {**subject.more, name: other}
             plain = subject.signature.parameters[name].kind is not inspect.Parameter.VAR_KEYWORD
