@@ -18,18 +18,18 @@ Floats = NDArray[np.float64]
 
 #: Fills of the regimes of a gap; tints of the Okabe-Ito colours, apart in lightness too.
 FILLS: dict[Any, str] = {
-    "bilateral": "#8FC3E6",
-    "unilateral upper": "#F7DFA8",
-    "unilateral lower": "#EBC5DA",
-    "meshed upper": "#F4F4F4",
-    "meshed lower": "#BFE3D5",
+    "bilateral": "#85C0E6",
+    "unilateral upper": "#F8E0A9",
+    "unilateral lower": "#E7BAD3",
+    "meshed upper": "#F1F1F1",
+    "meshed lower": "#B5DDCE",
     "free": "#FFFFFF",
-    "no gap": "#D0D0D0",
+    "no gap": "#A8A8A8",
     FAILED: "#6E6E6E",
 }
 
-#: Fills of other labels, in turn.
-OTHERS = ("#F4F4F4", "#8FC3E6", "#F7DFA8", "#BFE3D5", "#EBC5DA", "#C9B79C", "#7FA7A0", "#B0A8D9")
+#: Fills of other labels, in turn; like the above, steps of lightness, so that grey will do.
+OTHERS = ("#F3F3F3", "#85C0E6", "#F8E0A9", "#B5DDCE", "#E7BAD3", "#BBA583", "#71A29A", "#8A82BA")
 
 
 def draw_areas(
@@ -61,10 +61,12 @@ def draw_areas(
 
 def samples(fills: Mapping[Any, PolyCollection]) -> list[Patch]:
     """What a legend shows of areas."""
-    return [
-        Patch(facecolor=area.get_facecolor()[0], edgecolor=GREY, linewidth=0.5, label=str(word))
-        for word, area in fills.items()
-    ]
+    found = []
+    for word, area in fills.items():
+        colour: Any = area.get_facecolor()
+        look: dict[str, Any] = {"facecolor": colour[0], "edgecolor": GREY, "linewidth": 0.5}
+        found.append(Patch(label=str(word), **look))
+    return found
 
 
 def _colours(result: RefinedMap, fills: Mapping[Any, str]) -> dict[Any, str]:

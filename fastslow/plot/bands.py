@@ -78,10 +78,10 @@ def draw_bands(
     label : bool
         Whether to name the regions.
     """
-    levels = {value: name for name, (at, value) in sorted(values.items()) if at == state}
+    levels = sorted({value for at, value in values.values() if at == state})
     if not levels:
         return Bands(vertical=vertical)
-    edges = np.array([-np.inf, *sorted(levels), np.inf])
+    edges = np.array([-np.inf, *levels, np.inf])
     frame = ax.get_xaxis_transform() if vertical else ax.get_yaxis_transform()
     fills, names, parts, spans = [], [], [], []
     margin = 1e-9 * max(float(np.ptp(heights)) if heights.size else 0.0, 1e-300)
@@ -91,7 +91,8 @@ def draw_bands(
         )
         fill.set(zorder=0, in_layout=False)
         # added as an artist, so that the limits do not depend on it
-        fills.append(ax.add_artist(fill))
+        ax.add_artist(fill)
+        fills.append(fill)
         parts.append((float(start), float(stop)))
         inside = (heights > start + margin) & (heights < stop - margin)
         met = set(regions[inside].tolist())
@@ -99,12 +100,12 @@ def draw_bands(
             names.append(_name(ax, met.pop(), vertical))
             spans.append((float(start), float(stop)))
     lines = []
-    for level in sorted(levels):
+    for level in levels:
         ends = ([level, level], [0.0, 1.0])
-        words = f"interface {levels[level]}"
-        look: dict[str, Any] = {"color": GREY, "linewidth": 0.5, "zorder": 1, "label": words}
+        look: dict[str, Any] = {"color": GREY, "linewidth": 0.5, "zorder": 1}
         line = Line2D(*(ends if vertical else ends[::-1]), transform=frame, **look)
-        lines.append(ax.add_artist(line))
+        ax.add_artist(line)
+        lines.append(line)
     drawn = Bands(tuple(lines), tuple(fills), tuple(names), tuple(spans), vertical, tuple(parts))
     fit_bands(ax, drawn)
     return drawn

@@ -63,7 +63,8 @@ class Drawing:
         found: dict[str, list[NDArray[np.float64]]] = {}
         for artist in self.artists:
             curves = _curves(artist)
-            if curves:
+            # what helps the eye (interfaces, triangles) has no name
+            if curves and not str(artist.get_label()).startswith("_"):
                 found.setdefault(str(artist.get_label()), []).extend(curves)
         return {kind: tuple(curves) for kind, curves in found.items()}
 

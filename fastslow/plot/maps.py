@@ -139,16 +139,23 @@ def regime_map(
     ax.set_xlabel(typeset(result.names[0]))
     ax.set_ylabel(typeset(result.names[1]))
     drawn = draw_areas(ax, result, fills)
-    look = {"color": BLACK, "linewidth": 0.8, "solid_joinstyle": "round", "zorder": 2.0, **style}
+    look = {"color": BLACK, "linewidth": 0.8, "solid_joinstyle": "round", "zorder": 2.0}
+    look |= {"label": "boundary", **style}
     lines = [line for b in result.boundaries for line in ax.plot(*b.points.T, **look)]
-    over = []
+    over: list[Line2D] = []
     for number, (name, (x, y)) in enumerate((curves or {}).items()):
         dashes = (0, (4, 2)) if number == 0 else (0, (1 + number, 1.5, 4, 1.5))
         dressing: dict[str, Any] = {"linestyle": dashes, "linewidth": 1.3, "zorder": 3.0}
         over += ax.plot(np.asarray(x), np.asarray(y), color=VERMILION, label=name, **dressing)
-    points, tags = [], []
+    points: list[Line2D] = []
+    tags: list[Annotation] = []
     for name, at in (marks or {}).items():
-        dot = {"color": BLACK, "markersize": 4, "markeredgecolor": "white", "zorder": 4}
+        dot: dict[str, Any] = {
+            "color": BLACK,
+            "markersize": 4,
+            "markeredgecolor": "white",
+            "zorder": 4,
+        }
         points += ax.plot(*at, "o", label=name, **dot)
         if label:
             tags.append(tag(ax, name, at))

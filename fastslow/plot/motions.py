@@ -35,10 +35,11 @@ from fastslow.plot.covering import at_draw, settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place
 from fastslow.plot.legends import explained
+from fastslow.plot.marks import draw_dots
 from fastslow.plot.phases import draw_phases, fit_words, strip_height
 from fastslow.plot.quantities import Array, Quantity, along_run, at_crossings, of_run
 from fastslow.plot.spaces import HEIGHT, dress_space
-from fastslow.plot.style import MOTION, VERMILION, axes_for, spatial
+from fastslow.plot.style import MOTION, axes_for, spatial
 from fastslow.results.trajectories import Trajectory
 from fastslow.results.transitions import Phase
 
@@ -329,24 +330,6 @@ def draw_motion(
 def _alone(count: int) -> dict[str, Any]:
     """A single sample is no line: it is drawn as a dot."""
     return {"marker": ".", "markersize": 4.0} if count == 1 else {}
-
-
-def draw_dots(ax: Any, places: Sequence[Array]) -> Line2D | None:
-    """Mark crossings of interfaces by small dots."""
-    if not len(places[0]):
-        return None
-    (dots,) = ax.plot(
-        *places,
-        linestyle="none",
-        marker="o",
-        markersize=2.4,
-        markerfacecolor="white",
-        markeredgecolor=VERMILION,
-        markeredgewidth=0.6,
-        zorder=4,
-        label="interface crossing",
-    )
-    return dots
 
 
 def _bands(

@@ -29,10 +29,11 @@ from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place
 from fastslow.plot.legends import explained
-from fastslow.plot.motions import draw_dots, draw_motion
-from fastslow.plot.quantities import Array, Quantity, along_overlay, at_times, of_diagram
+from fastslow.plot.marks import draw_crossings, draw_transitions, draw_turning
+from fastslow.plot.motions import draw_motion
+from fastslow.plot.quantities import Array, Quantity, along_overlay, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
-from fastslow.plot.style import MOTION, TRANSITIONS, axes_for, spatial, typeset
+from fastslow.plot.style import MOTION, axes_for, spatial
 from fastslow.results.overlays import Overlay
 
 #: Shares of the slow quantity's travel over a period at which an arrow head sits: uneven, so that
@@ -185,9 +186,20 @@ def overlay(
     if spatial("overlay", ax, z):
         third = next((s for s in diagram.states if s not in (across.text, up.text)), up.text)
         shown = across, up, of_diagram(diagram, z, third)
-        look = {"virtual": virtual, "color": color, "style": style}
-        motion = along_overlay(lay, *shown)
-        return draw_space(diagram, shown, ax, width, label, legend, motion=motion, **look)
+        return draw_space(
+            diagram,
+            shown,
+            ax,
+            width,
+            label,
+            legend,
+            virtual=virtual,
+            lay=lay,
+            crossings=crossings,
+            turning=turning,
+            color=color,
+            style=style,
+        )
     own, ax = ax is None, axes_for(ax, width, height=78.0)
     drawn = draw_passage(
         ax,
@@ -223,13 +235,9 @@ def draw_passage(
     """Draw an overlay without a legend, its labels not placed yet; arguments as for `overlay`."""
     across, up = along_overlay(lay, *shown)
     lines = draw_motion(ax, lay.time, (across, up), lay.run.period, color, style)
-    dots = None
-    met = lay.run.crossings
-    if crossings and met:
-        times, state = np.array([c.time for c in met]), np.array([c.state for c in met])
-        dots = draw_dots(ax, at_times(lay, times, lay.run.states, state, *shown))
-    changes = _transitions(ax, lay, shown)
-    turns = _turning(ax, lay, shown) if turning else None
+    dots = draw_crossings(ax, lay, shown) if crossings else None
+    changes = draw_transitions(ax, lay, shown)
+    turns = draw_turning(ax, lay, shown) if turning else None
     # after the trajectory, so that the bands take its limits in
     below = draw_branches(
         ax, lay.diagram, shown, label=label, virtual=virtual, interfaces=interfaces
@@ -245,50 +253,6 @@ def draw_passage(
     heads = draw_heads(lines[-1], _heads(lay, up, lay.slow[len(lay) - drawn :]))
     text = shown[1].text
     return OverlayDrawing(ax, text, below, lines, dots, changes, turns, heads, None, shown[0].text)
-
-
-def at_moments(lay: Overlay, shown: tuple[Quantity, Quantity], moments: Any) -> list[Array]:
-    """Quantities at moments, which know their fast states and the slow quantity."""
-    state = np.array([[*m.state, m.value] for m in moments])
-    names = (*lay.diagram.states, lay.parameter)
-    return at_times(lay, np.array([m.time for m in moments]), names, state, *shown)
-
-
-def _transitions(ax: Axes, lay: Overlay, shown: tuple[Quantity, Quantity]) -> tuple[Line2D, ...]:
-    drawn: list[Line2D] = []
-    for kind, (marker, colour, text) in TRANSITIONS.items():
-        met = [t for t in lay.transitions if t.kind == kind]
-        if met:
-            filled = marker in "*PX"
-            drawn += ax.plot(
-                *at_moments(lay, shown, met),
-                linestyle="none",
-                marker=marker,
-                markersize=7.0 if marker == "*" else 5.5,
-                markerfacecolor=colour if filled else "none",
-                markeredgecolor="black" if filled else colour,
-                markeredgewidth=0.4 if filled else 1.2,
-                zorder=5.5,
-                label=text,
-            )
-    return tuple(drawn)
-
-
-def _turning(ax: Axes, lay: Overlay, shown: tuple[Quantity, Quantity]) -> Line2D | None:
-    """Bars where the slow quantity turns back."""
-    if not lay.turning:
-        return None
-    (line,) = ax.plot(
-        *at_moments(lay, shown, lay.turning),
-        linestyle="none",
-        marker="|",
-        markersize=9.0,
-        markeredgewidth=1.4,
-        color=MOTION,
-        zorder=4.6,
-        label=f"{typeset(lay.parameter)} turns back",
-    )
-    return line
 
 
 def _heads(lay: Overlay, values: Array, drawn: Array) -> list[int]:

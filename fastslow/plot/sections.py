@@ -129,7 +129,7 @@ def section(
     columns = {name: section[name] for name in names}
     horizontal, vertical = (q.of(columns, len(section)) for q in (across, up))
     own, ax = ax is None, axes_for(ax, width)
-    points = []
+    points: list[Line2D] = []
     kinds = [d for d in LOOKS if (section.directions == d).any()]
     for direction in kinds:
         marker, color, words = LOOKS[direction]

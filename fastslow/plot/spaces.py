@@ -17,10 +17,12 @@ from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place
 from fastslow.plot.legends import explained
-from fastslow.plot.quantities import Array, Quantity, along_branch
+from fastslow.plot.marks import draw_crossings, draw_transitions, draw_turning
+from fastslow.plot.quantities import Quantity, along_branch, along_overlay
 from fastslow.plot.stretches import draw_points, runs, worth_a_marker
 from fastslow.plot.style import BRANCH, LINES, SMALL, TEXT, axes_for
 from fastslow.results.diagrams import Diagram
+from fastslow.results.overlays import Overlay
 
 #: Size of the box of axes in space, which leaves room for the names of its axes.
 ZOOM = 0.86
@@ -55,6 +57,12 @@ class SpaceDrawing(Drawing):
         Sense of direction.
     along : str
         What the first axis shows.
+    crossings : Line2D or None
+        One dot for each crossing of an interface.
+    transitions : tuple of Line2D
+        One for each kind of transition.
+    turning : Line2D or None
+        Where the slow quantity turns back.
     """
 
     x: str
@@ -66,6 +74,9 @@ class SpaceDrawing(Drawing):
     labels: tuple[Annotation, ...] = ()
     arrows: tuple[Annotation, ...] = ()
     along: str = ""
+    crossings: Line2D | None = None
+    transitions: tuple[Line2D, ...] = ()
+    turning: Line2D | None = None
 
 
 def draw_space(
@@ -77,7 +88,9 @@ def draw_space(
     legend: bool | None,
     *,
     virtual: bool,
-    motion: Sequence[Array] | None = None,
+    lay: Overlay | None = None,
+    crossings: bool = True,
+    turning: bool = True,
     color: str = BRANCH,
     style: dict[str, Any],
 ) -> SpaceDrawing:
@@ -87,31 +100,38 @@ def draw_space(
     ----------
     shown : tuple of Quantity
         Along the three axes.
-    motion : sequence of ndarray, optional
-        The trajectory along the three axes.
+    lay : Overlay, optional
+        With the trajectory.
     color, style
         Of the trajectory, else of the branches.
     """
     own, space = ax is None, axes_for(ax, width, HEIGHT, space=True)
-    of_branches = {"color": color, **style} if motion is None else {"color": BRANCH}
+    of_branches = {"color": color, **style} if lay is None else {"color": BRANCH}
     branches: list[Line2D] = []
     drawn = [b for b in diagram.branches if b.admissible or virtual]
     for branch in drawn:
         places = along_branch(diagram, branch, *shown)
         for kind, rows in runs(branch):
             look = {**LINES[kind], "label": kind, **of_branches}
-            if motion is not None and kind == "stable":
+            if lay is not None and kind == "stable":
                 # wide enough to be seen beneath a trajectory that follows it
                 look["linewidth"] = 2.0
             branches += space.plot(*(p[rows] for p in places), **look)
-    line, heads = None, ()
-    if motion is not None:
+    line: Line2D | None = None
+    dots: Line2D | None = None
+    turns: Line2D | None = None
+    changes: tuple[Line2D, ...] = ()
+    heads: tuple[Annotation, ...] = ()
+    if lay is not None:
         look = {"linewidth": 0.7, "color": color, "label": "trajectory", **style}
-        (line,) = space.plot(*motion, **look)
+        (line,) = space.plot(*along_overlay(lay, *shown), **look)
+        dots = draw_crossings(space, lay, shown) if crossings else None
+        changes = draw_transitions(space, lay, shown)
+        turns = draw_turning(space, lay, shown) if turning else None
     markers, labels = draw_points(space, worth_a_marker(drawn), shown, label)
     dress_space(space, [q.label for q in shown])
     seen: dict[str, Artist] = {str(h.get_label()): h for h in [*branches, *markers]}
-    handles = [*seen.values(), *([] if line is None else [line])]
+    handles = [*seen.values(), *(m for m in (line, dots, turns, *changes) if m is not None)]
     key = explained(space, handles, own, label, legend)
     place(space, labels)
     settle(space)
@@ -119,7 +139,8 @@ def draw_space(
         heads = draw_arrows(line, length_along(line), ARROWS)
         settle(space)
     along, x, y = (q.text for q in shown)
-    return SpaceDrawing(space, x, y, tuple(branches), markers, line, key, labels, heads, along)
+    below = tuple(branches), markers, line, key, labels, heads
+    return SpaceDrawing(space, x, y, *below, along, dots, changes, turns)
 
 
 def dress_space(space: Any, names: Sequence[str]) -> None:

@@ -78,17 +78,17 @@ TRANSITIONS: dict[str, tuple[str, str, str]] = {
 
 #: Look of a phase of the motion by kind.
 PHASES: dict[str, dict[str, Any]] = {
-    "quiescent": {"facecolor": "#C9DDEB"},
-    "spiking": {"facecolor": "#F3C98B"},
+    "quiescent": {"facecolor": "#C2DBEB"},
+    "spiking": {"facecolor": "#EBBC72"},
     "jump": {"facecolor": VERMILION},
     "transit": {"facecolor": PURPLE},
     "excursion": {"facecolor": ORANGE},
-    "transient": {"facecolor": "#DDDDDD"},
+    "transient": {"facecolor": "#EBEBEB"},
     "outside": {"facecolor": "white", "hatch": "/////", "edgecolor": GREY},
 }
 
 #: Light fills of the regions, in turn.
-BANDS = ("#E4F1FA", "#FFFFFF", "#FBF0DC")
+BANDS = ("#E1F2FD", "#FFFFFF", "#EFE1C7")
 
 MM = 1 / 25.4
 COLUMN, FULL = 85 * MM, 170 * MM
@@ -231,7 +231,8 @@ def dot_look(code: str, size: float = 4.5) -> dict[str, Any]:
 
 def widen(ax: Axes) -> None:
     """Keep points that agree to rounding from filling the axes with their noise."""
-    limits = ((ax.dataLim.intervalx, ax.set_xlim), (ax.dataLim.intervaly, ax.set_ylim))
+    box = ax.dataLim
+    limits: list[Any] = [(box.intervalx, ax.set_xlim), (box.intervaly, ax.set_ylim)]
     sizes = [max(abs(low), abs(high)) for (low, high), _ in limits]
     if not max(sizes) < float("inf"):
         return
