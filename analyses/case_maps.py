@@ -32,7 +32,7 @@ from analyses.cases import (
 from analyses.output import Output
 from analyses.passages import OMEGA
 from analyses.regime_maps import critical_ratio
-from fastslow.plot.maps import FILLS
+from fastslow.plot.areas import FILLS
 from fastslow.plot.style import FULL, MM, SMALL, TEXT, VERMILION, dressed, new_figure
 from fastslow.results.refined_maps import MapComparison
 from fastslow.systems.gears import SCALINGS

@@ -19,7 +19,7 @@ import fastslow as fs
 from analyses.cases import WIDTHS, gear
 from analyses.gap_region import STATED
 from analyses.output import Output
-from fastslow.plot.maps import FILLS
+from fastslow.plot.areas import FILLS
 from fastslow.plot.style import FULL, GREY, MM, SMALL, TEXT, dressed, new_figure
 
 Floats = NDArray[np.float64]

@@ -14,6 +14,7 @@ from fastslow.interactive.views import View
 from fastslow.plot.branches import draw_branches
 from fastslow.plot.motions import draw_motion, phase_portrait, time_series
 from fastslow.plot.passages import draw_passage
+from fastslow.plot.quantities import along_run, of_diagram
 from fastslow.plot.style import GREY, MOTION, SMALL, TEXT, VERMILION, dressed, typeset
 
 #: Size of a figure of our own, in inches, and places of its axes in it.
@@ -44,17 +45,19 @@ def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:
     handles: list[Any] = []
     if lay is not None:
         # labels stand beside their points, to place them freely takes as long as all the rest
-        laid = draw_passage(main, lay, name)
+        shown = of_diagram(lay.diagram, None, lay.parameter), of_diagram(lay.diagram, name, name)
+        laid = draw_passage(main, lay, shown)
         handles = laid.handles
         curves += curves_of(laid, lay)
     elif view.diagram is not None:
-        below = draw_branches(main, view.diagram, name, label=True, virtual=True, interfaces=True)
+        across = view.diagram.parameter
+        shown = of_diagram(view.diagram, None, across), of_diagram(view.diagram, name, name)
+        below = draw_branches(main, view.diagram, shown, label=True, virtual=True, interfaces=True)
         handles = [*below.handles]
         curves += curves_of(below, view.diagram)
-        across = view.diagram.parameter
         if run is not None and across in run.columns:
-            handles += draw_motion(main, run.t, run[across], run[name], run.period, MOTION, {})
-            curves.append(run_curve(main, run, across, name))
+            handles += draw_motion(main, run.t, along_run(run, *shown), run.period, MOTION, {})
+            curves.append(run_curve(main, run, *shown))
         handles += _mark_value(main, view)
     else:
         _empty(main, "no diagram")

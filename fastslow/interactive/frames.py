@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from fastslow.interactive.tooltips import text_of
 from fastslow.interactive.views import View
-from fastslow.plot.branches import runs, special_shown
-from fastslow.plot.motions import at_crossings
+from fastslow.plot.quantities import Quantity, at_crossings
+from fastslow.plot.stretches import runs, worth_a_marker
 from fastslow.plot.style import (
     BANDS,
     BRANCH,
@@ -130,8 +130,7 @@ def frame_of(view: View, store: Store) -> dict[str, Any]:
             panels.append(_panel(x, y, _bands(view, x, y)))
             last = _last_period(run, columns[:, 0]) if x != "t" else 0
             panels[-1]["lines"] = _motion_lines(names, x, y, last, len(columns))
-            points = np.column_stack([at_crossings(run, x), at_crossings(run, y)])
-            panels[-1]["marks"] = [_contacts(run, points)]
+            panels[-1]["marks"] = [_contacts(run, x, y)]
     if diagram is not None:
         main = _panel(diagram.parameter, state, _bands(view, diagram.parameter, state))
         main["over"] = list(diagram.over)
@@ -146,8 +145,7 @@ def frame_of(view: View, store: Store) -> dict[str, Any]:
         if lay is not None and run is not None:
             last = _last_period(run, columns[:, 0])
             main["lines"] += _motion_lines(names, diagram.parameter, state, last, len(columns))
-            slow = at_crossings(run, diagram.parameter)
-            main["marks"].append(_contacts(run, np.column_stack([slow, at_crossings(run, state)])))
+            main["marks"].append(_contacts(run, diagram.parameter, state))
             main["marks"] += _transition_marks(view)
             for line in main["lines"]:
                 if line["look"] == "stable":
@@ -268,7 +266,8 @@ def _last_period(run: Trajectory, times: Array) -> int:
     return max(int(np.searchsorted(times, times[-1] - run.period, side="right")) - 1, 0)
 
 
-def _contacts(run: Trajectory, points: Array) -> dict[str, Any]:
+def _contacts(run: Trajectory, x: str, y: str) -> dict[str, Any]:
+    points = np.column_stack(at_crossings(run, Quantity(x), Quantity(y)))
     return {
         "look": "contact",
         "points": [
@@ -283,18 +282,16 @@ def _special_marks(view: View) -> list[dict[str, Any]]:
     diagram = view.diagram
     found: dict[str, list[list[Any]]] = {}
     numbers = {id(point): k for k, point in enumerate(diagram.special)}
-    for branch in diagram.branches:
-        for point in special_shown(branch) if branch.admissible else ():
-            k = numbers[id(point)]
-            found.setdefault(point.code, []).append(
-                [
-                    point[diagram.parameter],
-                    point[view.setup.state],
-                    text_of(point, diagram.parameter),
-                    f"diagram.special[{k}]",
-                    point.label,
-                ]
-            )
+    for point in worth_a_marker([b for b in diagram.branches if b.admissible]):
+        found.setdefault(point.code, []).append(
+            [
+                point[diagram.parameter],
+                point[view.setup.state],
+                text_of(point, diagram.parameter),
+                f"diagram.special[{numbers[id(point)]}]",
+                point.label,
+            ]
+        )
     return [{"look": code, "points": points} for code, points in found.items()]
 
 

@@ -13,10 +13,19 @@ from numpy.typing import NDArray
 from fastslow.errors import ArgumentError
 from fastslow.interactive.tooltips import Instant, text_of
 from fastslow.plot.branches import DiagramDrawing
-from fastslow.plot.heights import along, at_point
-from fastslow.plot.motions import MotionDrawing, at_crossings
+from fastslow.plot.marks import at_moments
+from fastslow.plot.motions import MotionDrawing
 from fastslow.plot.panels import PanelDrawing
-from fastslow.plot.passages import OverlayDrawing, at_moments, heights_at
+from fastslow.plot.passages import OverlayDrawing
+from fastslow.plot.quantities import (
+    Quantity,
+    along_branch,
+    along_overlay,
+    along_run,
+    at_crossings,
+    at_points,
+    at_times,
+)
 from fastslow.results.branches import Branch
 from fastslow.results.crossings import regions_at
 from fastslow.results.diagrams import Diagram
@@ -108,11 +117,11 @@ def curves_of(drawing: Any, result: Diagram | Trajectory | Overlay) -> tuple[Cur
         return (*below, *_overlay_curves(drawing, result))
     if isinstance(drawing, DiagramDrawing) and isinstance(result, Diagram):
         return tuple(_diagram_curves(drawing, result))
-    if isinstance(drawing, MotionDrawing) and isinstance(result, Trajectory):
+    if isinstance(drawing, MotionDrawing) and isinstance(result, Trajectory) and not drawing.z:
         return tuple(_motion_curves(drawing, result))
     raise ArgumentError(
         f"cannot pick in a {type(drawing).__name__} of a {type(result).__name__}; expected the "
-        "drawing of a diagram, a trajectory or an overlay, with what was drawn"
+        "drawing of a diagram, a trajectory or an overlay in the plane, with what was drawn"
     )
 
 
@@ -177,10 +186,9 @@ def _diagram_curves(drawing: DiagramDrawing, diagram: Diagram) -> Iterable[Curve
     special = list(diagram.special)
     for branch in diagram.branches:
         if branch.admissible or virtual:
-            heights = along(diagram, branch, drawing.state)
             yield Curve(
                 drawing.ax,
-                np.column_stack([branch.parameter, heights]),
+                np.column_stack(along_branch(diagram, branch, *drawing.shown)),
                 True,
                 _on_branch(diagram, branch),
                 diagram.parameter,
@@ -191,10 +199,9 @@ def _diagram_curves(drawing: DiagramDrawing, diagram: Diagram) -> Iterable[Curve
         for k, point in enumerate(special)
         if point.code in marked and (point.admissible or virtual)
     ]
-    at = [(special[k][diagram.parameter], at_point(special[k], drawing.state)) for k in numbers]
     yield Curve(
         drawing.ax,
-        np.reshape(at, (-1, 2)),
+        np.column_stack(at_points([special[k] for k in numbers], *drawing.shown)),
         False,
         lambda row, _: (special[numbers[row]], f"diagram.special[{numbers[row]}]"),
         diagram.parameter,
@@ -214,40 +221,42 @@ def _on_branch(diagram: Diagram, branch: Branch) -> Callable[[int, float], tuple
     return found
 
 
-def run_curve(ax: Axes, run: Trajectory, x: str, y: str) -> Curve:
-    """A run drawn over time or in the plane of two of its columns."""
-    return Curve(ax, np.column_stack([run[x], run[y]]), True, _on_run(run))
+def run_curve(ax: Axes, run: Trajectory, *shown: Quantity) -> Curve:
+    """A run drawn over time or in the plane of two quantities."""
+    return Curve(ax, np.column_stack(along_run(run, *shown)), True, _on_run(run))
 
 
 def _motion_curves(drawing: MotionDrawing, run: Trajectory) -> Iterable[Curve]:
-    yield run_curve(drawing.ax, run, drawing.x, drawing.y)
+    yield run_curve(drawing.ax, run, *drawing.shown)
     if drawing.crossings is not None:
-        at = np.column_stack([at_crossings(run, drawing.x), at_crossings(run, drawing.y)])
-        yield _at_crossings(drawing.ax, at, run)
+        yield _at_crossings(drawing.ax, at_crossings(run, *drawing.shown), run)
 
 
 def _overlay_curves(drawing: OverlayDrawing, lay: Overlay) -> Iterable[Curve]:
-    name, run = drawing.state, lay.run
-    yield Curve(drawing.ax, np.column_stack([lay.slow, lay[name]]), True, _on_run(run))
+    shown, run = drawing.shown, lay.run
+    yield Curve(drawing.ax, np.column_stack(along_overlay(lay, *shown)), True, _on_run(run))
     if drawing.crossings is not None:
         times = np.array([c.time for c in run.crossings])
         state = np.array([c.state for c in run.crossings])
-        slow = np.interp(times, lay.time, lay.slow)
-        heights = heights_at(lay, name, times, slow, run.states, state)
-        yield _at_crossings(drawing.ax, np.column_stack([slow, heights]), run)
+        at = at_times(lay, times, run.states, state, *shown)
+        yield _at_crossings(drawing.ax, at, run)
     if lay.transitions:
-        at = np.column_stack(at_moments(lay, name, lay.transitions))
         yield Curve(
             drawing.ax,
-            at,
+            np.column_stack(at_moments(lay, shown, lay.transitions)),
             False,
             lambda row, _: (lay.transitions[row], f"lay.transitions[{row}]"),
             lay.parameter,
         )
 
 
-def _at_crossings(ax: Axes, at: Array, run: Trajectory) -> Curve:
-    return Curve(ax, at, False, lambda row, _: (run.crossings[row], f"run.crossings[{row}]"))
+def _at_crossings(ax: Axes, at: list[Array], run: Trajectory) -> Curve:
+    return Curve(
+        ax,
+        np.column_stack(at),
+        False,
+        lambda row, _: (run.crossings[row], f"run.crossings[{row}]"),
+    )
 
 
 def _on_run(run: Trajectory) -> Callable[[int, float], tuple[Any, str]]:

@@ -139,10 +139,10 @@ class Pointer:
 
     def _clicked(self, event: Event) -> None:
         assert isinstance(event, MouseEvent)
-        toolbar = getattr(self.figure.canvas, "toolbar", None)
+        toolbar: Any = getattr(self.figure.canvas, "toolbar", None)
         found = self._found(event)
         # a drag of the toolbar's zoom or pan is no click on a point
-        if found is None or event.button != 1 or getattr(toolbar, "mode", ""):
+        if found is None or event.button != 1 or getattr(toolbar, "mode", False):
             return
         self.selected = found
         if self._on_click is not None:

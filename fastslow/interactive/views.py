@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from fastslow.arguments import tolerance
 from fastslow.diagrams.tracing import continue_equilibria
 from fastslow.errors import ArgumentError, FastSlowError, unknown_name
 from fastslow.model.model import Model
@@ -17,7 +18,7 @@ from fastslow.results.diagrams import Diagram
 from fastslow.results.outcome import Outcome
 from fastslow.results.overlays import Overlay
 from fastslow.results.trajectories import Trajectory
-from fastslow.simulation.arguments import initial_state, time_span, tolerance
+from fastslow.simulation.arguments import initial_state, time_span
 from fastslow.simulation.trajectories import period_of, simulate
 
 R = TypeVar("R")
@@ -186,7 +187,7 @@ def setup_of(
         tuple(begin.tolist()),
         None if t is None else (float(t[0]), float(t[1])),
         None if periods is None else float(periods),
-        tolerance(tol),
+        tolerance("tol", tol),
         shown,
     )
 

@@ -36,7 +36,7 @@ _drawable = within(30.0, 2000.0)
 def figure_width(name: str, value: Any) -> str | float:
     """The width of a figure: by its name, or in millimetres."""
     if isinstance(value, str):
-        return word("width", WIDTHS)(name, value)  # type: ignore[no-any-return]
+        return word("width", WIDTHS)(name, value)
     return _drawable(name, value)
 
 

@@ -55,6 +55,8 @@ class DiagramDrawing(Drawing):
     legend : Legend or None
     x : str
         What the horizontal axis shows.
+    shown : tuple of Quantity
+        What the axes show, the horizontal one first.
     """
 
     state: str
@@ -64,6 +66,7 @@ class DiagramDrawing(Drawing):
     bands: Bands
     legend: Legend | None
     x: str = ""
+    shown: tuple[Quantity, ...] = ()
 
     @property
     def handles(self) -> list[Artist]:
@@ -227,4 +230,6 @@ def draw_branches(
             bands = draw_bands(
                 ax, quantity.column, values, heights, regions, vertical=vertical, label=label
             )
-    return DiagramDrawing(ax, up.text, tuple(lines), markers, labels, bands, None, across.text)
+    return DiagramDrawing(
+        ax, up.text, tuple(lines), markers, labels, bands, None, across.text, shown
+    )

@@ -139,8 +139,8 @@ def regime_map(
     ax.set_xlabel(typeset(result.names[0]))
     ax.set_ylabel(typeset(result.names[1]))
     drawn = draw_areas(ax, result, fills)
-    look = {"color": BLACK, "linewidth": 0.8, "solid_joinstyle": "round", "zorder": 2.0}
-    look |= {"label": "boundary", **style}
+    look: dict[str, Any] = {"color": BLACK, "linewidth": 0.8, "zorder": 2.0}
+    look |= {"solid_joinstyle": "round", "label": "boundary", **style}
     lines = [line for b in result.boundaries for line in ax.plot(*b.points.T, **look)]
     over: list[Line2D] = []
     for number, (name, (x, y)) in enumerate((curves or {}).items()):

@@ -72,6 +72,8 @@ class MotionDrawing(Drawing):
         Where there is more than the trajectory to explain.
     z : str
         What the third axis shows, in space.
+    shown : tuple of Quantity
+        What the axes show, the horizontal one first.
     """
 
     x: str
@@ -84,6 +86,7 @@ class MotionDrawing(Drawing):
     words: tuple[Text, ...] = ()
     legend: Legend | None = None
     z: str = ""
+    shown: tuple[Quantity, ...] = ()
 
     @property
     def handles(self) -> list[Artist]:
@@ -178,7 +181,7 @@ def time_series(
         ax.set_xlim(float(time[0]), float(time[-1]), auto=None)
     strip = draw_phases(ax, phases, label) if phases else ((), ())
     bands = _bands(ax, run, (None, shown[1]), interfaces, label)
-    drawn = MotionDrawing(ax, "t", shown[1].text, lines, dots, (), bands, *strip)
+    drawn = MotionDrawing(ax, "t", shown[1].text, lines, dots, (), bands, *strip, shown=shown)
     if phases:
         at_draw(ax, lambda: fit_words(*strip))
     # a legend stays below the strip
@@ -293,7 +296,9 @@ def phase_portrait(
     fractions = (np.arange(arrows) + 0.5) / max(arrows, 1)
     heads = draw_arrows(lines[-1], length_along(lines[-1]), fractions.tolist())
     across, up, *more = (q.text for q in shown)
-    drawn = MotionDrawing(ax, across, up, lines, dots, heads, bands, z="".join(more))
+    drawn = MotionDrawing(
+        ax, across, up, lines, dots, heads, bands, z="".join(more), shown=tuple(shown)
+    )
     return _explained(drawn, own, label, legend)
 
 

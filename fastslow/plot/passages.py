@@ -65,6 +65,8 @@ class OverlayDrawing(Drawing):
     legend : Legend or None
     x : str
         What the horizontal axis shows.
+    shown : tuple of Quantity
+        What the axes show, the horizontal one first.
     """
 
     state: str
@@ -76,6 +78,7 @@ class OverlayDrawing(Drawing):
     arrows: tuple[Annotation, ...]
     legend: Legend | None
     x: str = ""
+    shown: tuple[Quantity, ...] = ()
 
     @property
     def handles(self) -> list[Artist]:
@@ -252,7 +255,9 @@ def draw_passage(
     drawn = len(points(lines[-1]))
     heads = draw_heads(lines[-1], _heads(lay, up, lay.slow[len(lay) - drawn :]))
     text = shown[1].text
-    return OverlayDrawing(ax, text, below, lines, dots, changes, turns, heads, None, shown[0].text)
+    return OverlayDrawing(
+        ax, text, below, lines, dots, changes, turns, heads, None, shown[0].text, shown
+    )
 
 
 def _heads(lay: Overlay, values: Array, drawn: Array) -> list[int]:
