@@ -51,7 +51,10 @@ napoleon_google_docstring = False
 napoleon_use_param = False
 napoleon_use_rtype = False
 # classes of these packages have pages of their own elsewhere, and nothing is fetched to link them
-nitpick_ignore_regex = [(r"py:.*", r"(abc|collections|enum|matplotlib|numpy|sympy|typing)\..*")]
+nitpick_ignore_regex = [
+    (r"py:.*", r"(abc|collections|enum|matplotlib|numpy|sympy|typing)\..*"),
+    (r"py:class", r"Figure"),
+]
 
 
 def prepare(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:

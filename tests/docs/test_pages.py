@@ -12,7 +12,7 @@ DOCS = ROOT / "docs"
 PAGES = sorted(page for page in DOCS.rglob("*.md"))
 CELL = re.compile(r"^```\{code-cell\}.*?\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
 ENTRY = re.compile(r"^\.\. auto\w+:: (\S+)$", flags=re.MULTILINE)
-HEAD = "---\nfile_format: mystnb\nkernelspec:\n  name: python3\n---\n"
+HEAD = "---\nfile_format: mystnb\nkernelspec:"
 
 
 def public_names():
