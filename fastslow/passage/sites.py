@@ -153,7 +153,7 @@ def level_of(site: Site, level: Mapping[Any, float] | None) -> tuple[int, float]
     """The state of a level, by its number, and how far it is from the special point."""
     if level is None:
         return None
-    if not isinstance(level, Mapping) or len(level) != 1:
+    if len(level) != 1:
         raise ArgumentError(
             f"level = {level!r}; expected one state and its value, as in {{'x': 1}}"
         )

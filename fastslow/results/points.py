@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import position
+from fastslow.arguments import position, word
 from fastslow.errors import unknown_name
 from fastslow.results.markup import points_html
 from fastslow.results.point_columns import columns_of_points
@@ -371,8 +371,7 @@ class SpecialPoints(Table, Result, tuple[SpecialPoint, ...]):
 
     def __call__(self, code: str) -> SpecialPoints:
         """Those of one code; UnknownNameError for a code that there is not."""
-        if not isinstance(code, str) or code not in CODE_NAMES:
-            raise unknown_name("special point code", code, CODE_NAMES)
+        word("special point code", CODE_NAMES)("code", code)
         return SpecialPoints(point for point in self if point.code == code)
 
     def __getitem__(self, key: Any) -> Any:

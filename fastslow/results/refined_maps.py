@@ -152,10 +152,7 @@ class RefinedMap(Result):
             For a label that is not in the map.
         """
         for label in (one, other):
-            if not isinstance(label, str | bool | int) or label not in self.labels:
-                raise unknown_name(
-                    "label", label if isinstance(label, str) else shown(label), self.labels
-                )
+            _require_label(label, self.labels)
         found = [b for b in self.boundaries if set(b.labels) == {one, other}]
         return tuple(sorted(found, key=lambda b: -len(b.points)))
 
@@ -350,3 +347,8 @@ def label_of(value: Any) -> tuple[Label, str]:
     if isinstance(value, str | bool | int):
         return value, ""
     raise ArgumentError(f"{value!r} is no label of a map; expected a string, a bool or a count")
+
+
+def _require_label(label: Any, labels: tuple[Label, ...]) -> None:
+    if not isinstance(label, str | bool | int) or label not in labels:
+        raise unknown_name("label", label if isinstance(label, str) else shown(label), labels)

@@ -205,7 +205,7 @@ def methods(r):
         "Model": (
             r["gear"],
             {
-                "with_parameters": {"named": {"C": 2.0}},
+                "with_parameters": {"changes": {"C": 2.0}},
                 "freed": {"name": "C"},
                 "frozen": {},
                 "ramped": {"name": "C", "rate": 0.1},
