@@ -1,0 +1,67 @@
+"""The page on errors and endings: what it lists is real, and no class and no outcome is missing."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import fastslow as fs
+from fastslow import errors
+from tests.errors.wrong_arguments import BY_FUNCTION, BY_PARAMETER, SAVE
+
+ROOT = Path(fs.__file__).parent
+PAGE = (ROOT.parent / "docs" / "errors.md").read_text(encoding="utf-8")
+SOURCES = {path: path.read_text(encoding="utf-8") for path in sorted(ROOT.rglob("*.py"))}
+TEXTS = {
+    node.value
+    for source in SOURCES.values()
+    for node in ast.walk(ast.parse(source))
+    if isinstance(node, ast.Constant) and isinstance(node.value, str)
+}
+
+#: What the errors of the wrong arguments are known to say.
+TRIED = {
+    words for rows in (*BY_PARAMETER.values(), *BY_FUNCTION.values(), SAVE) for _, _, words in rows
+}
+
+
+def outcomes():
+    """The codes of every Outcome built in the sources."""
+    found = set()
+    for source in SOURCES.values():
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Outcome":
+                assert isinstance(node.args[0], ast.Constant), "a code is a plain text"
+                found.add(node.args[0].value)
+    return found
+
+
+def first_cells(begin, end):
+    """What stands in the first column of the tables between two headings, mark by mark."""
+    part = PAGE[PAGE.index(begin) : PAGE.index(end) if end else len(PAGE)]
+    rows = re.findall(r"^\| (`.*?) \|", part, flags=re.M)
+    return [text for row in rows for text in re.findall(r"`([^`]+)`", row)]
+
+
+def test_every_outcome_is_explained():
+    assert set(first_cells("## Endings of a run", None)) == outcomes()
+
+
+def test_every_class_is_explained():
+    classes = {
+        name
+        for name, value in vars(errors).items()
+        if isinstance(value, type) and issubclass(value, fs.FastSlowError)
+    }
+    assert set(first_cells("## The classes", "## Arguments")) == classes - {"FastSlowError"}
+    assert "`fastslow.FastSlowError`" in PAGE
+    assert all(name in fs.__all__ for name in classes)
+    for name, base in re.findall(r"^\| `(\w+Error)` \| `(\w+)` \|", PAGE, flags=re.M):
+        assert base in {kind.__name__ for kind in getattr(errors, name).__mro__}
+
+
+@pytest.mark.parametrize("message", first_cells("## Arguments", "## Endings of a run"))
+def test_the_messages_are_real(message):
+    if message != "No such file":  # said by the system
+        assert any(message in text for text in TEXTS | TRIED), message
