@@ -153,7 +153,7 @@ def _checked(diagram: Diagram, run: Trajectory, radius: float, observed: object)
                 "expected the same parameters"
             )
     if not 0.0 < radius < 1.0:
-        raise ArgumentError(f"radius = {radius!r}; expected a number between 0 and 1")
+        raise ArgumentError(f"radius = {radius:g}; expected a number between 0 and 1")
     if not len(run.t):
         raise ArgumentError("the trajectory has no samples; simulate with dense=True or samples=")
     name = diagram.states[0] if observed is None else str(observed)

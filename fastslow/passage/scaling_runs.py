@@ -184,7 +184,7 @@ def _starts(site: Site, laws: list[Law], start: float | None) -> list[tuple[floa
     if start is not None:
         if not (way * (here - start) > 0):
             side = "below" if way > 0 else "above"
-            raise ArgumentError(f"start = {start!r}; expected a value {side} {name} = {here:g}")
+            raise ArgumentError(f"start = {start:g}; expected a value {side} {name} = {here:g}")
         far = [abs(here - start)] * len(laws)
     ends = sorted((here - 1.02 * way * max(far), here + 0.05 * way * max(far)))
     model = site.field.model

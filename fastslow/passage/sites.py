@@ -149,11 +149,11 @@ def drift(rate: Any) -> float:
     return value
 
 
-def level_of(site: Site, level: Mapping[Any, float] | None) -> tuple[int, float] | None:
+def level_of(site: Site, level: Any) -> tuple[int, float] | None:
     """The state of a level, by its number, and how far it is from the special point."""
     if level is None:
         return None
-    if len(level) != 1:
+    if not isinstance(level, Mapping) or len(level) != 1:
         raise ArgumentError(
             f"level = {level!r}; expected one state and its value, as in {{'x': 1}}"
         )

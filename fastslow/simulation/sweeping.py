@@ -213,7 +213,7 @@ def _rule(settings: _Settings, name: str) -> str:
             "passes the level"
         )
     if not 0.0 <= settings.phase <= 1.0:
-        raise ArgumentError(f"phase = {settings.phase!r}; expected a part of the period, 0 to 1")
+        raise ArgumentError(f"phase = {settings.phase:g}; expected a part of the period, 0 to 1")
     if settings.what == "section":
         way = {1: " upwards", -1: " downwards", 0: " touching", None: ""}
         passed = f"{settings.section} = {settings.level:g}{way[settings.direction]}"

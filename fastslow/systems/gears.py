@@ -230,9 +230,8 @@ def harmonic_gear_physical(
     UnknownNameError
         For another scaling.
     ArgumentError
-        For an inertia, ratio, damping or cubic stiffness that is not positive.
-    ModelError
-        For another value that is not a finite number.
+        For an inertia, ratio, damping or cubic stiffness that is not positive, or
+        another value that is not a finite number.
 
     References
     ----------

@@ -182,7 +182,7 @@ BY_PARAMETER = {
         (lambda a, b: [], Wrong, "the prediction has 0 labels for"),
     ],
     "progress": FLAG,
-    "radius": [*NUMBER, (2, Wrong, "radius = 2.0; expected a number between 0 and 1")],
+    "radius": [*NUMBER, (2, Wrong, "radius = 2; expected a number between 0 and 1")],
     "rate": NUMBER,
     "reach": POSITIVE,
     "region": [*TEXT, ("S9", Unknown, "unknown region 'S9'; did you mean 'S1'?")],
@@ -360,7 +360,7 @@ BY_FUNCTION = {
     "Trajectory.spectrum.samples": [*COUNT, (2, Wrong, "samples = 2; expected from 8")],
     "Trajectory.steady.tol": POSITIVE,
     "bifurcation_sweep.level": NUMBER,
-    "bifurcation_sweep.phase": [*NUMBER, (2, Wrong, "phase = 2.0; expected a part of the period")],
+    "bifurcation_sweep.phase": [*NUMBER, (2, Wrong, "phase = 2; expected a part of the period")],
     "bifurcation_sweep.settle": COUNT,
     "bifurcation_sweep.values": [
         ([1, 3, 2], Wrong, "values: expected strictly rising or strictly falling numbers"),
@@ -391,7 +391,7 @@ BY_FUNCTION = {
         ([1e-3, -1e-3], Wrong, "expected at least two positive speeds"),
         ("12", Wrong, "rates: expected numbers, received '12'"),
     ],
-    "delay_scaling.start": [*NUMBER, (5, Wrong, "start = 5.0; expected a value")],
+    "delay_scaling.start": [*NUMBER, (5, Wrong, "start = 5; expected a value")],
     "disagreements.one": [*MAPPING, ({"B": 1}, Unknown, "unknown entry 'B'")],
     "disagreements.other": MAPPING,
     "equilibria.named": [

@@ -133,7 +133,7 @@ def test_wrong_arguments(cusp_fold, corner):
     for level in (1.0, {}, {"x": 1, "y": 2}):
         with pytest.raises(fs.ArgumentError, match="expected one state and its value"):
             fold_delay(cusp_fold, 1e-3, level=level)
-    with pytest.raises(fs.ArgumentError, match="expected a finite value"):
+    with pytest.raises(fs.ArgumentError, match="level of x = inf; expected a finite number"):
         fold_delay(cusp_fold, 1e-3, level={"x": math.inf})
     with pytest.raises(fs.UnknownNameError, match="unknown state of the level 'z'"):
         fold_delay(cusp_fold, 1e-3, level={"z": 1})

@@ -71,7 +71,7 @@ def test_regions_of_the_gear():
 def test_bad_values():
     with pytest.raises(fs.UnknownNameError, match="'printd'; did you mean 'printed'"):
         harmonic_gear_physical("printd")
-    with pytest.raises(fs.ArgumentError, match="k2: expected a positive number, received -1"):
+    with pytest.raises(fs.ArgumentError, match="k2 = -1; expected a positive number"):
         harmonic_gear_physical(k2=-1)
-    with pytest.raises(fs.ModelError, match="parameter D: expected a finite number, received nan"):
+    with pytest.raises(fs.ArgumentError, match="D = nan; expected a finite number"):
         harmonic_gear_physical(D=float("nan"))
