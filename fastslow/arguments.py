@@ -156,15 +156,16 @@ def positive(name: str, value: Any) -> float:
     return result
 
 
-def whole(least: int, most: int | None = None) -> Check:
+def whole(least: int, most: int = 2**62) -> Check:
     """A whole number within bounds."""
 
     def check(name: str, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int | np.integer):
             raise refusal(name, value, "a whole number")
-        if value < least or (most is not None and value > most):
-            limits = f"at least {least}" if most is None else f"from {least} to {most}"
-            raise refusal(name, value, limits)
+        if value < least or value > most:
+            # a bound that only keeps memory and time within reason is named when it is met
+            upper = f" to {most}" if value > most or most <= 1000 else ""
+            raise refusal(name, value, f"a whole number from {least}{upper}")
         return int(value)
 
     return check

@@ -197,7 +197,7 @@ def slow_load_criterion(
         if name not in model.parameters:
             raise unknown_name("parameter", name, model.parameters)
     values: dict[str, Any] = {**dict(model.parameters), **swept}
-    shape = _broadcast(*map(np.asarray, values.values()))[0].shape
+    shape = _broadcast(np.zeros(()), *map(np.asarray, values.values()))[0].shape
     damping, load, omega, edges, stiffness = _gap_motion(model, gap)
 
     def number(expression: sp.Expr, **more: Floats) -> Floats:

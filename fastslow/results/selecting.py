@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import items, real_number, refusal
+from fastslow.arguments import real_number, refusal
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.outcome import Outcome
 from fastslow.results.points import CODE_NAMES, SpecialPoints
@@ -102,7 +102,8 @@ def limits_of(between: tuple[float, float]) -> tuple[float, float]:
     ArgumentError
         For anything else.
     """
-    ends = [real_number(end) for end in items()("between", between)]
+    sequence = isinstance(between, tuple | list | np.ndarray)
+    ends = [real_number(end) for end in between] if sequence and np.ndim(between) == 1 else []
     low, high = ends if len(ends) == 2 else (None, None)
     if low is None or high is None or not low <= high:
         raise refusal("between", between, "two numbers, the lower one first")

@@ -128,7 +128,7 @@ def spans_of(
         received = "both" if t is not None else "neither"
         raise ArgumentError(f"expected t=(start, end) or periods=, received {received}")
     if settle < 0:
-        raise ArgumentError(f"settle = {settle!r}; expected a number from 0")
+        raise ArgumentError(f"settle = {settle:g}; expected a number from 0")
     if t is not None:
         if start != 0:
             raise ArgumentError("start= goes with periods=; with t=(start, end) it is in t")
@@ -152,7 +152,7 @@ def spans_of(
         unit = own
         spans = np.stack([np.full(len(own), start), start + length * own], axis=1)
     if settle >= length:
-        raise ArgumentError(f"settle = {settle!r} leaves nothing of the run, which is {length:g}")
+        raise ArgumentError(f"settle = {settle:g} leaves nothing of the run, which is {length:g}")
     return spans, spans[:, 0] + settle * unit
 
 

@@ -17,11 +17,11 @@ def line():
 @pytest.mark.parametrize(
     ("over", "message"),
     [
-        ((1, 1), r"over=\(1, 1\): expected an increasing range"),
+        ((1, 1), r"over = \(1, 1\); expected two finite numbers"),
         ((2, -1), r"did you mean \(-1, 2\)"),
-        ((0, np.inf), "expected finite ends"),
-        ((0, "a"), "expected two numbers"),
-        (3, "expected two numbers"),
+        ((0, np.inf), "expected two finite numbers"),
+        ((0, "a"), "expected two finite numbers"),
+        (3, "expected two finite numbers"),
     ],
 )
 def test_range(line, over, message):

@@ -101,7 +101,7 @@ def test_spectrum_marks_its_lines():
     assert [label.get_text() for label in drawn.labels] == ["31.42", "62.83"]
     assert drawn.ax.get_yscale() == "log"
     assert drawn.ax.get_xlabel() == "angular frequency"
-    with pytest.raises(fs.ArgumentError, match="low < high"):
+    with pytest.raises(fs.ArgumentError, match="the lower one first"):
         fs.plot.spectrum(spectrum, over=(2, 1))
 
 

@@ -48,7 +48,7 @@ def test_initial_state_by_unknown_name(gear):
         ({"periods": 1, "start": math.nan}, "start = nan"),
         ({"t": (0, 1), "tol": 0}, "tol = 0; expected a positive number"),
         ({"t": (0, 1), "tol": 1}, "tol = 1; expected a number from"),
-        ({"t": (0, 1), "order": 2}, "order = 2; expected from 4 to 40"),
+        ({"t": (0, 1), "order": 2}, "order = 2; expected a whole number from 4 to 40"),
         ({"t": (0, 1), "order": 8.5}, "order = 8.5; expected a whole number"),
         ({"t": (0, 1), "samples": 1}, "samples = 1"),
         ({"t": (0, 1), "samples": [0.5, 0.2]}, "increasing"),

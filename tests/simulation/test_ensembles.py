@@ -267,7 +267,7 @@ def test_progress_and_pickle(gear, swept, capsys):
         ({"settle": 1}, "settle = 1 leaves nothing of the run"),
         ({"settle": -1}, "settle = -1; expected a number from 0"),
         ({"period": [1, 2, 3]}, r"period has shape \(3,\)"),
-        ({"samples": 1}, "samples = 1; expected at least 2"),
+        ({"samples": 1}, "samples = 1; expected a whole number from 2"),
         ({"samples": [0, 2]}, "samples from 0 to 2 leave the runs"),
         ({"tol": 0}, "tol = 0"),
     ],

@@ -285,9 +285,9 @@ def test_progress(capsys):
     [
         ({"over": {"x": (0, 1)}}, "ranges of two parameters, received x"),
         ({"over": {}}, "received none"),
-        ({"over": {"x": (0, 1), "y": (1, 1)}}, r"over y = \(1, 1\); expected finite, low < high"),
+        ({"over": {"x": (0, 1), "y": (1, 1)}}, r"over y = \(1, 1\); expected two finite"),
         ({"over": {"x": (0, np.inf), "y": (0, 1)}}, "over x"),
-        ({"over": {"x": 3, "y": (0, 1)}}, r"expected \(low, high\), received 3"),
+        ({"over": {"x": 3, "y": (0, 1)}}, "over x = 3; expected two finite numbers"),
         ({"cells": (0, 4)}, "cells = 0; expected a whole number from 1"),
         ({"cells": 8}, "cells = 8; expected two whole numbers"),
         ({"levels": -1}, "levels = -1"),
