@@ -163,6 +163,7 @@ def simulations(r):
             "point": fold,
             "rates": [1e-5, 1e-6],
             "level": {"x": 0.5},
+            "max_steps": 2000,
         },
         "warm": {"models": []},
     }

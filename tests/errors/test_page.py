@@ -8,7 +8,9 @@ import pytest
 
 import fastslow as fs
 from fastslow import errors
-from tests.errors.wrong_arguments import BY_FUNCTION, BY_PARAMETER, SAVE
+from tests.errors.wrong_arguments import BY_FUNCTION
+from tests.errors.wrong_by_parameter import BY_PARAMETER
+from tests.errors.wrong_values import SAVE
 
 ROOT = Path(fs.__file__).parent
 PAGE = (ROOT.parent / "docs" / "errors.md").read_text(encoding="utf-8")

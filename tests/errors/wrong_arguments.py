@@ -1,272 +1,29 @@
-"""Wrong arguments with what their errors must say: by parameter, or by function and parameter.
-
-A row is (what is given, the error, words of its message). A parameter of the same name means
-the same in every function, so that one entry serves them all.
-"""
+"""Wrong arguments with what their errors must say, by function and parameter."""
 
 import numpy as np
 
 import fastslow as fs
-
-NAN, INF = float("nan"), float("inf")
-Wrong, Unknown, BadModel = fs.ArgumentError, fs.UnknownNameError, fs.ModelError
-
-FLAG = [(NAN, Wrong, "nan; expected True or False"), (1, Wrong, "= 1; expected True or False")]
-NUMBER = [
-    (NAN, Wrong, "nan; expected a finite number"),
-    ("5", Wrong, "'5'; expected a finite number"),
-    (True, Wrong, "True; expected a finite number"),
-    ([1.0], Wrong, "[1.0]; expected a finite number"),
-]
-POSITIVE = [
-    (0, Wrong, "0; expected a positive number"),
-    (-1, Wrong, "-1; expected a positive number"),
-    (INF, Wrong, "inf; expected a positive number"),
-    ("5", Wrong, "'5'; expected a positive number"),
-]
-TOLERANCE = [*POSITIVE, (1.0, Wrong, "1.0; expected a number from 1e-16 to 0.1")]
-COUNT = [
-    (-1, Wrong, "-1; expected"),
-    (1.5, Wrong, "1.5; expected a whole number"),
-    (True, Wrong, "True; expected a whole number"),
-    ("3", Wrong, "'3'; expected a whole number"),
-]
-TEXT = [(3, Wrong, "3; expected text")]
-SYMBOL = [(2.5, Wrong, "2.5; expected a name or an expression")]
-MAPPING = [([1], Wrong, "[1]; expected a mapping"), ("x", Wrong, "'x'; expected a mapping")]
-PATH = [
-    ("", Wrong, "path = ''; expected the path of a file"),
-    (3, Wrong, "path = 3; expected the path of a file"),
-]
-SAVE = [
-    *PATH,
-    ("gear.csv", Wrong, "gear.csv: expected a name that ends in .npz or .nc"),
-    ("nowhere/gear.npz", fs.FileError, "nowhere/gear.npz cannot be written: No such file"),
-]
-FIGURE = [
-    *PATH,
-    ("gear.pgn", Unknown, "unknown figure format 'pgn'; did you mean 'png'?"),
-    ("nowhere/gear.pdf", fs.FileError, "nowhere/gear.pdf cannot be written: No such file"),
-]
-RANGE = [
-    ((1, 1), Wrong, "(1, 1); expected two finite numbers, the lower one first"),
-    ((2, -1), Wrong, "the lower one first; did you mean (-1, 2)?"),
-    ((0, INF), Wrong, "(0, inf); expected two finite numbers"),
-    ((0, NAN), Wrong, "(0, nan); expected two finite numbers"),
-    ((0, 1, 2), Wrong, "(0, 1, 2); expected two finite numbers"),
-    (("0", "1"), Wrong, "('0', '1'); expected two finite numbers"),
-    (3, Wrong, "3; expected two finite numbers"),
-]
-PLANE = [
-    (3, Wrong, "over = 3; expected a mapping"),
-    ({"C": (0, 1)}, Wrong, "over"),
-    ({"C": (1, 0), "D": (0, 1)}, Wrong, "over"),
-]
-COLUMN = [("omga", Unknown, "omga"), ("x +", Wrong, "'x +' is no expression")]
-NAME = [("omga", Unknown, "unknown"), (None, Unknown, "None")]
-
-
-def a(kind):
-    """Rows for an argument that is an object of a class."""
-    article = "an" if kind[0] in "AEIO" else "a"
-    return [
-        (None, Wrong, f"expected {article} {kind}, received None"),
-        ("omga", Wrong, f"expected {article} {kind}, received a str"),
-        (np.zeros(3), Wrong, f"expected {article} {kind}, received a ndarray"),
-    ]
-
-
-BY_PARAMETER = {
-    "angular": FLAG,
-    "arrows": COUNT,
-    "assume": [
-        (3, Wrong, "assume: received 3; expected a strict inequality"),
-        ({"R": "positive"}, Unknown, "unknown parameter 'R'; did you mean 'r'?"),
-        ({"r": "positiv"}, Wrong, "r is 'positiv'; expected 'positive', 'negative'"),
-        ("r >= 0", Wrong, "expected a strict inequality"),
-    ],
-    "at_least": [*COUNT, (0, Wrong, "at_least = 0; expected a whole number from 1")],
-    "ax": [("omga", Wrong, "ax: expected an Axes, received a str")],
-    "back": FLAG,
-    "between": [
-        ((1, 0), Wrong, "between = (1, 0); expected two numbers, the lower one first"),
-        ((0, NAN), Wrong, "between = (0, nan)"),
-        (("0", "1"), Wrong, "between = ('0', '1')"),
-    ],
-    "branches": COUNT,
-    "cells": [
-        ((0, 1), Wrong, "cells = 0; expected a whole number from 1"),
-        ((1, 1.5), Wrong, "cells = 1.5; expected a whole number"),
-        (3, Wrong, "cells = 3; expected two whole numbers"),
-    ],
-    "changes": [
-        *MAPPING,
-        ({"omga": 1}, Unknown, "unknown parameter 'omga'; did you mean 'omega'?"),
-        ({"C": NAN}, BadModel, "parameter C: expected a finite number, received nan"),
-        ({"C": "2"}, BadModel, "parameter C: expected a finite number, received '2'"),
-    ],
-    "code": [
-        ("LQ", Unknown, "'LQ'; did you mean 'LP'?"),
-        (3, Wrong, "code = 3; expected text"),
-    ],
-    "color": [("omga", Wrong, "color = 'omga'; expected a colour")],
-    "column": [*SYMBOL, ("y", Unknown, "unknown column 'y'")],
-    "combinations": MAPPING,
-    "crossings": FLAG,
-    "dense": FLAG,
-    "diagnostics": [("", Wrong, "diagnostics = ''; expected the path")],
-    "diagram": a("Diagram"),
-    "direction": [
-        (2, Wrong, "direction = 2; expected -1"),
-        (True, Wrong, "direction = True; expected -1"),
-        ("up", Wrong, "direction = 'up'; expected -1"),
-    ],
-    "dpi": [(0, Wrong, "dpi = 0; expected a number from 10"), (NAN, Wrong, "dpi = nan")],
-    "entry": [*NUMBER, (5, Wrong, "entry = 5; expected a value of p on the sheet before HB1")],
-    "exact": FLAG,
-    "expression": COLUMN,
-    "fills": [*MAPPING, ({True: "blu"}, Wrong, "'blu'; expected a colour")],
-    "forcing": [*MAPPING, ({"x": "1"}, BadModel, "'x' is both a state and a slow quantity")],
-    "format": [*TEXT, ("atuo", Unknown, "unknown export format 'atuo'; did you mean 'auto'?")],
-    "function": [
-        (3, Wrong, "function = 3; expected a function"),
-        (lambda a, b: [True], Wrong, "the function returned 1 labels for"),
-        (lambda a, b: a + 0.5, Wrong, "is no label of a map; expected a string"),
-    ],
-    "gain": POSITIVE,
-    "gap": [*TEXT, ("S9", Unknown, "unknown region 'S9'; did you mean")],
-    "guard": COUNT,
-    "implicit": FLAG,
-    "interfaces": FLAG,
-    "iterations": COUNT,
-    "keep": [*COUNT, (0, Wrong, "keep = 0; expected a whole number from 1")],
-    "key": [
-        *COLUMN,
-        (10**6, fs.OutOfRangeError, "1000000; the last of"),
-        (True, Wrong, "'True' is no expression"),
-    ],
-    "label": FLAG,
-    "largest_step": POSITIVE,
-    "largest_turn": POSITIVE,
-    "lay": a("Overlay"),
-    "least": [(-1, Wrong, "least = -1; expected a number from 0"), (NAN, Wrong, "least = nan")],
-    "legend": FLAG,
-    "level": NUMBER,
-    "levels": COUNT,
-    "max_crossings": [*COUNT, (0, Wrong, "max_crossings = 0; expected a whole number from 1")],
-    "max_steps": [*COUNT, (0, Wrong, "max_steps = 0; expected a whole number from 1")],
-    "model": a("Model"),
-    "models": [([None], Wrong, "models: expected a Model, received None")],
-    "most": [*COUNT, (0, Wrong, "most = 0; expected a whole number from 1")],
-    "name": [("omga", Unknown, "unknown"), (None, fs.FastSlowError, "None")],
-    "named": [({"omga": 1.0}, Unknown, "unknown")],
-    "names": MAPPING,
-    "observed": [*SYMBOL, ("y", Unknown, "unknown state 'y'")],
-    "ones": [
-        (3, Wrong, "ones = 3; expected a sequence"),
-        ([("x",)], Wrong, "expected a state and a term of its rate"),
-        ([("y", "x")], Unknown, "unknown state 'y'"),
-        ([("x", "x**7")], Wrong, "the rate of x has no term x**7"),
-    ],
-    "order": [*COUNT, (2, Wrong, "order = 2; expected a whole number from 4 to 40")],
-    "over": RANGE,
-    "parameter": [*SYMBOL, ("omga", Unknown, "unknown parameter 'omga'")],
-    "peaks": COUNT,
-    "period": POSITIVE,
-    "phase": NUMBER,
-    "phases": [(3, Wrong, "phases = 3"), ([3], Wrong, "phases[0]: expected a Phase")],
-    "point": a("SpecialPoint"),
-    "points": COUNT,
-    "predict": [
-        (3, Wrong, "predict = 3; expected a function"),
-        (lambda a, b: [], Wrong, "the prediction has 0 labels for"),
-    ],
-    "progress": FLAG,
-    "radius": [*NUMBER, (2, Wrong, "radius = 2; expected a number between 0 and 1")],
-    "rate": NUMBER,
-    "reach": POSITIVE,
-    "region": [*TEXT, ("S9", Unknown, "unknown region 'S9'; did you mean 'S1'?")],
-    "regions": [
-        *MAPPING,
-        ({"r": "x > 0"}, BadModel, "x = 0 decides a branch but is not one of the interfaces"),
-        ({"r": "x + 1"}, BadModel, "region r: expected a condition such as x > D"),
-    ],
-    "replace": MAPPING,
-    "result": a("RefinedMap"),
-    "run": a("Trajectory"),
-    "run_tol": TOLERANCE,
-    "samples": [
-        (1, Wrong, "samples = 1; expected"),
-        (NAN, Wrong, "samples"),
-        ("x", Wrong, "samples"),
-    ],
-    "section": SYMBOL,
-    "settings": [(3, Wrong, "settings: expected a Continuation, received a int")],
-    "settle": [(-1, Wrong, "settle = -1"), ("5", Wrong, "settle = '5'; expected")],
-    "since": [*NUMBER, (-5, Wrong, "since = -5 is outside the run, which is [0,")],
-    "size": POSITIVE,
-    "slow": MAPPING,
-    "smallest_step": POSITIVE,
-    "solutions": [("", Wrong, "solutions = ''; expected the path")],
-    "source": [("omga", Wrong, "source: expected an Overlay or Branch, received a str")],
-    "spectrum": a("Spectrum"),
-    "stable": FLAG,
-    "state": [
-        ([0.0], Wrong, "the initial state has shape (1,); expected 2 values, for x, v"),
-        ([0.0, NAN], Wrong, "initial v = nan; expected a finite number"),
-        (["a", 0], Wrong, "the initial state: expected numbers, received ['a', 0]"),
-        ([True, False], Wrong, "the initial state: expected numbers"),
-        ({"x": 0, "u": 0}, Unknown, "unknown state 'u'"),
-    ],
-    "states": [
-        ([0.0], Wrong, "the initial states have shape (1,); expected (m, 2) or (2,), for x, v"),
-        ({"x": 0, "u": 0}, Unknown, "unknown state 'u'"),
-        ([0.0, NAN], Wrong, "v = nan of trajectory 0; expected a finite number"),
-    ],
-    "step": POSITIVE,
-    "stiffness": [(0, Wrong, "stiffness = 0; expected positive numbers")],
-    "style": [
-        ({"linewdth": 1.0}, Unknown, "unknown property of a line 'linewdth'; did you mean"),
-        ({"linewidth": "x"}, Wrong, "linewidth = 'x'"),
-        ({"linewidth": NAN}, Wrong, "linewidth = nan; expected a finite number"),
-    ],
-    "sweep": a("Sweep"),
-    "t": [
-        ((1, 0), Wrong, "t = (1, 0); expected finite times, start < end"),
-        ((0, 0), Wrong, "t = (0, 0); expected finite times, start < end"),
-        ((0, INF), Wrong, "t = (0, inf); expected finite times"),
-        (5, Wrong, "t = 5; expected a pair (start, end)"),
-        (("0", "1"), Wrong, "t: expected numbers, received ('0', '1')"),
-        (None, Wrong, "expected t=(start, end) or periods=, received neither"),
-    ],
-    "threads": [*COUNT, (0, Wrong, "threads = 0; expected a whole number from 1")],
-    "times": [
-        (-1, Wrong, "time -1 is outside the run, which is [0,"),
-        (NAN, Wrong, "time nan is outside the run"),
-        ("5", Wrong, "times: expected numbers, received '5'"),
-    ],
-    "title": TEXT,
-    "tol": TOLERANCE,
-    "tolerance": POSITIVE,
-    "turning": FLAG,
-    "until": [*NUMBER, (1e9, Wrong, "until = 1e+09; expected a time from 0 to")],
-    "value": [
-        ({"q": 0.0}, Unknown, "parameter 'q'"),
-        ({"p": 7.0}, Wrong, "p = 7 is outside this"),
-        ({"p": NAN}, Wrong, "p = nan; expected a finite number"),
-        ({"p": "0"}, Wrong, "p = '0'; expected a finite number"),
-    ],
-    "values": [
-        ({"omga": 1.0}, Unknown, "unknown"),
-        (3, Wrong, "values = 3; expected a mapping"),
-    ],
-    "virtual": FLAG,
-    "what": [*TEXT, ("extrema", Unknown, "'extrema'; did you mean 'extremes'?")],
-    "width": [(0, Wrong, "width = 0; expected a number from 2 to 40")],
-    "window": [*TEXT, ("han", Unknown, "unknown window 'han'; did you mean 'hann'?")],
-    "x": [("omga", Unknown, "omga")],
-    "y": [("omga", Unknown, "omga")],
-}
+from tests.errors.wrong_by_parameter import BY_PARAMETER
+from tests.errors.wrong_values import (
+    COUNT,
+    FIGURE,
+    INF,
+    MAPPING,
+    NAME,
+    NAN,
+    NUMBER,
+    PATH,
+    PLANE,
+    POSITIVE,
+    RANGE,
+    SAVE,
+    SYMBOL,
+    TEXT,
+    BadModel,
+    Unknown,
+    Wrong,
+    a,
+)
 
 POSITIVES = [
     (0, Wrong, "= 0; expected positive numbers"),
