@@ -21,6 +21,9 @@ Points = NDArray[np.float64]
 #: Distance of the points that stand for a curve, in points (1/72 inch).
 STEP = 1.5
 
+#: What it costs to cover a point of a marker, in points of curves.
+MARKER = 10.0
+
 #: Group of artists that may be written over.
 FAINT = "fastslow faint"
 
@@ -75,22 +78,33 @@ def pixels_of(ax: Axes, places: Points) -> Points:
 
 
 def covered(ax: Axes) -> Points:
-    """Points in pixels along all curves and around all markers of the axes, shape (N, 2)."""
+    """Points in pixels along all curves and around all markers of the axes, and their weights.
+
+    Returns
+    -------
+    ndarray, shape (N, 3)
+        x, y, and what it costs to cover the point: 1 on a curve, more on a marker.
+    """
     frame, scale = ax.get_window_extent(), root(ax).dpi / 72.0
     step = STEP * scale
-    parts = [np.empty((0, 2))]
+    parts = [np.empty((0, 3))]
     for pixels, drawn, radius in _shapes(ax, scale):
         if drawn:
-            parts.append(_dense(pixels, frame, step))
+            parts.append(_weighed(_dense(pixels, frame, step), 1.0))
         if radius:
             near = np.isfinite(pixels).all(axis=1)
-            parts.append(_rounded(pixels[near], radius))
+            parts.append(_weighed(_rounded(pixels[near], radius), MARKER))
     ink = np.vstack(parts)
-    # one for each little square is enough
-    cells = np.floor((ink - (frame.x0, frame.y0)) / step).astype(np.int64)
+    # of several points in one little square the heaviest counts
+    ink = ink[np.argsort(-ink[:, 2], kind="stable")]
+    cells = np.floor((ink[:, :2] - (frame.x0, frame.y0)) / step)
     inside = (np.abs(cells) < 100_000).all(axis=1)
-    _, first = np.unique(cells[inside] @ np.array([1, 1_000_000]), return_index=True)
+    _, first = np.unique(cells[inside] @ np.array([1.0, 1e6]), return_index=True)
     return np.asarray(ink[inside][first])
+
+
+def _weighed(points: Points, weight: float) -> Points:
+    return np.column_stack([points, np.full(len(points), weight)])
 
 
 def _shapes(ax: Axes, scale: float) -> Iterator[tuple[Points, bool, float]]:
@@ -152,8 +166,8 @@ def overlaid(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Points:
     Parameters
     ----------
     boxes : ndarray, shape (K, 4)
-    ink : ndarray, shape (N, 2)
-        Points of curves: one each.
+    ink : ndarray, shape (N, 3)
+        Points with their weights, from `covered`.
     taken : ndarray, shape (M, 4)
         Other boxes: a thousand each.
     frame : Bbox
@@ -164,7 +178,7 @@ def overlaid(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Points:
     ndarray, shape (K,)
     """
     low, high = boxes[:, None, :2], boxes[:, None, 2:]
-    over = ((ink > low) & (ink < high)).all(axis=2).sum(axis=1)
+    over = ((ink[:, :2] > low) & (ink[:, :2] < high)).all(axis=2) @ ink[:, 2]
     met = ((taken[:, :2] < high) & (taken[:, 2:] > low)).all(axis=2).sum(axis=1)
     inside = (boxes[:, 0] > frame.x0) & (boxes[:, 2] < frame.x1)
     inside &= (boxes[:, 1] > frame.y0) & (boxes[:, 3] < frame.y1)

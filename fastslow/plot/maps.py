@@ -182,7 +182,7 @@ def _names(ax: Axes, result: RefinedMap, marks: list[tuple[float, float]]) -> di
     # a mark needs room for its own name, at any side of it
     room_around = 0.08 * frame.width * np.array([[0, 0], [1, 0], [-1, 0], [0, 0.5], [0, -0.5]])
     ink = [ax.transData.transform(at) + room_around for at in marks]
-    ink += [covered(ax), frame.corners()]
+    ink += [covered(ax)[:, :2], frame.corners()]
     legend: Any = ax.get_legend()
     if legend is not None:
         box = legend.get_window_extent()

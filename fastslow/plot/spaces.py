@@ -28,7 +28,7 @@ from fastslow.results.overlays import Overlay
 ZOOM = 0.86
 
 #: Height of a figure in space, in millimetres.
-HEIGHT = 84.0
+HEIGHT = 92.0
 
 #: Shares of the length of a trajectory at which an arrow head sits.
 ARROWS = (0.2, 0.45, 0.7, 0.95)

@@ -88,7 +88,7 @@ PHASES: dict[str, dict[str, Any]] = {
 }
 
 #: Light fills of the regions, in turn.
-BANDS = ("#E1F2FD", "#FFFFFF", "#EFE1C7")
+BANDS = ("#D6E7F4", "#FFFFFF", "#FEF0D8")
 
 MM = 1 / 25.4
 COLUMN, FULL = 85 * MM, 170 * MM
