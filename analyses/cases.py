@@ -10,7 +10,6 @@ import numpy as np
 import fastslow as fs
 from analyses.output import Output
 from analyses.passages import OMEGA, PERIODS, Case, Setting, laid
-from fastslow.plot.labels import place
 from fastslow.plot.style import FULL, MM, SMALL, TEXT, dressed, new_figure
 from fastslow.systems.gears import Scaling, gear_scales
 
@@ -105,14 +104,12 @@ def draw(figure: str, scaling: str, into: Output) -> None:
         axes = [dressed(ax) for ax in grid[:, column]]
         values = case.diagram.interface_values
         axes[0].set_title(f"{case.setting.title}\n{case.run.regime}", fontsize=TEXT)
-        look: dict[str, Any] = {"crossings": False, "interfaces": values, "linewidth": 0.8}
-        series = fs.plot.time_series(case.run, "x", ax=axes[0], **look)
-        portrait = fs.plot.phase_portrait(case.run, ax=axes[1], **look)
+        look: dict[str, Any] = {"crossings": False, "interfaces": values, "legend": False}
+        fs.plot.time_series(case.run, "x", ax=axes[0], **look)
+        fs.plot.phase_portrait(case.run, ax=axes[1], **look)
         overlay = fs.plot.overlay(case.lay, ax=axes[2], label=False, legend=False)
         assert isinstance(overlay, fs.plot.OverlayDrawing)
         overlays.append(overlay)
-        place(axes[0], bands=series.bands)
-        place(axes[1], bands=portrait.bands)
         for number, ax in enumerate(axes):
             ax.yaxis.labelpad = 1.0
             if column:
