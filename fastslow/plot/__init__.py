@@ -46,7 +46,7 @@ Two figures in one, 170 mm wide:
 >>> [line.get_label() for line in drawn.lines], other.legend
 (['stable', 'unstable', 'stable'], None)
 >>> drawn.data["HB Hopf"][0].round(6).tolist()
-[[-1.0, 1.0], [1.0, -1.0]]
+[[-1.0, -1.0], [1.0, 1.0]]
 """
 
 from fastslow.plot.branches import DiagramDrawing, diagram

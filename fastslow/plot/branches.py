@@ -155,14 +155,14 @@ def diagram(
     >>> import fastslow as fs
     >>> model = fs.systems.van_der_pol()
     >>> found = fs.continue_equilibria(model.frozen(), "w", over=(-2, 2))
-    >>> drawn = fs.plot.diagram(found, "x**2 + y", width="page", legend=False)
+    >>> drawn = fs.plot.diagram(found, "x**2 + v", width="page", legend=False)
     >>> drawn.ax.get_ylabel(), [text.get_text() for text in drawn.labels]
-    ('$x^{2} + y$', ['HB1', 'HB2'])
+    ('$x^{2} + v$', ['HB1', 'HB2'])
     >>> sorted(drawn.data)
     ['HB Hopf', 'stable', 'unstable']
     >>> def energy(columns):
     ...     return columns["x"] ** 2 / 2
-    >>> fs.plot.diagram(found, energy, x="y").ax.get_ylabel()
+    >>> fs.plot.diagram(found, energy, x="v").ax.get_ylabel()
     'energy'
     """
     across, up = (

@@ -178,8 +178,8 @@ def overlay(
     >>> diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6))
     >>> lay = fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=2))
     >>> drawn = fs.plot.overlay(lay, "v", linewidth=0.5)
-    >>> drawn.x, drawn.state, len(drawn.crossings.get_xdata())
-    ('w', 'v', 8)
+    >>> drawn.x, drawn.state, len(drawn.crossings.get_xdata()) == len(lay.run.crossings)
+    ('w', 'v', True)
     """
     diagram = lay.diagram
     across, up = (

@@ -115,7 +115,7 @@ def section(
     --------
     >>> import fastslow as fs
     >>> run = fs.simulate(fs.systems.van_der_pol(), [0.5, 0], t=(0, 60))
-    >>> found = run.section("y", direction=1)
+    >>> found = run.section("v", direction=1)
     >>> fs.plot.section(found, "t", "x**2").ax.get_ylabel()
     '$x^{2}$'
     """
