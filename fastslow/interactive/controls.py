@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable, Mapping
 from html import escape
 from importlib import import_module
@@ -62,6 +63,17 @@ def step_of(slider: Slider) -> float:
     return below / max(round(below / step), 1) if below > 0 else step
 
 
+def brief(value: float, step: float) -> float:
+    """A value with no more decimals than its slider resolves.
+
+    Examples
+    --------
+    >>> brief(0.38815789473684215, 0.004), brief(1203.7, 20.0)
+    (0.3882, 1204.0)
+    """
+    return round(value, max(1 - math.floor(math.log10(step)), 0))
+
+
 class Controls:
     """Sliders, figure, and what was clicked, of an explorer.
 
@@ -116,7 +128,10 @@ class Controls:
         self._following = True
         try:
             for name, slider in self.sliders.items():
-                slider.value = self._explorer.values[name]
+                value = self._explorer.values[name]
+                # one that is being dragged is left to the hand that drags it
+                if abs(slider.value - value) > 0.5 * slider.step:
+                    slider.value = value
         finally:
             self._following = False
         self.tell()
@@ -128,15 +143,16 @@ class Controls:
         if abs(change.new - self._explorer.values[name]) < 0.5 * change.owner.step:
             # the browser's own rounding
             return
+        value = {name: brief(change.new, change.owner.step)}
         try:
             loop = asyncio.get_running_loop()
         except RuntimeError:
-            self._show(self._explorer.set, {name: change.new})
+            self._show(self._explorer.set, value)
             return
         # while the slider moves without the measurement, which follows when it rests
         if self._later is not None:
             self._later.cancel()
-        self._show(self._explorer.glance, {name: change.new})
+        self._show(self._explorer.glance, value)
         self._later = loop.call_later(REST, self._show, self._explorer.set, {})
 
     def _show(self, how: Callable[[Mapping[str, float]], object], values: dict[str, float]) -> None:

@@ -8,18 +8,22 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 
 from fastslow.interactive.picking import Curve, curves_of, run_curve
 from fastslow.interactive.views import View
 from fastslow.plot.branches import draw_branches
 from fastslow.plot.motions import draw_motion, phase_portrait, time_series
 from fastslow.plot.passages import draw_passage
-from fastslow.plot.quantities import along_run, of_diagram
+from fastslow.plot.quantities import Quantity
 from fastslow.plot.style import GREY, MOTION, SMALL, TEXT, VERMILION, dressed, typeset
 
 #: Size of a figure of our own, in inches, and places of its axes in it.
 SIZE = (9.0, 5.0)
 PLACES = ((0.065, 0.6, 0.36, 0.34), (0.065, 0.115, 0.36, 0.34), (0.5, 0.235, 0.485, 0.705))
+
+#: Where the label of a special point stands, in points from it.
+BESIDE = (13.0, 7.0)
 
 
 def own_figure() -> Figure:
@@ -43,32 +47,38 @@ def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:
     curves: list[Curve] = []
     series, portrait, main = (dressed(figure.add_axes(place)) for place in PLACES)
     handles: list[Any] = []
+    labels: tuple[Annotation, ...] = ()
     if lay is not None:
-        # labels stand beside their points, to place them freely takes as long as all the rest
-        shown = of_diagram(lay.diagram, None, lay.parameter), of_diagram(lay.diagram, name, name)
-        laid = draw_passage(main, lay, shown)
-        handles = laid.handles
+        laid = draw_passage(main, lay, (Quantity(lay.parameter), Quantity(name)))
+        handles, labels = laid.handles, laid.diagram.labels
         curves += curves_of(laid, lay)
     elif view.diagram is not None:
-        across = view.diagram.parameter
-        shown = of_diagram(view.diagram, None, across), of_diagram(view.diagram, name, name)
+        shown = Quantity(view.diagram.parameter), Quantity(name)
         below = draw_branches(main, view.diagram, shown, label=True, virtual=True, interfaces=True)
-        handles = [*below.handles]
+        handles, labels = [*below.handles], below.labels
         curves += curves_of(below, view.diagram)
-        if run is not None and across in run.columns:
-            handles += draw_motion(main, run.t, along_run(run, *shown), run.period, MOTION, {})
-            curves.append(run_curve(main, run, *shown))
+        slow = view.diagram.parameter
+        if run is not None and slow in run.columns:
+            handles += draw_motion(main, run.t, (run[slow], run[name]), run.period, MOTION, {})
+            curves.append(run_curve(main, run, slow, name))
         handles += _mark_value(main, view)
     else:
         _empty(main, "no diagram")
     if run is not None:
         phases = () if lay is None else lay.phases
-        over_time = time_series(run, name, ax=series, interfaces=values, phases=phases)
+        over_time = time_series(
+            run, name, ax=series, interfaces=values, phases=phases, legend=False
+        )
         curves += curves_of(over_time, run)
         if len(run.columns) > 1:
             other = None if len(run.states) == 1 else _other(run.states, name)
             plane = phase_portrait(
-                run, None if other is None else name, other, ax=portrait, interfaces=values
+                run,
+                None if other is None else name,
+                other,
+                ax=portrait,
+                interfaces=values,
+                legend=False,
             )
             curves += curves_of(plane, run)
         else:
@@ -76,6 +86,9 @@ def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:
     else:
         _empty(series, "no trajectory")
         _empty(portrait, "no trajectory")
+    for label in labels:
+        # to place them freely would take as long as all the rest
+        label.set_position(BESIDE)
     if handles:
         figure.legend(
             handles=handles,
@@ -84,7 +97,8 @@ def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:
             ncols=4,
             fontsize=SMALL,
             frameon=False,
-            columnspacing=1.2,
+            columnspacing=1.0,
+            handlelength=1.8,
         )
     words = "  ".join(str(outcome) for outcome in view.outcomes)
     figure.text(0.01, 0.012, words, fontsize=SMALL, color=VERMILION, wrap=True)

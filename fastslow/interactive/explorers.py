@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from fastslow.arguments import formula, instance, interval, mapping, takes, tolerance
 from fastslow.errors import MissingPackageError, unknown_name
 from fastslow.interactive.drawing import draw_view, own_figure
 from fastslow.interactive.picking import Pick
@@ -19,6 +21,15 @@ from fastslow.interactive.views import Setup, View, at_start, setup_of, view_of
 from fastslow.model.model import Model
 
 
+@takes(
+    model=instance(Model),
+    parameter=formula,
+    over=interval,
+    tol=tolerance,
+    state=formula,
+    sliders=mapping,
+    figure=instance(Figure),
+)
 def explore(
     model: Model,
     *,
@@ -123,6 +134,8 @@ class Explorer:
         self.pointer = Pointer(figure, (), self._clicked)
         self._widget: Any = None
         self._picked_in: View | None = None
+        # Jupyter handles some messages of widgets in a thread beside that of the cells
+        self._lock = threading.RLock()
         self.view = view_of(model, setup)
         if self.view.diagram is not None:
             self.setup = replace(setup, otherwise=self.view.diagram.over)
@@ -157,20 +170,21 @@ class Explorer:
         return self._shown({**(values or {}), **named})
 
     def _shown(self, values: Mapping[Any, float], measured: bool = True) -> View:
-        given = {str(name): value for name, value in values.items()}
-        begin = {name: self.values[name] for name in self._states}
-        changes = dict(self.view.changes)
-        for name, value in given.items():
-            if name in begin:
-                begin[name] = value
-            elif name in self.model.parameters:
-                changes[name] = value
-            else:
-                raise unknown_name("parameter or state", name, [*self.model.parameters, *begin])
-        setup = at_start(self.setup, self.model, begin)
-        self.view = view_of(self.model, setup, changes, measured=measured)
-        self._draw()
-        return self.view
+        with self._lock:
+            given = {str(name): value for name, value in values.items()}
+            begin = {name: self.values[name] for name in self._states}
+            changes = dict(self.view.changes)
+            for name, value in given.items():
+                if name in begin:
+                    begin[name] = value
+                elif name in self.model.parameters:
+                    changes[name] = value
+                else:
+                    raise unknown_name("parameter or state", name, [*self.model.parameters, *begin])
+            setup = at_start(self.setup, self.model, begin)
+            self.view = view_of(self.model, setup, changes, measured=measured)
+            self._draw()
+            return self.view
 
     def glance(self, values: Mapping[Any, float]) -> View:
         """As `set`, without measuring the run against the diagram: for a slider that moves."""

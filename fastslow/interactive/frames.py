@@ -49,7 +49,7 @@ class Store:
 
     def __init__(self) -> None:
         self.arrays: list[dict[str, Any]] = []
-        self._known: dict[str, int] = {}
+        self._known: dict[tuple[int, tuple[float, ...], str], int] = {}
 
     def add(self, table: Array) -> int:
         """Keep a table (N, k) column by column, in 32 bits; its number.
@@ -59,15 +59,11 @@ class Store:
         with np.errstate(over="ignore", invalid="ignore"):
             first = np.where(np.ptp(table, axis=0) < 0.5 * np.abs(table[0]), table[0], 0.0)
             small = np.ascontiguousarray((table - first).T, dtype="<f4")
-        kept = {
-            "first": first.tolist(),
-            "rows": len(table),
-            "text": b64encode(small.tobytes()).decode(),
-        }
-        key = repr(kept)
+        text = b64encode(small.tobytes()).decode()
+        key = (len(table), tuple(first.tolist()), text)
         if key not in self._known:
             self._known[key] = len(self.arrays)
-            self.arrays.append(kept)
+            self.arrays.append({"first": first.tolist(), "rows": len(table), "text": text})
         return self._known[key]
 
 
@@ -91,9 +87,10 @@ def looks() -> dict[str, dict[str, Any]]:
     made["earlier"] = {**motion, "opacity": 0.4, "label": "earlier periods"}
     made["trajectory"] = {**motion, "label": "trajectory"}
     made["now"] = {**motion, "label": "value of the run"}
-    for code, (marker, colour) in MARKERS.items():
+    for code, name in CODE_NAMES.items():
+        marker, colour = MARKERS[code]
         made[code] = {"marker": marker, "color": colour, "filled": True, "size": 4.5}
-        made[code]["label"] = f"{code} {CODE_NAMES[code]}"
+        made[code]["label"] = f"{code} {name}"
     for kind, (marker, colour, label) in TRANSITIONS.items():
         filled = marker in "*PX"
         made[kind] = {"marker": marker, "color": colour, "filled": filled, "size": 6.0}
@@ -130,7 +127,8 @@ def frame_of(view: View, store: Store) -> dict[str, Any]:
             panels.append(_panel(x, y, _bands(view, x, y)))
             last = _last_period(run, columns[:, 0]) if x != "t" else 0
             panels[-1]["lines"] = _motion_lines(names, x, y, last, len(columns))
-            panels[-1]["marks"] = [_contacts(run, x, y)]
+            points = np.column_stack(at_crossings(run, Quantity(x), Quantity(y)))
+            panels[-1]["marks"] = [_contacts(run, points)]
     if diagram is not None:
         main = _panel(diagram.parameter, state, _bands(view, diagram.parameter, state))
         main["over"] = list(diagram.over)
@@ -145,7 +143,8 @@ def frame_of(view: View, store: Store) -> dict[str, Any]:
         if lay is not None and run is not None:
             last = _last_period(run, columns[:, 0])
             main["lines"] += _motion_lines(names, diagram.parameter, state, last, len(columns))
-            main["marks"].append(_contacts(run, diagram.parameter, state))
+            met = at_crossings(run, Quantity(diagram.parameter), Quantity(state))
+            main["marks"].append(_contacts(run, np.column_stack(met)))
             main["marks"] += _transition_marks(view)
             for line in main["lines"]:
                 if line["look"] == "stable":
@@ -266,8 +265,7 @@ def _last_period(run: Trajectory, times: Array) -> int:
     return max(int(np.searchsorted(times, times[-1] - run.period, side="right")) - 1, 0)
 
 
-def _contacts(run: Trajectory, x: str, y: str) -> dict[str, Any]:
-    points = np.column_stack(at_crossings(run, Quantity(x), Quantity(y)))
+def _contacts(run: Trajectory, points: Array) -> dict[str, Any]:
     return {
         "look": "contact",
         "points": [
@@ -282,16 +280,18 @@ def _special_marks(view: View) -> list[dict[str, Any]]:
     diagram = view.diagram
     found: dict[str, list[list[Any]]] = {}
     numbers = {id(point): k for k, point in enumerate(diagram.special)}
-    for point in worth_a_marker([b for b in diagram.branches if b.admissible]):
-        found.setdefault(point.code, []).append(
-            [
-                point[diagram.parameter],
-                point[view.setup.state],
-                text_of(point, diagram.parameter),
-                f"diagram.special[{numbers[id(point)]}]",
-                point.label,
-            ]
-        )
+    for branch in diagram.branches:
+        for point in worth_a_marker([branch]) if branch.admissible else ():
+            k = numbers[id(point)]
+            found.setdefault(point.code, []).append(
+                [
+                    point[diagram.parameter],
+                    point[view.setup.state],
+                    text_of(point, diagram.parameter),
+                    f"diagram.special[{k}]",
+                    point.label,
+                ]
+            )
     return [{"look": code, "points": points} for code, points in found.items()]
 
 

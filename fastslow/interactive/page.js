@@ -96,12 +96,14 @@ const CROSS = "M-.9-.45L-.45-.9L0-.45L.45-.9L.9-.45L.45 0L.9.45L.45.9L0 .45L-.45
 const SHAPES = {
   o: "M0-1A1 1 0 1 1-.001-1Z", s: "M-.85-.85H.85V.85H-.85Z", D: polygon(4, 0), "^": polygon(3, 0),
   v: polygon(3, Math.PI), P: PLUS, X: CROSS, "*": polygon(5, 0, 0.4), p: polygon(5, 0),
-  h: polygon(6, 0), x: "M-.8-.8L.8.8M-.8.8L.8-.8", "|": "M0-1V1",
+  h: polygon(6, 0), "8": polygon(8, Math.PI / 8), H: polygon(6, Math.PI / 6), "<": polygon(3, -Math.PI / 2),
+  ">": polygon(3, Math.PI / 2), d: "M0-1L.6 0L0 1L-.6 0Z", x: "M-.8-.8L.8.8M-.8.8L.8-.8",
+  "|": "M0-1V1", "+": "M-1 0H1M0-1V1", 1: "M0 0V1M0 0L-.87-.5M0 0L.87-.5",
 };
 
 function marker(look, x, y, parent) {
   const size = 0.95 * look.size;
-  const open = "x|".includes(look.marker);
+  const open = "x|1+".includes(look.marker);
   return make("path", {
     d: SHAPES[look.marker], transform: `translate(${x} ${y}) scale(${size})`,
     fill: open ? "none" : look.filled ? look.color : "#fff",

@@ -26,6 +26,7 @@ from fastslow.plot.quantities import (
     at_points,
     at_times,
 )
+from fastslow.plot.style import root
 from fastslow.results.branches import Branch
 from fastslow.results.crossings import regions_at
 from fastslow.results.diagrams import Diagram
@@ -117,11 +118,11 @@ def curves_of(drawing: Any, result: Diagram | Trajectory | Overlay) -> tuple[Cur
         return (*below, *_overlay_curves(drawing, result))
     if isinstance(drawing, DiagramDrawing) and isinstance(result, Diagram):
         return tuple(_diagram_curves(drawing, result))
-    if isinstance(drawing, MotionDrawing) and isinstance(result, Trajectory) and not drawing.z:
+    if isinstance(drawing, MotionDrawing) and isinstance(result, Trajectory):
         return tuple(_motion_curves(drawing, result))
     raise ArgumentError(
         f"cannot pick in a {type(drawing).__name__} of a {type(result).__name__}; expected the "
-        "drawing of a diagram, a trajectory or an overlay in the plane, with what was drawn"
+        "drawing of a diagram, a trajectory or an overlay, with what was drawn"
     )
 
 
@@ -142,7 +143,7 @@ def pick(curves: Iterable[Curve], ax: Axes, x: float, y: float) -> Pick | None:
         None where nothing is drawn near.
     """
     place = np.array([x, y])
-    points = 72.0 / ax.get_figure(root=True).dpi  # type: ignore[union-attr]
+    points = 72.0 / root(ax).dpi
     best: tuple[float, float, Curve, int, float] | None = None
     for curve in curves:
         if curve.ax is not ax or not len(curve.xy):
@@ -182,17 +183,18 @@ def _nearest(pixels: Array, place: Array, joined: bool) -> tuple[float, int, flo
 
 
 def _diagram_curves(drawing: DiagramDrawing, diagram: Diagram) -> Iterable[Curve]:
+    shown = Quantity(drawing.x), Quantity(drawing.state)
     virtual = any(line.get_label() == "virtual" for line in drawing.lines)
-    special = list(diagram.special)
     for branch in diagram.branches:
         if branch.admissible or virtual:
             yield Curve(
                 drawing.ax,
-                np.column_stack(along_branch(diagram, branch, *drawing.shown)),
+                np.column_stack(along_branch(diagram, branch, *shown)),
                 True,
                 _on_branch(diagram, branch),
                 diagram.parameter,
             )
+    special = list(diagram.special)
     marked = {str(line.get_label()).split()[0] for line in drawing.markers}
     numbers = [
         k
@@ -201,7 +203,7 @@ def _diagram_curves(drawing: DiagramDrawing, diagram: Diagram) -> Iterable[Curve
     ]
     yield Curve(
         drawing.ax,
-        np.column_stack(at_points([special[k] for k in numbers], *drawing.shown)),
+        np.column_stack(at_points([special[k] for k in numbers], *shown)),
         False,
         lambda row, _: (special[numbers[row]], f"diagram.special[{numbers[row]}]"),
         diagram.parameter,
@@ -221,25 +223,27 @@ def _on_branch(diagram: Diagram, branch: Branch) -> Callable[[int, float], tuple
     return found
 
 
-def run_curve(ax: Axes, run: Trajectory, *shown: Quantity) -> Curve:
+def run_curve(ax: Axes, run: Trajectory, x: str, y: str) -> Curve:
     """A run drawn over time or in the plane of two quantities."""
-    return Curve(ax, np.column_stack(along_run(run, *shown)), True, _on_run(run))
+    places = along_run(run, Quantity(x), Quantity(y))
+    return Curve(ax, np.column_stack(places), True, _on_run(run))
 
 
 def _motion_curves(drawing: MotionDrawing, run: Trajectory) -> Iterable[Curve]:
-    yield run_curve(drawing.ax, run, *drawing.shown)
+    yield run_curve(drawing.ax, run, drawing.x, drawing.y)
     if drawing.crossings is not None:
-        yield _at_crossings(drawing.ax, at_crossings(run, *drawing.shown), run)
+        at = at_crossings(run, Quantity(drawing.x), Quantity(drawing.y))
+        yield _at_crossings(drawing.ax, np.column_stack(at), run)
 
 
 def _overlay_curves(drawing: OverlayDrawing, lay: Overlay) -> Iterable[Curve]:
-    shown, run = drawing.shown, lay.run
+    shown, run = (Quantity(drawing.x), Quantity(drawing.state)), lay.run
     yield Curve(drawing.ax, np.column_stack(along_overlay(lay, *shown)), True, _on_run(run))
     if drawing.crossings is not None:
         times = np.array([c.time for c in run.crossings])
         state = np.array([c.state for c in run.crossings])
         at = at_times(lay, times, run.states, state, *shown)
-        yield _at_crossings(drawing.ax, at, run)
+        yield _at_crossings(drawing.ax, np.column_stack(at), run)
     if lay.transitions:
         yield Curve(
             drawing.ax,
@@ -250,13 +254,8 @@ def _overlay_curves(drawing: OverlayDrawing, lay: Overlay) -> Iterable[Curve]:
         )
 
 
-def _at_crossings(ax: Axes, at: list[Array], run: Trajectory) -> Curve:
-    return Curve(
-        ax,
-        np.column_stack(at),
-        False,
-        lambda row, _: (run.crossings[row], f"run.crossings[{row}]"),
-    )
+def _at_crossings(ax: Axes, at: Array, run: Trajectory) -> Curve:
+    return Curve(ax, at, False, lambda row, _: (run.crossings[row], f"run.crossings[{row}]"))
 
 
 def _on_run(run: Trajectory) -> Callable[[int, float], tuple[Any, str]]:

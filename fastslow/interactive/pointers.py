@@ -11,6 +11,7 @@ from matplotlib.backend_bases import Event, FigureCanvasBase, MouseEvent
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 
+from fastslow.arguments import function, takes
 from fastslow.errors import MissingPackageError
 from fastslow.interactive.picking import Curve, Pick, curves_of, pick
 from fastslow.plot.style import BLACK, GREY, SMALL
@@ -19,6 +20,7 @@ from fastslow.results.overlays import Overlay
 from fastslow.results.trajectories import Trajectory
 
 
+@takes(on_click=function)
 def inspect(
     drawing: Any,
     result: Diagram | Trajectory | Overlay,
@@ -139,10 +141,10 @@ class Pointer:
 
     def _clicked(self, event: Event) -> None:
         assert isinstance(event, MouseEvent)
-        toolbar: Any = getattr(self.figure.canvas, "toolbar", None)
+        toolbar: Any = self.figure.canvas.toolbar
         found = self._found(event)
         # a drag of the toolbar's zoom or pan is no click on a point
-        if found is None or event.button != 1 or getattr(toolbar, "mode", False):
+        if found is None or event.button != 1 or (toolbar is not None and toolbar.mode):
             return
         self.selected = found
         if self._on_click is not None:

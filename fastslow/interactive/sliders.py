@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import interval
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.interactive.views import around
 from fastslow.model.model import Model
@@ -115,14 +115,7 @@ def sliders_of(
             raise unknown_name("parameter or state", name, [*model.parameters, *start])
         state = name not in model.parameters
         value = float(start[name] if state else model.parameters[name])
-        try:
-            low, high = (float(v) for v in limits)
-        except (TypeError, ValueError):
-            low = high = math.nan
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise ArgumentError(
-                f"slider {name} = {limits!r}: expected a pair (low, high) of finite numbers"
-            )
+        low, high = interval(f"the range of slider {name}", limits)
         if not low <= value <= high:
             raise ArgumentError(
                 f"slider {name} = ({low:g}, {high:g}) does not hold its value, {value:g}"

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fastslow.arguments import tolerance
+from fastslow.arguments import interval, tolerance
 from fastslow.diagrams.tracing import continue_equilibria
 from fastslow.errors import ArgumentError, FastSlowError, unknown_name
 from fastslow.model.model import Model
@@ -178,7 +178,7 @@ def setup_of(
     if t is None and periods is None:
         t, periods = ((0.0, LONG), None) if period_of(model) is None else (None, 2.0)
     time_span(t, periods, 0.0, None, lambda: period_of(model))
-    limits = None if over is None else _limits(name, over)
+    limits = None if over is None else interval("over", over)
     if limits is None and name is not None and name not in slow:
         limits = around(dict(model.parameters).get(name, 0.0))
     return Setup(
@@ -329,15 +329,3 @@ def widened(low: float, high: float) -> Range:
     ends = unit * math.floor((low - margin) / unit), unit * math.ceil((high + margin) / unit)
     # a tenth is no binary number: 23 of them are to be 2.3
     return float(f"{ends[0]:.12g}"), float(f"{ends[1]:.12g}")
-
-
-def _limits(name: str | None, over: Sequence[float]) -> Range:
-    try:
-        low, high = (float(v) for v in over)
-    except (TypeError, ValueError):
-        low = high = math.nan
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise ArgumentError(
-            f"over={over!r}: expected a pair (low, high) of finite numbers, the range of {name}"
-        )
-    return low, high

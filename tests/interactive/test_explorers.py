@@ -3,6 +3,7 @@
 import asyncio
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -40,6 +41,16 @@ def test_nothing_is_compiled_anew_by_a_slider(explorer, monkeypatch):
     assert explorer.set(D=0.35).outcomes == ()
 
 
+def test_threads_take_turns(explorer):
+    values = np.linspace(0.2, 0.4, 4)
+    with ThreadPoolExecutor(4) as pool:
+        views = list(pool.map(lambda value: explorer.set(D=value), values))
+    assert [view.model.parameters["D"] for view in views] == values.tolist()
+    shown = pixels(explorer.figure)
+    explorer.set()
+    np.testing.assert_array_equal(pixels(explorer.figure), shown)
+
+
 def test_unknown_names_and_numbers_that_are_none(explorer):
     with pytest.raises(fs.UnknownNameError, match="unknown parameter or state 'Dd'"):
         explorer.set(Dd=1)
@@ -55,8 +66,8 @@ def test_unknown_names_and_numbers_that_are_none(explorer):
     [
         ({"E": (0, 1)}, "unknown parameter or state 'E'"),
         ({"D": (0.3, 0.5)}, "does not hold its value, 0.25"),
-        ({"D": (1, 0)}, "expected a pair"),
-        ({"D": 3}, "expected a pair"),
+        ({"D": (1, 0)}, "expected two finite numbers"),
+        ({"D": 3}, "expected two finite numbers"),
         ({"x": (0.5, 1)}, "does not hold its value, 0"),
     ],
 )

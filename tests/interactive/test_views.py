@@ -118,8 +118,8 @@ def test_a_second_slow_quantity_is_held():
     [
         ({"parameter": "w2"}, "unknown slow quantity or parameter 'w2'; did you mean 'w'?"),
         ({"state": "z"}, "unknown state 'z'"),
-        ({"over": (1, 0)}, "over=.1, 0.: expected a pair"),
-        ({"over": 3}, "over=3: expected a pair"),
+        ({"over": (1, 0)}, "did you mean .0, 1."),
+        ({"over": 3}, "over = 3; expected two finite numbers"),
         ({"start": [0]}, "expected 2 values"),
         ({"t": (0, 1), "periods": 2}, "received both"),
         ({"periods": -1}, "positive"),
