@@ -19,6 +19,7 @@ from fastslow.arguments import (
     numbers,
     refusal,
     shown,
+    text,
     within,
     word,
 )
@@ -87,7 +88,10 @@ def _level(name: str, value: Any) -> tuple[str, float]:
 
 def points_in_plane(name: str, value: Any) -> Mapping[str, tuple[float, float]]:
     """Texts with a point each."""
-    return {str(key): _point(f"{name}[{key!r}]", at) for key, at in mapping(name, value).items()}
+    return {
+        text(f"a name in {name}", key): _point(f"{name}[{key!r}]", at)
+        for key, at in mapping(name, value).items()
+    }
 
 
 def _point(name: str, value: Any) -> tuple[float, float]:
@@ -99,7 +103,10 @@ def _point(name: str, value: Any) -> tuple[float, float]:
 
 def lines_in_plane(name: str, value: Any) -> Mapping[str, Any]:
     """Texts with the two columns of a line each, which may have gaps of NaN."""
-    return {str(key): _line(f"{name}[{key!r}]", line) for key, line in mapping(name, value).items()}
+    return {
+        text(f"a name in {name}", key): _line(f"{name}[{key!r}]", line)
+        for key, line in mapping(name, value).items()
+    }
 
 
 def _line(name: str, value: Any) -> tuple[Any, ...]:

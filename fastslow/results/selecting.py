@@ -102,8 +102,8 @@ def limits_of(between: tuple[float, float]) -> tuple[float, float]:
     ArgumentError
         For anything else.
     """
-    sequence = isinstance(between, tuple | list | np.ndarray)
-    ends = [real_number(end) for end in between] if sequence and np.ndim(between) == 1 else []
+    sequence = isinstance(between, tuple | list) or getattr(between, "ndim", 0) == 1
+    ends = [real_number(end) for end in between] if sequence else []
     low, high = ends if len(ends) == 2 else (None, None)
     if low is None or high is None or not low <= high:
         raise refusal("between", between, "two numbers, the lower one first")

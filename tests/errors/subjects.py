@@ -166,6 +166,7 @@ def simulations(r):
             "max_steps": 2000,
         },
         "warm": {"models": []},
+        "explore": {"model": gear, "over": (-1.0, 1.0), "sliders": {"C": (2.0, 3.0)}, **kept},
     }
 
 
@@ -193,6 +194,7 @@ def analyses(r):
         "slow_load_gap": {"B": 2.0, "C": 4.0, "omega": 0.1},
         "load": {"path": "nothing.npz"},
         "read_auto": {"path": "b.nothing"},
+        "inspect": {"drawing": fs.plot.diagram(r["diagram"]), "result": r["diagram"]},
         "Model": {"rates": {x: -k * x}, "parameters": {k: 1.0}},
         "Continuation": {},
     }

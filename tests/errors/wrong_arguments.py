@@ -162,7 +162,12 @@ BY_FUNCTION = {
     "export.path": [(3, Wrong, "path = 3; expected the path of a file")],
     "export.start": [*MAPPING, ({"y": 0.0}, Unknown, "unknown state 'y'")],
     "hopf_exit.rate": [*NUMBER, (-0.05, Wrong, "expected rate > 0")],
+    "plot.parameter_plane.regions": [([1], Wrong, "regions: expected a RefinedMap")],
     "plot.parameter_plane.curves": [([None], Wrong, "curves: expected a PointBranch")],
+    "plot.panel.ax": [
+        ("omga", Wrong, "ax = 'omga'; expected a sequence"),
+        ([], Wrong, "panel: expected three axes, received 0"),
+    ],
     "plot.panel.state": [*SYMBOL, ("y", Unknown, "unknown state 'y'")],
     "plot.phase_portrait.interfaces": SIDES,
     "plot.regime_map.curves": [
@@ -234,6 +239,16 @@ BY_FUNCTION["systems.harmonic_gear_physical.scaling"] = SCALING
 BY_FUNCTION["systems.harmonic_gear_physical.D"] = OF_SYSTEMS[:2]
 for _name in ("J_i", "J_o", "N", "xi", "K_HD", "k2"):
     BY_FUNCTION[f"systems.gear_scales.{_name}"] = POSITIVE
+BY_FUNCTION["explore.parameter"] = [
+    *SYMBOL,
+    ("omga", Unknown, "unknown slow quantity or parameter 'omga'; did you mean 'omega'?"),
+]
+BY_FUNCTION["explore.periods"] = [(2, Wrong, "expected t=(start, end) or periods=, received both")]
+BY_FUNCTION["explore.start"] = BY_PARAMETER["state"]
+BY_FUNCTION["explore.state"] = [*SYMBOL, ("u", Unknown, "unknown state 'u'")]
+BY_FUNCTION["inspect.result"] = [
+    (None, Wrong, "cannot pick in a DiagramDrawing of a NoneType; expected the drawing")
+]
 
 
 def rows_of(function, parameter):
