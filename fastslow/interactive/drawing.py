@@ -60,7 +60,7 @@ def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:
         slow = view.diagram.parameter
         if run is not None and slow in run.columns:
             handles += draw_motion(main, run.t, (run[slow], run[name]), run.period, MOTION, {})
-            curves.append(run_curve(main, run, slow, name))
+            curves.append(run_curve(main, run, Quantity(slow), Quantity(name)))
         handles += _mark_value(main, view)
     else:
         _empty(main, "no diagram")

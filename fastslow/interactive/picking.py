@@ -118,11 +118,11 @@ def curves_of(drawing: Any, result: Diagram | Trajectory | Overlay) -> tuple[Cur
         return (*below, *_overlay_curves(drawing, result))
     if isinstance(drawing, DiagramDrawing) and isinstance(result, Diagram):
         return tuple(_diagram_curves(drawing, result))
-    if isinstance(drawing, MotionDrawing) and isinstance(result, Trajectory):
+    if isinstance(drawing, MotionDrawing) and isinstance(result, Trajectory) and not drawing.z:
         return tuple(_motion_curves(drawing, result))
     raise ArgumentError(
         f"cannot pick in a {type(drawing).__name__} of a {type(result).__name__}; expected the "
-        "drawing of a diagram, a trajectory or an overlay, with what was drawn"
+        "drawing of a diagram, a trajectory or an overlay in the plane, with what was drawn"
     )
 
 
@@ -183,13 +183,12 @@ def _nearest(pixels: Array, place: Array, joined: bool) -> tuple[float, int, flo
 
 
 def _diagram_curves(drawing: DiagramDrawing, diagram: Diagram) -> Iterable[Curve]:
-    shown = Quantity(drawing.x), Quantity(drawing.state)
     virtual = any(line.get_label() == "virtual" for line in drawing.lines)
     for branch in diagram.branches:
         if branch.admissible or virtual:
             yield Curve(
                 drawing.ax,
-                np.column_stack(along_branch(diagram, branch, *shown)),
+                np.column_stack(along_branch(diagram, branch, *drawing.shown)),
                 True,
                 _on_branch(diagram, branch),
                 diagram.parameter,
@@ -203,7 +202,7 @@ def _diagram_curves(drawing: DiagramDrawing, diagram: Diagram) -> Iterable[Curve
     ]
     yield Curve(
         drawing.ax,
-        np.column_stack(at_points([special[k] for k in numbers], *shown)),
+        np.column_stack(at_points([special[k] for k in numbers], *drawing.shown)),
         False,
         lambda row, _: (special[numbers[row]], f"diagram.special[{numbers[row]}]"),
         diagram.parameter,
@@ -223,21 +222,20 @@ def _on_branch(diagram: Diagram, branch: Branch) -> Callable[[int, float], tuple
     return found
 
 
-def run_curve(ax: Axes, run: Trajectory, x: str, y: str) -> Curve:
+def run_curve(ax: Axes, run: Trajectory, *shown: Quantity) -> Curve:
     """A run drawn over time or in the plane of two quantities."""
-    places = along_run(run, Quantity(x), Quantity(y))
-    return Curve(ax, np.column_stack(places), True, _on_run(run))
+    return Curve(ax, np.column_stack(along_run(run, *shown)), True, _on_run(run))
 
 
 def _motion_curves(drawing: MotionDrawing, run: Trajectory) -> Iterable[Curve]:
-    yield run_curve(drawing.ax, run, drawing.x, drawing.y)
+    yield run_curve(drawing.ax, run, *drawing.shown)
     if drawing.crossings is not None:
-        at = at_crossings(run, Quantity(drawing.x), Quantity(drawing.y))
+        at = at_crossings(run, *drawing.shown)
         yield _at_crossings(drawing.ax, np.column_stack(at), run)
 
 
 def _overlay_curves(drawing: OverlayDrawing, lay: Overlay) -> Iterable[Curve]:
-    shown, run = (Quantity(drawing.x), Quantity(drawing.state)), lay.run
+    shown, run = drawing.shown, lay.run
     yield Curve(drawing.ax, np.column_stack(along_overlay(lay, *shown)), True, _on_run(run))
     if drawing.crossings is not None:
         times = np.array([c.time for c in run.crossings])

@@ -244,6 +244,8 @@ BY_FUNCTION["explore.parameter"] = [
     ("omga", Unknown, "unknown slow quantity or parameter 'omga'; did you mean 'omega'?"),
 ]
 BY_FUNCTION["explore.periods"] = [(2, Wrong, "expected t=(start, end) or periods=, received both")]
+# without it there are two periods
+BY_FUNCTION["explore.t"] = [row for row in BY_PARAMETER["t"] if row[0] is not None]
 BY_FUNCTION["explore.start"] = BY_PARAMETER["state"]
 BY_FUNCTION["explore.state"] = [*SYMBOL, ("u", Unknown, "unknown state 'u'")]
 BY_FUNCTION["inspect.result"] = [

@@ -49,6 +49,21 @@ def test_a_click_beside_a_branch_gives_the_equilibrium_there(lay, mouse):
     assert pointer.selected.distance < 1.0
 
 
+def test_a_click_in_axes_of_expressions_and_functions(lay, mouse):
+    drawing = drawn(lay.diagram, lambda columns: columns["x"] ** 2)
+    pointer = fs.inspect(drawing, lay.diagram)
+    (near,) = lay.diagram.at(w=0.3217, stable=True)
+    mouse("button_press_event", drawing.ax, 0.3217, near["x"] ** 2)
+    assert pointer.selected.point["x"] == pytest.approx(near["x"], abs=2e-3)
+    motion = fs.plot.phase_portrait(lay.run, "x + v", "x*v")
+    pointer = fs.inspect(motion, lay.run)
+    state = lay.run(10.0)
+    mouse("button_press_event", motion.ax, state.sum(), state.prod())
+    assert pointer.selected.point.state == pytest.approx(state, abs=5e-3)
+    with pytest.raises(fs.ArgumentError, match="in the plane"):
+        fs.inspect(fs.plot.phase_portrait(lay.run, z="t"), lay.run)
+
+
 def test_a_marker_goes_before_the_line_it_lies_on(lay, mouse):
     drawing = drawn(lay.diagram)
     pointer = fs.inspect(drawing, lay.diagram)
