@@ -100,13 +100,14 @@ def _unilateral(scaling: str) -> Finding:
         "to": last,
         "slowest": slowest,
         "times": slowest / FASTEST,
+        "step": float(np.diff(resonances.SCANNED[scaling][:2])[0]),
         "contact": float(np.sqrt(p["A"])),
     }
     words += (
-        " At 15 N m, as in figure 3, it does so only where the load is about as fast as the "
+        " At 15 N m, as in figure 3, it does so only for loads no longer slow against the "
         "vibration in contact, √A = {contact:.2f}: here and there from ω_o = {slowest:.2f} on, "
-        "{times:.0f} times the largest frequency allowed, and all along from {from:.2f} to "
-        "{to:.2f}."
+        "{times:.0f} times the largest frequency allowed, and at all that were tried, in steps of "
+        "{step:.2g}, from {from:.2f} to {to:.2f}."
     )
     return Finding(scaling, "holds only where", words, numbers)
 

@@ -25,7 +25,7 @@ from fastslow.plot.style import FULL, GREY, MM, SMALL, TEXT, dressed, new_figure
 Floats = NDArray[np.float64]
 
 #: Frequencies scanned.
-SCANNED = {"consistent": np.arange(0.1, 6.01, 0.02), "printed": np.arange(2.0, 60.01, 0.5)}
+SCANNED = {"consistent": np.arange(0.1, 6.01, 0.02), "printed": np.arange(5.0, 50.01, 0.25)}
 
 #: Runs are at least so long: the start is forgotten as e^(−t/2).
 LENGTH = 40.0
