@@ -56,8 +56,8 @@ CAPTIONS = {
     "map_stiffness_torque": "Regimes over k1 and T_am at D = 0.25, ω_o = 0.01, near the lightest "
     "case of Fig. 5; the others, and those of Fig. 4 at 15 N m, lie above.",
     "resonances": "Loads no longer slow against the vibration in contact, at T_am = 15 N m: "
-    "regimes over ω_o and D under the consistent scaling, and at the three widths under the printed "
-    "one. Bars below: where all three are as Fig. 3 states; at (a) the longest such band.",
+    "regimes over ω_o and D under the consistent scaling, and at the three widths under the "
+    "printed one. Bars below: where all three are as Fig. 3 states; at (a) the longest such band.",
     "passages": "The last period of every case beside the gap: the overlays of Figs. 3 to 5, "
     "enlarged. Black: the frozen equilibria. The gear leaves each side where the load changes "
     "sign, arrives late on the other, and vibrates there.",
