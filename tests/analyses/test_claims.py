@@ -78,10 +78,9 @@ def test_every_number_of_the_table(findings):
 def test_a_change_of_any_number_is_noticed(findings):
     for key, finding in findings.items():
         for name, value in finding.numbers.items():
-            for other in (value * 1.0001, value + 1e-8):
-                changed = replace(finding, numbers={**finding.numbers, name: other})
-                if changed.words == finding.words:
-                    continue
+            other = value * 1.0001 if value else 1e-3
+            changed = replace(finding, numbers={**finding.numbers, name: other})
+            if changed.words != finding.words:
                 assert differences({**findings, key: changed}) == [(*key, name)]
         doubled = {name: 2 * value + 1 for name, value in finding.numbers.items()}
         changed = replace(finding, numbers=doubled, verdict="?")
