@@ -257,13 +257,34 @@ class FrozenField:
         return bool(np.all(self.signs[region] * h >= -tolerance * size))
 
     def neighbour(self, region: int, interface: int) -> int | None:
-        """The region across an interface, None if there is none."""
+        """The region across an interface, and across those that coincide with it, if any.
+
+        None if there is none.
+        """
         if self.signs[region, interface] == 0:
             return None
-        across = self.signs[region].copy()
-        across[interface] *= -1
-        found = np.flatnonzero((self.signs == across).all(axis=1))
-        return int(found[0]) if found.size else None
+        for crossed in ([interface], self.coinciding[interface]):
+            across = self.signs[region].copy()
+            across[crossed] *= -1
+            found = np.flatnonzero((self.signs == across).all(axis=1))
+            if found.size:
+                return int(found[0])
+        return None
+
+    @cached_property
+    def coinciding(self) -> list[list[int]]:
+        """For every interface those with its zero set at these parameter values, itself included.
+
+        Told by their ratio at points in general position, as x − D and x + D at D = 0.
+        """
+        count = len(self.interfaces)
+        points = np.random.default_rng(0).normal(size=(5, self.n + self.compiled.k))
+        with np.errstate(all="ignore"):
+            h = self.at(0, points)[2][:, :count]
+        products = h[:, :, None] * h[0][None, None, :]
+        crossed = products - products.transpose(0, 2, 1)
+        same = (np.abs(crossed) <= 1e-12 * np.abs(products)).all(axis=0)
+        return [np.flatnonzero(same[k] | (np.arange(count) == k)).tolist() for k in range(count)]
 
     def tangent(self, region: int, u: Array, weight: Array) -> tuple[Array, bool]:
         """Null vector of [F_x F_p], unit in the weighted norm, and whether it is the only one."""

@@ -234,8 +234,9 @@ def _cross(
     _, _, h, gradients = field.at(region, corner)
     size = np.abs(gradients * window.scale).max(axis=1)
     near = (np.abs(h) <= 1e-9 * size) & (field.signs[region] != 0)
-    meeting = [field.interfaces[k] for k in np.flatnonzero(near[: len(field.interfaces)])]
-    if len(meeting) > 1:
+    met = {interface, *np.flatnonzero(near[: len(field.interfaces)]).tolist()}
+    if not met <= set(field.coinciding[interface]):
+        meeting = [field.interfaces[k] for k in sorted(met)]
         return None, Outcome(
             "interfaces meet",
             f"the interfaces {' and '.join(meeting)} meet at the equilibrium {where}; where the "

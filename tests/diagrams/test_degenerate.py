@@ -125,3 +125,20 @@ def test_curves_end_exactly_on_interfaces():
     (point,) = curve.special("BF")
     assert curve.special_rows[0] in (0, len(curve) - 1)
     assert [point["p"], point["q"]] == pytest.approx([0, 0], abs=1e-14)
+
+
+def test_interfaces_that_coincide_are_crossed_together():
+    # a dead zone of no width: x³ + A x = w, one smooth curve with its folds at x = ±√(−A/3)
+    gear = fs.systems.harmonic_gear(D=0.0, A=-0.6)
+    diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 2))
+    assert (diagram.coverage, len(diagram.branches)) == ("complete", 1)
+    height = 0.4 * np.sqrt(0.2)
+    assert sorted(f["w"] for f in diagram.folds) == pytest.approx([-height, height], abs=1e-15)
+    (corner,) = diagram.boundary_equilibria
+    assert (corner.subtype, corner.state.tolist()) == ("persistence", [0.0, 0.0])
+    assert sorted(e["x"] for e in diagram.at(w=0.0)) == pytest.approx(
+        [-np.sqrt(0.6), 0.0, np.sqrt(0.6)], abs=1e-15
+    )
+    # next to it the gap is there, and so is its edge
+    narrow = fs.continue_equilibria(gear.with_parameters(D=1e-9).frozen(), "w", over=(-2, 2))
+    assert len(narrow.boundary_equilibria) == 2
