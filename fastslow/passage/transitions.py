@@ -103,7 +103,8 @@ class Passage:
 
     def two_thirds(self, old: Stay, new: Stay) -> Moment | None:
         """Where two thirds of the way from one course to another are done."""
-        rows = slice(old.stop, new.start + 1)
+        # near sheets are come to before
+        rows = slice(old.stop, new.stop)
         over = self.m.present[rows, new.course] & (self.m.way(old.course, new.course)[rows] > WAY)
         if not over.any():
             return None

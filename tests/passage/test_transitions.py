@@ -180,3 +180,15 @@ def test_a_short_unstable_stretch_is_followed_all_along():
     assert passage.special["w"] == pytest.approx(-1, abs=1e-9)
     assert passage.delay == pytest.approx(2, abs=1e-6)
     assert [p.kind for p in lay.phases] == ["quiescent"]
+
+
+def test_a_transition_is_where_two_thirds_of_the_way_are_done_even_after_landing():
+    # a soft contact: the radius about the new sheet is wider than the last third of the gap
+    gear = fs.systems.harmonic_gear(A=13.8889, B=2.372, C=3.5455, D=0.1, omega=0.01)
+    diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6))
+    lay = fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=1))
+    down, up = (t for t in lay.transitions if t.kind == "transit")
+    for transit, corner in ((down, 0.1), (up, -0.1)):
+        (new,) = diagram.at(w=transit.value, stable=True)
+        way = (transit.state[0] - corner) / (new["x"] - corner)
+        assert way == pytest.approx(2 / 3, abs=1e-6)
