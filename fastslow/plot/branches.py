@@ -188,7 +188,8 @@ def diagram(
     )
     drawn = replace(drawn, legend=explained(ax, drawn.handles, own, label, legend))
     place(ax, drawn.labels, [], [drawn.bands])
-    settle(ax)
+    if own:
+        settle(ax)
     return drawn
 
 

@@ -61,7 +61,10 @@ def at_draw(ax: Axes, step: Callable[[], None]) -> None:
 
 
 def settle(ax: Axes) -> None:
-    """Give the axes of a figure, and what stands in them, their places."""
+    """Give the axes of a figure, and what stands in them, their places.
+
+    Axes that were given are left to be settled when their figure is drawn.
+    """
     root(ax).draw_without_rendering()
 
 

@@ -309,7 +309,7 @@ def _explained(
     if len(drawn.handles) > 1:
         drawn = replace(drawn, legend=explained(drawn.ax, drawn.handles, own, label, legend, top))
     place(drawn.ax, bands=drawn.bands)
-    if drawn.bands or drawn.words:
+    if own and (drawn.bands or drawn.words):
         settle(drawn.ax)
     return drawn
 

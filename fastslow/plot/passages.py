@@ -218,7 +218,8 @@ def overlay(
     )
     drawn = replace(drawn, legend=explained(ax, drawn.handles, own, label, legend))
     place(ax, drawn.diagram.labels, [], [drawn.diagram.bands])
-    settle(ax)
+    if own:
+        settle(ax)
     return drawn
 
 

@@ -186,7 +186,8 @@ def parameter_plane(
     seen: dict[str, Artist] = {str(line.get_label()): line for line in (*lines, *markers)}
     key = explained(ax, [*seen.values(), *samples(fills)], own, label, legend)
     place(ax, labels)
-    settle(ax)
+    if own:
+        settle(ax)
     across, up, *above = (q.text for q in quantities)
     drawn = tuple(lines), tuple(markers), tuple(labels), key
     return PlaneDrawing(ax, *drawn, across, up, "".join(above), fills)

@@ -77,7 +77,7 @@ def test_wrong_arguments(turned, cusp_fold):
         fs.hopf_exit(turned, hopf, entry=1, rate=-EPS)
     with pytest.raises(fs.ArgumentError, match=r"entry = 1; expected .* from -2 to 0"):
         fs.hopf_exit(turned, hopf, entry=1, rate=EPS)
-    with pytest.raises(fs.ArgumentError, match="expected a positive ratio"):
+    with pytest.raises(fs.ArgumentError, match="gain = 0; expected a positive number"):
         fs.hopf_exit(turned, hopf, entry=-1, rate=EPS, gain=0)
     with pytest.raises(fs.ArgumentError, match="at a point HB"):
         fs.hopf_exit(turned, cusp_fold, entry=-1, rate=EPS)
