@@ -6,13 +6,13 @@ import asyncio
 import math
 from collections.abc import Callable, Mapping
 from html import escape
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
-from fastslow.errors import FastSlowError, MissingPackageError
+from fastslow.errors import FastSlowError
 from fastslow.interactive.sliders import Slider
+from fastslow.results.tables import extra
 
 if TYPE_CHECKING:
     from fastslow.interactive.explorers import Explorer
@@ -24,25 +24,9 @@ STEPS = 100
 REST = 0.4
 
 
-def package(name: str) -> Any:
-    """A package of the extra ``interactive``, imported late.
-
-    Raises
-    ------
-    MissingPackageError
-        When it is not installed.
-    """
-    try:
-        return import_module(name)
-    except ImportError:
-        raise MissingPackageError(
-            f"this needs {name}, of the extra 'interactive': pip install 'fastslow[interactive]'"
-        ) from None
-
-
 def live_canvas(figure: Figure) -> Any:
     """A canvas of ipympl for a figure, in place of the one that it has."""
-    backend = package("ipympl.backend_nbagg")
+    backend = extra("ipympl.backend_nbagg", "interactive")
     canvas = backend.Canvas(figure)
     # shows itself as part of the canvas
     backend.FigureManager(canvas, 0)
@@ -90,7 +74,7 @@ class Controls:
     """
 
     def __init__(self, explorer: Explorer) -> None:
-        widgets = package("ipywidgets")
+        widgets = extra("ipywidgets", "interactive")
         self._explorer = explorer
         self._following = False
         self._later: asyncio.TimerHandle | None = None

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     import xarray
 
 
-def extra(name: str) -> Any:
-    """A package of the extra ``data``, imported late.
+def extra(name: str, group: str = "data") -> Any:
+    """A package of an extra, imported late.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def extra(name: str) -> Any:
         return import_module(name)
     except ImportError:
         raise MissingPackageError(
-            f"this needs {name}, of the extra 'data': pip install 'fastslow[data]'"
+            f"this needs {name}, of the extra '{group}': pip install 'fastslow[{group}]'"
         ) from None
 
 
