@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+import matplotlib
 from matplotlib.figure import Figure
 
 from fastslow.errors import FastSlowError
@@ -26,7 +27,11 @@ REST = 0.4
 
 def live_canvas(figure: Figure) -> Any:
     """A canvas of ipympl for a figure, in place of the one that it has."""
+    kept = matplotlib.get_backend()
     backend = extra("ipympl.backend_nbagg", "interactive")
+    if matplotlib.get_backend() != kept:
+        # its import makes it the backend of pyplot
+        matplotlib.use(kept)
     canvas = backend.Canvas(figure)
     # shows itself as part of the canvas
     backend.FigureManager(canvas, 0)

@@ -275,7 +275,7 @@ def _tried(failures: list[Outcome], what: str, compute: Callable[[], R]) -> R | 
     try:
         return compute()
     except FastSlowError as error:
-        failures.append(Outcome(what, f"no {what}: {error}", False))
+        failures.append(Outcome("not computed", f"no {what}: {error}", False))
         return None
 
 

@@ -11,6 +11,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from fastslow.errors import unknown_name
+from fastslow.plot.arguments import line_colour
 from fastslow.plot.style import GREY
 from fastslow.results.refined_maps import FAILED, RefinedMap
 
@@ -70,6 +72,10 @@ def samples(fills: Mapping[Any, PolyCollection]) -> list[Patch]:
 
 
 def _colours(result: RefinedMap, fills: Mapping[Any, str]) -> dict[Any, str]:
+    for word, fill in fills.items():
+        if word not in result.labels:
+            raise unknown_name("label", word, result.labels)
+        line_colour(f"fills[{word!r}]", fill)
     known = {**FILLS, **fills}
     others = [word for word in result.labels if word not in known]
     turn = {word: OTHERS[k % len(OTHERS)] for k, word in enumerate(others)}
