@@ -100,7 +100,9 @@ def draw(into: Output) -> None:
     sheet = new_figure(FULL, 78 * MM)
     left, right = (dressed(ax) for ax in sheet.subplots(1, 2, width_ratios=(1.35, 1)))
     fills = {**FILLS, "unilateral": FILLS["unilateral upper"], "free": "#BDBDBD"}
-    fs.plot.regime_map(refined(), ax=left, fills=fills, legend=False, linewidth=0.5)
+    plane = refined()
+    own = {word: fills[word] for word in plane.labels}
+    fs.plot.regime_map(plane, ax=left, fills=own, legend=False, linewidth=0.5)
     for width in WIDTHS:
         left.axhline(width, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)))
     left.plot(longest("consistent"), [0.06, 0.06], color="black", linewidth=3)
