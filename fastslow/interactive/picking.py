@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
-from fastslow.interactive.tooltips import Instant, text_of
+from fastslow.interactive.tooltips import text_of
 from fastslow.plot.branches import DiagramDrawing
 from fastslow.plot.marks import at_moments
 from fastslow.plot.motions import MotionDrawing
@@ -28,8 +28,8 @@ from fastslow.plot.quantities import (
 )
 from fastslow.plot.style import root
 from fastslow.results.branches import Branch
-from fastslow.results.crossings import regions_at
 from fastslow.results.diagrams import Diagram
+from fastslow.results.moments import Moment
 from fastslow.results.overlays import Overlay
 from fastslow.results.points import Equilibrium
 from fastslow.results.trajectories import Trajectory
@@ -49,7 +49,7 @@ class Pick:
 
     Parameters
     ----------
-    point : Equilibrium, SpecialPoint, Crossing, Transition or Instant
+    point : Equilibrium, SpecialPoint, Crossing, Transition or Moment
     ax : Axes
     x, y : float
         Where it is drawn.
@@ -257,20 +257,11 @@ def _at_crossings(ax: Axes, at: Array, run: Trajectory) -> Curve:
 
 
 def _on_run(run: Trajectory) -> Callable[[int, float], tuple[Any, str]]:
-    """The state at a place along a trajectory: of its series where it kept them."""
+    """The moment at a place along a trajectory: of its series where it kept them."""
 
-    def found(row: int, part: float) -> tuple[Instant, str]:
+    def found(row: int, part: float) -> tuple[Moment, str]:
         times = run.t
         time = float(times[row] if part == 0 else (1 - part) * times[row] + part * times[row + 1])
-        if run.series is not None and len(run.steps):
-            columns, call = run.dense_columns(time), f"run({time!r})"
-        else:
-            rows = [run[name] for name in run.columns]
-            columns = np.array([np.interp(time, times, values) for values in rows])
-            call = f"np.array([np.interp({time!r}, run.t, run[s]) for s in run.states])"
-        n = len(run.states)
-        slow = dict(zip(run.forcing, columns[n:].tolist(), strict=True))
-        region = str(regions_at(run, np.array([time]))[0])
-        return Instant(time, run.states, columns[:n].copy(), slow, region), call
+        return run.at(t=time)[0], f"run.at(t={time!r})[0]"
 
     return found

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
 from textwrap import fill
 from typing import Any
 
@@ -18,35 +17,12 @@ from fastslow.results.transitions import Transition
 WIDTH = 44
 
 
-@dataclass(frozen=True, eq=False)
-class Instant:
-    """A trajectory at one time.
-
-    Parameters
-    ----------
-    time : float
-    states : tuple of str
-        States and slow states.
-    state : ndarray, shape (n,)
-        Their values: with ``time`` a start for `fastslow.simulate`.
-    slow : mapping
-        Slow quantities then.
-    region : str
-    """
-
-    time: float
-    states: tuple[str, ...]
-    state: NDArray[np.float64]
-    slow: Mapping[str, float]
-    region: str
-
-
 def text_of(point: Any, parameter: str = "") -> str:
     """What is known of a point, in a few short lines.
 
     Parameters
     ----------
-    point : Equilibrium, SpecialPoint, Crossing, Transition or Instant
+    point : Equilibrium, SpecialPoint, Crossing, Transition or Moment
     parameter : str
         What the diagram is over.
 

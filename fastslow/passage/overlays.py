@@ -22,10 +22,11 @@ from fastslow.passage.spikes import refined, turns_of
 from fastslow.passage.stays import Measured, Stay, measured, stays_of
 from fastslow.passage.transitions import Passage, leaving, passages_within, steep_parts
 from fastslow.results.diagrams import Diagram
+from fastslow.results.moments import Moment
 from fastslow.results.outcome import Outcome
 from fastslow.results.overlays import MEASURED, Overlay
 from fastslow.results.trajectories import Trajectory
-from fastslow.results.transitions import Moment, Phase, Transition
+from fastslow.results.transitions import Phase, Transition
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,11 @@ from fastslow.passage.excursions import Excursion
 from fastslow.passage.sheets import Course, ends_of, over_a_gap
 from fastslow.passage.slow_quantities import SlowQuantity
 from fastslow.passage.stays import WAY, Measured, Stay, way_done
-from fastslow.results.crossings import Crossing
+from fastslow.results.crossings import Crossing, regions_at
 from fastslow.results.diagrams import Diagram
+from fastslow.results.moments import Moment
 from fastslow.results.points import SpecialPoint
-from fastslow.results.transitions import SPIKING, Moment, StableSheet, Transition
+from fastslow.results.transitions import SPIKING, StableSheet, Transition
 
 Array = NDArray[np.float64]
 
@@ -49,7 +50,16 @@ class Passage:
     def moment(self, time: float) -> Moment:
         """The slow quantity and the state at a time."""
         value, state = self.slow.at(np.array([time]))
-        return Moment(float(time), float(value[0]), state[0].copy())
+        run, name = self.slow.run, self.slow.name
+        return Moment(
+            float(time),
+            self.slow.states,
+            state[0].copy(),
+            {name: float(value[0])},
+            str(regions_at(run, np.array([time]))[0]),
+            run.parameters,
+            parameter=name,
+        )
 
     def first(self, start: float, stop: float, over: Callable[[Array, Array], Array]) -> float:
         """First time of an interval, to rounding, from which on a condition holds.

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fastslow.arguments import among, takes
+from fastslow.errors import unknown_name
 
 if TYPE_CHECKING:
     from fastslow.results.trajectories import Trajectory
@@ -48,9 +52,51 @@ class Crossing:
         )
 
 
-def crossings_of(run: Trajectory) -> tuple[Crossing, ...]:
+class Crossings(tuple[Crossing, ...]):
+    """Crossings in order of time; called with an interface, those of that interface.
+
+    ``crossings("x - D", direction=+1)`` are the upward ones of an interface.
+
+    Parameters
+    ----------
+    items : iterable of Crossing
+    interfaces : tuple of str
+        Those that can be asked for.
+    """
+
+    interfaces: tuple[str, ...]
+
+    def __new__(cls, items: Iterable[Crossing] = (), interfaces: tuple[str, ...] = ()) -> Crossings:
+        made = super().__new__(cls, items)
+        made.interfaces = interfaces
+        return made
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        return tuple(self), self.interfaces
+
+    @takes(direction=among(-1, 0, 1, None))
+    def __call__(self, interface: object = None, *, direction: int | None = None) -> Crossings:
+        """Those of an interface, upwards (+1), downwards (−1) or only touching (0).
+
+        Raises
+        ------
+        UnknownNameError
+            For an interface that is not in the model.
+        """
+        if interface is not None and str(interface) not in self.interfaces:
+            raise unknown_name("interface", interface, self.interfaces)
+        kept = (
+            crossing
+            for crossing in self
+            if (interface is None or crossing.interface == str(interface))
+            and (direction is None or crossing.direction == direction)
+        )
+        return Crossings(kept, self.interfaces)
+
+
+def crossings_of(run: Trajectory) -> Crossings:
     """Every crossing in order of time."""
-    return tuple(
+    found = (
         Crossing(
             float(entry[0]),
             entry[6:].copy(),
@@ -62,6 +108,7 @@ def crossings_of(run: Trajectory) -> tuple[Crossing, ...]:
         )
         for entry in run.crossing_table
     )
+    return Crossings(found, run.interfaces)
 
 
 @dataclass(frozen=True)
@@ -94,6 +141,6 @@ def regions_at(run: Trajectory, times: NDArray[np.float64]) -> NDArray[np.str_]:
     """The region at each of some times; at a crossing the one that is entered."""
     if not len(run.steps):
         return np.full(len(times), "")
-    row = np.searchsorted(run.steps[:, 0], times, side="right") - 1
+    row = np.searchsorted(run.step_starts, times, side="right") - 1
     mode = run.steps[np.maximum(row, 0), 2].astype(int)
     return np.array(run.modes)[mode]

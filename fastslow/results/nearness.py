@@ -51,13 +51,18 @@ def _closest(line: Array, target: Array) -> tuple[float, int, float]:
     """Distance, row and part of the step after it, of the nearest point of a line."""
     if len(line) == 1:
         return float(np.linalg.norm(line[0] - target)), 0, 0.0
+    distance, part = along_line(line, target)
+    row = int(np.argmin(distance))
+    return math.sqrt(distance[row]), row, float(part[row])
+
+
+def along_line(line: Array, target: Array) -> tuple[Array, Array]:
+    """Distance² of every step of a line from a target, and the part of the step gone there."""
     step = np.diff(line, axis=0)
     length = (step**2).sum(axis=1)
     part = ((target - line[:-1]) * step).sum(axis=1) / np.where(length > 0, length, 1.0)
     part = np.clip(part, 0.0, 1.0)
-    distance = ((line[:-1] + part[:, None] * step - target) ** 2).sum(axis=1)
-    row = int(np.argmin(distance))
-    return math.sqrt(distance[row]), row, float(part[row])
+    return ((line[:-1] + part[:, None] * step - target) ** 2).sum(axis=1), part
 
 
 def _point(

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from itertools import chain
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import among, position, takes, text
+from fastslow.results import overlay_queries
 from fastslow.results.diagrams import Diagram
 from fastslow.results.formulas import evaluated
+from fastslow.results.moments import Moment, in_blocks, sample
 from fastslow.results.outcome import Outcome
 from fastslow.results.result import Result
 from fastslow.results.tables import Table
 from fastslow.results.trajectories import Trajectory
-from fastslow.results.transitions import Bursting, Moment, Phase, StableSheet, Transition
+from fastslow.results.transitions import Bursting, Phase, StableSheet, Transition, Transitions
 
 #: The usual outcome of an overlay.
 MEASURED = Outcome("measured", "the diagram covers the whole run.", True)
@@ -28,6 +32,10 @@ SHOWN = 12
 @dataclass(frozen=True, eq=False)
 class Overlay(Table, Result):
     """A trajectory laid over the equilibrium diagram of its frozen model.
+
+    ``lay["distance"]`` is a column and ``lay["x - w"]`` an expression, sample by sample;
+    ``lay[3]`` and iteration give the moments of samples, with the sheet followed then, and
+    ``lay[10:50]`` is the overlay of those samples.
 
     Parameters
     ----------
@@ -91,11 +99,13 @@ class Overlay(Table, Result):
     _row = "t"
     _places = ("t",)
 
-    #: Numbers are no columns, and rows no points: there is nothing to go through one by one.
-    __iter__: ClassVar[None] = None
-
     def __len__(self) -> int:
         return len(self.time)
+
+    def __iter__(self) -> Iterator[Moment]:
+        return chain.from_iterable(
+            overlay_queries.measured(self, block) for block in in_blocks(self.run)
+        )
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Time t, the slow quantity, states, distance, lag, and the label of the sheet followed."""
@@ -119,18 +129,37 @@ class Overlay(Table, Result):
         """Delay of every transition, in the slow quantity's units."""
         return np.array([t.delay for t in self.transitions])
 
-    def __getitem__(self, expression: object) -> NDArray[np.float64]:
-        """A state, slow quantity, t, distance, lag, or an expression in them, shape (N,).
+    @property
+    def special(self) -> Transitions:
+        """The transitions; ``lay.special("jump")`` those of one kind."""
+        return Transitions(self.transitions)
 
-        Parameters may stand in it too.
+    @overload
+    def __getitem__(self, key: slice) -> Overlay: ...
+    @overload
+    def __getitem__(self, key: int) -> Moment: ...
+    @overload
+    def __getitem__(self, key: str) -> NDArray[np.float64]: ...
+    def __getitem__(self, key: object) -> Overlay | Moment | NDArray[np.float64]:
+        """A column or expression, shape (N,); the moment of a sample; the overlay of some samples.
+
+        Columns are states, slow quantities, t, distance and lag. Parameters may
+        stand in an expression too.
 
         Raises
         ------
         UnknownNameError
             For a name that is none of these.
         ArgumentError
-            For what is no expression.
+            For what is no expression, or a slice that holds no sample or leaves some out.
+        OutOfRangeError
+            For a sample that there is not.
         """
+        if isinstance(key, slice):
+            return overlay_queries.rows_of(self, key)
+        if isinstance(key, int | np.integer) and not isinstance(key, bool):
+            row = position(key, len(self), "sample")
+            return overlay_queries.measured(self, [sample(self.run, row)])[0]
         known = {
             "t": self.time,
             "distance": self.distance,
@@ -140,7 +169,115 @@ class Overlay(Table, Result):
             **{name: self.run[name] for name in self.run.columns},
             self.parameter: self.slow,
         }
-        return np.broadcast_to(evaluated(expression, known), self.time.shape)
+        return np.broadcast_to(evaluated(key, known), self.time.shape)
+
+    @takes(region=text, sheet=text, direction=among(-1, 0, 1, None))
+    def at(
+        self,
+        *,
+        region: str | None = None,
+        sheet: str | None = None,
+        direction: int | None = None,
+        **value: float,
+    ) -> list[Moment]:
+        """The moments at one value of a column, with the sheet followed then.
+
+        As `Trajectory.at`; the parameter of a path is read between samples.
+
+        Parameters
+        ----------
+        region : str, optional
+            Keep only those in one region.
+        sheet : str, optional
+            Keep only those on the sheet of this label; ``""`` those on none.
+        direction : int, optional
+            Keep only passages upwards (+1), downwards (−1), or touches (0).
+        **value : float
+            A state, slow quantity or ``t`` by name, e.g. ``w=0.1``.
+
+        Returns
+        -------
+        list of Moment
+            In order of time.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no column, no region or no sheet.
+        ArgumentError
+            If the run does not reach the value.
+
+        Examples
+        --------
+        >>> import fastslow as fs
+        >>> model = fs.systems.cusp(omega=0.002)
+        >>> diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
+        >>> lay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=1))
+        >>> [(moment.sheet, round(moment["x"], 3)) for moment in lay.at(p=0)]
+        [('S1.1', -1.002), ('S1.2', 1.002), ('S1.1', -0.998)]
+        >>> [part.special("jump")[0].to_sheet for part in lay.select(kind="jump")]
+        ['S1.2', 'S1.1']
+        """
+        return overlay_queries.moments_of(self, value, direction, sheet, region)
+
+    @takes(region=text, sheet=text, kind=text)
+    def select(
+        self,
+        *,
+        region: str | None = None,
+        sheet: str | None = None,
+        kind: str | None = None,
+        between: tuple[float, float] | None = None,
+    ) -> tuple[Overlay, ...]:
+        """The parts of the overlay whose samples all fulfil the conditions, in order.
+
+        Parameters
+        ----------
+        region : str, optional
+            Samples in one region.
+        sheet : str, optional
+            Samples on the sheet of this label; ``""`` those on none.
+        kind : str, optional
+            Samples in a phase of this kind; see `fastslow.results.transitions.Phase`.
+        between : (float, float), optional
+            Samples between two times, ends included.
+
+        Returns
+        -------
+        tuple of Overlay
+            Each with its part of the run, phases and transitions, and without ``bursting``.
+
+        Raises
+        ------
+        UnknownNameError
+            For a region, sheet or kind that there is not.
+        ArgumentError
+            For a range that is none.
+        """
+        return overlay_queries.parts_of(self, sheet, region, kind, between)
+
+    def nearest(self, **values: float) -> Moment:
+        """The moment nearest to some values of columns, with the sheet followed then.
+
+        As `Trajectory.nearest`; the parameter of a path is read between samples.
+
+        Parameters
+        ----------
+        **values : float
+            At least one of the states, slow quantities and ``t``, e.g. ``w=0.1, x=0.3``.
+
+        Returns
+        -------
+        Moment
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no column.
+        ArgumentError
+            For a number that is not finite, or none at all.
+        """
+        return overlay_queries.nearest_on(self, values)
 
     def shares(self) -> dict[str, float]:
         """Part of the time on each sheet that is followed, and in ``""`` on none."""

@@ -44,13 +44,31 @@ class StepRoots:
 
 
 @dataclass(frozen=True)
-class _Zero:
-    """Zero from ``low`` to ``high`` (step + part), with the signs on both sides."""
+class Zero:
+    """Zero from ``low`` to ``high`` (step + part), with the signs on both sides.
+
+    The sign is 0 on the side of an end of the run that lies on zero.
+    """
 
     low: float
     high: float
     before: int
     after: int
+
+    @property
+    def long(self) -> bool:
+        """Whether the quantity rests on zero for a step or longer."""
+        return self.high - self.low >= 1
+
+    @property
+    def middle(self) -> float:
+        return (self.low + self.high) / 2
+
+    @property
+    def direction(self) -> int:
+        """+1 where the quantity grows through zero, −1 where it falls, 0 where it touches."""
+        after = self.after or -self.before
+        return 0 if after == self.before else after
 
 
 def find_roots(quantity: StepPolynomials) -> StepRoots:
@@ -66,9 +84,18 @@ def find_roots(quantity: StepPolynomials) -> StepRoots:
         A stretch on which the quantity is zero to rounding counts once, at its beginning
         (at its middle when it is shorter than a step).
     """
+    found = [zero for zero in find_zeros(quantity) if zero.before != 0]
+    where = np.array([zero.low if zero.long else zero.middle for zero in found])
+    step = np.minimum(where.astype(np.intp), len(quantity.coefficients) - 1)
+    direction = np.array([zero.direction for zero in found], dtype=np.int64)
+    return StepRoots(step, where - step, direction)
+
+
+def find_zeros(quantity: StepPolynomials) -> list[Zero]:
+    """All zeros along consecutive steps in order, those at the ends of the run too."""
     b = quantity.coefficients
     if not len(b):
-        return StepRoots(np.empty(0, dtype=np.intp), np.empty(0), np.empty(0, dtype=np.int64))
+        return []
     if b.shape[1] == 1:
         b = np.column_stack([b, np.zeros(len(b))])
     noise = 8.0 * np.finfo(float).eps * quantity.size
@@ -81,16 +108,10 @@ def find_roots(quantity: StepPolynomials) -> StepRoots:
     single, vague = _inside(bernstein, noise, b)
     vague += [(float(j), float(j)) for j in np.flatnonzero(ends == 0.0)]
     zeros = single + [
-        _Zero(low, high, _sign_beyond(b, noise, low, -1), _sign_beyond(b, noise, high, 1))
+        Zero(low, high, _sign_beyond(b, noise, low, -1), _sign_beyond(b, noise, high, 1))
         for low, high in _joined(sorted(vague))
     ]
-    zeros = _merged(sorted(zeros, key=lambda z: z.low), b, noise)
-    found = [z for z in zeros if z.before != 0]
-    where = np.array([z.low if z.high - z.low >= 1 else (z.low + z.high) / 2 for z in found])
-    after = np.array([z.after or -z.before for z in found], dtype=np.int64)
-    before = np.array([z.before for z in found], dtype=np.int64)
-    step = np.minimum(where.astype(np.intp), len(b) - 1)
-    return StepRoots(step, where - step, np.where(after == before, 0, after))
+    return _merged(sorted(zeros, key=lambda z: z.low), b, noise)
 
 
 @cache
@@ -120,7 +141,7 @@ def _changes(bernstein: Array) -> tuple[NDArray[np.int64], Array, Array]:
 
 def _inside(
     bernstein: Array, noise: Array, b: Array
-) -> tuple[list[_Zero], list[tuple[float, float]]]:
+) -> tuple[list[Zero], list[tuple[float, float]]]:
     """Single roots in the open steps, and intervals that are zero to rounding."""
     step = np.arange(len(b))
     low, width = np.zeros(len(b)), np.ones(len(b))
@@ -147,7 +168,7 @@ def _inside(
     row, lower, upper, first, last = (np.concatenate(parts) for parts in zip(*single, strict=True))
     root = row + _refined(b[row.astype(np.intp)], lower, upper, first)
     found = zip(root.tolist(), first.tolist(), last.tolist(), strict=True)
-    return [_Zero(u, u, int(before), int(after)) for u, before, after in found], vague
+    return [Zero(u, u, int(before), int(after)) for u, before, after in found], vague
 
 
 def _joined(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -203,9 +224,9 @@ def _sign_beyond(b: Array, noise: Array, u: float, side: int) -> int:
         reach += min(reach, 0.5)
 
 
-def _merged(zeros: list[_Zero], b: Array, noise: Array) -> list[_Zero]:
+def _merged(zeros: list[Zero], b: Array, noise: Array) -> list[Zero]:
     """Neighbours between which the quantity stays within rounding are one zero."""
-    kept: list[_Zero] = []
+    kept: list[Zero] = []
     for zero in zeros:
         if kept:
             last = kept[-1]
@@ -219,7 +240,7 @@ def _merged(zeros: list[_Zero], b: Array, noise: Array) -> list[_Zero]:
                     before, after = (
                         _sign_beyond(b, noise, u, side) for u, side in ((low, -1), (high, 1))
                     )
-                    kept[-1] = _Zero(low, high, before, after)
+                    kept[-1] = Zero(low, high, before, after)
                     continue
         kept.append(zero)
     return kept

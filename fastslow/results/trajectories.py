@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any, ClassVar
+from itertools import chain
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import among, finite, numbers, positive, takes
+from fastslow.arguments import among, finite, numbers, position, positive, takes, text
 from fastslow.results import formulas
 from fastslow.results.contacts import (
     Contacts,
@@ -19,12 +20,16 @@ from fastslow.results.contacts import (
     regime_of,
     residence_in,
 )
-from fastslow.results.crossings import Crossing, Segment, crossings_of, regions_at, segments_of
+from fastslow.results.crossings import Crossings, Segment, crossings_of, regions_at, segments_of
 from fastslow.results.dense import columns_at, refined_table
 from fastslow.results.markup import trajectory_html
+from fastslow.results.moments import Moment, in_blocks, is_dense, sample
 from fastslow.results.outcome import Outcome
 from fastslow.results.recurrence import Recurrence
 from fastslow.results.result import Result
+from fastslow.results.run_levels import in_region, moments_on, one_value
+from fastslow.results.run_nearness import nearest_moment
+from fastslow.results.run_parts import parts_of, samples_of
 from fastslow.results.sections import window_of
 from fastslow.results.tables import Table
 
@@ -32,6 +37,10 @@ from fastslow.results.tables import Table
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(Recurrence, Table, Result):
     """A solution in time.
+
+    ``run["x"]`` is a column and ``run["x**2 + v"]`` an expression at the samples ``run.t``;
+    ``run[3]`` and iteration give the moments of samples, ``run[10:50]`` is the trajectory of
+    those samples, with its crossings, and ``run(t)`` the states at any time.
 
     Parameters
     ----------
@@ -106,9 +115,6 @@ class Trajectory(Recurrence, Table, Result):
     _row = "t"
     _places = ("t",)
 
-    #: Numbers are no columns, and rows no points: there is nothing to go through one by one.
-    __iter__: ClassVar[None] = None
-
     @cached_property
     def t(self) -> NDArray[np.float64]:
         """Times of the samples; without samples, enough of them to plot."""
@@ -119,16 +125,139 @@ class Trajectory(Recurrence, Table, Result):
         """Names that can be asked for: states, slow states, slow quantities."""
         return (*self.states, *self.forcing)
 
-    def __getitem__(self, name: object) -> NDArray[np.float64]:
-        """A state, a slow quantity, or an expression in them, at the times ``t``, shape (N,)."""
-        columns = {key: partial(self._column, k) for k, key in enumerate(self.columns)}
-        return formulas.column(name, {**columns, "t": lambda: self.t}, self.parameters, len(self.t))
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __iter__(self) -> Iterator[Moment]:
+        return chain.from_iterable(in_blocks(self))
+
+    @overload
+    def __getitem__(self, key: slice) -> Trajectory: ...
+    @overload
+    def __getitem__(self, key: int) -> Moment: ...
+    @overload
+    def __getitem__(self, key: str) -> NDArray[np.float64]: ...
+    def __getitem__(self, key: object) -> Trajectory | Moment | NDArray[np.float64]:
+        """A column or expression at the times ``t``, shape (N,); a moment; the run of some samples.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no column and no parameter.
+        ArgumentError
+            For text that is no expression, or a slice that holds no sample or leaves some out.
+        OutOfRangeError
+            For a sample that there is not.
+        """
+        if isinstance(key, slice):
+            return samples_of(self, key)
+        if isinstance(key, int | np.integer) and not isinstance(key, bool):
+            return sample(self, position(key, len(self), "sample"))
+        columns = {name: partial(self._column, k) for k, name in enumerate(self.columns)}
+        return formulas.column(key, {**columns, "t": lambda: self.t}, self.parameters, len(self.t))
 
     def _column(self, row: int) -> NDArray[np.float64]:
         values = self._table[1]
-        if row >= len(values):
-            values = self._all_sampled
-        return values[row]
+        return values[row] if row < len(values) else self._all_sampled[row]
+
+    @takes(region=text, direction=among(-1, 0, 1, None))
+    def at(
+        self, *, region: str | None = None, direction: int | None = None, **value: float
+    ) -> list[Moment]:
+        """The moments at one value of a column, one per passage; of a time, the one then.
+
+        Every root of every step's series is found, to rounding; a touch counts
+        once. Of a stretch of time that stays on the value its two ends are
+        given, with ``resting=True``. Without dense output the samples are joined
+        by straight lines, and what is read between them says so
+        (``interpolated=True``).
+
+        Parameters
+        ----------
+        region : str, optional
+            Keep only those in one region (or sliding, as ``"S1|S2"``).
+        direction : int, optional
+            Keep only passages upwards (+1), downwards (−1), or touches (0).
+        **value : float
+            A state, slow state, slow quantity or ``t`` by name, e.g. ``x=0.5``.
+
+        Returns
+        -------
+        list of Moment
+            In order of time.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no column, or no region.
+        ArgumentError
+            If the run does not reach the value.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, v = sp.symbols("x v")
+        >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 6), tol=1e-13)
+        >>> [round(moment.time / sp.pi.evalf(), 9) for moment in run.at(x=0.5)]
+        [0.333333333, 1.666666667]
+        >>> round(run.at(t=3.2)[0]["v"], 9) == round(-sp.sin(3.2), 9)
+        True
+        """
+        name, level = one_value(value, (*self.columns, "t"))
+        return in_region(self, moments_on(self, name, level, direction), region)
+
+    @takes(region=text)
+    def select(
+        self, *, region: str | None = None, between: tuple[float, float] | None = None
+    ) -> tuple[Trajectory, ...]:
+        """The parts of the run that fulfil the conditions, each a trajectory, in order.
+
+        A part is cut exactly, keeps its series, and has the crossings at its ends.
+        Without dense output it goes from the first sample within to the last.
+
+        Parameters
+        ----------
+        region : str, optional
+            Stays in one region (or sliding, as ``"S1|S2"``).
+        between : (float, float), optional
+            Times, ends included.
+
+        Returns
+        -------
+        tuple of Trajectory
+
+        Raises
+        ------
+        UnknownNameError
+            For a region that there is not.
+        ArgumentError
+            For a range that is none.
+        """
+        return parts_of(self, region, between)
+
+    def nearest(self, **values: float) -> Moment:
+        """The moment nearest to some values of columns.
+
+        Distances are measured in units of each column's range. The moment is
+        found along the series, to rounding; without dense output on straight lines.
+
+        Parameters
+        ----------
+        **values : float
+            At least one of the states, slow quantities and ``t``, e.g. ``x=0.1, v=0``.
+
+        Returns
+        -------
+        Moment
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no column.
+        ArgumentError
+            For a number that is not finite, or none at all.
+        """
+        return nearest_moment(self, values)
 
     def __call__(self, times: ArrayLike) -> NDArray[np.float64]:
         """States at any times of the run, shape (n, N); (n,) for a scalar time.
@@ -159,9 +288,21 @@ class Trajectory(Recurrence, Table, Result):
     def _all_sampled(self) -> NDArray[np.float64]:
         return self.dense_columns(self.t)
 
+    @property
+    def sampled_columns(self) -> NDArray[np.float64]:
+        """Columns at the times ``t``: all of them, or without dense output those that were kept."""
+        values = self._table[1]
+        known = len(values) == len(self.columns) or not is_dense(self)
+        return values if known else self._all_sampled
+
     @cached_property
-    def crossings(self) -> tuple[Crossing, ...]:
-        """Every crossing in order of time."""
+    def step_starts(self) -> NDArray[np.float64]:
+        """When each step begins, side by side in memory for a binary search."""
+        return np.ascontiguousarray(self.steps[:, 0])
+
+    @cached_property
+    def crossings(self) -> Crossings:
+        """In order of time; ``run.crossings("x - D", direction=+1)`` those of an interface."""
         return crossings_of(self)
 
     @cached_property

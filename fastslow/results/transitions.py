@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import word
 from fastslow.results.delays import Delay, GapTransit
+from fastslow.results.moments import Moment
 from fastslow.results.points import SpecialPoint
 
 #: Stands for a sheet where the fast motion follows none.
@@ -25,6 +27,10 @@ KINDS = {
     "excursion": "leaves a sheet that has not ended and comes back",
     "change": "leaves for another reason",
 }
+
+
+#: Every kind of phase.
+PHASES = ("quiescent", "spiking", "jump", "transit", "excursion", "transient", "outside")
 
 
 @dataclass(frozen=True)
@@ -48,23 +54,6 @@ class StableSheet:
     start: int
     stop: int
     region: str
-
-
-@dataclass(frozen=True, eq=False)
-class Moment:
-    """A place along a trajectory.
-
-    Parameters
-    ----------
-    time, value : float
-        The time, and the slow quantity then.
-    state : ndarray, shape (n,)
-        The fast state then.
-    """
-
-    time: float
-    value: float
-    state: NDArray[np.float64] = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +171,21 @@ class Transition:
     def _compared(self) -> bool:
         """Whether the law speaks of the delay."""
         return bool(np.isfinite(self.predicted)) and not isinstance(self.law, GapTransit)
+
+
+class Transitions(tuple[Transition, ...]):
+    """Transitions in time; called with a kind, those of that kind.
+
+    Examples
+    --------
+    >>> Transitions()("jump")
+    ()
+    """
+
+    def __call__(self, kind: str) -> Transitions:
+        """Those of one kind; UnknownNameError for a kind that there is not."""
+        word("kind of transition", KINDS)("kind", kind)
+        return Transitions(t for t in self if t.kind == kind)
 
 
 @dataclass(frozen=True)

@@ -108,15 +108,15 @@ def test_every_part_of_a_panel_answers(lay, panel, mouse):
     run = lay.run
     time = 0.37 * run.span[1]
     mouse("button_press_event", panel.time_series.ax, time, run(time)[0])
-    instant = pointer.selected.point
-    assert instant.time == pytest.approx(time, rel=2e-3)
-    np.testing.assert_array_equal(instant.state, run(instant.time))
-    np.testing.assert_array_equal(given(lay, pointer.selected.call), instant.state)
-    assert instant.slow["w"] == pytest.approx(0.4 * np.sin(0.02 * instant.time), abs=1e-9)
+    moment = pointer.selected.point
+    assert moment.time == pytest.approx(time, rel=2e-3)
+    np.testing.assert_array_equal(moment.state, run(moment.time))
+    np.testing.assert_array_equal(given(lay, pointer.selected.call).state, moment.state)
+    assert moment.slow["w"] == pytest.approx(0.4 * np.sin(0.02 * moment.time), abs=1e-9)
     again = fs.simulate(
         fs.systems.harmonic_gear(A=-0.6, B=0.0, C=0.4, omega=0.02),
-        instant.state,
-        t=(instant.time, run.span[1]),
+        moment.state,
+        t=(moment.time, run.span[1]),
     )
     np.testing.assert_allclose(again.end, run.end, atol=1e-7)
 
@@ -146,12 +146,11 @@ def test_a_run_without_series_is_read_between_its_samples(folded, mouse):
     drawing = fs.plot.time_series(run, "v", crossings=False)
     pointer = fs.inspect(drawing, run)
     mouse("button_press_event", drawing.ax, run.t[200], run["v"][200])
-    instant = pointer.selected.point
-    expected = [np.interp(instant.time, run.t, run[name]) for name in run.states]
-    np.testing.assert_allclose(instant.state, expected, rtol=1e-12)
-    np.testing.assert_array_equal(
-        eval(pointer.selected.call, {"np": np, "run": run}), instant.state
-    )
+    moment = pointer.selected.point
+    expected = [np.interp(moment.time, run.t, run[name]) for name in run.states]
+    np.testing.assert_allclose(moment.state, expected, rtol=1e-12)
+    assert moment.interpolated
+    np.testing.assert_array_equal(eval(pointer.selected.call, {"run": run}).state, moment.state)
 
 
 def test_a_diagram_from_a_file_answers(lay, tmp_path, mouse):

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import fastslow as fs
+from fastslow.results.moments import Moment
 from fastslow.results.points import SpecialPoint
-from fastslow.results.transitions import Moment, Phase, StableSheet, Transition
+from fastslow.results.transitions import Phase, StableSheet, Transition
 
 
 def special(code):
@@ -17,9 +18,13 @@ def special(code):
     )  # fmt: skip
 
 
+def moment(time, value):
+    return Moment(time, ("x",), np.ones(1), {"w": value}, parameter="w")
+
+
 def transition(code, kind, **more):
     point = special(code) if code else None
-    leave = Moment(2.5, 0.55, np.ones(1))
+    leave = moment(2.5, 0.55)
     return Transition(
         3.0, 0.6, np.ones(1), "S1", "S2", point, 0.1 if code else np.nan, kind, leave, **more
     )
@@ -33,13 +38,13 @@ def lay(gear):
 
 
 def test_duration_and_width():
-    landed = transition("LP", "jump", land=Moment(4.0, 0.7, np.ones(1)))
+    landed = transition("LP", "jump", land=moment(4.0, 0.7))
     assert (landed.duration, landed.width) == pytest.approx((1.5, 0.15))
     assert np.isnan(transition("LP", "jump").duration)
 
 
 def test_sentences():
-    text = transition("LP", "jump", land=Moment(4.0, 0.7, np.ones(1))).describe("w")
+    text = transition("LP", "jump", land=moment(4.0, 0.7)).describe("w")
     assert text == (
         "t = 3, w = 0.6: S1 → S2, jump at LP1, w = 0.5; delay 0.1; lands at w = 0.7, t = 4"
     )
