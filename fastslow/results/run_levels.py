@@ -13,13 +13,16 @@ from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.expressions import StepPolynomials, along_steps
 from fastslow.results.moments import Moment, is_dense, moments_at
-from fastslow.results.step_roots import Zero, find_zeros
+from fastslow.results.step_roots import CLOSE, Zero, find_zeros
 from fastslow.results.turning import extremes_of
 
 if TYPE_CHECKING:
     from fastslow.results.trajectories import Trajectory
 
 Array = NDArray[np.float64]
+
+#: An end of a run that misses the value by this, or this part of it, is on it.
+NEAR = 1e-12
 
 
 def one_value(values: Mapping[str, float], valid: Sequence[str]) -> tuple[str, float]:
@@ -53,12 +56,25 @@ def moments_on(run: Trajectory, name: str, level: float, direction: int | None) 
     if not is_dense(run):
         values = run[name]
         return between_samples(run, name, values, level, direction)
-    zeros = find_zeros(along_steps(run, name).minus(level))
+    quantity = along_steps(run, name).minus(level)
+    zeros = _with_ends(find_zeros(quantity), quantity, NEAR * max(1.0, abs(level)))
     if not zeros:
         low, high = extremes_of(run, name, None)
         if not low <= level <= high:
             raise outside(name, level, (low, high))
     return _moments(run, zeros, run.steps[:, 0], run.steps[:, 1], direction)
+
+
+def _with_ends(zeros: list[Zero], quantity: StepPolynomials, near: float) -> list[Zero]:
+    """The zeros, and an end of the run that misses zero by rounding only."""
+    b = quantity.coefficients
+    first, last = float(b[0, 0]), float(b[-1].sum())
+    # the passage of a neighbouring zero is not counted again
+    if abs(first) <= near and not (zeros and zeros[0].low <= CLOSE):
+        zeros = [Zero(0.0, 0.0, 0, int(np.sign(b[0, 1:].sum()))), *zeros]
+    if abs(last) <= near and not (zeros and zeros[-1].high >= len(b) - CLOSE):
+        zeros = [*zeros, Zero(len(b), len(b), int(np.sign(b[-1, 0] - last)), 0)]
+    return zeros
 
 
 def between_samples(

@@ -73,7 +73,8 @@ def nearest_moment(run: Trajectory, values: Mapping[str, float]) -> Moment:
     target = np.array([float(value) for value in values.values()])
     time, distance = nearest_time(times, table / scale, target / scale)
     if is_dense(run) and len(distance):
-        close = np.argsort(distance, kind="stable")[: 4 * STEPS]
+        close = np.argpartition(distance, min(4 * STEPS, len(distance)) - 1)[: 4 * STEPS]
+        close = close[np.argsort(distance[close], kind="stable")]
         starts = times[close]
         steps = np.searchsorted(run.step_starts, starts, side="right") - 1
         # of those nearest by straight lines, in that order, each step once

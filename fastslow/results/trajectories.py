@@ -11,7 +11,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import among, finite, numbers, position, positive, takes, text
+from fastslow.arguments import among, finite, numbers, position, positive, takes
 from fastslow.results import formulas
 from fastslow.results.contacts import (
     Contacts,
@@ -27,15 +27,14 @@ from fastslow.results.moments import Moment, in_blocks, is_dense, sample
 from fastslow.results.outcome import Outcome
 from fastslow.results.recurrence import Recurrence
 from fastslow.results.result import Result
-from fastslow.results.run_levels import in_region, moments_on, one_value
-from fastslow.results.run_nearness import nearest_moment
-from fastslow.results.run_parts import parts_of, samples_of
+from fastslow.results.run_parts import samples_of
+from fastslow.results.run_queries import Queries
 from fastslow.results.sections import window_of
 from fastslow.results.tables import Table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Recurrence, Table, Result):
+class Trajectory(Queries, Recurrence, Table, Result):
     """A solution in time.
 
     ``run["x"]`` is a column and ``run["x**2 + v"]`` an expression at the samples ``run.t``;
@@ -159,105 +158,6 @@ class Trajectory(Recurrence, Table, Result):
     def _column(self, row: int) -> NDArray[np.float64]:
         values = self._table[1]
         return values[row] if row < len(values) else self._all_sampled[row]
-
-    @takes(region=text, direction=among(-1, 0, 1, None))
-    def at(
-        self, *, region: str | None = None, direction: int | None = None, **value: float
-    ) -> list[Moment]:
-        """The moments at one value of a column, one per passage; of a time, the one then.
-
-        Every root of every step's series is found, to rounding; a touch counts
-        once. Of a stretch of time that stays on the value its two ends are
-        given, with ``resting=True``. Without dense output the samples are joined
-        by straight lines, and what is read between them says so
-        (``interpolated=True``).
-
-        Parameters
-        ----------
-        region : str, optional
-            Keep only those in one region (or sliding, as ``"S1|S2"``).
-        direction : int, optional
-            Keep only passages upwards (+1), downwards (−1), or touches (0).
-        **value : float
-            A state, slow state, slow quantity or ``t`` by name, e.g. ``x=0.5``.
-
-        Returns
-        -------
-        list of Moment
-            In order of time.
-
-        Raises
-        ------
-        UnknownNameError
-            For a name that is no column, or no region.
-        ArgumentError
-            If the run does not reach the value.
-
-        Examples
-        --------
-        >>> import sympy as sp, fastslow as fs
-        >>> x, v = sp.symbols("x v")
-        >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 6), tol=1e-13)
-        >>> [round(moment.time / sp.pi.evalf(), 9) for moment in run.at(x=0.5)]
-        [0.333333333, 1.666666667]
-        >>> round(run.at(t=3.2)[0]["v"], 9) == round(-sp.sin(3.2), 9)
-        True
-        """
-        name, level = one_value(value, (*self.columns, "t"))
-        return in_region(self, moments_on(self, name, level, direction), region)
-
-    @takes(region=text)
-    def select(
-        self, *, region: str | None = None, between: tuple[float, float] | None = None
-    ) -> tuple[Trajectory, ...]:
-        """The parts of the run that fulfil the conditions, each a trajectory, in order.
-
-        A part is cut exactly, keeps its series, and has the crossings at its ends.
-        Without dense output it goes from the first sample within to the last.
-
-        Parameters
-        ----------
-        region : str, optional
-            Stays in one region (or sliding, as ``"S1|S2"``).
-        between : (float, float), optional
-            Times, ends included.
-
-        Returns
-        -------
-        tuple of Trajectory
-
-        Raises
-        ------
-        UnknownNameError
-            For a region that there is not.
-        ArgumentError
-            For a range that is none.
-        """
-        return parts_of(self, region, between)
-
-    def nearest(self, **values: float) -> Moment:
-        """The moment nearest to some values of columns.
-
-        Distances are measured in units of each column's range. The moment is
-        found along the series, to rounding; without dense output on straight lines.
-
-        Parameters
-        ----------
-        **values : float
-            At least one of the states, slow quantities and ``t``, e.g. ``x=0.1, v=0``.
-
-        Returns
-        -------
-        Moment
-
-        Raises
-        ------
-        UnknownNameError
-            For a name that is no column.
-        ArgumentError
-            For a number that is not finite, or none at all.
-        """
-        return nearest_moment(self, values)
 
     def __call__(self, times: ArrayLike) -> NDArray[np.float64]:
         """States at any times of the run, shape (n, N); (n,) for a scalar time.

@@ -241,7 +241,16 @@ def methods(r):
         "Ensemble": (r["many"], {"__getitem__": {"name": "x"}, "save": save}),
         "Equilibrium": (r["equilibrium"], {"__getitem__": {"name": "x"}, "save": save}),
         "SpecialPoint": (r["fold"], {"__getitem__": {"name": "x"}, "save": save}),
-        "Overlay": (r["lay"], {"__getitem__": {"expression": "x"}, "save": save}),
+        "Overlay": (
+            r["lay"],
+            {
+                "__getitem__": {"key": "x"},
+                "at": {"value": {"p": 0.0}},
+                "select": {},
+                "nearest": {"values": {"p": 0.0}},
+                "save": save,
+            },
+        ),
         "PointBranch": (
             r["curve"],
             {
@@ -268,7 +277,10 @@ def methods(r):
             r["gap"],
             {
                 "__call__": {"times": 0.0},
-                "__getitem__": {"name": "x"},
+                "__getitem__": {"key": "x"},
+                "at": {"value": {"x": 0.0}},
+                "select": {},
+                "nearest": {"values": {"x": 0.0}},
                 "dense_columns": {"times": 0.0},
                 "contacts": {},
                 "extremes": {"name": "x"},
@@ -334,6 +346,8 @@ def fuller(r):
         "Model.with_parameters": {"changes": {"C": 2.0}},
         "Branch.select": {"between": (-0.5, 0.5)},
         "Diagram.select": {"between": (-0.5, 0.5)},
+        "Overlay.select": {"between": (0.0, 50.0)},
+        "Trajectory.select": {"between": (0.0, 50.0)},
         "Trajectory.__call__": {"times": [0.0, 1.0]},
         "plot.time_series": {"interfaces": {"edge": ("x", 0.0)}, "phases": list(r["lay"].phases)},
         "plot.phase_portrait": {"interfaces": {"edge": ("x", 0.0)}},

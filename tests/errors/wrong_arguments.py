@@ -44,6 +44,12 @@ SIDES = [
     ({"edge": ("x", NAN)}, Wrong, "interfaces['edge'] = nan; expected a finite number"),
 ]
 
+NEAR = [
+    ({"omga": 1.0}, Unknown, "unknown column 'omga'"),
+    ({}, Wrong, "expected values of some of"),
+    ({"x": "0"}, Wrong, "x = '0'; expected a finite number"),
+]
+
 BY_FUNCTION = {
     "Branch.intersections.other": a("Branch"),
     "Branch.nearest.values": [
@@ -90,6 +96,24 @@ BY_FUNCTION = {
         ({"u": "g"}, Unknown, "unknown slow quantity 'u'"),
         ({"w": None}, BadModel, "path of w: expected an expression, received None"),
     ],
+    "Overlay.at.value": [
+        ({"q": 0.0}, Unknown, "unknown column 'q'"),
+        ({"p": 7.0}, Wrong, "p = 7 is outside this run's range"),
+        ({"p": "0"}, Wrong, "p = '0'; expected a finite number"),
+        ({"p": 0.0, "x": 0.0}, Wrong, "a value of one of p, x, t, received p, x"),
+    ],
+    "Overlay.nearest.values": NEAR,
+    "Overlay.select.kind": [
+        *TEXT,
+        ("jmp", Unknown, "unknown kind of phase 'jmp'; did you mean 'jump'?"),
+    ],
+    "Trajectory.at.value": [
+        ({"q": 0.0}, Unknown, "unknown column 'q'"),
+        ({"x": 70.0}, Wrong, "x = 70 is outside this run's range"),
+        ({"t": -1}, Wrong, "t = -1 is outside this run's range [0, "),
+        ({"x": NAN}, Wrong, "x = nan; expected a finite number"),
+    ],
+    "Trajectory.nearest.values": NEAR,
     "Ensemble.__getitem__.name": [("y", Unknown, "unknown column 'y'")],
     "PointBranch.intersections.other": a("PointBranch"),
     "RefinedMap.at.named": [({"omga": 0.5}, Unknown, "unknown axis 'omga'")],

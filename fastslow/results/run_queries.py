@@ -1,0 +1,121 @@
+"""What a run is asked: its moments at a value, its parts, the moment nearest to a point."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, cast
+
+from fastslow.arguments import among, takes, text
+from fastslow.results.moments import Moment
+from fastslow.results.run_levels import in_region, moments_on, one_value
+from fastslow.results.run_nearness import nearest_moment
+from fastslow.results.run_parts import parts_of
+
+if TYPE_CHECKING:
+    from fastslow.results.trajectories import Trajectory
+
+
+class Queries:
+    """The questions to a `Trajectory` about its moments and parts."""
+
+    @property
+    def _run(self) -> Trajectory:
+        return cast("Trajectory", self)
+
+    @takes(region=text, direction=among(-1, 0, 1, None))
+    def at(
+        self, *, region: str | None = None, direction: int | None = None, **value: float
+    ) -> list[Moment]:
+        """The moments at one value of a column, one per passage; of a time, the one then.
+
+        Every root of every step's series is found, to rounding; a touch counts
+        once, and so does an end of the run within 1e-12 of the value. Of a stretch
+        of time that stays on the value its two ends are given, with
+        ``resting=True``. Without dense output the samples are joined by straight
+        lines, and what is read between them says so (``interpolated=True``).
+
+        Parameters
+        ----------
+        region : str, optional
+            Keep only those in one region (or sliding, as ``"S1|S2"``).
+        direction : int, optional
+            Keep only passages upwards (+1), downwards (−1), or touches (0).
+        **value : float
+            A state, slow state, slow quantity or ``t`` by name, e.g. ``x=0.5``.
+
+        Returns
+        -------
+        list of Moment
+            In order of time.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no column, or no region.
+        ArgumentError
+            If the run does not reach the value.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, v = sp.symbols("x v")
+        >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 6), tol=1e-13)
+        >>> [round(moment.time / sp.pi.evalf(), 9) for moment in run.at(x=0.5)]
+        [0.333333333, 1.666666667]
+        >>> round(run.at(t=3.2)[0]["v"], 9) == round(-sp.sin(3.2), 9)
+        True
+        """
+        name, level = one_value(value, (*self._run.columns, "t"))
+        return in_region(self._run, moments_on(self._run, name, level, direction), region)
+
+    @takes(region=text)
+    def select(
+        self, *, region: str | None = None, between: tuple[float, float] | None = None
+    ) -> tuple[Trajectory, ...]:
+        """The parts of the run that fulfil the conditions, each a trajectory, in order.
+
+        A part is cut exactly, keeps its series, and has the crossings at its ends.
+        Without dense output it goes from the first sample within to the last.
+
+        Parameters
+        ----------
+        region : str, optional
+            Stays in one region (or sliding, as ``"S1|S2"``).
+        between : (float, float), optional
+            Times, ends included.
+
+        Returns
+        -------
+        tuple of Trajectory
+
+        Raises
+        ------
+        UnknownNameError
+            For a region that there is not.
+        ArgumentError
+            For a range that is none.
+        """
+        return parts_of(self._run, region, between)
+
+    def nearest(self, **values: float) -> Moment:
+        """The moment nearest to some values of columns.
+
+        Distances are measured in units of each column's range. The moment is
+        found along the series, to rounding; without dense output on straight lines.
+
+        Parameters
+        ----------
+        **values : float
+            At least one of the states, slow quantities and ``t``, e.g. ``x=0.1, v=0``.
+
+        Returns
+        -------
+        Moment
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no column.
+        ArgumentError
+            For a number that is not finite, or none at all.
+        """
+        return nearest_moment(self._run, values)
