@@ -44,6 +44,7 @@ SIDES = [
     ({"edge": ("x", NAN)}, Wrong, "interfaces['edge'] = nan; expected a finite number"),
 ]
 
+REGION = [*TEXT, ("S9", Unknown, "unknown region 'S9'; did you mean 'S3'?")]
 NEAR = [
     ({"omga": 1.0}, Unknown, "unknown column 'omga'"),
     ({}, Wrong, "expected values of some of"),
@@ -113,7 +114,9 @@ BY_FUNCTION = {
         ({"t": -1}, Wrong, "t = -1 is outside this run's range [0, "),
         ({"x": NAN}, Wrong, "x = nan; expected a finite number"),
     ],
+    "Trajectory.at.region": REGION,
     "Trajectory.nearest.values": NEAR,
+    "Trajectory.select.region": REGION,
     "Ensemble.__getitem__.name": [("y", Unknown, "unknown column 'y'")],
     "PointBranch.intersections.other": a("PointBranch"),
     "RefinedMap.at.named": [({"omga": 0.5}, Unknown, "unknown axis 'omga'")],

@@ -1,0 +1,162 @@
+"""What an overlay answers at a value, in a part, and near a point."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import fastslow as fs
+
+x, t, g, w, omega = sp.symbols("x t g w omega")
+
+#: x' = w + x − x³ with w = cos(ωt): jumps at both folds, four times in two periods.
+MODEL = fs.Model({x: w + x - x**3}, forcing={w: sp.cos(omega * t)}, parameters={omega: 0.002})
+
+
+@pytest.fixture(scope="module")
+def run():
+    return fs.simulate(MODEL, [1.3], periods=2)
+
+
+@pytest.fixture(scope="module")
+def lay(run):
+    return fs.overlay(fs.continue_equilibria(MODEL.frozen(), "w", over=(-1.2, 1.2)), run)
+
+
+@pytest.fixture(scope="module")
+def on_path(run):
+    """The same over g = −w, along a path."""
+    fast = MODEL.frozen(slow={w: -g})
+    return fs.overlay(fs.continue_equilibria(fast, "g", over=(-1.2, 1.2)), run)
+
+
+def test_the_slow_quantity_is_passed_at_known_times(lay):
+    found = lay.at(w=0.5)
+    angles = np.array([1, 5, 7, 11]) * np.pi / 3
+    assert [m.time for m in found] == pytest.approx(angles / 0.002, rel=1e-11)
+    assert [m.value for m in found] == pytest.approx([0.5] * 4, abs=1e-12)
+    falling, rising = lay.at(w=0.0)[:2]
+    assert falling["x"] > 0 > rising["x"]
+    assert falling.sheet != rising.sheet
+    assert [m.sheet for m in lay.at(w=0.0)] == [falling.sheet, rising.sheet] * 2
+    on_lower = lay.at(w=0.0, sheet=rising.sheet)
+    assert [m.time for m in on_lower] == [m.time for m in lay.at(w=0.0, direction=1)]
+
+
+def test_a_moment_says_what_is_followed(lay):
+    (moment,) = lay.at(t=100.0)
+    row = int(np.argmin(np.abs(lay.time - 100)))
+    sheet = lay.sheets[lay.followed[row]]
+    assert (moment.sheet, moment.branch) == (sheet.label, sheet.branch)
+    assert moment.distance == pytest.approx(lay.distance[row], rel=0.1)
+    assert moment.value == moment["w"] == pytest.approx(np.cos(0.2), abs=1e-12)
+    assert moment["omega"] == 0.002
+    assert moment["t"] == 100.0
+    assert f"on {sheet.label}" in repr(moment)
+
+
+@settings(max_examples=30, deadline=None)
+@given(part=st.floats(0, 1))
+def test_a_moment_of_the_overlay_is_that_of_the_run(lay, part):
+    when = part * lay.run.span[1]
+    (moment,) = lay.at(t=when)
+    assert np.array_equal(moment.state, lay.run(when))
+    row = np.searchsorted(lay.time, when, side="right") - 1
+    number = lay.followed[row]
+    assert moment.sheet == ("" if number < 0 else lay.sheets[number].label)
+
+
+def test_samples_by_number(lay):
+    moments = list(lay)
+    assert len(moments) == len(lay)
+    assert [m.distance for m in moments] == lay.distance.tolist()
+    assert [m.value for m in moments] == pytest.approx(lay.slow, abs=1e-15)
+    assert lay[-1].time == lay.time[-1]
+    with pytest.raises(fs.OutOfRangeError, match="no sample"):
+        lay[len(lay)]
+    with pytest.raises(fs.ArgumentError, match="an overlay is cut with a step of 1"):
+        lay[::-1]
+
+
+@settings(max_examples=30, deadline=None)
+@given(data=st.data())
+def test_slices_joined_are_the_whole(lay, data):
+    middle = data.draw(st.integers(1, len(lay) - 1))
+    parts = lay[:middle], lay[middle:]
+    for name in ("t", "x", "w", "distance"):
+        assert np.array_equal(np.concatenate([p[name] for p in parts]), lay[name])
+    for part in parts:
+        assert len(part.run) == len(part)
+        assert part.phases[0].start >= part.time[0] if part.phases else len(part) == 1
+    # what happens between the two samples is in neither
+    between = [q for q in lay.transitions if lay.time[middle - 1] < q.time < lay.time[middle]]
+    assert sum(len(p.transitions) for p in parts) + len(between) == len(lay.transitions)
+
+
+def test_stays_on_a_sheet(lay):
+    labels = [sheet.label for sheet in lay.sheets]
+    stays = [lay.select(sheet=label) for label in labels]
+    assert [len(part) for part in stays] == [2, 3]
+    for label, parts in zip(labels, stays, strict=True):
+        assert all(part.shares() == {label: 1.0} for part in parts)
+        assert sum(map(len, parts)) == np.isin(lay.followed, labels.index(label)).sum()
+    assert lay.select() == (lay,)
+    assert lay.select(sheet="") == ()
+
+
+def test_phases_of_a_kind(lay):
+    jumps = lay.select(kind="jump")
+    assert len(jumps) == len(lay.special("jump")) == 4
+    for part, transition in zip(jumps, lay.special("jump"), strict=True):
+        assert part.transitions == (transition,)
+        assert transition.leave.time <= part.time[0] < part.time[-1] <= transition.land.time
+        assert [phase.kind for phase in part.phases] == ["jump"]
+        assert part.bursting is None
+    assert lay.select(kind="spiking") == ()
+
+
+def test_between_times(lay):
+    (part,) = lay.select(between=(1000, 2000), region="S1")
+    assert 1000 <= part.time[0] < part.time[-1] <= 2000
+    for one, other in pairwise(part.phases):
+        assert one.end == other.start
+    assert lay.select(between=(1e6, 2e6)) == ()
+
+
+def test_a_part_is_kept_in_a_file(lay, tmp_path, same):
+    part = lay.select(kind="jump")[0]
+    part.save(tmp_path / "part.npz")
+    again = fs.load(tmp_path / "part.npz")
+    assert same(again, part)
+    assert again.at(t=part.time[1])[0].sheet == part.at(t=part.time[1])[0].sheet
+
+
+def test_transitions_of_a_kind(lay):
+    assert tuple(lay.special) == lay.transitions
+    assert lay.special("Hopf") == ()
+    with pytest.raises(fs.UnknownNameError, match="did you mean 'jump'"):
+        lay.special("jmp")
+
+
+def test_the_parameter_of_a_path(lay, on_path):
+    found = on_path.at(g=-0.5)
+    assert [m.time for m in found] == pytest.approx([m.time for m in lay.at(w=0.5)], rel=1e-3)
+    assert all(m.interpolated for m in found)
+    assert [m.value for m in found] == pytest.approx([-0.5] * 4, abs=1e-12)
+    assert found[0]["w"] == pytest.approx(0.5, abs=1e-3)
+    assert [m.time for m in on_path.at(w=0.5)] == [m.time for m in lay.at(w=0.5)]
+    near = on_path.nearest(g=-0.5, x=found[0]["x"], t=found[0].time)
+    assert near.time == pytest.approx(found[0].time, rel=1e-6)
+    with pytest.raises(fs.ArgumentError, match="g = 3 is outside this run's range"):
+        on_path.at(g=3)
+
+
+def test_nearest(lay):
+    found = lay.nearest(w=0.0, x=1.0)
+    assert found["x"] == pytest.approx(1.0, abs=1e-2)
+    assert found.sheet == lay.at(w=0.0)[0].sheet
+    with pytest.raises(fs.UnknownNameError, match="unknown column 'q'"):
+        lay.nearest(q=0)
