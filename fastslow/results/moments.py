@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.errors import unknown_name
+from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.crossings import regions_at
 from fastslow.results.dense import columns_at
 from fastslow.results.points import _Point
@@ -93,6 +93,14 @@ class Moment(_Point):
 def is_dense(run: Trajectory) -> bool:
     """Whether there is a series to read between samples."""
     return run.series is not None and len(run.steps) > 0 and run.span[0] < run.span[1]
+
+
+def check_readable(run: Trajectory) -> None:
+    """Refuse a run that kept neither series nor samples."""
+    if not is_dense(run) and not len(run):
+        raise ArgumentError(
+            "this run kept no samples and no dense output; simulate with dense=True or samples="
+        )
 
 
 def moments_at(run: Trajectory, times: Array) -> list[Moment]:

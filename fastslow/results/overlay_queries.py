@@ -164,8 +164,9 @@ def parts_of(
     if kind is not None:
         word("kind of phase", PHASES)("kind", kind)
         starts = np.array([phase.start for phase in lay.phases])
-        right = np.array([phase.kind == kind for phase in lay.phases])
-        wanted &= right[np.maximum(np.searchsorted(starts, lay.time, side="right") - 1, 0)]
+        # the last entry stands for no phase: one sample has none
+        right = np.array([*(phase.kind == kind for phase in lay.phases), False])
+        wanted &= right[np.searchsorted(starts, lay.time, side="right") - 1]
     if between is not None:
         low, high = limits_of(between)
         wanted &= (lay.time >= low) & (lay.time <= high)

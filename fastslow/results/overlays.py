@@ -214,7 +214,7 @@ class Overlay(Table, Result):
         >>> diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
         >>> lay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=1))
         >>> [(moment.sheet, round(moment["x"], 3)) for moment in lay.at(p=0)]
-        [('S1.1', -1.002), ('S1.2', 1.002), ('S1.1', -0.998)]
+        [('S1.1', -1.0), ('S1.2', 1.0), ('S1.1', -1.0)]
         >>> [part.special("jump")[0].to_sheet for part in lay.select(kind="jump")]
         ['S1.2', 'S1.1']
         """

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.expressions import StepPolynomials, along_steps
-from fastslow.results.moments import Moment, is_dense, moments_at
+from fastslow.results.moments import Moment, check_readable, is_dense, moments_at
 from fastslow.results.step_roots import CLOSE, Zero, find_zeros
 from fastslow.results.turning import extremes_of
 
@@ -47,6 +47,7 @@ def one_value(values: Mapping[str, float], valid: Sequence[str]) -> tuple[str, f
 
 def moments_on(run: Trajectory, name: str, level: float, direction: int | None) -> list[Moment]:
     """The moments at which a column has a value, in order of time; see `Trajectory.at`."""
+    check_readable(run)
     if name == "t":
         low, high = run.span if is_dense(run) else (float(run.t[0]), float(run.t[-1]))
         if not low <= level <= high:

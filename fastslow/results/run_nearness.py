@@ -13,7 +13,7 @@ from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.dense import refined_table
 from fastslow.results.expressions import StepPolynomials, along_steps
-from fastslow.results.moments import Moment, is_dense, moments_at
+from fastslow.results.moments import Moment, check_readable, is_dense, moments_at
 from fastslow.results.nearness import along_line
 from fastslow.results.step_roots import find_zeros
 
@@ -62,6 +62,7 @@ def units_of(table: Array) -> Array:
 def nearest_moment(run: Trajectory, values: Mapping[str, float]) -> Moment:
     """The nearest moment of a trajectory; see `Trajectory.nearest`."""
     checked_values(values, (*run.columns, "t"))
+    check_readable(run)
     if is_dense(run) and run.sampled is not None:
         # samples may be few
         times, columns = refined_table(run)

@@ -95,7 +95,7 @@ def _cut(run: Trajectory, begin: float, end: float, sampled: Samples | None) -> 
             if series is not None:
                 series = np.concatenate([_moved(series[0], ahead)[None], series[1:]])
         # the last step may reach past the end, the first one be all there is
-        steps[-1, 1] = min(steps[-1, 1], end - steps[-1, 0])
+        steps[-1, 1] = max(min(steps[-1, 1], end - steps[-1, 0]), 0.0)
     times = run.crossing_table[:, 0]
     part = replace(
         run,

@@ -59,10 +59,14 @@ class Queries:
         >>> import sympy as sp, fastslow as fs
         >>> x, v = sp.symbols("x v")
         >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 6), tol=1e-13)
-        >>> [round(moment.time / sp.pi.evalf(), 9) for moment in run.at(x=0.5)]
-        [0.333333333, 1.666666667]
-        >>> round(run.at(t=3.2)[0]["v"], 9) == round(-sp.sin(3.2), 9)
-        True
+        >>> for moment in run.at(x=0.5):  # at π/3 and 5π/3
+        ...     print(moment)
+        Moment(t = 1.04719755: x = 0.5, v = -0.866025; in S1)
+        Moment(t = 5.23598776: x = 0.5, v = 0.866025; in S1)
+        >>> run.at(t=3.2)
+        [Moment(t = 3.2: x = -0.998295, v = 0.0583741; in S1)]
+        >>> [part.span for part in run.select(between=(1, 2))]
+        [(1.0, 2.0)]
         """
         name, level = one_value(value, (*self._run.columns, "t"))
         return in_region(self._run, moments_on(self._run, name, level, direction), region)

@@ -118,6 +118,14 @@ def test_phases_of_a_kind(lay):
     assert lay.select(kind="spiking") == ()
 
 
+def test_one_sample(lay):
+    one = lay[7:8]
+    assert (len(one), one.phases, one.transitions) == (1, (), ())
+    assert one.select(kind="jump") == ()
+    assert one.select(sheet=lay[7].sheet) == (one,)
+    assert one.at(t=lay.time[7])[0].sheet == one.nearest(x=3).sheet == lay[7].sheet
+
+
 def test_between_times(lay):
     (part,) = lay.select(between=(1000, 2000), region="S1")
     assert 1000 <= part.time[0] < part.time[-1] <= 2000

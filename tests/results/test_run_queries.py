@@ -261,6 +261,27 @@ def test_one_sample(swing):
     assert list(one.to_dict()["region"]) == [swing[5].region]
 
 
+@pytest.mark.parametrize("dense", [True, False])
+def test_no_samples(dense):
+    none = fs.simulate(SWING, [1, 0], t=(0, 10), dense=dense, samples=[])
+    assert list(none) == []
+    with pytest.raises(fs.ArgumentError, match="hold none of the 0 there are"):
+        none[0:1]
+    if dense:
+        assert none.at(t=1.0)[0]["x"] == pytest.approx(np.cos(1), abs=1e-9)
+        return
+    assert none.select(between=(1, 2)) == ()
+    for question in (lambda: none.at(x=0.5), lambda: none.at(t=1), lambda: none.nearest(x=0)):
+        with pytest.raises(fs.ArgumentError, match="kept no samples and no dense output"):
+            question()
+
+
+def test_a_run_without_a_step():
+    none = fs.simulate(fs.Model({x: 1 / x}), [0.0], t=(0, 1))
+    assert times_of(none.at(x=0.0)) == times_of(none.at(t=0.0)) == times_of(none) == [0.0]
+    assert none.select(region="S1") == ()
+
+
 def test_samples_by_number(swing):
     assert swing[0].time == 0
     assert swing[-1].time == 10
