@@ -178,6 +178,7 @@ def _move(
     start, stop = max(span[0], low), min(span[1], high)
     axis = (ax.xaxis if vertical else ax.yaxis).get_transform()
     ends = axis.transform([start, stop])
+    air = AIR * root(ax).dpi / 72.0 * np.array([-1.0, -1.0, 1.0, 1.0])
     best: tuple[float, tuple[float, float], Points] = (np.inf, name.get_position(), boxes[:0])
     for depth in DEPTHS:
         inside = float(axis.inverted().transform([ends[0] + depth * (ends[1] - ends[0])])[0])
@@ -185,7 +186,7 @@ def _move(
             at = (inside, side) if vertical else (side, inside)
             name.set_position(at)
             box = box_of(name)[None]
-            cost = float(overlaid(box, ink, boxes, frame)[0])
+            cost = float(overlaid(box + air, ink, boxes, frame)[0])
             if cost < best[0]:
                 best = cost, at, box
     name.set_position(best[1])
