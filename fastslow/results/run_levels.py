@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: An end of a run that misses the value by this, or this part of it, is on it.
+#: An end of a run that misses the value by this part of the terms of its step is on it.
 NEAR = 1e-12
 
 
@@ -58,7 +58,7 @@ def moments_on(run: Trajectory, name: str, level: float, direction: int | None) 
         values = run[name]
         return between_samples(run, name, values, level, direction)
     quantity = along_steps(run, name).minus(level)
-    zeros = _with_ends(find_zeros(quantity), quantity, NEAR * max(1.0, abs(level)))
+    zeros = _with_ends(find_zeros(quantity), quantity)
     if not zeros:
         low, high = extremes_of(run, name, None)
         if not low <= level <= high:
@@ -66,14 +66,15 @@ def moments_on(run: Trajectory, name: str, level: float, direction: int | None) 
     return _moments(run, zeros, run.steps[:, 0], run.steps[:, 1], direction)
 
 
-def _with_ends(zeros: list[Zero], quantity: StepPolynomials, near: float) -> list[Zero]:
+def _with_ends(zeros: list[Zero], quantity: StepPolynomials) -> list[Zero]:
     """The zeros, and an end of the run that misses zero by rounding only."""
     b = quantity.coefficients
     first, last = float(b[0, 0]), float(b[-1].sum())
+    near = NEAR * quantity.size
     # the passage of a neighbouring zero is not counted again
-    if abs(first) <= near and not (zeros and zeros[0].low <= CLOSE):
+    if abs(first) <= near[0] and not (zeros and zeros[0].low <= CLOSE):
         zeros = [Zero(0.0, 0.0, 0, int(np.sign(b[0, 1:].sum()))), *zeros]
-    if abs(last) <= near and not (zeros and zeros[-1].high >= len(b) - CLOSE):
+    if abs(last) <= near[-1] and not (zeros and zeros[-1].high >= len(b) - CLOSE):
         zeros = [*zeros, Zero(len(b), len(b), int(np.sign(b[-1, 0] - last)), 0)]
     return zeros
 

@@ -28,7 +28,7 @@ class Queries:
         """The moments at one value of a column, one per passage; of a time, the one then.
 
         Every root of every step's series is found, to rounding; a touch counts
-        once, and so does an end of the run within 1e-12 of the value. Of a stretch
+        once, and so does an end of the run that misses the value by rounding. Of a stretch
         of time that stays on the value its two ends are given, with
         ``resting=True``. Without dense output the samples are joined by straight
         lines, and what is read between them says so (``interpolated=True``).

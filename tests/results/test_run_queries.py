@@ -79,6 +79,13 @@ def test_the_end_counts_though_it_misses_by_rounding():
     assert times_of(run.at(x=value))[-1] == pytest.approx(run.span[1], abs=1e-12)
 
 
+def test_what_decays_is_never_zero():
+    run = fs.simulate(fs.Model({x: -x}), [1.0], t=(0, 40))
+    assert run.end[1] < 1e-17
+    with pytest.raises(fs.ArgumentError, match="x = 0 is outside this run's range"):
+        run.at(x=0.0)
+
+
 def test_a_level_at_a_step_counts_once(swing):
     for start in swing.steps[1:-1, 0]:
         level = swing(start)[0]
