@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import sympy as sp
+from sympy.core.function import AppliedUndef
 from sympy.logic.boolalg import Boolean
 
 from fastslow.arguments import shown
@@ -102,11 +103,16 @@ class Structure:
         named: dict[Pattern, str] = {}
         for pattern, whole in patterns.items():
             signs = _both_ways(_cell(interfaces, pattern))
-            asked = [
-                name
-                for name, condition in self.conditions.items()
-                if smooth(_indicator(condition), signs, self.moving, values) == 1
-            ]
+            asked = []
+            for region, condition in self.conditions.items():
+                try:
+                    if smooth(_indicator(condition), signs, self.moving, values) == 1:
+                        asked.append(region)
+                except ModelError as error:
+                    raise ModelError(
+                        f"region {region!r} ({condition}): {error}; regions are bounded by "
+                        f"interfaces: {', '.join(i.name for i in interfaces) or 'none'}"
+                    ) from error
             if len(asked) > 1:
                 raise ModelError(
                     f"regions {asked[0]!r} and {asked[1]!r} overlap; expected one condition "
@@ -275,6 +281,11 @@ def read_expression(what: str, expression: Any) -> sp.Expr:
 
 def _checked(what: str, expression: Any, known: set[str]) -> sp.Expr:
     written = read_expression(what, expression)
+    for function in sorted(written.atoms(AppliedUndef), key=str):
+        raise ModelError(
+            f"{what}: {function} is a function without a definition; expected symbols for states "
+            "and slow quantities, such as x, and not x(t)"
+        )
     for symbol in sorted(written.free_symbols, key=lambda s: s.name):
         if symbol.name not in known:
             reason = unknown_name("symbol", symbol.name, sorted(known))

@@ -135,7 +135,7 @@ def slow_quantity(diagram: Diagram, run: Trajectory) -> SlowQuantity:
     UnknownNameError
         If the parameter is no slow quantity of the run.
     ArgumentError
-        If the run leaves the path along which the model was frozen, or the path
+        If nothing varies slowly in the run, or it leaves the path along which the model was frozen, or the path
         passes the same place twice along its whole length.
     """
     name = diagram.parameter
@@ -145,6 +145,11 @@ def slow_quantity(diagram: Diagram, run: Trajectory) -> SlowQuantity:
     constants = {**run.parameters, **diagram.parameters}
     known = {**constants, name: 0.0}
     laws = {q: t for q, t in diagram.path.items() if name in names_in(t, known)}
+    if not laws and not quantities:
+        raise ArgumentError(
+            f"nothing varies slowly in this run, and the diagram is over {name}; run a model "
+            f"with forcing={{{name}: ...}} or slow={{{name}: ...}}"
+        )
     if not laws:
         raise unknown_name("slow quantity of the trajectory", name, quantities)
     wanted = np.array([run[q] for q in laws])

@@ -82,6 +82,8 @@ def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text]) -> None:
     """Hide the words that are wider than their boxes, in axes with their final places."""
     # without labels there are no words
     for box, word in zip(boxes, words, strict=False):
+        # a hidden text has no extent, and an earlier draw may have hidden it
+        word.set_visible(True)
         word.set_visible(word.get_window_extent().width <= box.get_window_extent().width)
 
 

@@ -47,8 +47,9 @@ def draw_points(
         look = {"zorder": 5, "label": f"{code} {CODE_NAMES[code]}"}
         markers += ax.plot(*at.T, **dot_look(code), **look)
         if label:
-            words = [_words(p) for p in same]
-            labels += [tag(ax, word, spot) for word, spot in zip(words, at, strict=True)]
+            # branches that cross share their branch point: it is named once
+            words = {(_words(p), *np.round(spot, 9)): spot for p, spot in zip(same, at, strict=True)}
+            labels += [tag(ax, word, spot) for (word, *_), spot in words.items()]
     return tuple(markers), tuple(labels)
 
 

@@ -9,6 +9,7 @@ import fastslow as fs
 from fastslow import ArgumentError, FastSlowError, Model, ModelError, UnknownNameError
 
 x, v, w, t, omga, omega, D = sp.symbols("x v w t omga omega D")
+X = sp.Function("x")(t)
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +58,14 @@ def test_other_things_that_are_no_model():
         Model({x: sp.Abs(x)}, regions={"r": x + 1})
 
 
+@pytest.mark.parametrize(
+    "rates", [{X: -X}, {x: -X}, {x: -sp.Function("f")(x)}], ids=["x(t)", "mixed", "f(x)"]
+)
+def test_functions_without_a_definition(rates):
+    with pytest.raises(ModelError, match=r"[xf]\([tx]\) is a function without a definition"):
+        Model(rates)
+
+
 def test_unknown_parameter(gear):
     message = r"unknown parameter 'omga'; did you mean 'omega'\? \(known: A, B, C, D, omega\)"
     with pytest.raises(UnknownNameError, match=message):
@@ -68,7 +77,8 @@ def test_unknown_parameter(gear):
 def test_regions_that_contradict():
     with pytest.raises(ModelError, match="regions 'a' and 'b' overlap"):
         Model({x: sp.Abs(x)}, regions={"a": x > 0, "b": x > 0})
-    with pytest.raises(ModelError, match=r"x - 5 = 0 decides a branch but is not one"):
+    message = r"region 'far' \(x > 5\): x - 5 = 0 decides a branch but is not one of .*: x$"
+    with pytest.raises(ModelError, match=message):
         Model({x: sp.Abs(x)}, regions={"far": x > 5})
     with pytest.raises(ModelError, match=r"region 'far' .* is empty or unknown"):
         Model({x: sp.Abs(x)}, regions={"far": sp.And(x > 0, x < 0)})

@@ -107,6 +107,9 @@ def test_wrong_pairs_are_refused(lay, gear):
     frozen = fs.continue_equilibria(gear.frozen().with_parameters(w=1), "A", (1, 2))
     with pytest.raises(fs.FastSlowError, match="unknown slow quantity of the trajectory 'A'"):
         fs.overlay(frozen, lay.run)
+    still = fs.simulate(gear.frozen().with_parameters(w=1), [0, 0], t=(0, 1))
+    with pytest.raises(fs.ArgumentError, match=r"varies slowly.*forcing=\{A: \.\.\.\}"):
+        fs.overlay(frozen, still)
 
 
 def test_at_equal_distances_the_sheet_that_the_motion_turns_to_is_the_first():

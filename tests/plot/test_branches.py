@@ -165,3 +165,10 @@ def test_bands_are_named_by_what_lies_in_them(gear):
     names = [name.get_text() for name in drawn.bands.names]
     assert names[0] == above != "S1"
     assert sorted(names) == ["S1", "S2", "S3"]
+
+
+def test_branches_that_cross_name_their_branch_point_once():
+    x, w = sp.symbols("x w")
+    model = fs.Model({x: x * (w - x)}, parameters={w: 1})
+    drawn = fs.plot.diagram(fs.continue_equilibria(model, "w", over=(-1, 1.3)))
+    assert [text.get_text() for text in drawn.labels] == ["BP1"]

@@ -18,6 +18,19 @@ def test_a_figure_of_its_own_names_what_has_room(folded_lay):
         assert word.get_visible() == (word.get_window_extent().width <= room)
 
 
+def test_what_has_no_room_stays_hidden_when_drawn_again(folded_lay):
+    start, end = folded_lay.run.span
+    half = 0.5 * (start + end)
+    phases = [
+        Phase(start, half, "quiescent", ("S1",)),
+        Phase(half, half + 0.001 * (end - start), "quiescent", ("S2",)),
+    ]
+    drawn = fs.plot.time_series(folded_lay.run, phases=phases)
+    for _ in range(3):
+        drawn.ax.figure.draw_without_rendering()
+        assert [word.get_visible() for word in drawn.words] == [True, False]
+
+
 @pytest.mark.parametrize(
     ("phase", "text"),
     [
