@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from docutils.nodes import image, literal_block
 from sphinx.application import Sphinx
 from sphinx.util.nodes import make_refnode
 
@@ -91,7 +92,20 @@ def by_last_name(app: Sphinx, env: Any, node: Any, child: Any) -> Any:
     return None
 
 
+def describe_figures(app: Sphinx, doctree: Any) -> None:
+    """Name the call that draws a cell's figure as the figure's text for screen readers."""
+    for cell in doctree.findall(
+        lambda n: "cell" in getattr(n, "attributes", {}).get("classes", ())
+    ):
+        source = "\n".join(block.astext() for block in cell.findall(literal_block))
+        calls = re.findall(r"fs\.plot\..*", source)
+        for picture in cell.findall(image):
+            if not picture.get("alt"):
+                picture["alt"] = f"Figure: {calls[-1] if calls else 'output of the code above'}"
+
+
 def setup(app: Sphinx) -> None:
     """Add what the pages need beside the extensions."""
     app.connect("autodoc-process-docstring", prepare, priority=400)  # before Napoleon
     app.connect("missing-reference", by_last_name)
+    app.connect("doctree-read", describe_figures)

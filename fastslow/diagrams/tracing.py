@@ -38,6 +38,9 @@ from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, Specia
 
 Array = NDArray[np.float64]
 
+#: Largest distance from an interface, in units of the window, of what lies in it.
+INSIDE = 1e-9
+
 #: First step along the branch that crosses at a branch point, in units of the window.
 SWITCH = 1e-3
 
@@ -197,11 +200,24 @@ def _traced(
     region = field.regions.index(start.region)
     u = np.append(start.state, value)
     tangent, _ = field.tangent(region, u, window.weight)
+    if bounded and _along_interface(field, region, np.array([u]), window).any():
+        # rounding would end it everywhere: no side of the interface is left or entered
+        curve = _traced(field, start, value, window, settings, False)
+        rows = np.concatenate([piece.u for piece in curve.pieces])
+        if _along_interface(field, region, rows, window).any():
+            return curve
     forward = walk(field, region, u, tangent, window, settings, bounded=bounded)
     if forward.closed:
         return joined(None, forward)
     backward = walk(field, region, u, -tangent, window, settings, bounded=bounded)
     return rising(joined(backward, forward))
+
+
+def _along_interface(field: FrozenField, region: int, rows: Array, window: Window) -> Array:
+    """Which of the interfaces that bound a region hold all of the points."""
+    _, _, values, slopes = field.at(region, rows)
+    near = np.abs(values) < INSIDE * np.abs(slopes * window.scale).max(axis=-1)
+    return near.all(axis=0) & (field.signs[region] != 0)
 
 
 def _switched(

@@ -280,18 +280,22 @@ def _special_marks(view: View) -> list[dict[str, Any]]:
     diagram = view.diagram
     found: dict[str, list[list[Any]]] = {}
     numbers = {id(point): k for k, point in enumerate(diagram.special)}
+    named = set()
     for branch in diagram.branches:
         for point in worth_a_marker([branch]) if branch.admissible else ():
             k = numbers[id(point)]
+            # branches that cross share their branch point: it is named once
+            name = point.label, *np.round([point[diagram.parameter], *point.state], 9)
             found.setdefault(point.code, []).append(
                 [
                     point[diagram.parameter],
                     point[view.setup.state],
                     text_of(point, diagram.parameter),
                     f"diagram.special[{k}]",
-                    point.label,
+                    "" if name in named else point.label,
                 ]
             )
+            named.add(name)
     return [{"look": code, "points": points} for code, points in found.items()]
 
 

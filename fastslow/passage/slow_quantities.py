@@ -135,8 +135,8 @@ def slow_quantity(diagram: Diagram, run: Trajectory) -> SlowQuantity:
     UnknownNameError
         If the parameter is no slow quantity of the run.
     ArgumentError
-        If nothing varies slowly in the run, or it leaves the path along which the model was frozen, or the path
-        passes the same place twice along its whole length.
+        If nothing varies slowly in the run, it leaves the path along which the model was
+        frozen, or the path passes the same place twice along its whole length.
     """
     name = diagram.parameter
     quantities = (*run.forcing, *(s for s in run.states if s not in diagram.states))

@@ -48,8 +48,8 @@ def draw_points(
         markers += ax.plot(*at.T, **dot_look(code), **look)
         if label:
             # branches that cross share their branch point: it is named once
-            words = {(_words(p), *np.round(spot, 9)): spot for p, spot in zip(same, at, strict=True)}
-            labels += [tag(ax, word, spot) for (word, *_), spot in words.items()]
+            spots = {(_words(p), *np.round(s, 9)): s for p, s in zip(same, at, strict=True)}
+            labels += [tag(ax, word, spot) for (word, *_), spot in spots.items()]
     return tuple(markers), tuple(labels)
 
 

@@ -142,3 +142,19 @@ def test_interfaces_that_coincide_are_crossed_together():
     # next to it the gap is there, and so is its edge
     narrow = fs.continue_equilibria(gear.with_parameters(D=1e-9).frozen(), "w", over=(-2, 2))
     assert len(narrow.boundary_equilibria) == 2
+
+
+def test_equilibria_that_lie_in_an_interface_all_along():
+    # prey x, predator y; the prey is harvested above the very level at which the predator rests
+    x, y, w = sp.symbols("x y w")
+    harvest = sp.Piecewise((0.5 * x, x > 1), (0, True))
+    model = fs.Model({x: x * (w - x - y) - harvest, y: y * (x - 1)}, parameters={w: 2})
+    diagram = fs.continue_equilibria(model, "w", over=(1.6, 4))
+    resting = [b for b in diagram if np.abs(b["x"] - 1).max() < 1e-9 and b["y"].max() > 0.1]
+    assert {b.region[0]: b.range for b in resting} == {"S1": (1.6, 4.0), "S2": (1.6, 4.0)}
+    for branch in resting:
+        harvested = 0.5 if branch.region[0] == "S1" else 0.0
+        np.testing.assert_allclose(branch["y"], branch["w"] - 1 - harvested, atol=1e-12)
+        assert not branch.special("BE")
+    # beside them: no prey, no predator above and at the level
+    assert len(diagram) == 4

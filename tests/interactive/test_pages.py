@@ -264,3 +264,14 @@ def test_wrong_values_raise_before_anything_is_computed(explorer, tmp_path, slid
 def test_a_folder_that_is_not_there(explorer, tmp_path):
     with pytest.raises(fs.FileError, match="cannot be written"):
         explorer.export(tmp_path / "none" / "page.html", sliders={"D": [0.25]}, progress=False)
+
+
+def test_branches_that_cross_name_their_branch_point_once():
+    x, w, t = sp.symbols("x w t")
+    model = fs.Model({x: x * (w - x)}, forcing={w: sp.sin(t / 10)})
+    data = page_data(fs.explore(model, over=(-1, 1.3), start=[1]), {})
+    for frame in data["frames"]:
+        for panel in frame["panels"]:
+            names = [p[4] for mark in panel["marks"] for p in mark["points"] if len(p) > 4]
+            assert names.count("BP1") <= 1
+    assert "BP1" in str(data["frames"])
