@@ -80,8 +80,8 @@ def test_the_end_counts_though_it_misses_by_rounding():
 
 
 def test_what_decays_is_never_zero():
-    run = fs.simulate(fs.Model({x: -x}), [1.0], t=(0, 40))
-    assert run.end[1] < 1e-17
+    run = fs.simulate(fs.Model({x: -x}), [1e-14], t=(0, 1))
+    assert 0 < run.end[1] < 1e-14
     with pytest.raises(fs.ArgumentError, match="x = 0 is outside this run's range"):
         run.at(x=0.0)
 
@@ -178,9 +178,9 @@ def test_a_slow_quantity_is_passed_as_often_as_its_law(forced, level):
 
 
 @settings(max_examples=40, deadline=None)
-@given(cuts=st.lists(st.floats(0.01, 0.99), min_size=1, max_size=4, unique=True))
+@given(cuts=st.lists(st.floats(0.01, 0.99), min_size=1, max_size=4))
 def test_parts_joined_are_the_whole(forced, cuts):
-    edges = [0.0, *(c * forced.span[1] for c in sorted(cuts)), forced.span[1]]
+    edges = sorted({0.0, *(c * forced.span[1] for c in cuts), forced.span[1]})
     parts = [forced.select(between=pair)[0] for pair in pairwise(edges)]
     assert [p.span for p in parts] == list(pairwise(edges))
     for part in parts:
