@@ -43,15 +43,10 @@ MARKERS: dict[str, tuple[str, str]] = {
     "HH": (">", BLACK),
     "BF": ("d", PURPLE),
     "BH": ("X", GREEN),
-    "LPC": ("8", VERMILION),
-    "PD": ("*", BLUE),
-    "TR": ("H", GREEN),
-    "GR": ("1", BLACK),
-    "BPC": ("+", ORANGE),
 }
 
 #: Markers that are strokes, without a face.
-STROKES = "x|1+"
+STROKES = "x|"
 
 #: Colour and line of a curve of special points by code, and of its virtual parts.
 CURVES: dict[str, dict[str, Any]] = {
@@ -222,7 +217,7 @@ def dot_look(code: str, size: float = 4.5) -> dict[str, Any]:
     return {
         "linestyle": "none",
         "marker": marker,
-        "markersize": size + (1.0 if marker in "*dp8hH" else 0.0),
+        "markersize": size + (1.0 if marker in "dph" else 0.0),
         "markerfacecolor": colour,
         "markeredgecolor": colour if stroke else "white",
         "markeredgewidth": 0.9 if stroke else 0.5,
