@@ -62,6 +62,6 @@ def unknown_name(kind: str, name: object, valid: Iterable[object]) -> UnknownNam
     names = [str(v) for v in valid]
     near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
     near = near or [v for v in names if v.casefold() == str(name).casefold()]
-    hint = f"; did you mean '{near[0]}'?" if near else ";"
+    hint = f"; did you mean '{near[0]}'?" if near else ""
     known = ", ".join(names) if names else "none"
     return UnknownNameError(f"unknown {kind} '{name}'{hint} (known: {known})")

@@ -41,4 +41,4 @@ def test_the_nearest_name(values):
     message = r"^unknown parameter 'omga'; did you mean 'omega'\? \(known: A, omega\)$"
     with pytest.raises(fs.UnknownNameError, match=message):
         values["omga"]
-    assert str(unknown_name("state", "zzz", [])) == "unknown state 'zzz'; (known: none)"
+    assert str(unknown_name("state", "zzz", [])) == "unknown state 'zzz' (known: none)"

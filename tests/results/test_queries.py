@@ -52,7 +52,7 @@ def test_expressions(branch, folded):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("y", "unknown column 'y'; .*known: x, p, q"),
+        ("y", "unknown column 'y' .*known: x, p, q"),
         ("x + lst", "unknown column 'lst'"),
         ("sn(x)", "unknown function 'sn'; did you mean 'sin'"),
         ("sin(x, p)", "sin takes one argument, received 2"),
