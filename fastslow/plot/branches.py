@@ -12,17 +12,8 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.arguments import (
-    flag,
-    instance,
-    takes,
-)
-from fastslow.plot.arguments import (
-    axis_quantity,
-    figure_width,
-    line_colour,
-    line_style,
-)
+from fastslow.arguments import flag, instance, takes
+from fastslow.plot.arguments import axis_quantity, figure_width, line_colour, line_style
 from fastslow.plot.bands import Bands, draw_bands
 from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing

@@ -13,16 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from fastslow.arguments import (
-    flag,
-    instance,
-    takes,
-)
+from fastslow.arguments import flag, instance, takes
 from fastslow.errors import ArgumentError
-from fastslow.plot.arguments import (
-    figure_width,
-    line_style,
-)
+from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.legends import explained

@@ -14,19 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation, Text
 from numpy.typing import ArrayLike
 
-from fastslow.arguments import (
-    flag,
-    instance,
-    mapping,
-    takes,
-)
+from fastslow.arguments import flag, instance, mapping, takes
 from fastslow.plot.areas import draw_areas, samples
-from fastslow.plot.arguments import (
-    figure_width,
-    line_style,
-    lines_in_plane,
-    points_in_plane,
-)
+from fastslow.plot.arguments import figure_width, line_style, lines_in_plane, points_in_plane
 from fastslow.plot.covering import covered, settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place, tag

@@ -14,13 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.text import Annotation, Text
 
-from fastslow.arguments import (
-    flag,
-    instance,
-    items,
-    takes,
-    whole,
-)
+from fastslow.arguments import flag, instance, items, takes, whole
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import (
     axis_quantity,

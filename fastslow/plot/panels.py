@@ -10,19 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.patches import Patch
 
-from fastslow.arguments import (
-    flag,
-    formula,
-    instance,
-    items,
-    takes,
-    text,
-)
+from fastslow.arguments import flag, formula, instance, items, takes, text
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.plot.arguments import (
-    figure_width,
-    line_style,
-)
+from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place

@@ -12,17 +12,8 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.arguments import (
-    flag,
-    instance,
-    takes,
-)
-from fastslow.plot.arguments import (
-    axis_quantity,
-    figure_width,
-    line_colour,
-    line_style,
-)
+from fastslow.arguments import flag, instance, takes
+from fastslow.plot.arguments import axis_quantity, figure_width, line_colour, line_style
 from fastslow.plot.arrows import draw_heads, points
 from fastslow.plot.branches import DiagramDrawing, draw_branches
 from fastslow.plot.covering import settle

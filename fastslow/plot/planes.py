@@ -16,18 +16,10 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
-from fastslow.arguments import (
-    flag,
-    instance,
-    takes,
-)
+from fastslow.arguments import flag, instance, takes
 from fastslow.errors import ArgumentError
 from fastslow.plot.areas import draw_areas, samples
-from fastslow.plot.arguments import (
-    axis_quantity,
-    figure_width,
-    line_style,
-)
+from fastslow.plot.arguments import axis_quantity, figure_width, line_style
 from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place, tag

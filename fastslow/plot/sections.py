@@ -9,18 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
-from fastslow.arguments import (
-    flag,
-    instance,
-    positive,
-    takes,
-)
+from fastslow.arguments import flag, instance, positive, takes
 from fastslow.errors import ArgumentError
-from fastslow.plot.arguments import (
-    axis_quantity,
-    figure_width,
-    line_style,
-)
+from fastslow.plot.arguments import axis_quantity, figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.legends import explained
 from fastslow.plot.quantities import quantity_of

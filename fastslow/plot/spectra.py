@@ -11,19 +11,9 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.arguments import (
-    flag,
-    instance,
-    interval,
-    takes,
-    whole,
-)
+from fastslow.arguments import flag, instance, interval, takes, whole
 from fastslow.errors import ArgumentError
-from fastslow.plot.arguments import (
-    figure_width,
-    line_colour,
-    line_style,
-)
+from fastslow.plot.arguments import figure_width, line_colour, line_style
 from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place, tag

@@ -10,16 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
-from fastslow.arguments import (
-    flag,
-    instance,
-    positive,
-    takes,
-)
-from fastslow.plot.arguments import (
-    figure_width,
-    line_style,
-)
+from fastslow.arguments import flag, instance, positive, takes
+from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.legends import explained
 from fastslow.plot.style import BLACK, BLUE, GREY, VERMILION, axes_for, typeset, widen
