@@ -82,7 +82,7 @@ FINE = fs.Continuation(step=0.004, largest_step=0.004)
 def soft_diagram() -> fs.Diagram:
     """Of the gear with A = 0.1 at D = 0.25."""
     model = gear("consistent").with_parameters(A=SOFT, D=GAP)
-    return fs.continue_equilibria(model.frozen(), "w", over=(-0.1, 0.3), settings=FINE)
+    return fs.continue_equilibria(model.frozen(), "w", over=(-0.1, 0.3), continuation=FINE)
 
 
 def _one_curve(scaling: str) -> Finding:

@@ -66,5 +66,5 @@ def _use(model: Model) -> None:
     value = fast.parameters.get(names[0]) or 0.0
     few = Continuation(branches=2)
     continue_equilibria(
-        fast.with_parameters(slow), names[0], (value - 1.0, value + 1.0), settings=few
+        fast.with_parameters(slow), names[0], (value - 1.0, value + 1.0), continuation=few
     )

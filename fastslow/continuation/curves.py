@@ -96,12 +96,12 @@ def tangent(system: System, z: Array, frame: Frame) -> Array:
 
 @np.errstate(all="ignore")
 def corrected(
-    system: System, guess: Array, direction: Array, frame: Frame, settings: Continuation
+    system: System, guess: Array, direction: Array, frame: Frame, continuation: Continuation
 ) -> tuple[Array, int] | None:
     """The point of the curve in the plane through a guess, and the Newton steps it took."""
     z, normal = guess.copy(), direction * frame.weight
     guide = system.renewed(guess)
-    for used in range(1, settings.iterations + 1):
+    for used in range(1, continuation.iterations + 1):
         matrix = np.vstack([slopes(system, z, guide, frame.scale), normal]) * frame.scale
         right = np.append(-system.residual(z, guide), (guess - z) @ normal)
         rows = np.abs(matrix).max(axis=1)
@@ -112,7 +112,7 @@ def corrected(
         except np.linalg.LinAlgError:
             return None
         z = z + step * frame.scale
-        if np.abs(step).max() <= settings.tolerance:
+        if np.abs(step).max() <= continuation.tolerance:
             # one more, whose matrix is the same to rounding
             left = system.residual(z, guide)
             right = np.append(-left, (guess - z) @ normal)
@@ -136,7 +136,7 @@ def follow(
     start: Array,
     direction: Array,
     frame: Frame,
-    settings: Continuation,
+    continuation: Continuation,
     stop: Callable[[Array], bool] = lambda _: False,
     bounds: Callable[[Array], Array] | None = None,
 ) -> tuple[Array, Array, str]:
@@ -147,7 +147,7 @@ def follow(
     system : System
     start, direction : ndarray, shape (N + 1,)
     frame : Frame
-    settings : Continuation
+    continuation : Continuation
     stop : callable
         Whether the curve ends after a point.
     bounds : callable, optional
@@ -161,18 +161,18 @@ def follow(
     status : str
     """
     rows, tangents = [start], [direction]
-    step = settings.step
-    while len(rows) < settings.points:
+    step = continuation.step
+    while len(rows) < continuation.points:
         last, along = rows[-1], tangents[-1]
-        if step < settings.smallest_step:
+        if step < continuation.smallest_step:
             return np.array(rows), np.array(tangents), SMALL_STEP
-        found = corrected(system, last + step * along, along, frame, settings)
+        found = corrected(system, last + step * along, along, frame, continuation)
         turned, cosine = along, -1.0
         if found is not None:
             turned = tangent(system, found[0], frame)
             cosine = float((turned * frame.weight) @ along)
             turned = turned if cosine >= 0 else -turned
-        if found is None or abs(cosine) < np.cos(settings.largest_turn):
+        if found is None or abs(cosine) < np.cos(continuation.largest_turn):
             step *= 0.5
             continue
         z, used = found
@@ -191,15 +191,15 @@ def follow(
         rows.append(z)
         tangents.append(turned)
         states = frame.size - 2
-        if np.any(np.abs(z[:states]) > settings.reach * frame.scale[:states]):
+        if np.any(np.abs(z[:states]) > continuation.reach * frame.scale[:states]):
             return np.array(rows), np.array(tangents), WINDOW
         if len(rows) > 4 and _returns(start, direction, last, along, turned, step, frame):
             rows[-1], tangents[-1] = start, direction
             return np.array(rows), np.array(tangents), CLOSED
         if stop(z):
             return np.array(rows), np.array(tangents), STOPPED
-        if used <= 3 and cosine > np.cos(0.5 * settings.largest_turn):
-            step = min(1.5 * step, settings.largest_step)
+        if used <= 3 and cosine > np.cos(0.5 * continuation.largest_turn):
+            step = min(1.5 * step, continuation.largest_step)
         elif used >= 6:
             step *= 0.7
     return np.array(rows), np.array(tangents), FULL

@@ -46,7 +46,7 @@ CURVES = {
     parameters=items(formula),
     over=mapping,
     code=text,
-    settings=instance(Continuation),
+    continuation=instance(Continuation),
     virtual=flag,
 )
 def continue_points(
@@ -55,7 +55,7 @@ def continue_points(
     over: Mapping[Any, tuple[float, float]],
     *,
     code: str | None = None,
-    settings: Continuation | None = None,
+    continuation: Continuation | None = None,
     virtual: bool = True,
 ) -> PointBranch:
     """Trace a curve of special points in the plane of two parameters.
@@ -75,7 +75,7 @@ def continue_points(
     code : str, optional
         Which curve to trace from a codimension-two point: ``"LP"`` or ``"HB"``
         from BT and ZH, ``"BE"`` or ``"LP"`` from BF, ``"BE"`` or ``"HB"`` from BH.
-    settings : Continuation, optional
+    continuation : Continuation, optional
         Lengths in units of the ranges.
     virtual : bool
         Whether the curve goes on beyond an interface as one of virtual points;
@@ -109,7 +109,7 @@ def continue_points(
     code = _curve_code(point, code)
     model = _model(point, (first, second))
     field = FrozenField(model, first, second)
-    settings = settings or Continuation()
+    continuation = continuation or Continuation()
     region = _region_of(field, point)
     u = np.append(point.state, [point.parameters[n] for n in (first, second)])
     if np.any(u[-2:] < lower) or np.any(u[-2:] > upper):
@@ -125,7 +125,7 @@ def continue_points(
             f"the point {point.label} does not lie on a curve of {code} points of region "
             f"{field.regions[region]}: Newton's method did not converge from it"
         )
-    return _traced(system, landing, frame, settings, point, (first, second), virtual)
+    return _traced(system, landing, frame, continuation, point, (first, second), virtual)
 
 
 def _names(parameters: Sequence[Any]) -> tuple[str, str]:
@@ -218,7 +218,7 @@ def _traced(
     system: Defining,
     start: Array,
     frame: Frame,
-    settings: Continuation,
+    continuation: Continuation,
     point: SpecialPoint,
     names: tuple[str, str],
     virtual: bool,
@@ -237,11 +237,13 @@ def _traced(
 
     bounds = others if isinstance(system, OnInterface) else None
     direction = curves.tangent(system, start, frame)
-    rows, tangents, last = curves.follow(system, start, direction, frame, settings, stop, bounds)
+    rows, tangents, last = curves.follow(
+        system, start, direction, frame, continuation, stop, bounds
+    )
     first = last
     if last != curves.CLOSED:
         back, turned, first = curves.follow(
-            system, start, -direction, frame, settings, stop, bounds
+            system, start, -direction, frame, continuation, stop, bounds
         )
         rows = np.concatenate([back[:0:-1], rows])
         tangents = np.concatenate([-turned[:0:-1], tangents])
@@ -291,7 +293,7 @@ def _traced(
         last == curves.CLOSED,
         dict(field.model.parameters),
         field.model.equations,
-        asdict(settings),
+        asdict(continuation),
     )
 
 

@@ -53,7 +53,7 @@ ADMISSIBLE = Outcome(
     model=instance(Model),
     parameter=formula,
     over=interval,
-    settings=instance(Continuation),
+    continuation=instance(Continuation),
     marks=items(finite),
     virtual=flag,
 )
@@ -62,7 +62,7 @@ def continue_equilibria(
     parameter: Any,
     over: tuple[float, float],
     *,
-    settings: Continuation | None = None,
+    continuation: Continuation | None = None,
     marks: Sequence[float] = (),
     virtual: bool = False,
 ) -> Diagram:
@@ -82,7 +82,7 @@ def continue_equilibria(
         What varies.
     over : (float, float)
         Its range, in its own units.
-    settings : Continuation, optional
+    continuation : Continuation, optional
     marks : sequence of float
         Parameter values at which a point UZ is wanted exactly.
     virtual : bool
@@ -122,20 +122,20 @@ def continue_equilibria(
             f"'{quantity}' still varies in time; trace the branches of model.frozen() instead"
         )
     field = _field(model, name)
-    settings = settings or Continuation()
-    starts = starts_of(field, lower, upper, settings.starts)
+    continuation = continuation or Continuation()
+    starts = starts_of(field, lower, upper, continuation.starts)
     window = Window(lower, upper, starts.scale())
     branches: list[Branch] = []
     for admissible in (True, False) if virtual else (True,):
         for value in starts.values(branches):
-            if len(branches) >= settings.branches:
+            if len(branches) >= continuation.branches:
                 break
-            for start in starts.at(value, admissible)[: settings.branches - len(branches)]:
+            for start in starts.at(value, admissible)[: continuation.branches - len(branches)]:
                 if not any(_passes(field, b, start, value, window) for b in branches):
-                    curve = _traced(field, start, value, window, settings, admissible)
+                    curve = _traced(field, start, value, window, continuation, admissible)
                     branches += _branches(field, curve, window, marks, admissible)
-        branches += _switched(field, branches, window, settings, marks, admissible)
-    full = len(branches) >= settings.branches
+        branches += _switched(field, branches, window, continuation, marks, admissible)
+    full = len(branches) >= continuation.branches
     missed = starts.missed(branches)
     sound = all(o.success for branch in branches for o in branch.outcomes)
     traced = sound and not full and not missed
@@ -152,9 +152,9 @@ def continue_equilibria(
         _interface_values(field),
         _text(model),
         corrector,
-        _too_many(settings) if full else _continuum(name, missed) if missed else SEARCHED,
+        _too_many(continuation) if full else _continuum(name, missed) if missed else SEARCHED,
         {quantity: str(law) for quantity, law in model.path.items()},
-        asdict(settings),
+        asdict(continuation),
     )
 
 
@@ -167,10 +167,10 @@ def _continuum(name: str, missed: Sequence[tuple[str, float]]) -> Outcome:
     )
 
 
-def _too_many(settings: Continuation) -> Outcome:
+def _too_many(continuation: Continuation) -> Outcome:
     return Outcome(
         "too many branches",
-        f"{settings.branches} branches were traced and there may be more; raise "
+        f"{continuation.branches} branches were traced and there may be more; raise "
         "Continuation(branches=…) to look for them.",
         False,
     )
@@ -193,7 +193,7 @@ def _traced(
     start: Equilibrium,
     value: float,
     window: Window,
-    settings: Continuation,
+    continuation: Continuation,
     bounded: bool,
 ) -> Curve:
     """The whole branch through a start."""
@@ -202,14 +202,14 @@ def _traced(
     tangent, _ = field.tangent(region, u, window.weight)
     if bounded and _along_interface(field, region, np.array([u]), window).any():
         # rounding would end it everywhere: no side of the interface is left or entered
-        curve = _traced(field, start, value, window, settings, False)
+        curve = _traced(field, start, value, window, continuation, False)
         rows = np.concatenate([piece.u for piece in curve.pieces])
         if _along_interface(field, region, rows, window).any():
             return curve
-    forward = walk(field, region, u, tangent, window, settings, bounded=bounded)
+    forward = walk(field, region, u, tangent, window, continuation, bounded=bounded)
     if forward.closed:
         return joined(None, forward)
-    backward = walk(field, region, u, -tangent, window, settings, bounded=bounded)
+    backward = walk(field, region, u, -tangent, window, continuation, bounded=bounded)
     return rising(joined(backward, forward))
 
 
@@ -224,7 +224,7 @@ def _switched(
     field: FrozenField,
     branches: Sequence[Branch],
     window: Window,
-    settings: Continuation,
+    continuation: Continuation,
     marks: Sequence[float],
     admissible: bool,
 ) -> list[Branch]:
@@ -233,7 +233,7 @@ def _switched(
     waiting = [p for b in branches if b.admissible == admissible for p in b.special("BP")]
     while waiting:
         point = waiting.pop(0)
-        if point.switch is None or len(branches) + len(found) >= settings.branches:
+        if point.switch is None or len(branches) + len(found) >= continuation.branches:
             continue
         region = field.regions.index(point.regions[0])
         u = np.append(point.state, point.parameters[field.parameter])
@@ -248,7 +248,7 @@ def _switched(
             start = point_at(field, region, near.u, admissible)
             if any(_passes(field, b, start, value, window) for b in (*branches, *found)):
                 continue
-            curve = _traced(field, start, value, window, settings, admissible)
+            curve = _traced(field, start, value, window, continuation, admissible)
             fresh = _branches(field, curve, window, marks, admissible)
             found += fresh
             waiting += [p for b in fresh for p in b.special("BP")]

@@ -76,7 +76,7 @@ def walk(
     start: Array,
     tangent: Array,
     window: Window,
-    settings: Continuation,
+    continuation: Continuation,
     *,
     bounded: bool = True,
 ) -> Walk:
@@ -94,15 +94,15 @@ def walk(
     pieces: list[Piece] = []
     joins: list[int] = []
     first = Piece(region, start[None], tangent[None])
-    step = settings.step
+    step = continuation.step
     while len(pieces) < PIECES:
         signs = field.signs[region] if bounded else np.zeros(field.compiled.m)
         u, tangents, status, step = loops.loop("trace")(
             field.compiled.address, region, field.values, start, tangent, signs,
-            window.weight, window.lower, window.upper, settings.reach * window.scale[:-1],
-            max(step, 10 * settings.smallest_step), settings.smallest_step,
-            settings.largest_step, settings.largest_turn, settings.tolerance,
-            settings.iterations, settings.points, not joins,
+            window.weight, window.lower, window.upper, continuation.reach * window.scale[:-1],
+            max(step, 10 * continuation.smallest_step), continuation.smallest_step,
+            continuation.largest_step, continuation.largest_turn, continuation.tolerance,
+            continuation.iterations, continuation.points, not joins,
         )  # fmt: skip
         back = _returned(region, u, tangents, first, window) if joins else None
         if back is not None:
@@ -130,7 +130,7 @@ def walk(
             closed = status == loops.CLOSED
             if closed:
                 u[-1], tangents[-1] = first.u[0], first.tangents[0]
-            outcome = _outcome(status, field, u[-1], window, settings)
+            outcome = _outcome(status, field, u[-1], window, continuation)
             return Walk(tuple(pieces), tuple(joins), outcome, closed=closed)
         row, corner = met
         interface = _interface_of(field, region, row)
@@ -150,7 +150,7 @@ def walk(
         home = region == first.region and apart < 1e-9
         if home:
             return Walk(tuple(pieces), tuple(joins), _closed(), closed=True)
-    return Walk(tuple(pieces), tuple(joins), _full(field, start, settings))
+    return Walk(tuple(pieces), tuple(joins), _full(field, start, continuation))
 
 
 def _returned(region: int, u: Array, tangents: Array, first: Piece, window: Window) -> Piece | None:
@@ -346,10 +346,10 @@ def _closed() -> Outcome:
     return Outcome("closed loop", "the branch returned to its start: a closed loop.", True)
 
 
-def _full(field: FrozenField, u: Array, settings: Continuation) -> Outcome:
+def _full(field: FrozenField, u: Array, continuation: Continuation) -> Outcome:
     return Outcome(
         "too many points",
-        f"the branch has {settings.points} rows and goes on at {_where(field, u)}; "
+        f"the branch has {continuation.points} rows and goes on at {_where(field, u)}; "
         "raise Continuation(points=…) or largest_step.",
         False,
     )
@@ -360,7 +360,7 @@ def _outcome(
     field: FrozenField,
     u: Array,
     window: Window,
-    settings: Continuation,
+    continuation: Continuation,
 ) -> Outcome:
     where = _where(field, u)
     near = 1e-12 * max(abs(window.lower), abs(window.upper), window.upper - window.lower)
@@ -381,15 +381,15 @@ def _outcome(
         k = int(np.argmax(np.abs(u[:-1]) / window.scale[:-1]))
         return Outcome(
             "left the window",
-            f"|{field.model.states[k]}| grew beyond {settings.reach * window.scale[k]:.3g} near "
-            f"{where}; raise Continuation(reach=…) to follow it further.",
+            f"|{field.model.states[k]}| grew beyond {continuation.reach * window.scale[k]:.3g} "
+            f"near {where}; raise Continuation(reach=…) to follow it further.",
             False,
         )
     if status == loops.FULL:
-        return _full(field, u, settings)
+        return _full(field, u, continuation)
     return Outcome(
         "step too small",
-        f"no next point was found from {where} with steps down to {settings.smallest_step:g}: the "
-        "curve is singular here, or the rates are not defined beyond.",
+        f"no next point was found from {where} with steps down to {continuation.smallest_step:g}: "
+        "the curve is singular here, or the rates are not defined beyond.",
         False,
     )

@@ -90,7 +90,7 @@ def rows(diagram: fs.Diagram) -> int:
 def traced(model: fs.Model, over: tuple[float, float], step: float) -> Callable[[], fs.Diagram]:
     """A continuation with steps of one length, a part of the range."""
     settings = fs.Continuation(step=step, largest_step=step, points=1_000_000)
-    return lambda: fs.continue_equilibria(model, "w", over, settings=settings)
+    return lambda: fs.continue_equilibria(model, "w", over, continuation=settings)
 
 
 def fastslow() -> Iterator[Row]:

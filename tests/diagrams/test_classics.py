@@ -118,7 +118,7 @@ def test_a_tiny_loop_is_found_because_its_critical_values_are_known():
 def test_coverage_is_claimed_only_where_it_is_proved(reactor):
     assert fs.continue_equilibria(reactor, p1, (0, 0.2)).coverage == "found"
     cut = fs.continue_equilibria(
-        fs.Model({x: p - x}, parameters={p: 0}), p, (0, 1), settings=fs.Continuation(points=10)
+        fs.Model({x: p - x}, parameters={p: 0}), p, (0, 1), continuation=fs.Continuation(points=10)
     )
     assert cut.coverage == "found"
     cusp = fs.Model({x: p + q * x - x**3}, parameters={p: 0, q: 1})
@@ -245,7 +245,7 @@ def test_twenty_states():
     }
     model = fs.Model(rates, parameters={p: 0})
     settings = fs.Continuation(starts=1)
-    diagram = fs.continue_equilibria(model, "p", (-1, 1), settings=settings)
+    diagram = fs.continue_equilibria(model, "p", (-1, 1), continuation=settings)
     bound = 2 / (3 * np.sqrt(3))
     uniform = [f["p"] for f in diagram.folds if np.ptp(f.state) < 1e-9]
     assert sorted(uniform) == pytest.approx([-bound, bound], rel=1e-12)

@@ -72,7 +72,7 @@ def test_a_pole():
     """x = 1/p has two branches, each leaving at p = 0."""
     settings = fs.Continuation(reach=100.0)
     model = fs.Model({x: 1 - p * x}, parameters={p: 1})
-    diagram = fs.continue_equilibria(model, p, (-1, 1), settings=settings)
+    diagram = fs.continue_equilibria(model, p, (-1, 1), continuation=settings)
     assert len(diagram.branches) == 2
     for branch in diagram.branches:
         assert branch.outcome.code == "left the window"
@@ -80,7 +80,7 @@ def test_a_pole():
 
 
 def test_too_many_points_are_said(line):
-    diagram = fs.continue_equilibria(line, p, (0, 1), settings=fs.Continuation(points=10))
+    diagram = fs.continue_equilibria(line, p, (0, 1), continuation=fs.Continuation(points=10))
     assert diagram.branches[0].outcome.code == "too many points"
     assert "Continuation(points" in diagram.branches[0].outcome.message
 
@@ -122,7 +122,9 @@ def test_a_double_root_is_one_equilibrium():
 def test_too_many_branches_are_said():
     """sin x = p has a branch for every half turn of x that the search meets."""
     model = fs.Model({x: p - sp.sin(x)}, parameters={p: 0})
-    diagram = fs.continue_equilibria(model, p, (-0.5, 0.5), settings=fs.Continuation(branches=5))
+    diagram = fs.continue_equilibria(
+        model, p, (-0.5, 0.5), continuation=fs.Continuation(branches=5)
+    )
     assert len(diagram.branches) == 5
     assert diagram.coverage == "found"
     assert diagram.outcome.code == "too many branches"
