@@ -25,14 +25,15 @@ from fastslow.plot.style import (
     GREEN,
     GREY,
     LINES,
-    MARKERS,
     MM,
     SMALL,
     TEXT,
     VERMILION,
     dressed,
     new_figure,
+    point_colour,
 )
+from fastslow.results.point_types import POINT_TYPES
 from fastslow.systems.gears import SCALINGS, gear_scales
 
 Floats = NDArray[np.float64]
@@ -177,7 +178,7 @@ def _draw_cases(ax: Axes, figure: str, scaling: str) -> None:
                 look |= {"linestyle": LINES["neutral"]["linestyle"], "linewidth": 0.9}
             ax.plot(branch.parameter[rows], branch["x"][rows], **look)
         for point in case.diagram.boundary_equilibria:
-            marker, fill = MARKERS["BE"]
+            marker, fill = POINT_TYPES["BE"].marker, point_colour("BE")
             ax.plot(point["w"], point["x"], marker, color=fill, markersize=4, zorder=6)
         value = case.setting.name.split("_")[-2]
         ax.annotate(
@@ -202,7 +203,7 @@ def draw_equilibria(into: Output) -> None:
             _draw_cases(ax, figure, scaling)
             letter = "abcdef"[3 * row + column]
             ax.set_title(f"({letter}) Fig. {3 + column}, {scaling}", loc="left", fontsize=TEXT)
-    marker, fill = MARKERS["BE"]
+    marker, fill = POINT_TYPES["BE"].marker, point_colour("BE")
     handles = [
         Line2D([], [], color=BLACK, linewidth=1.2, label="stable"),
         Line2D([], [], color=BLACK, linewidth=0.9, linestyle=LINES["neutral"]["linestyle"],

@@ -20,25 +20,10 @@ from fastslow.diagrams.fields import FrozenField
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.results.point_branches import PointBranch
+from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
-
-#: Curves that start from a point of each kind, the usual one first.
-CURVES = {
-    "LP": ("LP",),
-    "HB": ("HB",),
-    "NSD": ("HB",),
-    "BP": ("BP",),
-    "BE": ("BE",),
-    "CP": ("LP",),
-    "BT": ("HB", "LP"),
-    "GH": ("HB",),
-    "ZH": ("HB", "LP"),
-    "HH": ("HB",),
-    "BF": ("BE", "LP"),
-    "BH": ("BE", "HB"),
-}
 
 
 @takes(
@@ -150,11 +135,12 @@ def _ranges(names: tuple[str, str], over: Mapping[Any, tuple[float, float]]) -> 
 
 
 def _curve_code(point: SpecialPoint, code: str | None) -> str:
-    possible = CURVES.get(point.code)
-    if possible is None:
+    known = POINT_TYPES.get(point.code)
+    possible = known.curves if known else ()
+    if not possible:
         raise ArgumentError(
             f"a point {point.code} starts no curve in a parameter plane; expected one of "
-            f"{', '.join(CURVES)}"
+            f"{', '.join(c for c, known in POINT_TYPES.items() if known.curves)}"
         )
     if code is None:
         return possible[0]

@@ -21,14 +21,15 @@ from fastslow.plot.style import (
     GREEK,
     GREY,
     LINES,
-    MARKERS,
     MOTION,
     TRANSITIONS,
     VERMILION,
+    point_colour,
 )
 from fastslow.results.branches import Branch
 from fastslow.results.crossings import regions_at
-from fastslow.results.points import CODE_NAMES, type_of
+from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.points import type_of
 from fastslow.results.trajectories import Trajectory
 
 Array = NDArray[np.float64]
@@ -87,10 +88,9 @@ def looks() -> dict[str, dict[str, Any]]:
     made["earlier"] = {**motion, "opacity": 0.4, "label": "earlier periods"}
     made["trajectory"] = {**motion, "label": "trajectory"}
     made["now"] = {**motion, "label": "value of the run"}
-    for code, name in CODE_NAMES.items():
-        marker, colour = MARKERS[code]
-        made[code] = {"marker": marker, "color": colour, "filled": True, "size": 4.5}
-        made[code]["label"] = f"{code} {name}"
+    for code, known in POINT_TYPES.items():
+        look = {"marker": known.marker, "color": point_colour(code), "filled": True, "size": 4.5}
+        made[code] = {**look, "label": known.title}
     for kind, (marker, colour, label) in TRANSITIONS.items():
         filled = marker in "*PX"
         made[kind] = {"marker": marker, "color": colour, "filled": filled, "size": 6.0}

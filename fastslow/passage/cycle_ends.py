@@ -11,6 +11,7 @@ from fastslow.passage.excursions import Excursion
 from fastslow.passage.sheets import ends_of
 from fastslow.passage.transitions import Passage
 from fastslow.results.crossings import Crossing
+from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
 from fastslow.results.transitions import SPIKING, Transition
 
@@ -68,7 +69,7 @@ def cycle_end(p: Passage, e: Excursion) -> CycleEnd:
     if begun and size < SHRUNK:
         return CycleEnd("Hopf", begun[0], "; ".join(words))
     words.insert(0, "a bifurcation of the cycle, not of equilibria")
-    near = [point for point in p.diagram.special if point.code in ("LP", "HB", "BP", "BE")]
+    near = [q for q in p.diagram.special if POINT_TYPES[q.code].changes_stability]
     if near:
         closest = min(near, key=lambda q: abs(q[name] - last.value))
         away = abs(closest[name] - last.value)

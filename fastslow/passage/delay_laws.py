@@ -11,7 +11,8 @@ from fastslow.model.model import Model
 from fastslow.passage.boundary_delays import boundary_delay, gap_transit
 from fastslow.passage.fold_delays import fold_delay
 from fastslow.results.delays import BoundaryDelay, FoldDelay, GapTransit
-from fastslow.results.points import CODE_NAMES, SpecialPoint
+from fastslow.results.point_types import POINT_TYPES, point_name
+from fastslow.results.points import SpecialPoint
 
 
 @takes(
@@ -66,14 +67,16 @@ def predict_delay(
     >>> round(predict_delay(diagram.folds[0], 1e-3).leading, 9)
     0.019469027
     """
-    if point.code == "LP":
+    known = POINT_TYPES.get(point.code)
+    law = known.law if known else ""
+    if law == "fold":
         return fold_delay(point, rate, level=level, parameter=parameter, model=model)
-    if point.code == "BE" and point.subtype == "degenerate":
+    if law == "boundary" and point.subtype == "degenerate":
         return gap_transit(point, rate, parameter=parameter, model=model)
-    if point.code == "BE":
+    if law == "boundary":
         return boundary_delay(point, rate, level=level, parameter=parameter, model=model)
-    hint = "; at a Hopf point see hopf_exit" if point.code == "HB" else ""
+    hint = "; at a Hopf point see hopf_exit" if law == "entry-exit" else ""
     raise ArgumentError(
         f"expected a fold (LP) or a boundary equilibrium (BE), received {point.label}, a "
-        f"{CODE_NAMES.get(point.code, point.code)}{hint}"
+        f"{point_name(point.code)}{hint}"
     )

@@ -33,6 +33,7 @@ from fastslow.results.delay_scalings import DelayScaling
 from fastslow.results.delays import BoundaryDelay, FoldDelay, GapTransit
 from fastslow.results.diagrams import Diagram
 from fastslow.results.outcome import Outcome
+from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
 from fastslow.results.sections import Section
 from fastslow.results.trajectories import Trajectory
@@ -243,8 +244,8 @@ def _stable_rows(
             apart = np.abs(np.append(other.state, other[name]) - here)
             if other.code != site.point.code or np.any(apart > 1e-7 * (1.0 + np.abs(here))):
                 continue
-            # a boundary equilibrium stands twice, in both of its regions
-            for begin, step in ((row, -1), (row + (other.code == "BE"), 1)):
+            second = row + POINT_TYPES[other.code].two_rows
+            for begin, step in ((row, -1), (second, 1)):
                 rows = _monotone(branch, begin, step, way)
                 if len(rows) > 1:
                     return branch, rows

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from fastslow.results.branches import Branch, Sheet
 from fastslow.results.diagrams import Diagram
 from fastslow.results.interpolation import hermite
+from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
 from fastslow.results.transitions import StableSheet
 
 Array = NDArray[np.float64]
-
-#: Codes at which a stable sheet can end.
-ENDING = ("LP", "HB", "BP", "BE")
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +174,7 @@ def ends_of(diagram: Diagram, sheet: StableSheet) -> list[SpecialPoint]:
     return [
         point
         for point, row in zip(branch.special, branch.special_rows, strict=True)
-        if point.code in ENDING
+        if POINT_TYPES[point.code].changes_stability
         and sheet.start - 1 <= row <= sheet.stop
         and min(abs(point[diagram.parameter] - low), abs(point[diagram.parameter] - high)) <= near
     ]

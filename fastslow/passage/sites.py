@@ -17,7 +17,8 @@ from fastslow.diagrams.fields import FrozenField
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import real
-from fastslow.results.points import CODE_NAMES, SpecialPoint
+from fastslow.results.point_types import point_name
+from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
 
@@ -132,9 +133,9 @@ def _field(model: Model, name: str, values: tuple[tuple[str, float], ...]) -> Fr
 def require_code(point: SpecialPoint, code: str, law: str) -> None:
     """Raise unless a special point is of a code."""
     if point.code != code:
-        received = f"{point.label}, a {CODE_NAMES.get(point.code, point.code)}"
+        received = f"{point.label}, a {point_name(point.code)}"
         raise ArgumentError(
-            f"{law} holds at a point {code} ({CODE_NAMES[code]}); received {received}"
+            f"{law} holds at a point {code} ({point_name(code)}); received {received}"
         )
 
 

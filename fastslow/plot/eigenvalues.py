@@ -24,10 +24,11 @@ from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place, tag
 from fastslow.plot.legends import explained
-from fastslow.plot.style import GREY, MARKERS, SMALL, TEXT, VERMILION, axes_for, root, typeset
+from fastslow.plot.style import GREY, SMALL, TEXT, VERMILION, axes_for, point_colour, root, typeset
 from fastslow.results.branches import Branch
 from fastslow.results.overlays import Overlay
-from fastslow.results.points import CODE_NAMES, SpecialPoint
+from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -314,11 +315,11 @@ def _marks(
     """Special points: what crosses the imaginary axis, or all eigenvalues of the point."""
     markers: list[Line2D] = []
     labels: list[Annotation] = []
-    for code in CODE_NAMES:
+    for code, known in POINT_TYPES.items():
         roots: list[complex] = []
         for point in (p for p in met if p.code == code):
             values = point.eigenvalues[np.isfinite(point.eigenvalues.real)]
-            if code in ("LP", "HB", "BP", "NSD") and len(values):
+            if known.event and len(values):
                 near = np.abs(values.real)
                 values = values[near <= near.min() + 1e-9 * max(float(np.abs(values).max()), 1e-9)]
             roots += values.tolist()
@@ -326,14 +327,11 @@ def _marks(
                 top = max(values, key=lambda z: z.imag)
                 labels.append(tag(ax, point.label, (float(top.real), float(top.imag))))
         if roots:
-            marker, colour = MARKERS[code]
+            marker, colour = known.marker, point_colour(code)
             at = np.array(roots)
-            text = f"{code} {CODE_NAMES[code]}"
-            if code == "BE":
-                # open, because other points may lie there too
-                markers += _dots(ax, at, marker, "none", colour, text)
-            else:
-                markers += _dots(ax, at, marker, colour, "white", text)
+            # open with two rows, whose eigenvalues in the other region lie there too
+            face, edge = ("none", colour) if known.two_rows else (colour, "white")
+            markers += _dots(ax, at, marker, face, edge, known.title)
     return tuple(markers), tuple(labels)
 
 

@@ -26,9 +26,10 @@ from fastslow.plot.labels import place, tag
 from fastslow.plot.legends import explained
 from fastslow.plot.quantities import Quantity, at_points, quantity_of
 from fastslow.plot.spaces import HEIGHT, dress_space
-from fastslow.plot.style import CURVES, axes_for, dot_look, spatial
+from fastslow.plot.style import VIRTUAL_CURVE, axes_for, curve_look, dot_look, spatial
 from fastslow.results.point_branches import PointBranch
-from fastslow.results.points import CODE_NAMES, SpecialPoint
+from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.points import SpecialPoint
 from fastslow.results.refined_maps import RefinedMap
 
 
@@ -165,9 +166,9 @@ def parameter_plane(
         for code, real, rows in _runs(curve):
             if not (real or virtual):
                 continue
-            look = {**CURVES[code], "zorder": 2.0, "label": f"{code} {CODE_NAMES[code]}"}
+            look = {**curve_look(code), "zorder": 2.0, "label": POINT_TYPES[code].title}
             if not real:
-                look |= {**CURVES["virtual"], "label": "virtual"}
+                look |= {**VIRTUAL_CURVE, "label": "virtual"}
             lines += ax.plot(*(place[rows] for place in places), **{**look, **style})
     markers, labels = _special_points(ax, curves, quantities, virtual, label)
     if space:
@@ -221,7 +222,7 @@ def _special_points(
     labels: list[Annotation] = []
     names = curves[0].parameter_names
     spans = np.ptp(np.concatenate([c.parameter for c in curves]), axis=0) + 1e-300
-    for code in CODE_NAMES:
+    for code in POINT_TYPES:
         met: list[SpecialPoint] = []
         seen: list[NDArray[np.float64]] = []
         for point in (p for curve in curves for p in curve.special(code)):
@@ -235,7 +236,7 @@ def _special_points(
         if not met:
             continue
         places = np.column_stack(at_points(met, *shown))
-        look = {"zorder": 5, "label": f"{code} {CODE_NAMES[code]}"}
+        look = {"zorder": 5, "label": POINT_TYPES[code].title}
         markers += ax.plot(*places.T, **dot_look(code, 5.0), **look)
         if label:
             # numbered over all curves, which number their own points each

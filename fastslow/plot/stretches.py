@@ -13,7 +13,8 @@ from fastslow.plot.labels import tag
 from fastslow.plot.quantities import Quantity, at_points
 from fastslow.plot.style import dot_look
 from fastslow.results.branches import Branch
-from fastslow.results.points import CODE_NAMES, SpecialPoint
+from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.points import SpecialPoint
 
 #: What is written beside an end point is no longer than this; a sentence is for the hover.
 WORDY = 24
@@ -39,12 +40,12 @@ def draw_points(
     """Draw special points in the plane or in space, one marker for each code, and label them."""
     markers: list[Line2D] = []
     labels: list[Annotation] = []
-    for code in CODE_NAMES:
+    for code in POINT_TYPES:
         same = [p for p in points if p.code == code]
         if not same:
             continue
         at = np.column_stack(at_points(same, *shown))
-        look = {"zorder": 5, "label": f"{code} {CODE_NAMES[code]}"}
+        look = {"zorder": 5, "label": POINT_TYPES[code].title}
         markers += ax.plot(*at.T, **dot_look(code), **look)
         if label:
             # branches that cross share their branch point: it is named once

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from fastslow.arguments import word
 from fastslow.errors import ArgumentError, FileError, unknown_name
+from fastslow.results.point_types import POINT_TYPES
 
 # M. Okabe and K. Ito, Color Universal Design, 2008
 BLACK, ORANGE, GREEN = "#000000", "#E69F00", "#009E73"
@@ -27,36 +28,22 @@ LINES: dict[str, dict[str, Any]] = {
     "virtual": {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.45},
 }
 
-#: Marker and colour of a special point by code; no two codes share a marker.
-MARKERS: dict[str, tuple[str, str]] = {
-    "LP": ("o", VERMILION),
-    "HB": ("s", GREEN),
-    "BP": ("D", ORANGE),
-    "NSD": ("P", GREY),
-    "BE": ("^", PURPLE),
-    "UZ": ("x", BLACK),
-    "EP": ("|", BLACK),
-    "CP": ("v", VERMILION),
-    "BT": ("p", BLACK),
-    "GH": ("h", BLUE),
-    "ZH": ("<", BLACK),
-    "HH": (">", BLACK),
-    "BF": ("d", PURPLE),
-    "BH": ("X", GREEN),
+#: The palette by the names used in `fastslow.results.point_types`.
+COLOURS = {
+    "black": BLACK,
+    "orange": ORANGE,
+    "green": GREEN,
+    "blue": BLUE,
+    "vermilion": VERMILION,
+    "purple": PURPLE,
+    "grey": GREY,
 }
 
 #: Markers that are strokes, without a face.
 STROKES = "x|"
 
-#: Colour and line of a curve of special points by code, and of its virtual parts.
-CURVES: dict[str, dict[str, Any]] = {
-    "LP": {"color": VERMILION, "linestyle": "-", "linewidth": 1.5},
-    "HB": {"color": GREEN, "linestyle": (0, (6, 1.5)), "linewidth": 1.5},
-    "BE": {"color": PURPLE, "linestyle": (0, (5, 1.5, 1, 1.5)), "linewidth": 1.5},
-    "BP": {"color": ORANGE, "linestyle": (0, (6, 1.5, 1, 1.5, 1, 1.5)), "linewidth": 1.3},
-    "NSD": {"color": GREY, "linestyle": "-", "linewidth": 0.7},
-    "virtual": {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.6},
-}
+#: Line of the virtual parts of a curve of special points.
+VIRTUAL_CURVE: dict[str, Any] = {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.6}
 
 #: Marker, colour and legend text of a transition by kind.
 TRANSITIONS: dict[str, tuple[str, str, str]] = {
@@ -210,9 +197,21 @@ def spatial(function: str, ax: Axes | None, z: object) -> bool:
     return given or z is not None
 
 
+def point_colour(code: str) -> str:
+    """Colour of the special points of a code and of their curves."""
+    return COLOURS[POINT_TYPES[code].colour]
+
+
+def curve_look(code: str) -> dict[str, Any]:
+    """Properties of the line of a curve of special points."""
+    line = POINT_TYPES[code].line
+    assert line is not None
+    return {"color": point_colour(code), "linestyle": line[0], "linewidth": line[1]}
+
+
 def dot_look(code: str, size: float = 4.5) -> dict[str, Any]:
     """Properties of the marker of a special point."""
-    marker, colour = MARKERS[code]
+    marker, colour = POINT_TYPES[code].marker, point_colour(code)
     stroke = marker in STROKES
     return {
         "linestyle": "none",

@@ -16,12 +16,13 @@ from fastslow.results.auto_text import AutoCurve, eigenvalues_of, parameters_of,
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import Diagram
 from fastslow.results.outcome import Outcome
+from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
 
 #: Types of points of an equilibrium curve; those written every so many steps are none.
-CODES = {1: "BP", 2: "LP", 3: "HB", -4: "UZ", 9: "EP", -9: "EP"}
+CODES = {number: one.code for one in POINT_TYPES.values() for number in one.auto}
 
 #: IPS of equilibria of ODEs, and of travelling waves seen as such.
 EQUILIBRIA = (1, 11)
@@ -209,7 +210,7 @@ def _branch(
         code = CODES.get(int(np.sign(kind)) * (abs(int(kind)) % 10))
         if code is None or label == 0:
             continue
-        if code in ("LP", "HB", "BP"):
+        if POINT_TYPES[code].event:
             stability[row] = "neutral"
         counts[code] = counts.get(code, 0) + 1
         special.append(

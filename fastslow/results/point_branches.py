@@ -16,7 +16,8 @@ from fastslow.results.markup import points_html
 from fastslow.results.meetings import intersections
 from fastslow.results.outcome import Outcome
 from fastslow.results.point_columns import labels_at
-from fastslow.results.points import CODE_NAMES, SpecialPoints
+from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.points import SpecialPoints
 from fastslow.results.result import Result
 from fastslow.results.tables import Table, numbered
 
@@ -145,7 +146,7 @@ class PointBranch(Table, Result):
     def __repr__(self) -> str:
         first, second = self.parameter_names
         lines = [
-            f"Curve of {self.code} ({CODE_NAMES[self.code]}) in {self.region} "
+            f"Curve of {self.code} ({POINT_TYPES[self.code].name}) in {self.region} "
             f"over {first} and {second}, {len(self)} points"
         ]
         for point in self.special:

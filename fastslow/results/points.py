@@ -13,28 +13,12 @@ from fastslow.arguments import position, word
 from fastslow.errors import unknown_name
 from fastslow.results.markup import points_html
 from fastslow.results.point_columns import columns_of_points
+from fastslow.results.point_types import POINT_TYPES, point_name
 from fastslow.results.result import LIVE, Result
 from fastslow.results.tables import Table
 
 #: An eigenvalue counts as zero when its real part is below this times the largest modulus.
 NEUTRAL = 1e-10
-
-CODE_NAMES = {
-    "EP": "end point",
-    "UZ": "user value",
-    "LP": "fold",
-    "HB": "Hopf",
-    "BP": "branch point",
-    "NSD": "neutral saddle",
-    "BE": "boundary equilibrium",
-    "CP": "cusp",
-    "BT": "Bogdanov-Takens",
-    "GH": "generalized Hopf",
-    "ZH": "zero-Hopf",
-    "HH": "double Hopf",
-    "BF": "fold on an interface",
-    "BH": "Hopf on an interface",
-}
 
 
 def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
@@ -259,8 +243,8 @@ class SpecialPoint(_Point):
     Parameters
     ----------
     code : str
-        LP, HB, BP, NSD, BE, UZ or EP; on a curve of such points CP, BT, GH, ZH,
-        HH, BF or BH.
+        LP, HB, BP, NSD, BE, TF, UZ or EP; on a curve of such points CP, BT, GH, ZH,
+        HH, BF or BH (see `fastslow.results.point_types`).
     label : str
         The code with its number along the diagram, such as ``"BE2"``.
     states, state, parameters
@@ -339,7 +323,7 @@ class SpecialPoint(_Point):
     @property
     def kind(self) -> str:
         """What it is, in words."""
-        kind = CODE_NAMES.get(self.code, self.code)
+        kind = point_name(self.code)
         if self.subtype or self.criticality:
             kind += f", {self.subtype or self.criticality}"
         if self.clarke is not None and self.clarke.q_hopf is not None:
@@ -371,7 +355,7 @@ class SpecialPoints(Table, Result, tuple[SpecialPoint, ...]):
 
     def __call__(self, code: str) -> SpecialPoints:
         """Those of one code; UnknownNameError for a code that there is not."""
-        word("special point code", CODE_NAMES)("code", code)
+        word("special point code", POINT_TYPES)("code", code)
         return SpecialPoints(point for point in self if point.code == code)
 
     def __getitem__(self, key: Any) -> Any:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from fastslow.arguments import real_number, refusal
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.outcome import Outcome
-from fastslow.results.points import CODE_NAMES, SpecialPoints
+from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.points import SpecialPoints
 
 if TYPE_CHECKING:
     from fastslow.results.branches import Branch
@@ -33,8 +34,7 @@ def rows_of(branch: Branch, wanted: slice) -> Branch:
     kept = [
         (point, row)
         for point, row in zip(branch.special, branch.special_rows, strict=True)
-        # a boundary equilibrium stands on two rows
-        if start <= row < stop or (point.code == "BE" and row + 1 == start)
+        if start <= row < stop or (POINT_TYPES[point.code].two_rows and row + 1 == start)
     ]
     first, last = branch.outcomes
     known = branch.known_stability
@@ -68,8 +68,8 @@ def parts_of(
     between: tuple[float, float] | None,
 ) -> tuple[Branch, ...]:
     """Runs of rows that fulfil conditions; see `Branch.select`."""
-    if code is not None and code not in CODE_NAMES:
-        raise unknown_name("special point code", code, CODE_NAMES)
+    if code is not None and code not in POINT_TYPES:
+        raise unknown_name("special point code", code, POINT_TYPES)
     wanted = np.ones(len(branch), dtype=bool)
     if stable is not None:
         wanted &= branch.stable == stable

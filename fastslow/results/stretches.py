@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.selecting import runs_of
 
 if TYPE_CHECKING:
@@ -15,16 +16,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Codes at which stability can change.
-CHANGING = ("LP", "HB", "BP", "BE")
-
 
 def stable_rows(branch: Branch) -> list[tuple[int, int]]:
     """First and last row of every stable stretch, the special points at its ends included."""
     ends = set()
     for point, row in zip(branch.special, branch.special_rows, strict=True):
-        if point.code in CHANGING:
-            ends |= {row, row + 1} if point.code == "BE" else {row}
+        known = POINT_TYPES[point.code]
+        if known.changes_stability:
+            ends |= {row, row + 1} if known.two_rows else {row}
     return [
         (start - (start - 1 in ends), stop - 1 + (stop in ends))
         for start, stop in runs_of(branch.stable)

@@ -9,6 +9,7 @@ from sympy.logic.boolalg import Boolean
 
 from fastslow.model.structure import real
 from fastslow.results.named import Named
+from fastslow.results.point_types import point_name
 from fastslow.symbolic.algebra import tidy
 from fastslow.symbolic.boundaries import BoundaryForm
 from fastslow.symbolic.critical import (
@@ -175,9 +176,9 @@ def derive_region(setting: Setting, boundary: tuple[BoundaryForm, ...]) -> Regio
 
 def _notes(found: list[Family], points: list[CriticalPoint], whole: Stability) -> tuple[str, ...]:
     """What stayed implicit, each once."""
-    names = {"LP": "fold", "BP": "branch point", "CP": "cusp", "HB": "Hopf"}
     kept = [f.note for f in found if f.note]
-    sets = [f"the {names[p.code]} set is given by its equations" for p in points if p.equations]
+    implicit = [point_name(p.code) for p in points if p.equations]
+    sets = [f"the {name} set is given by its equations" for name in implicit]
     return tuple(dict.fromkeys([*kept, *sets, *whole.notes]))
 
 

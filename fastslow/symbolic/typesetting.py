@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import sympy as sp
 
 from fastslow.model.structure import real
+from fastslow.results.point_types import point_name
 from fastslow.symbolic.algebra import longer
 from fastslow.symbolic.forms import Continuum, CriticalPoint, EquilibriumForm
 from fastslow.symbolic.stability import Stability
-from fastslow.symbolic.wording import PARTS, POINT_NAMES
+from fastslow.symbolic.wording import PARTS
 
 if TYPE_CHECKING:
     from fastslow.symbolic.boundaries import BoundaryForm
@@ -114,7 +115,7 @@ def _point(point: CriticalPoint) -> str:
     shown += [f"{_tex(e)} = 0" for e in point.equations]
     if point.frequency_squared is not None:
         shown.append(rf"\omega^2 = {_tex(point.frequency_squared)}")
-    name = POINT_NAMES[point.code]
+    name = point_name(point.code)
     return rf"\text{{{name}: }} " + r",\quad ".join(shown) + _when(point.exists, point.admissible)
 
 

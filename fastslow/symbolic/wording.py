@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import sympy as sp
 
 from fastslow.model.structure import real
+from fastslow.results.point_types import point_name
 from fastslow.symbolic.algebra import longer
 
 if TYPE_CHECKING:
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 
 #: Longer expressions are not printed; the objects hold them whole.
 PARTS = 600
-
-POINT_NAMES = {"LP": "fold", "BP": "branch point", "CP": "cusp", "HB": "Hopf"}
 
 
 def summary(law: Derivation) -> str:
@@ -87,7 +86,7 @@ def _point(point: CriticalPoint) -> str:
     text = ", ".join(f"{n} = {shown(e)}" for n, e in values.items() if e != real(n))
     if point.equations:
         text = ", ".join([text, *(f"{shown(e)} = 0" for e in point.equations)]).strip(", ")
-    return f"{POINT_NAMES[point.code]}: {text}{_when(point.exists, point.admissible)}"
+    return f"{point_name(point.code)}: {text}{_when(point.exists, point.admissible)}"
 
 
 def _boundary(form: BoundaryForm) -> str:

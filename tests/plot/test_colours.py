@@ -8,7 +8,7 @@ from matplotlib.colors import to_rgb
 
 from fastslow.plot import style
 from fastslow.plot.areas import FILLS, OTHERS
-from fastslow.results.points import CODE_NAMES
+from fastslow.results.point_types import POINT_TYPES
 
 # linear sRGB as a dichromat sees it (Machado, Oliveira and Fernandes 2009, severity 1), and grey
 SIGHTS = {
@@ -86,19 +86,13 @@ def test_lines_and_words_stand_out_from_every_region(ground, sight):
     assert difference(style.MOTION, style.BRANCH, sight) > 30.0
 
 
-def test_every_code_has_a_marker_of_its_own():
-    assert set(CODE_NAMES) <= set(style.MARKERS)
-    shapes = [marker for marker, _ in style.MARKERS.values()]
-    assert len(set(shapes)) == len(shapes)
-
-
 def test_transitions_and_curves_differ_in_more_than_colour():
     shapes = [marker for marker, _, _ in style.TRANSITIONS.values()]
     assert len(set(shapes)) == len(shapes)
     lines = [
-        (str(look["linestyle"]), look["linewidth"] > 1.0)
-        for kind, look in style.CURVES.items()
-        if kind != "virtual"
+        (str(known.line[0]), known.line[1] > 1.0)
+        for known in POINT_TYPES.values()
+        if known.line is not None
     ]
     assert len(set(lines)) == len(lines)
     styles = [str(look["linestyle"]) for look in style.LINES.values()]

@@ -1,0 +1,257 @@
+"""The types of special points: one record for each code."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointType:
+    """What is known about all points of one code.
+
+    Parameters
+    ----------
+    code : str
+        The code, such as ``"LP"``.
+    name : str
+        The name of the field, such as ``"fold"``.
+    summary : str
+        One sentence that defines it, for the documentation.
+    codimension : int
+        0 for points that mark a row, 1 for points of a branch over one parameter, 2
+        for points of a curve in a parameter plane.
+    event : str
+        The eigenvalues that define it: ``"zero"``, ``"imaginary pair"``,
+        ``"opposite pair"`` (two real eigenvalues with sum zero), or ``""``.
+    unstable : int, optional
+        By how much the number of eigenvalues with positive real part changes at a
+        generic point of this code; None where it may change by any number.
+    two_rows : bool
+        Whether it takes two rows of a branch, one in each of two regions.
+    law : str
+        The law of delay in slow passage: ``"fold"``, ``"boundary"``,
+        ``"entry-exit"``, or ``""`` where there is none.
+    curves : tuple of str
+        Codes of the curves that can be continued from it in two parameters, the usual
+        one first.
+    auto : tuple of int
+        Numbers of the type in files of AUTO-07p.
+    marker : str
+        Marker of Matplotlib in figures.
+    colour : str
+        Name of a colour of the palette in `fastslow.plot.style`.
+    line : tuple, optional
+        Matplotlib's line style and width of a curve of such points.
+
+    Examples
+    --------
+    >>> POINT_TYPES["HB"].name, POINT_TYPES["HB"].unstable
+    ('Hopf', 2)
+    """
+
+    code: str
+    name: str
+    summary: str
+    codimension: int
+    marker: str
+    colour: str
+    event: str = ""
+    unstable: int | None = 0
+    two_rows: bool = False
+    law: str = ""
+    curves: tuple[str, ...] = ()
+    auto: tuple[int, ...] = ()
+    line: tuple[str | tuple[int, tuple[float, ...]], float] | None = None
+
+    @property
+    def changes_stability(self) -> bool:
+        """Whether a branch may gain, lose or end its stability there."""
+        return self.unstable != 0
+
+    @property
+    def title(self) -> str:
+        """Code and name, as legends show them."""
+        return f"{self.code} {self.name}"
+
+
+_ALL = (
+    PointType(
+        code="EP",
+        name="end point",
+        summary="First or last row of a branch.",
+        codimension=0,
+        auto=(9, -9),
+        marker="|",
+        colour="black",
+    ),
+    PointType(
+        code="UZ",
+        name="user value",
+        summary="Row at a parameter value given in ``marks=``.",
+        codimension=0,
+        auto=(-4,),
+        marker="x",
+        colour="black",
+    ),
+    PointType(
+        code="LP",
+        name="fold",
+        summary="Saddle-node or limit point: the branch turns in the parameter.",
+        codimension=1,
+        event="zero",
+        unstable=1,
+        law="fold",
+        curves=("LP",),
+        auto=(2,),
+        marker="o",
+        colour="vermilion",
+        line=("-", 1.5),
+    ),
+    PointType(
+        code="HB",
+        name="Hopf",
+        summary="Andronov-Hopf point: a complex pair of eigenvalues crosses the imaginary axis.",
+        codimension=1,
+        event="imaginary pair",
+        unstable=2,
+        law="entry-exit",
+        curves=("HB",),
+        auto=(3,),
+        marker="s",
+        colour="green",
+        line=((0, (6, 1.5)), 1.5),
+    ),
+    PointType(
+        code="BP",
+        name="branch point",
+        summary="Two branches cross, as at transcritical and pitchfork bifurcations.",
+        codimension=1,
+        event="zero",
+        unstable=1,
+        curves=("BP",),
+        auto=(1,),
+        marker="D",
+        colour="orange",
+        line=((0, (6, 1.5, 1, 1.5, 1, 1.5)), 1.3),
+    ),
+    PointType(
+        code="NSD",
+        name="neutral saddle",
+        summary="Two real eigenvalues have sum zero; no bifurcation of equilibria.",
+        codimension=1,
+        event="opposite pair",
+        curves=("HB",),
+        marker="P",
+        colour="grey",
+        line=("-", 0.7),
+    ),
+    PointType(
+        code="BE",
+        name="boundary equilibrium",
+        summary="An equilibrium meets an interface.",
+        codimension=1,
+        unstable=None,
+        two_rows=True,
+        law="boundary",
+        curves=("BE",),
+        marker="^",
+        colour="purple",
+        line=((0, (5, 1.5, 1, 1.5)), 1.5),
+    ),
+    PointType(
+        code="TF",
+        name="two-fold",
+        summary="A pseudo-equilibrium meets a point where both fields are tangent to the "
+        "interface; its branch ends there.",
+        codimension=1,
+        unstable=None,
+        marker="*",
+        colour="purple",
+    ),
+    PointType(
+        code="CP",
+        name="cusp",
+        summary="Two folds meet.",
+        codimension=2,
+        unstable=None,
+        curves=("LP",),
+        marker="v",
+        colour="vermilion",
+    ),
+    PointType(
+        code="BT",
+        name="Bogdanov-Takens",
+        summary="A double zero eigenvalue: a curve of Hopf points ends on a curve of folds.",
+        codimension=2,
+        unstable=None,
+        curves=("HB", "LP"),
+        marker="p",
+        colour="black",
+    ),
+    PointType(
+        code="GH",
+        name="generalized Hopf",
+        summary="Bautin point: the first Lyapunov coefficient vanishes.",
+        codimension=2,
+        unstable=None,
+        curves=("HB",),
+        marker="h",
+        colour="blue",
+    ),
+    PointType(
+        code="ZH",
+        name="zero-Hopf",
+        summary="Fold-Hopf point: a zero eigenvalue and an imaginary pair.",
+        codimension=2,
+        unstable=None,
+        curves=("HB", "LP"),
+        marker="<",
+        colour="black",
+    ),
+    PointType(
+        code="HH",
+        name="double Hopf",
+        summary="Hopf-Hopf point: two imaginary pairs.",
+        codimension=2,
+        unstable=None,
+        curves=("HB",),
+        marker=">",
+        colour="black",
+    ),
+    PointType(
+        code="BF",
+        name="fold on an interface",
+        summary="A fold meets an interface.",
+        codimension=2,
+        unstable=None,
+        curves=("BE", "LP"),
+        marker="d",
+        colour="purple",
+    ),
+    PointType(
+        code="BH",
+        name="Hopf on an interface",
+        summary="A Hopf point meets an interface.",
+        codimension=2,
+        unstable=None,
+        curves=("BE", "HB"),
+        marker="X",
+        colour="green",
+    ),
+)
+
+#: The types by code, in the order of legends.
+POINT_TYPES: Mapping[str, PointType] = MappingProxyType({one.code: one for one in _ALL})
+
+
+def point_name(code: str) -> str:
+    """Name of a code; the code itself where it is of a later version.
+
+    Examples
+    --------
+    >>> point_name("BP"), point_name("QQ")
+    ('branch point', 'QQ')
+    """
+    return POINT_TYPES[code].name if code in POINT_TYPES else code
