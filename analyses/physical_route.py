@@ -110,7 +110,13 @@ def route() -> Route:
     wrong = fs.systems.harmonic_gear_physical("printed", omega=SPEED)
     span = 6 * np.pi / SPEED
     runs = [
-        fs.simulate(model, [0.0] * len(model.states), t=(0, end), tol=TOLERANCE, samples=3001)
+        fs.simulate(
+            model,
+            [0.0] * len(model.states),
+            t=(0, end),
+            integration=fs.Integration(rtol=TOLERANCE),
+            samples=3001,
+        )
         for model, end in (
             (pair, span),
             (single, span),

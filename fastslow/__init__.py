@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from fastslow.results.sweeps import Sweep
     from fastslow.results.trajectories import Trajectory
     from fastslow.simulation.ensembles import simulate_many
+    from fastslow.simulation.settings import Integration
     from fastslow.simulation.sweeping import bifurcation_sweep
     from fastslow.simulation.trajectories import simulate
     from fastslow.sweeps.refinement import refined_map
@@ -73,6 +74,7 @@ _HOME = {
     "Equilibrium": "results.points",
     "FastSlowError": "errors",
     "FileError": "errors",
+    "Integration": "simulation.settings",
     "MissingPackageError": "errors",
     "Model": "model.model",
     "ModelError": "errors",
@@ -128,6 +130,7 @@ __all__ = [
     "Equilibrium",
     "FastSlowError",
     "FileError",
+    "Integration",
     "MissingPackageError",
     "Model",
     "ModelError",

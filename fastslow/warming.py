@@ -13,6 +13,7 @@ from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.tracing import continue_equilibria
 from fastslow.model.model import Model
 from fastslow.simulation.ensembles import simulate_many
+from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
 
@@ -43,7 +44,9 @@ def warm(*models: Model) -> Path:
     x, v, w = sp.symbols("x v w")
     # planar, with an interface, a fold and no polynomial: every common loop has its turn
     common = Model({x: v, v: w - v - sp.sin(x) - sp.Abs(x)}, forcing={w: sp.sin(sp.Symbol("t"))})
-    simulate(Model({x: -sp.gamma(2 + x)}), [0.0], t=(0.0, 1e-6), max_steps=1)
+    simulate(
+        Model({x: -sp.gamma(2 + x)}), [0.0], t=(0.0, 1e-6), integration=Integration(max_steps=1)
+    )
     for model in (common, *models):
         _use(model)
     return cache_directory()
@@ -53,8 +56,8 @@ def _use(model: Model) -> None:
     free = [name for name in model.free if name not in model.parameters]
     whole = model.with_parameters(dict.fromkeys(free, 0.0)) if free else model
     state = np.zeros(len(model.states) + len(model.slow_states))
-    simulate(whole, state, t=(0.0, 1e-6), max_steps=1)
-    simulate_many(whole, state, t=(0.0, 1e-6), max_steps=1)
+    simulate(whole, state, t=(0.0, 1e-6), integration=Integration(max_steps=1))
+    simulate_many(whole, state, t=(0.0, 1e-6), integration=Integration(max_steps=1))
     timed = any("t" in {s.name for s in rate.free_symbols} for rate in model.rates.values())
     if timed:
         return

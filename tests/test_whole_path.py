@@ -38,7 +38,7 @@ def test_van_der_pol(van_der_pol):
     hopf = diagram.special("HB")
     assert [p["w"] for p in hopf] == pytest.approx([-1, 1], abs=1e-13)
 
-    run = fs.simulate(van_der_pol, [2, 0], periods=1, tol=1e-11)
+    run = fs.simulate(van_der_pol, [2, 0], periods=1, integration=fs.Integration(rtol=1e-11))
     assert run.outcome.success
     assert run.crossings == ()
     assert run.period == pytest.approx(100 * np.pi, rel=1e-14)
@@ -88,7 +88,7 @@ def test_piecewise_linear_with_two_interfaces(beam):
     for value, state in ((-7, -2.0), (0.5, 0.5), (5, 2.0)):
         assert diagram.at(w=value)[0]["x"] == pytest.approx(state, abs=1e-14)
 
-    run = fs.simulate(beam, [0, 0], periods=2, tol=1e-12)
+    run = fs.simulate(beam, [0, 0], periods=2, integration=fs.Integration(rtol=1e-12))
     assert [c.interface for c in run.crossings[:4]] == ["x - 1", "x - 1", "x + 1", "x + 1"]
     assert all(abs(abs(c.state[0]) - 1) < 1e-15 for c in run.crossings)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from fastslow.arguments import formula, instance, interval, mapping, takes, tolerance
+from fastslow.arguments import formula, instance, interval, mapping, takes
 from fastslow.errors import MissingPackageError, unknown_name
 from fastslow.interactive.drawing import draw_view, own_figure
 from fastslow.interactive.picking import Pick
@@ -19,13 +19,14 @@ from fastslow.interactive.pointers import Pointer, picture
 from fastslow.interactive.sliders import Slider, sliders_of
 from fastslow.interactive.views import Setup, View, at_start, setup_of, view_of
 from fastslow.model.model import Model
+from fastslow.simulation.settings import DEFAULT, Integration, integration_settings
 
 
 @takes(
     model=instance(Model),
     parameter=formula,
     over=interval,
-    tol=tolerance,
+    integration=integration_settings,
     state=formula,
     sliders=mapping,
     figure=instance(Figure),
@@ -38,7 +39,7 @@ def explore(
     start: Any = None,
     t: Sequence[float] | None = None,
     periods: float | None = None,
-    tol: float = 1e-9,
+    integration: Integration = DEFAULT,
     state: object = None,
     sliders: Mapping[Any, Sequence[float]] | None = None,
     figure: Figure | None = None,
@@ -64,8 +65,8 @@ def explore(
     t, periods
         Length of the run, as in `fastslow.simulate`; by default two periods, and
         t = (0, 100) where there is no period.
-    tol : float
-        Tolerance of the run.
+    integration : Integration
+        Error control of the run.
     state : str or Symbol, optional
         What stands over time and over the parameter, by default the first state.
     sliders : mapping, optional
@@ -83,7 +84,7 @@ def explore(
     UnknownNameError
         For a name that is not in the model.
     ArgumentError
-        For a range, start, time span or tolerance that is none.
+        For a range, start or time span that is none.
 
     Examples
     --------
@@ -99,7 +100,7 @@ def explore(
         start=start,
         t=t,
         periods=periods,
-        tol=tol,
+        integration=integration,
         state=state,
     )
     names = (*model.states, *model.slow_states)

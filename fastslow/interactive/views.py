@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fastslow.arguments import interval, tolerance
+from fastslow.arguments import interval
 from fastslow.diagrams.tracing import continue_equilibria
 from fastslow.errors import ArgumentError, FastSlowError, unknown_name
 from fastslow.model.model import Model
@@ -19,6 +19,7 @@ from fastslow.results.outcome import Outcome
 from fastslow.results.overlays import Overlay
 from fastslow.results.trajectories import Trajectory
 from fastslow.simulation.arguments import initial_state, time_span
+from fastslow.simulation.settings import DEFAULT, Integration
 from fastslow.simulation.trajectories import period_of, simulate
 
 R = TypeVar("R")
@@ -46,8 +47,8 @@ class Setup:
     t : tuple of float or None
     periods : float or None
         Length of the run; one of the two.
-    tol : float
-        Tolerance of the run.
+    integration : Integration
+        Error control of the run.
     state : str
         What stands over time and over the parameter.
     otherwise : tuple of float, optional
@@ -59,7 +60,7 @@ class Setup:
     start: tuple[float, ...]
     t: Range | None
     periods: float | None
-    tol: float
+    integration: Integration
     state: str
     otherwise: Range | None = None
 
@@ -105,7 +106,7 @@ class View:
         >>> view = view_of(gear, setup_of(gear, over=(-2, 6)), {"D": 0.3})
         >>> print(view.call())
         model = model.with_parameters({'D': 0.3})
-        run = fs.simulate(model, {'x': 0.0, 'v': 0.0}, periods=2.0, tol=1e-09)
+        run = fs.simulate(model, {'x': 0.0, 'v': 0.0}, periods=2.0)
         diagram = fs.continue_equilibria(model.frozen(), 'w', over=(-2.0, 6.0))
         lay = fs.overlay(diagram, run)
         fs.plot.panel(lay, 'x')
@@ -117,7 +118,10 @@ class View:
         length = f"t={setup.t!r}" if setup.t is not None else f"periods={setup.periods!r}"
         if self.run is not None:
             start = dict(zip(names, setup.start, strict=True))
-            lines.append(f"run = fs.simulate(model, {start!r}, {length}, tol={setup.tol!r})")
+            given = (
+                "" if setup.integration == DEFAULT else f", integration=fs.{setup.integration!r}"
+            )
+            lines.append(f"run = fs.simulate(model, {start!r}, {length}{given})")
         if self.diagram is not None:
             frozen = "model.frozen()"
             if self.held:
@@ -145,7 +149,7 @@ def setup_of(
     start: Any = None,
     t: Sequence[float] | None = None,
     periods: float | None = None,
-    tol: float = 1e-9,
+    integration: Integration = DEFAULT,
     state: object = None,
 ) -> Setup:
     """Check how views are to be computed, and fill in what is not given.
@@ -157,7 +161,7 @@ def setup_of(
     UnknownNameError
         For a parameter or state that is not in the model.
     ArgumentError
-        For a range, start, time span or tolerance that is none.
+        For a range, start or time span that is none.
 
     Examples
     --------
@@ -187,7 +191,7 @@ def setup_of(
         tuple(begin.tolist()),
         None if t is None else (float(t[0]), float(t[1])),
         None if periods is None else float(periods),
-        tolerance("tol", tol),
+        integration,
         shown,
     )
 
@@ -228,7 +232,13 @@ def view_of(
     run = _tried(
         failures,
         "trajectory",
-        lambda: simulate(here, setup.start, t=setup.t, periods=setup.periods, tol=setup.tol),
+        lambda: simulate(
+            here,
+            setup.start,
+            t=setup.t,
+            periods=setup.periods,
+            integration=setup.integration,
+        ),
     )
     diagram, held = None, _held(here, setup, run)
     if setup.parameter is not None:

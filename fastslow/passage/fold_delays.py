@@ -24,6 +24,7 @@ from fastslow.passage.sites import (
 )
 from fastslow.results.delays import FoldDelay
 from fastslow.results.points import SpecialPoint
+from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
 Array = NDArray[np.float64]
@@ -185,7 +186,7 @@ def jump_time(site: Site, form: FoldForm, level: tuple[int, float]) -> float:
         past = y / form.a
         state = site.u[:-1] + past * form.along + 0.5 * past**2 * form.bend
         try:
-            run = simulate(model, state, t=(0.0, 10.0 / y), tol=1e-15)
+            run = simulate(model, state, t=(0.0, 10.0 / y), integration=Integration(rtol=1e-15))
         except ModelError:
             return math.nan
         number, height = level

@@ -17,7 +17,6 @@ from fastslow.arguments import (
     positive,
     takes,
     text,
-    tolerance,
 )
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
@@ -26,6 +25,7 @@ from fastslow.results.refined_maps import RefinedMap
 from fastslow.results.slow_loads import NO_GAP
 from fastslow.simulation.arguments import initial_state
 from fastslow.simulation.ensembles import simulate_many
+from fastslow.simulation.settings import DEFAULT, Integration, integration_settings
 from fastslow.sweeps.refinement import refined_map
 
 Floats = NDArray[np.float64]
@@ -36,7 +36,7 @@ Parameters = Mapping[Any, Any] | Callable[[Floats, Floats], Mapping[Any, Any]]
     model=instance(Model),
     over=mapping,
     parameters=either(function, mapping),
-    run_tol=tolerance,
+    integration=integration_settings,
     tol=positive,
     gap=text,
     period=positive,
@@ -56,8 +56,7 @@ def regime_map(
     periods: float = 3,
     period: float | None = None,
     gap: str | None = None,
-    run_tol: float = 1e-9,
-    max_steps: int = 1_000_000,
+    integration: Integration = DEFAULT,
     threads: int | None = None,
     progress: bool = False,
 ) -> RefinedMap:
@@ -84,10 +83,8 @@ def regime_map(
         As in `refined_map`; all new points of a level are simulated together.
     periods : float
         Length of every run in periods of the forcing.
-    period, gap, max_steps, threads
+    period, gap, integration, threads
         As in `simulate_many`.
-    run_tol : float
-        Tolerance of the simulations, its ``tol``.
     progress : bool
         Whether to show a progress bar.
 
@@ -127,8 +124,7 @@ def regime_map(
             periods=periods,
             period=period,
             gap=gap,
-            tol=run_tol,
-            max_steps=max_steps,
+            integration=integration,
             threads=threads,
         )
         words = [str(word) or NO_GAP for word in many.regime]

@@ -18,8 +18,6 @@ from fastslow.arguments import (
     mapping,
     numbers,
     takes,
-    tolerance,
-    whole,
 )
 from fastslow.diagrams.tracing import continue_equilibria
 from fastslow.errors import ArgumentError, FastSlowError
@@ -37,10 +35,14 @@ from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
 from fastslow.results.sections import Section
 from fastslow.results.trajectories import Trajectory
+from fastslow.simulation.settings import Integration, integration_settings
 from fastslow.simulation.trajectories import simulate
 
 Array = NDArray[np.float64]
 Law = FoldDelay | BoundaryDelay | GapTransit
+
+#: Error control of the runs, by default.
+PRECISE = Integration(rtol=1e-13)
 
 #: A run starts where this many relaxation times of its sheet, integrated, lie before the point.
 FORGOTTEN = 40.0
@@ -55,8 +57,7 @@ REACH = 4.0
     level=mapping,
     start=finite,
     parameter=formula,
-    tol=tolerance,
-    max_steps=whole(1, 2**40),
+    integration=integration_settings,
     progress=flag,
 )
 def delay_scaling(
@@ -67,8 +68,7 @@ def delay_scaling(
     level: Mapping[Any, float] | None = None,
     start: float | None = None,
     parameter: object = None,
-    tol: float = 1e-13,
-    max_steps: int = 1_000_000,
+    integration: Integration = PRECISE,
     progress: bool = False,
 ) -> DelayScaling:
     """Measure the delay past a special point at a range of rates, beside its law.
@@ -95,10 +95,9 @@ def delay_scaling(
         Value of the parameter at which every run starts.
     parameter : str or Symbol, optional
         What drifts, by default the parameter of the point's diagram.
-    tol : float
-        Tolerance of the simulations.
-    max_steps : int
-        Where a run stops.
+    integration : Integration
+        Error control of the runs, and where one of them stops; by default with
+        ``rtol=1e-13``, so that small delays keep their digits.
     progress : bool
         Whether to show a progress bar.
 
@@ -137,7 +136,7 @@ def delay_scaling(
     for law, (value, state) in zip(
         tqdm(laws, unit="rate", disable=not progress), before, strict=True
     ):
-        delay, outcome = _measured(ramp, site, law, value, state, tol, max_steps)
+        delay, outcome = _measured(ramp, site, law, value, state, integration)
         delays.append(delay)
         outcomes.append(outcome)
     return fitted(site, direction, _event(first), eps, np.array(delays), laws, outcomes)
@@ -268,7 +267,7 @@ def _monotone(branch: Branch, row: int, step: int, way: float) -> NDArray[np.int
 
 
 def _measured(
-    ramp: Model, site: Site, law: Law, value: float, state: Array, tol: float, max_steps: int
+    ramp: Model, site: Site, law: Law, value: float, state: Array, integration: Integration
 ) -> tuple[float, Outcome]:
     """The delay of one run, nan with the reason where there is none."""
     name, speed = site.field.parameter, abs(law.rate)
@@ -277,7 +276,7 @@ def _measured(
     model = ramp.with_parameters({f"{name}_rate": law.rate, f"{name}_start": value})
     end = (ahead + REACH * span) / speed
     try:
-        run = simulate(model, state, t=(0.0, end), tol=tol, max_steps=max_steps)
+        run = simulate(model, state, t=(0.0, end), integration=integration)
     except FastSlowError as error:
         return math.nan, Outcome("not simulated", str(error), False)
     times = _hits(run, law, ahead / speed)

@@ -27,7 +27,7 @@ def outcome_of(
     if code == 2:
         return Outcome(
             "too many crossings",
-            f"stopped at {time} after {limits[1]} crossings; raise max_crossings=.",
+            f"stopped at {time} after {limits[1]} crossings; raise max_crossings= of Integration.",
             False,
         )
     size = float(np.abs(end[1:]).max())
@@ -40,7 +40,7 @@ def outcome_of(
     if code == 1:
         return Outcome(
             "too many steps",
-            f"stopped at {time} after {limits[0]} steps; raise max_steps= or tol=.",
+            f"stopped at {time} after {limits[0]} steps; raise max_steps= or rtol= of Integration.",
             False,
         )
     if code in (3, 4) and n_steps:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import finite, flag, instance, mapping, takes, text, tolerance, whole
+from fastslow.arguments import finite, flag, instance, mapping, takes, text, whole
 from fastslow.compiled.generic import load_loop
 from fastslow.compiled.lane_steps import CompiledSteps, compile_steps
 from fastslow.compiled.series import CompiledSeries
@@ -26,9 +26,15 @@ from fastslow.simulation.many_arguments import (
     times_of,
 )
 from fastslow.simulation.rooms import MODE, STEPS, beginnings
+from fastslow.simulation.settings import (
+    DEFAULT,
+    Integration,
+    Resolved,
+    integration_settings,
+    resolve,
+)
 from fastslow.simulation.trajectories import (
     SOURCES,
-    default_order,
     gap_of,
     layout_of,
     once_a_model,
@@ -76,12 +82,8 @@ _CHUNK = 512
     parameters=mapping,
     start=finite,
     settle=finite,
-    tol=tolerance,
-    order=whole(4, 40),
-    implicit=flag,
+    integration=integration_settings,
     gap=text,
-    max_steps=whole(1, 2**40),
-    max_crossings=whole(1, 2**40),
     threads=whole(1, 1024),
     progress=flag,
 )
@@ -95,13 +97,9 @@ def simulate_many(
     start: float = 0.0,
     period: ArrayLike | None = None,
     settle: float = 0.0,
-    tol: float = 1e-9,
+    integration: Integration = DEFAULT,
     samples: int | Sequence[float] | Floats | None = None,
-    order: int | None = None,
-    implicit: bool = False,
     gap: str | None = None,
-    max_steps: int = 1_000_000,
-    max_crossings: int = 1_000_000,
     threads: int | None = None,
     progress: bool = False,
 ) -> Ensemble:
@@ -133,21 +131,12 @@ def simulate_many(
     settle : float
         How much is left out of extremes, hits and evenly spaced samples at the
         beginning: periods with ``periods``, time with ``t``.
-    tol : float
-        Error allowed in a step, relative to 1 + |y| for every state y.
+    integration : Integration
+        Error allowed, order and method of the steps, and where to stop a trajectory.
     samples : int or sequence of float, optional
         How many evenly spaced samples of every column to keep, or at which times.
-    order : int, optional
-        Order of the series, 4 to 40; by default that of `simulate`.
-    implicit : bool
-        Whether an implicit method may take long steps through settled phases, one
-        trajectory at a time. Plain steps taken together are so cheap that this pays
-        only where the fast motion is some thirty times faster than the slow one lets
-        the steps be, as in stiff contacts.
     gap : str, optional
         The region that counts as the gap for `Ensemble.regime`.
-    max_steps, max_crossings : int
-        Where to stop a trajectory.
     threads : int, optional
         By default the cores that this process may use.
     progress : bool
@@ -160,8 +149,8 @@ def simulate_many(
     Raises
     ------
     ArgumentError
-        For lengths that differ, numbers that are not finite, a wrong span or
-        tolerance, or ``periods`` without a common period.
+        For lengths that differ, numbers that are not finite, a wrong span, or
+        ``periods`` without a common period.
     UnknownNameError
         For a state, parameter or gap that is not in the model.
     ModelError
@@ -172,21 +161,23 @@ def simulate_many(
     >>> import numpy as np, sympy as sp
     >>> x, v, k = sp.symbols("x v k")
     >>> oscillator = Model({x: v, v: -k * x}, parameters={k: 1})
-    >>> many = simulate_many(oscillator, [1, 0], parameters={k: [1, 4]}, t=(0, np.pi), tol=1e-12)
+    >>> fine = Integration(rtol=1e-12)
+    >>> many = simulate_many(
+    ...     oscillator, [1, 0], parameters={k: [1, 4]}, t=(0, np.pi), integration=fine
+    ... )
     >>> many.minimum.round(9)
     array([[-1., -1.],
            [-1., -2.]])
     """
     starts, swept = starts_and_parameters(model, states, parameters)
     count = len(starts)
-    order = default_order(tol) if order is None else order
-    limits = (max_steps, max_crossings)
+    resolved = resolve(integration, implicit=False)
     threads = threads_of(threads)
     own = periods_of(model, period, count, swept)
     spans, since = spans_of(t, periods, start, settle, own)
     times = times_of(samples, spans, since)
     groups = [
-        (one, chosen, series_of(one, order), steps_of(one, order))
+        (one, chosen, series_of(one, resolved.order), steps_of(one, resolved.order))
         for one, chosen in alike(model, swept, count)
     ]
     gaps = [gap_of(one, gap) for one, *_ in groups]
@@ -206,8 +197,9 @@ def simulate_many(
             run = _run(
                 compiled,
                 lanes,
-                (tol, limits, threads),
-                sizes_of(model, compiled, implicit),
+                resolved,
+                threads,
+                sizes_of(model, compiled, resolved.implicit),
                 (values, starts[chosen], spans[chosen], since[chosen]),
                 times if len(times) == 1 else times[chosen],
                 columns if times.size else 0,
@@ -243,10 +235,10 @@ def simulate_many(
         codes[:, 1],
         (times if len(times) > 1 else times[0], sampled) if samples is not None else None,
         "; ".join(dict.fromkeys(compiled.method for *_, compiled, _ in groups)),
-        limits,
+        resolved.limits,
         {n: v for n, v in model.parameters.items() if n not in swept},
         model.equations,
-        {"tol": tol, "order": order, "implicit": implicit},
+        resolved.recorded(),
     )
 
 
@@ -263,7 +255,8 @@ def _parameter_table(
 def _run(
     compiled: CompiledSeries,
     lanes: CompiledSteps,
-    settings: tuple[float, tuple[int, int], int],
+    resolved: Resolved,
+    threads: int,
     sizes: tuple[int, int, int],
     rows: tuple[Floats, Floats, Floats, Floats],
     times: Floats,
@@ -271,7 +264,6 @@ def _run(
     report: Callable[[int], object],
 ) -> tuple[Any, ...]:
     """Extremes, hits, times seen, ends, codes and samples of trajectories with one series."""
-    tol, limits, threads = settings
     values, starts, spans, since = rows
     count, n = starts.shape
     counted = (since <= spans[:, 0])[:, None]
@@ -295,8 +287,8 @@ def _run(
             sizes,
             compiled.signs,
             compiled.continuous,
-            tol,
-            limits,
+            resolved.rtol,
+            resolved.limits,
             values,
             spans,
             since,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -21,7 +21,6 @@ from fastslow.arguments import (
     positive,
     takes,
     text,
-    tolerance,
     whole,
 )
 from fastslow.errors import ArgumentError, FastSlowError, unknown_name
@@ -30,6 +29,7 @@ from fastslow.results.outcome import Outcome
 from fastslow.results.sweeps import Sweep, SweepPass
 from fastslow.results.trajectories import Trajectory
 from fastslow.simulation.arguments import initial_state
+from fastslow.simulation.settings import DEFAULT, Integration, integration_settings, resolve
 from fastslow.simulation.trajectories import simulate
 
 Array = NDArray[np.float64]
@@ -50,8 +50,7 @@ KINDS = ("stroboscopic", "extremes", "section")
     level=finite,
     direction=among(-1, 0, 1, None),
     back=flag,
-    tol=tolerance,
-    max_steps=whole(1, 2**40),
+    integration=integration_settings,
     period=positive,
     progress=flag,
 )
@@ -71,8 +70,7 @@ def bifurcation_sweep(
     direction: int | None = 1,
     period: float | None = None,
     back: bool = True,
-    tol: float = 1e-9,
-    max_steps: int = 1_000_000,
+    integration: Integration = DEFAULT,
     progress: bool = False,
 ) -> Sweep:
     """Bifurcation diagram by simulation: what is left after the transient, value by value.
@@ -109,10 +107,8 @@ def bifurcation_sweep(
         needs it: the unit of time of ``settle`` and ``keep``.
     back : bool
         Whether to sweep back as well.
-    tol : float
-        Tolerance of the simulations.
-    max_steps : int
-        Where a run at one value stops.
+    integration : Integration
+        Error control of the runs, and where one of them stops.
     progress : bool
         Whether to show a progress bar.
 
@@ -157,7 +153,7 @@ def bifurcation_sweep(
         level,
         direction,
         period,
-        {"tol": tol, "max_steps": max_steps},
+        integration,
     )
     begin = initial_state(model, state)
     rule = _rule(settings, name)
@@ -170,7 +166,8 @@ def bifurcation_sweep(
             finished = passes[-1].ends[np.isfinite(passes[-1].ends).all(axis=1)]
             begin = finished[-1] if len(finished) else begin
     others = {n: v for n, v in model.parameters.items() if n != settings.parameter}
-    kept = {"settle": settings.settle, "keep": settings.keep, **settings.limits}
+    runs = resolve(integration, implicit=True).recorded()
+    kept = {"settle": settings.settle, "keep": settings.keep, **runs}
     return Sweep(settings.parameter, name, what, rule, tuple(passes), others, model.equations, kept)
 
 
@@ -188,7 +185,7 @@ class _Settings:
     level: float
     direction: int | None
     period: float | None
-    limits: dict[str, Any]
+    integration: Integration
 
 
 def _values(values: ArrayLike) -> Array:
@@ -230,7 +227,7 @@ def _try_first(model: Model, value: float, begin: Array, settings: _Settings) ->
         begin,
         periods=1,
         period=settings.period,
-        **{**settings.limits, "max_steps": 1},
+        integration=replace(settings.integration, max_steps=1),
     )
     if len(run.steps):
         _points(run, settings)
@@ -276,7 +273,7 @@ def _at_value(
                 periods=settings.settle,
                 period=settings.period,
                 dense=False,
-                **settings.limits,
+                integration=settings.integration,
             )
             if not settled.outcome:
                 return nothing, settled.outcome, None
@@ -287,7 +284,7 @@ def _at_value(
             periods=settings.keep,
             start=first,
             period=settings.period,
-            **settings.limits,
+            integration=settings.integration,
         )
         if not run.outcome:
             return nothing, run.outcome, None

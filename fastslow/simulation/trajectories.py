@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite, flag, instance, positive, takes, text, tolerance, whole
+from fastslow.arguments import finite, flag, instance, positive, takes, text
 from fastslow.compiled.generic import load_loop
 from fastslow.compiled.series import CompiledSeries, compile_series
 from fastslow.model.model import Model
@@ -27,6 +27,7 @@ from fastslow.simulation.arguments import (
 )
 from fastslow.simulation.implicit_steps import DEGREE, IMPLICIT, SETTLED_ORDER
 from fastslow.simulation.rooms import MODE, SAMPLES, STEPS, beginnings, room_for
+from fastslow.simulation.settings import DEFAULT, Integration, integration_settings, resolve
 
 _ARGUMENTS = (
     "address",
@@ -103,13 +104,9 @@ period_of = once_a_model(Model.period)
     model=instance(Model),
     start=finite,
     period=positive,
-    tol=tolerance,
+    integration=integration_settings,
     dense=flag,
-    order=whole(4, 40),
-    implicit=flag,
     gap=text,
-    max_steps=whole(1, 2**40),
-    max_crossings=whole(1, 2**40),
 )
 def simulate(
     model: Model,
@@ -119,14 +116,10 @@ def simulate(
     periods: float | None = None,
     start: float = 0.0,
     period: float | None = None,
-    tol: float = 1e-9,
+    integration: Integration = DEFAULT,
     samples: int | Sequence[float] | NDArray[np.float64] | None = None,
     dense: bool = True,
-    order: int | None = None,
-    implicit: bool = True,
     gap: str | None = None,
-    max_steps: int = 1_000_000,
-    max_crossings: int = 1_000_000,
 ) -> Trajectory:
     """Follow one trajectory, with every crossing of an interface located.
 
@@ -150,26 +143,16 @@ def simulate(
         Start of time with ``periods``.
     period : float, optional
         The period, where the model's own is not wanted or cannot be found.
-    tol : float
-        Error allowed in a step, relative to 1 + |y| for every state y.
+    integration : Integration
+        Error allowed, order and method of the steps, and where to stop.
     samples : int or sequence of float, optional
         How many evenly spaced samples, or at which times. By default the
         steps themselves are refined enough to plot.
     dense : bool
         Whether the series is kept, for evaluation at any time. Without it the
         memory does not grow with the number of steps by more than 24 bytes each.
-    order : int, optional
-        Order of the series, 4 to 40, by default chosen by the tolerance; of
-        collocation polynomials 12 at most.
-    implicit : bool
-        Whether an implicit method may take long steps through settled phases,
-        in which stability and not accuracy limits the series. They forget what is
-        smaller than ``tol``: where a slow passage through a Hopf point decays below
-        it, its exit depends on ``tol``, with them or without.
     gap : str, optional
         The region that counts as the gap for `Trajectory.regime`.
-    max_steps, max_crossings : int
-        Where to stop.
 
     Returns
     -------
@@ -179,7 +162,7 @@ def simulate(
     Raises
     ------
     ArgumentError
-        For a wrong initial state, span, tolerance or sample times, a frozen
+        For a wrong initial state, span or sample times, a frozen
         model without values, or ``periods`` without a common period.
     UnknownNameError
         For an initial value or gap that is not in the model.
@@ -191,7 +174,8 @@ def simulate(
     >>> import sympy as sp
     >>> x, v = sp.symbols("x v")
     >>> oscillator = Model({x: v, v: -x})
-    >>> run = simulate(oscillator, [1, 0], t=(0, 2 * sp.pi), tol=1e-12)
+    >>> fine = Integration(rtol=1e-12)
+    >>> run = simulate(oscillator, [1, 0], t=(0, 2 * sp.pi), integration=fine)
     >>> run(sp.pi).round(10) + 0.0
     array([-1.,  0.])
     """
@@ -199,15 +183,13 @@ def simulate(
     begin = initial_state(model, state)
     span, period = time_span(t, periods, start, period, lambda: period_of(model))
     times = sample_times(samples, span)
-    if order is None:
-        order = default_order(tol)
-    limits = (max_steps, max_crossings)
+    resolved = resolve(integration, implicit=True)
     between = gap_of(model, gap)
-    compiled = series_of(model, order)
+    compiled = series_of(model, resolved.order)
     kept = compiled.n_states + compiled.n_forcing
     rows = compiled.n_states if dense else kept
     sampled = np.empty((rows, len(times)))
-    layout, sizes = layout_of(compiled), sizes_of(model, compiled, implicit)
+    layout, sizes = layout_of(compiled), sizes_of(model, compiled, resolved.implicit)
     (place,), (carried,), (counted,) = beginnings(
         np.array([span[0]]), begin[None], compiled.n_forcing
     )
@@ -219,11 +201,11 @@ def simulate(
         compiled.continuous,
         compiled.parameter_array(model),
         span,
-        tol,
+        resolved.rtol,
         times,
         sampled,
         span[0],
-        limits,
+        resolved.limits,
         _room.store if dense else np.empty(0),
         *_LISTED,
         room_for(layout, sizes, len(times)),
@@ -242,7 +224,9 @@ def simulate(
         dict(model.parameters),
         period,
         between,
-        outcome_of(code, mode, end, n_steps, float(np.abs(begin).max()), compiled.modes, limits),
+        outcome_of(
+            code, mode, end, n_steps, float(np.abs(begin).max()), compiled.modes, resolved.limits
+        ),
         (span[0], float(end[0])),
         end,
         _method(compiled, steps),
@@ -252,13 +236,7 @@ def simulate(
         _kept(store, len(steps), kept, compiled.order + 1) if dense else None,
         (times[:reached], sampled[:, :reached]) if samples is not None else None,
         equations=model.equations,
-        settings={
-            "tol": tol,
-            "order": order,
-            "implicit": implicit,
-            "max_steps": limits[0],
-            "max_crossings": limits[1],
-        },
+        settings=resolved.recorded(),
     )
 
 
@@ -293,11 +271,6 @@ def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
     if implicit:
         words.append(f"{implicit} implicit steps of order {SETTLED_ORDER} through settled phases")
     return ", ".join(words)
-
-
-def default_order(tol: float) -> int:
-    """Order of the series for a tolerance, one of two so that little is compiled."""
-    return 16 if tol >= 1e-11 else 24
 
 
 def layout_of(compiled: CompiledSeries) -> tuple[int, int, int, int, int]:

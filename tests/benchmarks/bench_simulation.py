@@ -108,7 +108,9 @@ def main() -> None:
     def ours(dense: bool = True) -> fs.Trajectory:
         return fs.simulate(model, [0, 0], periods=3, samples=TIMES, dense=dense)
 
-    exact = fs.simulate(model, [0, 0], periods=3, samples=TIMES, tol=1e-14)["x"]
+    exact = fs.simulate(
+        model, [0, 0], periods=3, samples=TIMES, integration=fs.Integration(rtol=1e-14)
+    )["x"]
     mine, theirs = ours()["x"], scipy_with_events(1e-9)
     print(f"largest error: fastslow {np.abs(mine - exact).max():.1e}, ", end="")
     print(f"SciPy {np.abs(theirs - exact).max():.1e}")

@@ -163,7 +163,7 @@ def simulations(r):
             "point": fold,
             "rates": [1e-5, 1e-6],
             "level": {"x": 0.5},
-            "max_steps": 2000,
+            "integration": fs.Integration(rtol=1e-13, max_steps=2000),
         },
         "warm": {"models": []},
         "explore": {"model": gear, "over": (-1.0, 1.0), "sliders": {"C": (2.0, 3.0)}, **kept},
@@ -197,6 +197,7 @@ def analyses(r):
         "inspect": {"drawing": fs.plot.diagram(r["diagram"]), "result": r["diagram"]},
         "Model": {"rates": {x: -k * x}, "parameters": {k: 1.0}},
         "Continuation": {},
+        "Integration": {},
     }
 
 

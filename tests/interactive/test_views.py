@@ -123,7 +123,6 @@ def test_a_second_slow_quantity_is_held():
         ({"start": [0]}, "expected 2 values"),
         ({"t": (0, 1), "periods": 2}, "received both"),
         ({"periods": -1}, "positive"),
-        ({"tol": 0}, "tol"),
     ],
 )
 def test_wrong_settings_raise_at_once(folded, settings, message):

@@ -14,7 +14,7 @@ def test_a_frozen_slow_quantity_drifts():
     assert ramp.free == ()
     assert dict(ramp.parameters) == {"D": 2.0, "w_start": -1.0, "w_rate": 0.5}
     # x = (w − rate/D)/D is the motion that stays bounded backwards in time
-    run = fs.simulate(ramp, [(-1 - 0.25) / 2], t=(0, 4), tol=1e-13)
+    run = fs.simulate(ramp, [(-1 - 0.25) / 2], t=(0, 4), integration=fs.Integration(rtol=1e-13))
     assert run["w"][-1] == pytest.approx(1.0, abs=1e-14)
     assert run["x"][-1] == pytest.approx((1.0 - 0.25) / 2, abs=1e-12)
     assert ramp.frozen().free == ("w",)

@@ -201,7 +201,9 @@ def test_the_law_of_the_gear_under_its_sine(gear):
         slow = gear.with_parameters(omega=omega)
         mean, swing = slow.parameters["B"], slow.parameters["C"]
         falls = (math.pi + math.asin(mean / swing)) / omega
-        run = fs.simulate(slow, [0.3, 0], t=(0.8 * falls, 1.4 * falls), tol=1e-12)
+        run = fs.simulate(
+            slow, [0.3, 0], t=(0.8 * falls, 1.4 * falls), integration=fs.Integration(rtol=1e-12)
+        )
         left = next(c for c in run.crossings if c.interface == "x - D" and c.time > 0.99 * falls)
         met = next(c for c in run.crossings if c.interface == "x + D" and c.time > left.time)
         speeds.append(omega * math.sqrt(swing**2 - mean**2))

@@ -22,7 +22,9 @@ def turned(turning):
 def ramped(turning):
     """Entered at p = −1 with |z| = 0.001; the smallest amplitude is 4.5e-8."""
     ramp = turning.ramped("p", EPS, start=-1.0)
-    return fs.simulate(ramp, [RADIUS, 0.0], t=(0, 2.6 / EPS), tol=1e-16)
+    return fs.simulate(
+        ramp, [RADIUS, 0.0], t=(0, 2.6 / EPS), integration=fs.Integration(rtol=1e-16)
+    )
 
 
 def bernoulli(p):
@@ -129,7 +131,10 @@ def part_at(fast, diagram, law):
     times = np.linspace(*span, 20_001)
     ramp = fast.ramped("I", rate, start=entry)
     push = np.array([1e-6, 0])
-    one, other = (fs.simulate(ramp, start + s * push, t=span, tol=1e-16)(times) for s in (1, -1))
+    one, other = (
+        fs.simulate(ramp, start + s * push, t=span, integration=fs.Integration(rtol=1e-16))(times)
+        for s in (1, -1)
+    )
     v, r = one - other
     bend = 1 - one[0] ** 2
     trace, slope = bend - 0.064, 0.08 * (v - 0.8 * r)

@@ -11,7 +11,9 @@ x, y, p, t = sp.symbols("x y p t")
 
 def laid(model, name, over, start, **span):
     diagram = fs.continue_equilibria(model.frozen(), name, over=over)
-    return fs.overlay(diagram, fs.simulate(model, start, tol=1e-11, **span))
+    return fs.overlay(
+        diagram, fs.simulate(model, start, integration=fs.Integration(rtol=1e-11), **span)
+    )
 
 
 @pytest.fixture(scope="module")

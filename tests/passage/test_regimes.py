@@ -68,7 +68,7 @@ def test_the_boundary_in_the_width(slow):
         levels=1,
         tol=1e-9,
         periods=2,
-        run_tol=1e-11,
+        integration=fs.Integration(rtol=1e-11),
     )
     (line,) = narrow.boundary("bilateral", "unilateral upper")
     (row,) = np.flatnonzero((line.points[:, 1] == 1.03) & (line.accuracy[:, 1] == 0))
@@ -123,7 +123,7 @@ def test_degenerate_points_keep_their_own_label(slow):
         [0, 0],
         cells=(1, 1),
         levels=1,
-        max_steps=10,
+        integration=fs.Integration(max_steps=10),
         periods=2,
     )
     assert stopped.labels == ("failed",)

@@ -75,7 +75,9 @@ def test_runs_agree_with_the_independent_passages(folded):
     }
     for eps, loads in known.items():
         ramp = fast.ramped("w", -eps, start=0.2)
-        run = fs.simulate(ramp, [0.9427182380145632, 0], t=(0, 0.42 / eps), tol=1e-13)
+        run = fs.simulate(
+            ramp, [0.9427182380145632, 0], t=(0, 0.42 / eps), integration=fs.Integration(rtol=1e-13)
+        )
         for level, load in zip((0.25, -0.25), loads, strict=True):
             assert run.section("x", level)["w"][0] == pytest.approx(load, abs=2e-13)
 
@@ -152,7 +154,9 @@ def test_runs_that_do_not_get_there(cusp, cusp_fold):
     assert math.isnan(beyond.exponent)
     assert "x = 5: not reached by p =" in str(beyond.outcomes[0])
     assert "2 runs failed" in repr(beyond)
-    stopped = fs.delay_scaling(cusp, cusp_fold, [1e-3, 1e-4], level={"x": 0.5}, max_steps=3)
+    stopped = fs.delay_scaling(
+        cusp, cusp_fold, [1e-3, 1e-4], level={"x": 0.5}, integration=fs.Integration(max_steps=3)
+    )
     assert "steps" in str(stopped.outcomes[0])
 
 

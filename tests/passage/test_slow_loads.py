@@ -77,7 +77,13 @@ def test_the_edge_found_by_simulation(gear, omega, digits):
     low, high = 0.9 * edge, 1.1 * edge
     for _ in range(7):
         widths = np.linspace(low, high, 33)
-        many = fs.simulate_many(model, [0, 0], parameters={"D": widths}, periods=2, tol=1e-11)
+        many = fs.simulate_many(
+            model,
+            [0, 0],
+            parameters={"D": widths},
+            periods=2,
+            integration=fs.Integration(rtol=1e-11),
+        )
         reached = many.regime == "bilateral"
         assert set(many.regime) == {"bilateral", "unilateral upper"}
         last = int(np.argmin(reached)) - 1
@@ -123,7 +129,9 @@ def test_a_gap_with_other_damping_and_stiffness():
     assert says.amplitude == pytest.approx(0.12)
     edge = float(says.widest)
     widths = edge * np.array([1 - 1e-6, 1 + 1e-6])
-    many = fs.simulate_many(model, [1, 0], parameters={"D": widths}, periods=4, tol=1e-11)
+    many = fs.simulate_many(
+        model, [1, 0], parameters={"D": widths}, periods=4, integration=fs.Integration(rtol=1e-11)
+    )
     assert many.regime.tolist() == ["bilateral", "unilateral upper"]
     assert slow_load_criterion(model).widest == pytest.approx(edge, rel=0.1)
 
@@ -174,7 +182,9 @@ def test_a_load_that_only_just_stays_positive(gear):
     assert ratios[1] < 1
     model = gear.with_parameters(D=0.3, omega=omega)
     loads = {"C": 2.372 * ratios}
-    many = fs.simulate_many(model, [0.35, 0], parameters=loads, periods=4, tol=1e-12)
+    many = fs.simulate_many(
+        model, [0.35, 0], parameters=loads, periods=4, integration=fs.Integration(rtol=1e-12)
+    )
     assert many.regime.tolist() == ["meshed upper", "unilateral upper"]
     assert slow_load_criterion(model, loads, exact=True).regime.tolist() == many.regime.tolist()
     assert slow_load_criterion(model, loads).regime.tolist() == ["meshed upper"] * 2

@@ -33,7 +33,9 @@ def results(gear):
     other = fs.simulate(gear, [0, 0], periods=1, samples=7, dense=False)
     sweep = fs.bifurcation_sweep(gear, "C", [3.4, 3.5], [0, 0], settle=0, keep=1)
     many = fs.simulate_many(gear, [[0, 0], [1, 0]], parameters={"D": [0.2, 0.3]}, periods=1)
-    short = fs.simulate_many(gear, [[0, 0]], periods=1, max_steps=5, samples=3)
+    short = fs.simulate_many(
+        gear, [[0, 0]], periods=1, integration=fs.Integration(max_steps=5), samples=3
+    )
     return {
         "diagram": diagram,
         "branch": diagram[0],
@@ -137,7 +139,7 @@ def test_what_is_in_a_file(results, tmp_path):
     kept = tree["result"]["fields"]
     assert "x' = v\nv' = -v + w - (A + x**2)" in kept["equations"]
     assert ["A", 41.67] in kept["parameters"]["mapping"]
-    assert ["tol", 1e-9] in kept["settings"]["mapping"]
+    assert ["rtol", 1e-9] in kept["settings"]["mapping"]
     results["diagram"].save(tmp_path / "gear.nc")
     with h5netcdf.File(tmp_path / "gear.nc") as file:
         group = file["branches/0"]

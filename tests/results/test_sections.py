@@ -19,20 +19,25 @@ MESH = 0.7
 def cycle():
     """The van der Pol oscillator, unforced."""
     model = fs.systems.van_der_pol().frozen().with_parameters(w=0)
-    return fs.simulate(model, [2, 0], t=(0, 120), tol=1e-13)
+    return fs.simulate(model, [2, 0], t=(0, 120), integration=fs.Integration(rtol=1e-13))
 
 
 @pytest.fixture(scope="module")
 def meshed():
     """A gear pair always in contact, which is a linear oscillator."""
     model = fs.systems.gear_pair(Omega=MESH)
-    return fs.simulate(model, [1.1, 0], periods=120, tol=1e-13)
+    return fs.simulate(model, [1.1, 0], periods=120, integration=fs.Integration(rtol=1e-13))
 
 
 @pytest.fixture(scope="module")
 def rattling():
     """The same pair beyond the jump, where the teeth part once every period."""
-    return fs.simulate(fs.systems.gear_pair(Omega=0.85), [1.1, 0], periods=120, tol=1e-13)
+    return fs.simulate(
+        fs.systems.gear_pair(Omega=0.85),
+        [1.1, 0],
+        periods=120,
+        integration=fs.Integration(rtol=1e-13),
+    )
 
 
 def response(times):
@@ -170,9 +175,11 @@ def test_settled_on_a_cycle(cycle):
 
 def test_too_short_and_at_rest(cycle):
     model = fs.systems.van_der_pol().frozen().with_parameters(w=0)
-    short = fs.simulate(model, [2, 0], t=(0, 5), tol=1e-13).steady()
+    short = fs.simulate(model, [2, 0], t=(0, 5), integration=fs.Integration(rtol=1e-13)).steady()
     assert short.outcome.code == "too short"
-    rest = fs.simulate(model.with_parameters(w=2), [2, 0.1], t=(0, 200), tol=1e-13).steady()
+    rest = fs.simulate(
+        model.with_parameters(w=2), [2, 0.1], t=(0, 200), integration=fs.Integration(rtol=1e-13)
+    ).steady()
     assert rest.outcome.code == "equilibrium"
     assert rest.multiple is None
 
@@ -219,7 +226,13 @@ def test_wrong_questions(cycle, meshed):
         meshed.spectrum("y")
     with pytest.raises(fs.UnknownNameError, match="unknown column 'y'"):
         meshed.section("x", 1.1)["y"]
-    light = fs.simulate(fs.systems.gear_pair(), [1.1, 0], periods=3, tol=1e-13, dense=False)
+    light = fs.simulate(
+        fs.systems.gear_pair(),
+        [1.1, 0],
+        periods=3,
+        integration=fs.Integration(rtol=1e-13),
+        dense=False,
+    )
     with pytest.raises(fs.ArgumentError, match="dense=True"):
         light.section("x")
     with pytest.raises(fs.ArgumentError, match="dense=True"):

@@ -8,6 +8,8 @@ import sympy as sp
 
 from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.model.model import Model
+from fastslow.simulation.ensembles import simulate_many
+from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
 
@@ -46,20 +48,42 @@ def test_initial_state_by_unknown_name(gear):
         ({"periods": 0}, "periods = 0; expected a positive number"),
         ({"periods": 1, "period": -1}, "period = -1; expected a positive"),
         ({"periods": 1, "start": math.nan}, "start = nan"),
-        ({"t": (0, 1), "tol": 0}, "tol = 0; expected a positive number"),
-        ({"t": (0, 1), "tol": 1}, "tol = 1; expected a number from"),
-        ({"t": (0, 1), "order": 2}, "order = 2; expected a whole number from 4 to 40"),
-        ({"t": (0, 1), "order": 8.5}, "order = 8.5; expected a whole number"),
+        ({"t": (0, 1), "integration": 1e-9}, "integration: expected an Integration"),
         ({"t": (0, 1), "samples": 1}, "samples = 1"),
         ({"t": (0, 1), "samples": [0.5, 0.2]}, "increasing"),
         ({"t": (0, 1), "samples": [0.5, 2.0]}, r"leave the run, \[0, 1\]"),
-        ({"t": (0, 1), "max_steps": 0}, "max_steps = 0"),
         ({"t": (0, 1), "gap": "S1"}, "gap = 'S1'; expected a region with one region below"),
     ],
 )
 def test_span_and_settings(gear, keywords, message):
     with pytest.raises(ArgumentError, match=message):
         simulate(gear, [0, 0], **keywords)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "message"),
+    [
+        ({"rtol": 0}, "rtol = 0; expected a positive number"),
+        ({"rtol": 1}, "rtol = 1; expected a number from 1e-16 to 0.1"),
+        ({"order": 2}, "order = 2; expected a whole number from 4 to 40"),
+        ({"order": 8.5}, "order = 8.5; expected a whole number"),
+        ({"implicit": 1}, "implicit = 1; expected True or False"),
+        ({"max_steps": 0}, "max_steps = 0"),
+        ({"max_crossings": None}, "max_crossings = None; expected a whole number"),
+    ],
+)
+def test_settings(keywords, message):
+    with pytest.raises(ArgumentError, match=message):
+        Integration(**keywords)
+
+
+def test_a_run_keeps_its_settings(gear):
+    run = simulate(gear, [0, 0], t=(0, 1), integration=Integration(rtol=1e-12, max_steps=9))
+    expected = {"rtol": 1e-12, "order": 24, "implicit": True, "max_steps": 9}
+    assert run.settings == {**expected, "max_crossings": 1_000_000}
+    many = simulate_many(gear, [0, 0], t=(0, 1))
+    expected = {"rtol": 1e-9, "order": 16, "implicit": False, "max_steps": 1_000_000}
+    assert many.settings == {**expected, "max_crossings": 1_000_000}
 
 
 def test_unknown_gap(gear):

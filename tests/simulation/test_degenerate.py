@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 
 from fastslow.model.model import Model
+from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
 x, v, y = sp.symbols("x v y")
@@ -44,7 +45,9 @@ def test_rest_in_the_closed_gap(unloaded, start):
 
 @pytest.mark.parametrize("load", [1e-12, -1e-12])
 def test_tiny_drift_from_a_corner(gear, load):
-    run = simulate(gear.with_parameters(B=load, C=0), [0.25, 0], t=(0, 20), tol=1e-13)
+    run = simulate(
+        gear.with_parameters(B=load, C=0), [0.25, 0], t=(0, 20), integration=Integration(rtol=1e-13)
+    )
     assert run.word[0] == ("S1" if load > 0 else "S2")
     if load < 0:
         # x = D + w (t - 1 + exp(-t)) in the gap
@@ -108,11 +111,11 @@ def test_not_finite_at_the_start():
 
 
 def test_limits_return_what_was_computed(gear):
-    run = simulate(gear, [0, 0], periods=3, max_crossings=5, samples=1000)
+    run = simulate(gear, [0, 0], periods=3, integration=Integration(max_crossings=5), samples=1000)
     assert run.outcome.code == "too many crossings"
     assert len(run.crossings) == 5
     assert run.t[-1] <= run.span[1] < 600 * math.pi
-    run = simulate(gear, [0, 0], periods=3, max_steps=50)
+    run = simulate(gear, [0, 0], periods=3, integration=Integration(max_steps=50))
     assert run.outcome.code == "too many steps"
     assert len(run.steps) == 50
     assert np.isfinite(run(run.span[1])).all()
@@ -121,7 +124,7 @@ def test_limits_return_what_was_computed(gear):
 def test_interface_that_depends_on_the_state_nonlinearly():
     # a rotation leaves the circle |z| < 1 nowhere and meets x y = 1/4 where sin 2 t = 1/2
     model = Model({x: -y, y: x}, interfaces={"hyperbola": x * y - sp.Rational(1, 4)})
-    run = simulate(model, [1, 0], t=(0, 3), tol=1e-13)
+    run = simulate(model, [1, 0], t=(0, 3), integration=Integration(rtol=1e-13))
     assert [c.time for c in run.crossings] == pytest.approx(
         [math.pi / 12, 5 * math.pi / 12], abs=1e-13
     )
@@ -131,7 +134,7 @@ def test_interface_that_depends_on_the_state_nonlinearly():
 def test_interface_that_depends_on_time():
     t = sp.Symbol("t")
     square = sp.Piecewise((1, sp.sin(t) > 0), (-1, True))
-    run = simulate(Model({x: square}), [0], t=(1, 10), tol=1e-12)
+    run = simulate(Model({x: square}), [0], t=(1, 10), integration=Integration(rtol=1e-12))
     assert [c.time for c in run.crossings] == pytest.approx(
         [math.pi, 2 * math.pi, 3 * math.pi], abs=1e-12
     )

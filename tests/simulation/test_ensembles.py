@@ -13,6 +13,7 @@ from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.model.model import Model
 from fastslow.results.ensembles import Ensemble
 from fastslow.simulation.ensembles import simulate_many
+from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
 x, v, t = sp.symbols("x v t")
@@ -60,7 +61,9 @@ def swept(gear):
 def test_each_is_the_trajectory_by_itself(gear, swept):
     for i in range(len(D)):
         model = gear.with_parameters(D=D[i], C=C[i])
-        assert_alike(swept, i, simulate(model, [0, 0], periods=1, implicit=False))
+        assert_alike(
+            swept, i, simulate(model, [0, 0], periods=1, integration=Integration(implicit=False))
+        )
     assert set(swept.regime) >= {"bilateral", "unilateral upper"}
     assert swept.success.all()
     assert swept.minimum.shape == swept.maximum.shape == swept.final.shape == (7, 2)
@@ -86,7 +89,9 @@ def test_initial_states_of_all_kinds(gear):
     states = np.array([[0.0, 0.0], [0.5, -1.0], [-1.0, 2.0]])
     many = simulate_many(gear, states, t=(1, 20))
     for i, state in enumerate(states):
-        assert_alike(many, i, simulate(gear, state, t=(1, 20), implicit=False))
+        assert_alike(
+            many, i, simulate(gear, state, t=(1, 20), integration=Integration(implicit=False))
+        )
     named = simulate_many(gear, {v: states[:, 1], "x": states[:, 0]}, t=(1, 20))
     assert_identical(many, named)
     transposed = simulate_many(gear, np.asfortranarray(states), t=(1, 20))
@@ -96,11 +101,13 @@ def test_initial_states_of_all_kinds(gear):
 def test_a_transient_left_out(gear):
     many = simulate_many(gear, [0, 3], parameters={"C": C}, periods=1, settle=0.6)
     for i in range(len(C)):
-        run = simulate(gear.with_parameters(C=C[i]), [0, 3], periods=1, implicit=False)
+        run = simulate(
+            gear.with_parameters(C=C[i]), [0, 3], periods=1, integration=Integration(implicit=False)
+        )
         assert_alike(many, i, run, since=many.since[i])
     assert many.since == pytest.approx(np.full(7, 120 * math.pi))
     later = simulate_many(gear, [0, 3], t=(0, 10), settle=2.0)
-    run = simulate(gear, [0, 3], t=(0, 10), implicit=False)
+    run = simulate(gear, [0, 3], t=(0, 10), integration=Integration(implicit=False))
     assert_alike(later, 0, run, since=2.0)
 
 
@@ -110,7 +117,12 @@ def test_own_periods(gear):
     assert many.span[:, 1] == pytest.approx(4 * math.pi / omega)
     assert many.t.shape == many["x"].shape == (3, 50)
     for i in range(3):
-        run = simulate(gear.with_parameters(omega=omega[i]), [0, 0], periods=2, implicit=False)
+        run = simulate(
+            gear.with_parameters(omega=omega[i]),
+            [0, 0],
+            periods=2,
+            integration=Integration(implicit=False),
+        )
         assert_alike(many, i, run)
         assert np.abs(many["x"][i] - run(many.t[i])[0]).max() < 1e-9
         assert np.abs(many["w"][i] - (2.372 + 3.546 * np.sin(omega[i] * many.t[i]))).max() < 1e-12
@@ -125,7 +137,13 @@ def test_common_samples(gear):
     many = simulate_many(gear, [0, 0], parameters={"D": D}, t=(0, 30), samples=times)
     assert many.t.shape == (91,)
     assert many["v"].shape == (7, 91)
-    run = simulate(gear.with_parameters(D=D[4]), [0, 0], t=(0, 30), implicit=False, samples=times)
+    run = simulate(
+        gear.with_parameters(D=D[4]),
+        [0, 0],
+        t=(0, 30),
+        integration=Integration(implicit=False),
+        samples=times,
+    )
     for name in ("x", "v", "w"):
         assert np.abs(many[name][4] - run[name]).max() < 1e-9
     counted = simulate_many(gear, [0, 0], t=(0, 30), settle=10, samples=3)
@@ -138,7 +156,14 @@ def test_regions_that_some_values_empty(gear):
     many = simulate_many(gear, [0, 0], parameters={"D": clearance}, t=(0, 30))
     for i, value in enumerate(clearance):
         assert_alike(
-            many, i, simulate(gear.with_parameters(D=value), [0, 0], t=(0, 30), implicit=False)
+            many,
+            i,
+            simulate(
+                gear.with_parameters(D=value),
+                [0, 0],
+                t=(0, 30),
+                integration=Integration(implicit=False),
+            ),
         )
 
 
@@ -146,7 +171,12 @@ def test_filippov(friction):
     mu = np.array([0.1, 0.3, 0.5, 1.5])
     many = simulate_many(friction, [2, 0], parameters={"mu": mu, "a": 1.2}, t=(0, 30))
     for i in range(4):
-        run = simulate(friction.with_parameters(mu=mu[i], a=1.2), [2, 0], t=(0, 30), implicit=False)
+        run = simulate(
+            friction.with_parameters(mu=mu[i], a=1.2),
+            [2, 0],
+            t=(0, 30),
+            integration=Integration(implicit=False),
+        )
         assert_alike(many, i, run)
     assert many.hits.sum() > 10
 
@@ -199,7 +229,9 @@ def test_extremes_within_a_step():
     k = sp.Symbol("k")
     model = Model({x: v, v: -(k**2) * x}, parameters={k: 1})
     rates = np.linspace(0.3, 3, 12)
-    many = simulate_many(model, [0, 1], parameters={k: rates}, t=(0, 25), tol=1e-12)
+    many = simulate_many(
+        model, [0, 1], parameters={k: rates}, t=(0, 25), integration=Integration(rtol=1e-12)
+    )
     assert np.abs(many.maximum[:, 0] * rates - 1).max() < 1e-10
     assert np.abs(many.minimum[:, 0] * rates + 1).max() < 1e-10
     assert np.abs(many.maximum[:, 1] - 1).max() < 1e-10
@@ -269,7 +301,7 @@ def test_progress_and_pickle(gear, swept, capsys):
         ({"period": [1, 2, 3]}, r"period has shape \(3,\)"),
         ({"samples": 1}, "samples = 1; expected a whole number from 2"),
         ({"samples": [0, 2]}, "samples from 0 to 2 leave the runs"),
-        ({"tol": 0}, "tol = 0"),
+        ({"integration": 1e-9}, "integration: expected an Integration, received a float"),
     ],
 )
 def test_wrong_arguments(gear, keywords, message):

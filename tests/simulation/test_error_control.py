@@ -9,6 +9,7 @@ import pytest
 import sympy as sp
 
 from fastslow.model.model import Model
+from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
 x, y, z, v, t = sp.symbols("x y z v t")
@@ -24,7 +25,7 @@ PROMISED = 10.0
 def test_the_whole_run_of_the_gear(gear, tol):
     times = [float(s["t"]) for s in P1["samples"]]
     exact = np.array([[float(s["x"]), float(s["v"])] for s in P1["samples"]]).T
-    run = simulate(gear, [0, 0], periods=3, tol=tol)
+    run = simulate(gear, [0, 0], periods=3, integration=Integration(rtol=tol))
     assert np.abs(run(times) - exact).max() < PROMISED * tol
     assert len(run.crossings) == 41
 
@@ -33,7 +34,7 @@ def test_rounding_limits_the_gear_at_1e_14(gear):
     times = [float(s["t"]) for s in P1["samples"]]
     exact = np.array([[float(s["x"]), float(s["v"])] for s in P1["samples"]]).T
     for tol in (1e-14, 1e-15):
-        run = simulate(gear, [0, 0], periods=3, tol=tol)
+        run = simulate(gear, [0, 0], periods=3, integration=Integration(rtol=tol))
         # 3e-14 measured, over 1600 steps: 1/4 unit of the last place of x each
         assert np.abs(run(times) - exact).max() < 1e-13
 
@@ -82,7 +83,7 @@ def test_the_whole_run_on_contracting_linear_regions():
         {x: v, v: a * sp.cos(t) - c * v - x - k * dead},
         parameters={c: 1, k: 20, D: 0.25, a: 2},
     )
-    best = simulate(model, [0, 0], t=(0, 25), tol=1e-14)
+    best = simulate(model, [0, 0], t=(0, 25), integration=Integration(rtol=1e-14))
     times = np.linspace(0, 25, 101)[:-1]
     with mpmath.workdps(30):
         form = PiecewiseLinear(1, 20, 0.25, 2)
@@ -90,7 +91,7 @@ def test_the_whole_run_on_contracting_linear_regions():
         exact, crossings = form.follow([0, 0], list(map(mpmath.mpf, times)), guesses)
     assert len(crossings) > 10
     for tol in TOLERANCES:
-        run = simulate(model, [0, 0], t=(0, 25), tol=tol)
+        run = simulate(model, [0, 0], t=(0, 25), integration=Integration(rtol=tol))
         assert np.abs(run(times) - exact).max() < PROMISED * tol
         for crossing, time in zip(run.crossings, crossings, strict=True):
             assert abs(crossing.time - float(time)) < PROMISED * tol / abs(crossing.state[1])
@@ -131,7 +132,7 @@ def relay(mode):
 )
 @pytest.mark.parametrize("tol", [1e-6, 1e-9, 1e-12])
 def test_every_step(model, start, end, rates, tol):
-    run = simulate(model, start, t=(0, end), tol=tol)
+    run = simulate(model, start, t=(0, end), integration=Integration(rtol=tol))
     modes = {run.modes[int(step[2])] for step in run.steps}
     assert modes == ({"S1", "S2", "S1|S2"} if model is RELAY else {"S1"})
     # the first and last steps of every mode, and some between

@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 
 from fastslow.model.model import Model
+from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
 x, y, v, t = sp.symbols("x y v t")
@@ -14,7 +15,7 @@ x, y, v, t = sp.symbols("x y v t")
 
 def test_dry_friction_comes_to_rest(friction):
     # half swings about +-mu lose 2 mu each until |x| < mu
-    run = simulate(friction, [2, 0], t=(0, 30), tol=1e-13)
+    run = simulate(friction, [2, 0], t=(0, 30), integration=Integration(rtol=1e-13))
     assert [c.time for c in run.crossings] == pytest.approx(
         [math.pi, 2 * math.pi, 3 * math.pi], abs=1e-12
     )
@@ -25,7 +26,7 @@ def test_dry_friction_comes_to_rest(friction):
 
 def test_sticking_ends_when_the_force_exceeds_friction(friction):
     model = friction.with_parameters(a=2.0, mu=0.8)
-    run = simulate(model, [0, 0], t=(0, 2), tol=1e-13)
+    run = simulate(model, [0, 0], t=(0, 2), integration=Integration(rtol=1e-13))
     assert run.word == ("S1|S2", "S1")
     assert run.crossings[0].time == pytest.approx(math.asin(0.4), abs=1e-12)
     assert run.crossings[0].from_region == "S1|S2"
@@ -33,7 +34,7 @@ def test_sticking_ends_when_the_force_exceeds_friction(friction):
 
 def test_a_section_counts_sticking_once_where_it_begins(friction):
     model = friction.with_parameters(a=2.0, mu=1.9)
-    run = simulate(model, [3, 0], t=(0, 60), tol=1e-13)
+    run = simulate(model, [3, 0], t=(0, 60), integration=Integration(rtol=1e-13))
     begin = [s.start for s in run.segments[1:] if "|" in s.region]
     assert len(begin) > 3
     follows = zip(run.segments[:-1], run.segments[1:], strict=True)
@@ -46,7 +47,7 @@ def test_a_section_counts_sticking_once_where_it_begins(friction):
 def test_sliding_field_and_its_exit():
     # slides on y = 0 with x' = 1 while -1 < x < 1, leaves upwards at x = 1
     field = {x: 1, y: sp.Piecewise((x - 1, y > 0), (1 + 0 * x, True))}
-    run = simulate(Model(field), [0, -0.5], t=(0, 3), tol=1e-12)
+    run = simulate(Model(field), [0, -0.5], t=(0, 3), integration=Integration(rtol=1e-12))
     assert run.word == ("S2", "S1|S2", "S1")
     assert [c.time for c in run.crossings] == pytest.approx([0.5, 1.0], abs=1e-12)
     sliding = np.linspace(0.5, 1.0, 7)
@@ -60,7 +61,7 @@ def test_sliding_on_a_curve_stays_on_it():
     side = sp.Piecewise((-1, r2 - 1 > 0), (2, True))
     spin = sp.Piecewise((1, r2 - 1 > 0), (4, True))
     model = Model({x: side * x - spin * y, y: side * y + spin * x})
-    run = simulate(model, [0.5, 0], t=(0, 10), tol=1e-12)
+    run = simulate(model, [0.5, 0], t=(0, 10), integration=Integration(rtol=1e-12))
     assert run.word == ("S2", "S1|S2")
     begin = run.crossings[0].time
     assert begin == pytest.approx(math.log(2) / 2, abs=1e-11)
@@ -91,7 +92,7 @@ def test_an_escaping_start_is_not_unique():
 def test_relay_feedback_oscillates_without_chatter():
     # y'' = -y' - sign(y), started away: accumulating, but no chatter before
     model = Model({x: v, v: -v - sp.sign(x)})
-    run = simulate(model, [1, 0], t=(0, 4), tol=1e-12)
+    run = simulate(model, [1, 0], t=(0, 4), integration=Integration(rtol=1e-12))
     assert run.outcome
     assert 1 <= len(run.crossings) < 20
 
@@ -105,7 +106,12 @@ def test_where_sliding_ends_one_way_goes_on(tol):
     model = Model({x: sp.Piecewise((1, y > 0), (3, True)), y: above}, parameters={a: 0.1})
     for start in np.linspace(-0.3, 0.3, 41):
         for value in (0.1, -0.2):
-            run = simulate(model.with_parameters(a=value), [start, 0], t=(0, 2.5), tol=tol)
+            run = simulate(
+                model.with_parameters(a=value),
+                [start, 0],
+                t=(0, 2.5),
+                integration=Integration(rtol=tol),
+            )
             assert run.outcome
             assert run.word == ("S1|S2", "S1")
             assert run.crossings[-1].state[0] == pytest.approx(math.pi / 2, abs=10 * tol)

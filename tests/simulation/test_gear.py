@@ -8,6 +8,7 @@ import pytest
 import sympy as sp
 
 from fastslow.model.model import Model
+from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
 # quadruple-precision Taylor series of order 40, tolerance 1e-30
@@ -20,13 +21,13 @@ INTERFACES = {"+D": "x - D", "-D": "x + D"}
 
 @pytest.mark.parametrize("tol", [1e-6, 1e-9, 1e-12])
 def test_states_reach_the_tolerance(gear, tol):
-    run = simulate(gear, [0, 0], periods=3, tol=tol)
+    run = simulate(gear, [0, 0], periods=3, integration=Integration(rtol=tol))
     assert np.abs(run(TIMES) - STATES).max() < 10 * tol
     assert len(run.crossings) == 41
 
 
 def test_states_and_crossings_to_rounding(gear):
-    run = simulate(gear, [0, 0], periods=3, tol=1e-13, samples=TIMES)
+    run = simulate(gear, [0, 0], periods=3, integration=Integration(rtol=1e-13), samples=TIMES)
     assert np.abs(np.array([run["x"], run["v"]]) - STATES).max() < 1e-12
     assert len(run.crossings) == len(P1["crossings"]) == 41
     for crossing, expected in zip(run.crossings, P1["crossings"], strict=True):
@@ -70,7 +71,7 @@ def test_signs_agree_with_the_region_at_every_step(gear):
 def test_printed_scaling_has_825_crossings(gear):
     stiff = gear.with_parameters(A=12152.8, B=40.5, C=60.55)
     coarse = simulate(stiff, [0, 0], periods=3)
-    fine = simulate(stiff, [0, 0], periods=3, tol=1e-13)
+    fine = simulate(stiff, [0, 0], periods=3, integration=Integration(rtol=1e-13))
     assert len(coarse.crossings) == len(fine.crossings) == 825
     # the last crossings before the run ends, where all errors have come together
     late = [abs(a.time - b.time) for a, b in zip(coarse.crossings, fine.crossings, strict=True)]
@@ -95,7 +96,9 @@ def test_slow_passage_through_the_gap(speed):
         forcing={w: sp.Rational(1, 5) - e * t},
         parameters={A: -0.6, D: 0.25, e: speed},
     )
-    run = simulate(model, [0.9427182380145632, 0], t=(0, 0.42 / speed), tol=1e-13)
+    run = simulate(
+        model, [0.9427182380145632, 0], t=(0, 0.42 / speed), integration=Integration(rtol=1e-13)
+    )
     assert run.word[:3] == ("S1", "S2", "S3")
     loads = [0.2 - speed * c.time for c in run.crossings[:2]]
     assert loads == pytest.approx(PASSAGES[speed], abs=2e-13)

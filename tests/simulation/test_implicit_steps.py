@@ -13,6 +13,7 @@ from numba import njit
 from fastslow.model.model import Model
 from fastslow.simulation.implicit_steps import DEGREE, P, Q, join, weights
 from fastslow.simulation.matrices import contracts, factorise_in_place, solve_in_place
+from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
 x, y, z, v, t, w = sp.symbols("x y z v t w")
@@ -117,7 +118,7 @@ def test_a_settled_oscillator_is_its_forced_response(relaxing, tol, stiffness):
     """Within 10 tol at every time, in few steps."""
     model = relaxing.with_parameters(k=stiffness, b=max(1, 0.2 * stiffness**0.5))
     start = forced(model, np.array([0.0]))[:, 0]
-    run = simulate(model, start, t=(0, 1000), tol=tol)
+    run = simulate(model, start, t=(0, 1000), integration=Integration(rtol=tol))
     # the series alone would take a step of about 9 / frequency
     assert len(run.steps) < max(1000, 1000 * stiffness**0.5 / 9 / 50)
     times = np.linspace(0, 1000, 4001)
@@ -125,7 +126,7 @@ def test_a_settled_oscillator_is_its_forced_response(relaxing, tol, stiffness):
 
 
 def test_steps_are_saved_and_nothing_else_changes(gear):
-    explicit = simulate(gear, [0, 0], periods=3, implicit=False)
+    explicit = simulate(gear, [0, 0], periods=3, integration=Integration(implicit=False))
     mixed = simulate(gear, [0, 0], periods=3)
     assert 2 * len(mixed.steps) < len(explicit.steps)
     times = np.linspace(0, mixed.span[1], 20_001)
@@ -152,7 +153,7 @@ def test_a_focus_that_turns_unstable_is_not_damped():
         {x: p * x - 8 * y, y: 8 * x + p * y}, forcing={p: k * t}, parameters={k: sp.Rational(1, 50)}
     )
     # the integral of p from -30 to 0 is 9: the amplitude falls by exp(-9), far above tol
-    run = simulate(model, [1e-3, 0], t=(-30, 32), tol=1e-13)
+    run = simulate(model, [1e-3, 0], t=(-30, 32), integration=Integration(rtol=1e-13))
     radius = np.hypot(*run(np.array([0.0, 30.0, 32.0])))
     assert radius == pytest.approx(1e-3 * np.exp([-9, 0, 0.01 * (32**2 - 30**2)]), rel=1e-6)
 
@@ -162,7 +163,7 @@ def test_three_fast_states_and_a_slow_one():
     s = sp.Symbol("s")
     rates = {x: -500 * (x - y), y: -30 * (y - z), z: -80 * (z - s)}
     model = Model(rates, slow={s: -s / 100})
-    run = simulate(model, [1, 1, 1, 1], t=(0, 300), tol=1e-10)
+    run = simulate(model, [1, 1, 1, 1], t=(0, 300), integration=Integration(rtol=1e-10))
     assert len(run.steps) < 600
     # on the slow manifold each one is the next times a ratio
     times = np.linspace(1, 300, 500)
@@ -183,5 +184,5 @@ def test_equilibrium_is_one_long_step():
 def test_an_unstable_equilibrium_is_left():
     """x' = x from 1e-12: exp(t) until it is 1, where an implicit method would stay at 0."""
     model = Model({x: x, y: -800 * y})
-    run = simulate(model, [1e-12, 0.5], t=(0, 12 * np.log(10)), tol=1e-14)
+    run = simulate(model, [1e-12, 0.5], t=(0, 12 * np.log(10)), integration=Integration(rtol=1e-14))
     assert run([run.span[1]])[0] == pytest.approx(1, rel=1e-8)

@@ -15,6 +15,7 @@ from fastslow.results.ensembles import Ensemble
 from fastslow.simulation import ensembles
 from fastslow.simulation.ensembles import simulate_many
 from fastslow.simulation.lanes import UNDER_WAY
+from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
 x, v, y, t = sp.symbols("x v y t")
@@ -57,11 +58,16 @@ def gears(gear, table):
 
 def test_gears_are_those_of_simulate(gear, table):
     # at a tight tolerance both are close to the solution, so that they are close to each other
-    many = many_gears(gear, table, slice(0, None, 6), tol=1e-13, order=16)
+    many = many_gears(gear, table, slice(0, None, 6), integration=Integration(rtol=1e-13, order=16))
     assert many.hits.sum() > 80
     for k, i in enumerate(range(0, len(table["D"]), 6)):
         one = gear.with_parameters(**{name: table[name][i] for name in ("D", "C", "omega")})
-        run = simulate(one, table["states"][i], t=(0, 60), implicit=False, tol=1e-13, order=16)
+        run = simulate(
+            one,
+            table["states"][i],
+            t=(0, 60),
+            integration=Integration(implicit=False, rtol=1e-13, order=16),
+        )
         assert many.final[k] == pytest.approx(run.end[1:], abs=1e-11)
         assert many["x"][k] == pytest.approx(run(many.t)[0], abs=1e-11)
         for column, name in enumerate(("x", "v")):
@@ -112,7 +118,12 @@ def test_an_oscillator_against_its_closed_form(oscillator, m):
     c, k = np.linspace(0.0, 0.4, m), np.linspace(1.0, 30.0, m)
     times = np.linspace(0, 20, 41)
     many = simulate_many(
-        oscillator, [1, 0], parameters={"c": c, "k": k}, t=(0, 20), samples=times, tol=1e-13
+        oscillator,
+        [1, 0],
+        parameters={"c": c, "k": k},
+        t=(0, 20),
+        samples=times,
+        integration=Integration(rtol=1e-13),
     )
     w = np.sqrt(k - c**2)[:, None]
     decay = np.exp(-c[:, None] * times)
@@ -124,7 +135,12 @@ def test_an_oscillator_against_its_closed_form(oscillator, m):
     assert many.minimum[:, 0] == pytest.approx(-np.exp(-c * np.pi / w[:, 0]), abs=3e-11)
     assert many.maximum[:, 0] == pytest.approx(np.ones(m), abs=3e-11)
     later = simulate_many(
-        oscillator, [1, 0], parameters={"c": c, "k": k}, t=(0, 20), settle=2.0, tol=1e-13
+        oscillator,
+        [1, 0],
+        parameters={"c": c, "k": k},
+        t=(0, 20),
+        settle=2.0,
+        integration=Integration(rtol=1e-13),
     )
     turns = np.arange(0, 100) * np.pi / w
     heights = np.where(
@@ -144,7 +160,9 @@ def test_rates_of_all_kinds():
     )
     start = np.column_stack([np.linspace(-1, 1, 11), np.linspace(0.5, 3, 11), np.zeros(11)])
     rates = {"a": np.linspace(0.1, 2, 11), "b": np.linspace(0.2, 3, 11)}
-    many = simulate_many(model, start, parameters=rates, t=(0, 5), tol=1e-12)
+    many = simulate_many(
+        model, start, parameters=rates, t=(0, 5), integration=Integration(rtol=1e-12)
+    )
     expected = np.column_stack(
         [
             np.log(np.exp(start[:, 0]) + 5 * rates["a"]),
@@ -194,13 +212,14 @@ def friction_stuck(many: Ensemble) -> str:
     [({"max_steps": 1}, "too many steps"), ({"max_steps": 37}, "too many steps")],
 )
 def test_limits(gear, table, keywords, code):
-    many = many_gears(gear, table, slice(0, 20), samples=None, settle=0.0, **keywords)
+    settings = Integration(implicit=False, **keywords)
+    many = many_gears(gear, table, slice(0, 20), samples=None, settle=0.0, integration=settings)
     assert (many.n_steps <= keywords["max_steps"]).all()
     some = many.n_steps == keywords["max_steps"]
     assert some.sum() >= 15
     for i in np.flatnonzero(some):
         one = gear.with_parameters(**{name: table[name][i] for name in ("D", "C", "omega")})
-        run = simulate(one, table["states"][i], t=(0, 60), implicit=False, **keywords)
+        run = simulate(one, table["states"][i], t=(0, 60), integration=settings)
         assert many.outcomes[i].code == run.outcome.code == code
         assert many.reached[i] == pytest.approx(run.span[1], rel=0.05)
 
@@ -235,6 +254,6 @@ def test_a_model_too_large_for_lanes_is_that_of_simulate(gear, table, monkeypatc
     many = many_gears(gear, table, slice(0, 9))
     for i in range(9):
         one = gear.with_parameters(**{name: table[name][i] for name in ("D", "C", "omega")})
-        run = simulate(one, table["states"][i], t=(0, 60), implicit=False)
+        run = simulate(one, table["states"][i], t=(0, 60), integration=Integration(implicit=False))
         assert np.array_equal(many.final[i], run.end[1:])
         assert many.n_steps[i] == len(run.steps)

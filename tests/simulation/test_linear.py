@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from fastslow.model.model import Model
+from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
 numbers = st.floats(-1.5, 1.5, allow_nan=False).map(lambda z: round(z, 3))
@@ -24,7 +25,9 @@ def test_free_flight_between_two_springs(linear, k1, k3, gap, speed):
     flight, upper, lower = 2 * gap / speed, math.pi / math.sqrt(k1), math.pi / math.sqrt(k3)
     period = 2 * flight + upper + lower
     expected = np.cumsum([upper, flight, lower, flight] * 3)
-    run = simulate(model, [gap, speed], t=(0, 3 * period - flight / 2), tol=1e-12)
+    run = simulate(
+        model, [gap, speed], t=(0, 3 * period - flight / 2), integration=Integration(rtol=1e-12)
+    )
     times = [c.time for c in run.crossings]
     assert len(times) == 11
     assert times == pytest.approx(expected[:11], rel=1e-10)
@@ -35,7 +38,9 @@ def test_free_flight_between_two_springs(linear, k1, k3, gap, speed):
 
 def test_energy_and_period_of_the_oscillator_with_a_gap(linear):
     gap, amplitude = 0.25, 1.25
-    run = simulate(linear, [amplitude, 0], t=(0, 400), tol=1e-14, samples=4001)
+    run = simulate(
+        linear, [amplitude, 0], t=(0, 400), integration=Integration(rtol=1e-14), samples=4001
+    )
     x, v = run["x"], run["v"]
     outside = np.maximum(np.abs(x) - gap, 0)
     assert np.ptp(v**2 + outside**2) < 2e-12
@@ -74,7 +79,7 @@ def exact(values, signs, state, times):
 @settings(max_examples=20, deadline=None)
 def test_every_segment_is_the_exact_solution_in_its_region(kinked, values, start):
     model = kinked.with_parameters(dict(zip("abcdepqrs", values, strict=True)))
-    run = simulate(model, start, t=(0, 4), tol=1e-13)
+    run = simulate(model, start, t=(0, 4), integration=Integration(rtol=1e-13))
     assert run.outcome
     signs = {name: tuple(region.signs.values()) for name, region in model.regions.items()}
     state = np.array(start)

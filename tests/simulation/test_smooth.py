@@ -6,6 +6,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from fastslow.model.model import Model
+from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
 x, y, z, w, t = sp.symbols("x y z w t")
@@ -18,7 +19,7 @@ def test_van_der_pol_with_slow_forcing():
         forcing={w: a * sp.cos(e * t)},
         parameters={a: 0.8, e: 0.05},
     )
-    run = simulate(model, [1, 0], periods=1, tol=1e-12)
+    run = simulate(model, [1, 0], periods=1, integration=Integration(rtol=1e-12))
     times = np.linspace(0, run.span[1], 50)
     reference = solve_ivp(
         lambda s, u: [
@@ -40,7 +41,7 @@ def test_van_der_pol_with_slow_forcing():
 def test_period_of_van_der_pol():
     # period 6.66328685932 at mu = 1, by high-precision integration
     model = Model({x: y, y: (1 - x**2) * y - x}, interfaces={"rest": y})
-    run = simulate(model, [2, 0], t=(0, 80), tol=1e-13)
+    run = simulate(model, [2, 0], t=(0, 80), integration=Integration(rtol=1e-13))
     peaks = [c.time for c in run.crossings if c.direction < 0]
     assert peaks[-1] - peaks[-2] == pytest.approx(6.66328685932, abs=2e-11)
 
@@ -48,7 +49,7 @@ def test_period_of_van_der_pol():
 def test_slow_state():
     e = sp.Symbol("e")
     model = Model({x: z - x}, slow={z: -e * z}, parameters={e: 0.01})
-    run = simulate(model, {"z": 1.0, "x": 0.0}, t=(0, 100), tol=1e-13)
+    run = simulate(model, {"z": 1.0, "x": 0.0}, t=(0, 100), integration=Integration(rtol=1e-13))
     times = np.linspace(0, 100, 11)
     slow = np.exp(-0.01 * times)
     fast = (slow - np.exp(-times)) / 0.99
@@ -60,7 +61,7 @@ def test_slow_state():
 @pytest.mark.parametrize("tol", [1e-6, 1e-8, 1e-10, 1e-12])
 def test_error_follows_the_tolerance_on_a_contracting_region(tol):
     model = Model({x: -x + sp.cos(t)})
-    run = simulate(model, [1], t=(0, 50), tol=tol)
+    run = simulate(model, [1], t=(0, 50), integration=Integration(rtol=tol))
     times = np.linspace(0, 50, 101)
     exact = (np.cos(times) + np.sin(times)) / 2 + np.exp(-times) / 2
     assert np.abs(run(times)[0] - exact).max() < 10 * tol
@@ -69,5 +70,5 @@ def test_error_follows_the_tolerance_on_a_contracting_region(tol):
 def test_order_is_free():
     model = Model({x: y, y: -x})
     for order in (6, 30):
-        run = simulate(model, [1, 0], t=(0, 10), tol=1e-10, order=order)
+        run = simulate(model, [1, 0], t=(0, 10), integration=Integration(rtol=1e-10, order=order))
         assert run(10.0) == pytest.approx([np.cos(10), -np.sin(10)], abs=1e-8)

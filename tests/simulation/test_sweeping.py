@@ -40,7 +40,7 @@ def swept(pair):
         settle=150,
         keep=4,
         what="extremes",
-        tol=1e-12,
+        integration=fs.Integration(rtol=1e-12),
     )
 
 
@@ -73,7 +73,7 @@ def test_stroboscopic_points_in_closed_form(pair):
     values = [0.3, 0.5, 0.6]
     drawn = fs.bifurcation_sweep(
         pair, "Omega", values, {"x": 1.1, "v": 0}, column="v", settle=60, keep=2, phase=0.25,
-        back=False, tol=1e-12,
+        back=False, integration=fs.Integration(rtol=1e-12),
     )  # fmt: skip
     assert drawn.down is None
     for value in values:
@@ -137,7 +137,14 @@ def test_nothing_is_lost_where_values_fail(roessler):
 
 def test_falling_values_and_progress(pair, capsys):
     drawn = fs.bifurcation_sweep(
-        pair, "Omega", [0.6, 0.5], [1.1, 0], settle=1, keep=1, tol=1e-12, progress=True
+        pair,
+        "Omega",
+        [0.6, 0.5],
+        [1.1, 0],
+        settle=1,
+        keep=1,
+        integration=fs.Integration(rtol=1e-12),
+        progress=True,
     )
     assert drawn.passes[0] is drawn.down
     assert drawn.values.tolist() == [0.5, 0.6]
@@ -182,7 +189,7 @@ def test_the_slow_quantity_of_a_frozen_model_is_swept():
     ],
 )
 def test_wrong_arguments(pair, changes, error, text):
-    given = {"parameter": "Omega", "values": [0.5], "state": [1.1, 0], "tol": 1e-12, **changes}
+    given = {"parameter": "Omega", "values": [0.5], "state": [1.1, 0], **changes}
     with pytest.raises(error, match=text):
         fs.bifurcation_sweep(pair, **given)
 
