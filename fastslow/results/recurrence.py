@@ -105,7 +105,8 @@ class Recurrence:
         --------
         >>> import sympy as sp, fastslow as fs
         >>> x, v = sp.symbols("x v")
-        >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 10), tol=1e-13)
+        >>> fine = fs.Integration(rtol=1e-13)
+        >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 10), integration=fine)
         >>> (run.section("x", 0.0, direction=-1).times / sp.pi.evalf()).astype(float).round(9)
         array([0.5, 2.5])
         """

@@ -58,7 +58,8 @@ class Queries:
         --------
         >>> import sympy as sp, fastslow as fs
         >>> x, v = sp.symbols("x v")
-        >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 6), tol=1e-13)
+        >>> fine = fs.Integration(rtol=1e-13)
+        >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 6), integration=fine)
         >>> for moment in run.at(x=0.5):  # at π/3 and 5π/3
         ...     print(moment)
         Moment(t = 1.04719755: x = 0.5, v = -0.866025; in S1)
