@@ -67,7 +67,8 @@ def pieces(rate, side_of, start, end, times):
         )
         last = run.t[-1]
         chosen = here[here <= last]
-        found[:, np.isin(times, chosen)] = run.sol(chosen)
+        if len(chosen):  # SciPy's dense output takes no empty array
+            found[:, np.isin(times, chosen)] = run.sol(chosen)
         now, u = last, run.y[:, -1]
         if run.status == 1:
             crossings.append(now)
