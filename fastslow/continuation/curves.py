@@ -19,6 +19,9 @@ from fastslow.continuation.settings import Continuation
 
 Array = NDArray[np.float64]
 
+#: States beyond this multiple of their scale end a curve.
+REACH = 1e6
+
 #: How a trace ends.
 FULL, RANGE, SMALL_STEP, WINDOW, CLOSED, STOPPED, BOUND = (
     "full",
@@ -191,7 +194,7 @@ def follow(
         rows.append(z)
         tangents.append(turned)
         states = frame.size - 2
-        if np.any(np.abs(z[:states]) > continuation.reach * frame.scale[:states]):
+        if np.any(np.abs(z[:states]) > REACH * frame.scale[:states]):
             return np.array(rows), np.array(tangents), WINDOW
         if len(rows) > 4 and _returns(start, direction, last, along, turned, step, frame):
             rows[-1], tangents[-1] = start, direction

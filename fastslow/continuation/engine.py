@@ -14,6 +14,20 @@ from numba import njit
 from fastslow.compiled.pointers import call_address
 from fastslow.continuation.loops import CLOSED, FULL, INTERFACE, RANGE, SMALL_STEP, WINDOW
 
+#: A state is measured by this part of its distance from the middle of the equilibria at which
+#: branches start, once that exceeds its unit: a branch to infinity has rows equal in log(x).
+FAR = 0.5
+
+#: By how much the largest step may grow where a state is so far away.
+GROWTH = 10.0
+
+#: Newton's method may move a prediction by this part of the step. A smooth curve that turns by
+#: the angle a in one step is off its tangent by a/2 of it; farther off is another curve.
+ASIDE = 0.2
+
+#: How far beyond an edge of the window, in units of its state, a branch tangent to it may be.
+TANGENT = 1e-9
+
 
 @njit(error_model="numpy")
 def solve(matrix, right):  # type: ignore[no-untyped-def]
@@ -85,6 +99,21 @@ def _dips(h0, s0, h1, s1):  # type: ignore[no-untyped-def]
 
 
 @njit(error_model="numpy")
+def _local_weight(point, weight, middle, local):  # type: ignore[no-untyped-def]
+    """Fill the weights at a point; returns how many units the farthest state is away."""
+    farthest = 1.0
+    for j in range(point.shape[0]):
+        local[j] = weight[j]
+        if j < middle.shape[0]:
+            away = FAR * abs(point[j] - middle[j]) * math.sqrt(weight[j])
+            # a periodic state has no middle (NaN) and is never far away
+            if away > 1.0:
+                local[j] = weight[j] / (away * away)
+                farthest = max(farthest, away)
+    return farthest
+
+
+@njit(error_model="numpy")
 def trace(  # type: ignore[no-untyped-def]
     address,
     mode,
@@ -95,7 +124,10 @@ def trace(  # type: ignore[no-untyped-def]
     weight,
     lower,
     upper,
-    window,
+    low,
+    high,
+    middle,
+    periods,
     step,
     smallest,
     largest,
@@ -119,8 +151,12 @@ def trace(  # type: ignore[no-untyped-def]
         Inverse squares of the scales.
     lower, upper : float
         Range of the last component.
-    window : ndarray, shape (n,)
-        Bounds on the moduli of the others.
+    low, high : ndarray, shape (n,)
+        Window of the others.
+    middle : ndarray, shape (n,)
+        Where each of the others is not far away; NaN if it never is.
+    periods : ndarray, shape (n,)
+        Period of each of the others, 0 if there is none.
     closing : bool
         Whether a return to the start ends the curve.
 
@@ -147,6 +183,7 @@ def trace(  # type: ignore[no-untyped-def]
     slope = np.empty(m)
     new_h = np.empty(m)
     new_slope = np.empty(m)
+    local = np.empty(size)
     heights = n * (n + 2)
 
     rows[0] = start
@@ -166,22 +203,24 @@ def trace(  # type: ignore[no-untyped-def]
         cosine = 1.0
         if step < smallest:
             return rows[:count], tangents[:count], SMALL_STEP, step
+        farthest = _local_weight(last, weight, middle, local)
+        unit = 1.0 / _norm(direction, local)
         for j in range(size):
-            guess[j] = last[j] + step * direction[j]
+            guess[j] = last[j] + step * unit * direction[j]
         for used in range(1, iterations + 1):  # noqa: B007  the step size depends on it
             call_address(address, mode, guess, parameters, out)
             along = 0.0
             for j in range(size):
-                along += direction[j] * weight[j] * (guess[j] - last[j])
+                along += direction[j] * local[j] * (guess[j] - last[j])
             for i in range(n):
                 right[i] = -out[i]
-            right[n] = step - along
-            _bordered(out, n, direction, weight, matrix)
+            right[n] = step / unit - along
+            _bordered(out, n, direction, local, matrix)
             if not solve(matrix, right):
                 break
             for j in range(size):
                 guess[j] += right[j]
-            if _norm(right, weight) <= tolerance:
+            if _norm(right, local) <= tolerance:
                 accepted = True
                 break
         if accepted:
@@ -190,27 +229,54 @@ def trace(  # type: ignore[no-untyped-def]
                 turned[i] = 0.0
                 accepted = accepted and math.isfinite(out[i])
             turned[n] = 1.0
-            _bordered(out, n, direction, weight, matrix)
+            _bordered(out, n, direction, local, matrix)
             accepted = accepted and solve(matrix, turned)
+        new_unit = 1.0
         if accepted:
             length = _norm(turned, weight)
             cosine = 0.0
             for j in range(size):
                 turned[j] /= length
-                cosine += turned[j] * weight[j] * direction[j]
-            accepted = cosine > math.cos(turn)
+                cosine += turned[j] * local[j] * direction[j]
+            new_unit = 1.0 / _norm(turned, local)
+            cosine *= unit * new_unit
+            for j in range(size):
+                right[j] = guess[j] - last[j] - step * unit * direction[j]
+            aside = _norm(right, local)
+            accepted = cosine > math.cos(turn) and aside <= max(ASIDE, turn) * step
         if accepted:
             for k in range(m):
                 new_h[k] = signs[k] * out[heights + k]
                 new_slope[k] = 0.0
                 for j in range(size):
                     new_slope[k] += signs[k] * out[heights + m + k * size + j] * turned[j]
+                before = slope[k] * step * unit
+                after = new_slope[k] * step * new_unit
                 if (
                     new_h[k] > 0.0
                     and step > 4.0 * smallest
-                    and _dips(max(h[k], 0.0), slope[k] * step, new_h[k], new_slope[k] * step)
+                    and _dips(max(h[k], 0.0), before, new_h[k], after)
                 ):
                     accepted = False
+            if step > 4.0 * smallest:
+                for i in range(n):
+                    slack = TANGENT / math.sqrt(local[i])
+                    before = step * unit * direction[i]
+                    after = step * new_unit * turned[i]
+                    if guess[i] > low[i] and _dips(
+                        max(last[i] - low[i], 0.0) + slack,
+                        before,
+                        guess[i] - low[i] + slack,
+                        after,
+                    ):
+                        accepted = False
+                    if guess[i] < high[i] and _dips(
+                        max(high[i] - last[i], 0.0) + slack,
+                        -before,
+                        high[i] - guess[i] + slack,
+                        -after,
+                    ):
+                        accepted = False
         if not accepted:
             step *= 0.5
             continue
@@ -225,22 +291,29 @@ def trace(  # type: ignore[no-untyped-def]
         if guess[n] < lower or guess[n] > upper:
             return rows[:count], tangents[:count], RANGE, step
         for i in range(n):
-            if abs(guess[i]) > window[i]:
+            slack = TANGENT / math.sqrt(local[i])
+            if guess[i] < low[i] - slack or guess[i] > high[i] + slack:
                 return rows[:count], tangents[:count], WINDOW, step
         if closing and count > 4:
             ahead = 0.0
             apart = 0.0
             same = 0.0
             for j in range(size):
-                ahead += (start[j] - last[j]) * weight[j] * direction[j]
+                gap = start[j] - last[j]
+                if j < n and periods[j] > 0.0:
+                    gap -= periods[j] * np.round(gap / periods[j])
+                ahead += gap * local[j] * direction[j] * unit
                 same += tangent[j] * weight[j] * turned[j]
             for j in range(size):
-                off = start[j] - last[j] - ahead * direction[j]
-                apart += off * off * weight[j]
+                gap = start[j] - last[j]
+                if j < n and periods[j] > 0.0:
+                    gap -= periods[j] * np.round(gap / periods[j])
+                off = gap - ahead * direction[j] * unit
+                apart += off * off * local[j]
             if 0.0 < ahead <= step and math.sqrt(apart) < 0.2 * step and same > 0.9:
                 return rows[:count], tangents[:count], CLOSED, step
         if used <= 3 and cosine > math.cos(0.5 * turn):
-            step = min(1.5 * step, largest)
+            step = min(1.5 * step, largest * min(farthest, GROWTH))
         elif used >= 6:
             step *= 0.7
     return rows[:count], tangents[:count], FULL, step

@@ -13,8 +13,8 @@ _EVALUATION = "fastslow.continuation.evaluation"
 _SOURCES = ("fastslow.compiled.pointers",)
 _ARGUMENTS = {
     "trace": (
-        "address mode parameters start tangent signs weight lower upper window step smallest "
-        "largest turn tolerance iterations points closing"
+        "address mode parameters start tangent signs weight lower upper low high middle "
+        "periods step smallest largest turn tolerance iterations points closing"
     ),
     "evaluate": "address modes points parameters width",
     "refine": "address mode parameters start scale row normal point width m iterations",

@@ -37,8 +37,6 @@ class Continuation:
         Newton iterations allowed in one step.
     points : int
         Rows that one branch may have.
-    reach : float
-        States beyond this multiple of their scale end the branch ("left the window").
     starts : int
         Values of the parameter, beside both ends, at which branches are looked for.
     branches : int
@@ -57,7 +55,6 @@ class Continuation:
     tolerance: float = 1e-10
     iterations: int = 8
     points: int = 20_000
-    reach: float = 1e6
     starts: int = 7
     branches: int = 100
 

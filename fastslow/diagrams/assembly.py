@@ -104,7 +104,7 @@ def branch_of(
     region = np.repeat(names, [len(t[0]) for t in tables])
     if not curve.closed:
         special, at_row = _with_ends(field, curve, special, at_row, rows)
-    source = Source(field.model, window.scale[:-1])
+    source = Source(field.model, window.scale[:-1], window.states)
     return Branch(
         field.model.states,
         field.parameter,

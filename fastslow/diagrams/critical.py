@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import sympy as sp
 
@@ -12,7 +14,9 @@ from fastslow.model.structure import real
 DEGREE = 8
 
 
-def critical_values(equations: RegionEquations, lower: float, upper: float) -> list[float] | None:
+def critical_values(
+    equations: RegionEquations, lower: float, upper: float, edges: Sequence[sp.Expr] = ()
+) -> list[float] | None:
     """Values between which a region's admissible equilibria move without meeting or leaving.
 
     These are the real roots in the parameter of the discriminant and leading
@@ -26,6 +30,8 @@ def critical_values(equations: RegionEquations, lower: float, upper: float) -> l
     equations : RegionEquations
     lower, upper : float
         Range of the parameter.
+    edges : sequence of Expr
+        Further functions of the states at whose zeros a start is wanted on both sides.
 
     Returns
     -------
@@ -33,7 +39,7 @@ def critical_values(equations: RegionEquations, lower: float, upper: float) -> l
         None where the region's equations are no polynomial of moderate degree
         in unknown and parameter, so that nothing is proved.
     """
-    conditions = _conditions(equations)
+    conditions = _conditions(equations, edges)
     if conditions is None:
         return None
     p = real(equations.field.parameter)
@@ -48,7 +54,7 @@ def critical_values(equations: RegionEquations, lower: float, upper: float) -> l
     return sorted(values)
 
 
-def _conditions(equations: RegionEquations) -> list[sp.Expr] | None:
+def _conditions(equations: RegionEquations, more: Sequence[sp.Expr]) -> list[sp.Expr] | None:
     """Polynomials in the parameter whose roots are the critical values."""
     left = equations.elimination
     p = real(equations.field.parameter)
@@ -62,7 +68,7 @@ def _conditions(equations: RegionEquations) -> list[sp.Expr] | None:
         return None
     if len(alone) == len(left.remaining) and (alone or left.unknowns):
         return alone
-    edges = _edges(equations)
+    edges = _edges(equations, more)
     if edges is None or not left.unknowns:
         return edges
     (x,) = left.unknowns
@@ -78,13 +84,13 @@ def _conditions(equations: RegionEquations) -> list[sp.Expr] | None:
     return [sp.expand(f) for f in found]
 
 
-def _edges(equations: RegionEquations) -> list[sp.Expr] | None:
+def _edges(equations: RegionEquations, more: Sequence[sp.Expr]) -> list[sp.Expr] | None:
     """What bounds the region, along its equilibria; None unless polynomial in both."""
     left = equations.elimination
     p = real(equations.field.parameter)
     solved = {real(n): e for n, e in left.solved.items()}
     edges = []
-    for bound in equations.bounds:
+    for bound in (*equations.bounds, *more):
         h = bound.subs(solved)
         if not h.is_polynomial(p, *left.unknowns):
             return None

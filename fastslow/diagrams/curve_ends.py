@@ -41,7 +41,7 @@ def outcome_of(status: str, system: Defining, z: Array, names: tuple[str, str]) 
     if status == curves.WINDOW:
         return Outcome(
             "left the window",
-            f"a state grew without bound near {where}; raise Continuation(reach=…).",
+            f"a state grew without bound near {where}.",
             False,
         )
     if status == curves.FULL:

@@ -16,6 +16,7 @@ from fastslow.continuation.loops import loop
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
+from fastslow.results.windows import StateWindow
 
 Array = NDArray[np.float64]
 
@@ -30,10 +31,13 @@ class Source:
     ----------
     model : Model
     unit : ndarray, shape (n,)
+    window : StateWindow
+        In which its diagram was traced.
     """
 
     model: Model
     unit: Array
+    window: StateWindow
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,6 +289,19 @@ class FrozenField:
         crossed = products - products.transpose(0, 2, 1)
         same = (np.abs(crossed) <= 1e-12 * np.abs(products)).all(axis=0)
         return [np.flatnonzero(same[k] | (np.arange(count) == k)).tolist() for k in range(count)]
+
+    def rounding(self, region: int, u: Array) -> Array:
+        """Bound on the rounding error of each state at an equilibrium, shape (n,).
+
+        ε |J⁻¹| (|J| |x| + |F_p| |p|), in the units of the states; infinite where J is singular.
+        """
+        _, slopes, _, _ = self.at(region, u)
+        jacobian = slopes[:, : self.n]
+        try:
+            inverse = np.linalg.inv(jacobian)
+        except np.linalg.LinAlgError:
+            return np.full(self.n, np.inf)
+        return np.asarray(np.finfo(float).eps * np.abs(inverse) @ (np.abs(slopes) @ np.abs(u)))
 
     def tangent(self, region: int, u: Array, weight: Array) -> tuple[Array, bool]:
         """Null vector of [F_x F_p], unit in the weighted norm, and whether it is the only one."""

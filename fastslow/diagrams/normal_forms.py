@@ -23,6 +23,10 @@ Array = NDArray[np.float64]
 Vector = NDArray[Any]  # real or complex
 
 
+#: A column below this part of the rows of a singular matrix is zero but for rounding.
+SINGULAR = 1e-13
+
+
 @dataclass(frozen=True, eq=False)
 class Multilinear:
     """Second and third derivatives of rates at one point, as multilinear forms.
@@ -143,10 +147,30 @@ def cusp_form(forms: Multilinear, jacobian: Array) -> float:
 
 
 def null_vectors(jacobian: Array) -> tuple[Array, Array]:
-    """Left and right null vectors of length one, the right one's largest component positive."""
-    left, _, right = np.linalg.svd(jacobian)
-    q = right[-1]
-    return left[:, -1], q if q[np.argmax(np.abs(q))] > 0 else -q
+    """Left and right null vectors of length one, the right one's largest component positive.
+
+    The matrix is balanced first, so that the units of the states do not cost digits.
+
+    Examples
+    --------
+    >>> _, q = null_vectors(np.array([[0.0, 1.0], [1e-17, -1.0]]))
+    >>> [abs(round(c, 12)) for c in q.tolist()]
+    [1.0, 0.0]
+    """
+    matrix = np.array(jacobian, dtype=float)
+    rows, columns = np.ones(len(matrix)), np.ones(len(matrix))
+    for _ in range(3):
+        size = np.abs(matrix).max(axis=1)
+        size[size == 0] = 1.0
+        matrix, rows = matrix / size[:, None], rows / size
+        size = np.abs(matrix).max(axis=0)
+        # a column that is zero but for rounding is one at a fold, and stays one
+        size[size < SINGULAR] = 1.0
+        matrix, columns = matrix / size, columns / size
+    left, _, right = np.linalg.svd(matrix)
+    p, q = rows * left[:, -1], columns * right[-1]
+    p, q = p / np.linalg.norm(p), q / np.linalg.norm(q)
+    return p, q if q[np.argmax(np.abs(q))] > 0 else -q
 
 
 def first_lyapunov(forms: Multilinear, jacobian: Array, frequency: float) -> float:

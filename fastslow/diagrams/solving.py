@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from fastslow.arguments import flag, instance, mapping, takes
 from fastslow.diagrams.equations import region_equations, same
 from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.windows import within
 from fastslow.model.model import Model
 from fastslow.results.points import Equilibria, Equilibrium
+from fastslow.results.windows import state_window
 
 Array = NDArray[np.float64]
 
@@ -20,13 +22,14 @@ Array = NDArray[np.float64]
 IDLE = "(none)"
 
 
-@takes(model=instance(Model), values=mapping, virtual=flag)
+@takes(model=instance(Model), values=mapping, virtual=flag, window=mapping)
 def equilibria(
     model: Model,
     values: Mapping[Any, float] | None = None,
     /,
     *,
     virtual: bool = False,
+    window: Mapping[Any, tuple[float | None, float | None]] | None = None,
     **named: float,
 ) -> Equilibria:
     """All equilibria of a frozen model at given values of its slow quantities.
@@ -47,6 +50,9 @@ def equilibria(
         Slow quantity or parameter (symbol or name) to its value.
     virtual : bool
         Whether to add the virtual ones, which lie outside their region.
+    window : mapping, optional
+        State to its range (low, high), in its own units; None in place of an end
+        is no bound. Equilibria outside are left out, as negative concentrations.
     **named : float
         The same by name.
 
@@ -58,9 +64,11 @@ def equilibria(
     Raises
     ------
     UnknownNameError
-        For a name that is no parameter.
+        For a name that is no parameter, or in the window no state.
     ModelError
         For a slow quantity without value.
+    ArgumentError
+        For a range in the window that is none.
 
     Examples
     --------
@@ -75,7 +83,10 @@ def equilibria(
     given = model.with_parameters(values, **named)
     name = next(iter(given.parameters), IDLE)
     value = given.parameters[name] if given.parameters else 0.0
-    return solve_at(FrozenField(given, name), value, virtual)
+    asked = state_window(model.states, window)
+    field = FrozenField(given, name)
+    found = solve_at(field, value, virtual)
+    return Equilibria(within(field, asked, found), found.coverage)
 
 
 def solve_at(field: FrozenField, value: float, virtual: bool = False) -> Equilibria:

@@ -13,23 +13,33 @@ from fastslow.diagrams.critical import critical_values
 from fastslow.diagrams.equations import region_equations
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.solving import solve_at
+from fastslow.diagrams.windows import Sides, edges_left, edges_of, known, within
 from fastslow.results.branches import Branch
 from fastslow.results.points import Equilibrium
+from fastslow.results.windows import ROUNDING, StateWindow, typical
 
 Array = NDArray[np.float64]
+
+
+#: Critical values nearer to each other than this part of the range are one, up to rounding.
+SAME = 1e-10
 
 
 class Starts:
     """Equilibria from which branches are traced, solved for once at each value."""
 
-    def __init__(self, field: FrozenField, lower: float, upper: float, inside: int) -> None:
+    def __init__(
+        self, field: FrozenField, lower: float, upper: float, inside: int, window: StateWindow
+    ) -> None:
         self._field = field
         self._over = (lower, upper)
+        self._asked = window
         # the golden ratio keeps the values clear of each other and of round numbers
         parts = [(0.5 + k * 0.6180339887498949) % 1.0 for k in range(inside)]
         spread = [lower + p * (upper - lower) for p in parts]
-        equations = dict.fromkeys(region_equations(field))
-        between = [critical_values(e, lower, upper) for e in equations]
+        equations = self._equations = tuple(dict.fromkeys(region_equations(field)))
+        self._edges = edges_of(window, window.given)
+        between = [critical_values(e, lower, upper, self._edges) for e in equations]
         self.complete = all(b is not None for b in between)
         self._continua = [
             (equation.region, value)
@@ -38,21 +48,43 @@ class Starts:
             if lower <= value <= upper
         ]
         levels = sorted({lower, upper, *(v for b in between for v in b or ())})
-        middles = [0.5 * (a + b) for a, b in pairwise(levels)]
+        least = SAME * (upper - lower)
+        middles = [0.5 * (a + b) for a, b in pairwise(levels) if b - a > least]
         self._first = [lower, upper, *(middles if self.complete else [*middles, *spread])]
         self._found: dict[float, list[Equilibrium]] = {}
-        self._scale: Array | None = None
 
     def at(self, value: float, admissible: bool) -> list[Equilibrium]:
+        """Equilibria in the window."""
+        points = self._asked_at(value, admissible)
+        unit = self.scale[:-1]
+        return [e for e in points if self.window.contains(e.state, unit)]
+
+    def _asked_at(self, value: float, admissible: bool) -> list[Equilibrium]:
+        """Equilibria within the bounds that were asked for."""
         if value not in self._found:
-            self._found[value] = solve_at(self._field, value, virtual=True)
+            solved = solve_at(self._field, value, virtual=True)
+            self._found[value] = within(self._field, self._asked, solved)
         return [e for e in self._found[value] if e.admissible == admissible and not e.continuum]
 
+    @cached_property
+    def window(self) -> StateWindow:
+        """The window asked for, with defaults about the equilibria at the first values."""
+        for admissible in (True, False):
+            points = [e for v in self._first for e in self._asked_at(v, admissible)]
+            if points:
+                break
+        states = np.reshape([e.state for e in points], (-1, self._field.n))
+        return self._asked.around(states, known(self._field, points))
+
     def values(self, branches: Sequence[Branch]) -> Iterable[float]:
-        """The first values, then one between each two special points found so far."""
+        """The first values, then those between edges left and special points found so far."""
         yield from self._first
         done: set[float] = set()
+        left = self._asked.given
         while True:
+            if (now := edges_left(self.window, branches)) != left:
+                left = now
+                yield from self._beside_edges(left)[1]
             special = {p[b.parameter_name] for b in branches for p in b.special}
             levels = sorted({*self._over, *special})
             gap = 1e-6 * (self._over[1] - self._over[0])
@@ -63,13 +95,31 @@ class Starts:
             done |= set(fresh)
             yield from fresh
 
+    def prove(self, branches: Sequence[Branch]) -> bool:
+        """Whether these branches are sure to be all in the window."""
+        return self.complete and self._beside_edges(edges_left(self.window, branches))[0]
+
+    def _beside_edges(self, left: Sides) -> tuple[bool, list[float]]:
+        """Values between those at which an equilibrium is on an edge that a branch has left by.
+
+        A branch that leaves may come back between two values at which equilibria
+        are looked for. With them, whether there can be no others.
+        """
+        edges = tuple(e for e in edges_of(self.window, left) if e not in self._edges)
+        if not edges:
+            return True, []
+        between = [critical_values(e, *self._over, edges) for e in self._equations]
+        levels = sorted({*self._over, *(v for b in between for v in b or ())})
+        middles = [0.5 * (a + b) for a, b in pairwise(levels)]
+        return all(b is not None for b in between), middles
+
     def missed(self, branches: Sequence[Branch]) -> list[tuple[str, float]]:
         """Regions and values at which a continuum of equilibria is part of no branch."""
         near = 1e-9 * (self._over[1] - self._over[0])
         return [
             (self._field.regions[region], value)
             for region, value in self._within
-            if not any(_upright(b, value, near, self.scale()) for b in branches)
+            if not any(_upright(b, value, near, self.scale) for b in branches)
         ]
 
     @cached_property
@@ -86,19 +136,23 @@ class Starts:
             )
         ]
 
+    @cached_property
     def scale(self) -> Array:
         """Unit of each state, the size of its equilibria, and the length of the range."""
-        if self._scale is not None:
-            return self._scale
-        states = [e.state for v in self._first for e in (*self.at(v, True), *self.at(v, False))]
         n = self._field.n
-        size = np.abs(states).max(axis=0) if states else np.zeros(n)
-        spread = np.ptp(states, axis=0) if states else np.zeros(n)
+        both = [e for v in self._first for k in (True, False) for e in self._asked_at(v, k)]
+        table = np.reshape([e.state for e in both], (-1, n))
+        states = table[self.window.contains(table)]
+        size = np.abs(states).max(axis=0, initial=0.0)
+        # a few equilibria near a pole are far away and must not set the unit
+        wide = typical(states, ROUNDING * size)
+        middle = np.median(states, axis=0) if len(states) else np.zeros(n)
+        spread = np.minimum(np.ptp(states, axis=0) if len(states) else np.zeros(n), wide)
+        size = np.minimum(size, np.abs(middle) + wide)
         # far from zero it is the differences that count
-        moved = np.where(spread > 1e-9 * size, np.maximum(spread, 1e-3 * size), size)
+        moved = np.where(spread > ROUNDING * size, np.maximum(spread, 1e-3 * size), size)
         size = np.where(size > 1e-14 * max(size.max(initial=0.0), 1e-300), moved, 1.0)
-        self._scale = np.append(size, self._over[1] - self._over[0])
-        return self._scale
+        return np.append(size, self._over[1] - self._over[0])
 
 
 def _upright(branch: Branch, value: float, near: float, scale: Array) -> bool:
@@ -109,6 +163,8 @@ def _upright(branch: Branch, value: float, near: float, scale: Array) -> bool:
 
 
 @lru_cache(maxsize=64)
-def starts_of(field: FrozenField, lower: float, upper: float, inside: int) -> Starts:
+def starts_of(
+    field: FrozenField, lower: float, upper: float, inside: int, window: StateWindow
+) -> Starts:
     """Where tracing starts, searched for once."""
-    return Starts(field, lower, upper, inside)
+    return Starts(field, lower, upper, inside, window)

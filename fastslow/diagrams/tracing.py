@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import lru_cache
 from typing import Any
@@ -18,6 +18,7 @@ from fastslow.arguments import (
     instance,
     interval,
     items,
+    mapping,
     takes,
 )
 from fastslow.continuation.loops import loop
@@ -35,6 +36,7 @@ from fastslow.results.branches import Branch
 from fastslow.results.diagrams import SEARCHED, Diagram
 from fastslow.results.outcome import Outcome
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
+from fastslow.results.windows import LEFT, state_window
 
 Array = NDArray[np.float64]
 
@@ -56,6 +58,7 @@ ADMISSIBLE = Outcome(
     continuation=instance(Continuation),
     marks=items(finite),
     virtual=flag,
+    window=mapping,
 )
 def continue_equilibria(
     model: Model,
@@ -65,6 +68,7 @@ def continue_equilibria(
     continuation: Continuation | None = None,
     marks: Sequence[float] = (),
     virtual: bool = False,
+    window: Mapping[Any, tuple[float | None, float | None]] | None = None,
 ) -> Diagram:
     """Trace every branch of equilibria of a frozen model over a parameter range.
 
@@ -87,6 +91,12 @@ def continue_equilibria(
         Parameter values at which a point UZ is wanted exactly.
     virtual : bool
         Whether to trace the virtual branches too.
+    window : mapping, optional
+        State to its range (low, high), in its own units: what lies outside is
+        neither looked for nor traced, and a branch that leaves ends exactly on
+        the edge. None in place of an end leaves the default there, an infinite
+        end is no bound. The default is 10⁴ times the size of the equilibria from
+        which branches are traced, and ``diagram.window`` records it.
 
     Returns
     -------
@@ -95,11 +105,11 @@ def continue_equilibria(
     Raises
     ------
     UnknownNameError
-        If the parameter is not one of the model's.
+        If the parameter is not one of the model's, or a name in the window no state.
     ModelError
         If the model is not frozen, or a slow quantity has no value.
     ArgumentError
-        If the range is empty, reversed or not finite, or a mark lies outside.
+        If a range is empty, reversed or not finite, or a mark lies outside.
 
     Examples
     --------
@@ -123,21 +133,22 @@ def continue_equilibria(
         )
     field = _field(model, name)
     continuation = continuation or Continuation()
-    starts = starts_of(field, lower, upper, continuation.starts)
-    window = Window(lower, upper, starts.scale())
+    asked = state_window(model.states, window)
+    starts = starts_of(field, lower, upper, continuation.starts, asked)
+    within = Window(lower, upper, starts.scale, starts.window)
     branches: list[Branch] = []
     for admissible in (True, False) if virtual else (True,):
         for value in starts.values(branches):
             if len(branches) >= continuation.branches:
                 break
             for start in starts.at(value, admissible)[: continuation.branches - len(branches)]:
-                if not any(_passes(field, b, start, value, window) for b in branches):
-                    curve = _traced(field, start, value, window, continuation, admissible)
-                    branches += _branches(field, curve, window, marks, admissible)
-        branches += _switched(field, branches, window, continuation, marks, admissible)
+                if not any(_passes(field, b, start, value, within) for b in branches):
+                    curve = _traced(field, start, value, within, continuation, admissible)
+                    branches += _branches(field, curve, within, marks, admissible)
+        branches += _switched(field, branches, within, continuation, marks, admissible)
     full = len(branches) >= continuation.branches
     missed = starts.missed(branches)
-    sound = all(o.success for branch in branches for o in branch.outcomes)
+    sound = all(o.success or o.code == LEFT for branch in branches for o in branch.outcomes)
     traced = sound and not full and not missed
     corrector = _corrector(field)
     return Diagram(
@@ -146,7 +157,7 @@ def continue_equilibria(
         (lower, upper),
         dict(field.model.parameters),
         tuple(replace(branch, corrector=corrector) for branch in _labelled(branches)),
-        "complete" if starts.complete and traced else "found",
+        "complete" if traced and starts.prove(branches) else "found",
         field.interfaces,
         field.regions,
         _interface_values(field),
@@ -155,6 +166,7 @@ def continue_equilibria(
         _too_many(continuation) if full else _continuum(name, missed) if missed else SEARCHED,
         {quantity: str(law) for quantity, law in model.path.items()},
         asdict(continuation),
+        starts.window,
     )
 
 
@@ -242,6 +254,8 @@ def _switched(
             near = beside(field, region, guess, point.switch * window.weight, guess, window)
             value = float(near.u[-1])
             if not near.converged or not window.lower <= value <= window.upper:
+                continue
+            if not window.contains(near.u):
                 continue
             if field.admissible(region, near.u) != admissible:
                 continue

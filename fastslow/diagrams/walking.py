@@ -13,6 +13,7 @@ from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.two_folds import cut_at_two_fold, two_fold_ahead
 from fastslow.results.outcome import Outcome
+from fastslow.results.windows import MARGIN, ON_EDGE, StateWindow
 
 Array = NDArray[np.float64]
 
@@ -33,15 +34,29 @@ class Window:
         Range of the parameter.
     scale : ndarray, shape (n + 1,)
         Unit of each state and of the parameter.
+    states : StateWindow
+        Range of every state.
     """
 
     lower: float
     upper: float
     scale: Array
+    states: StateWindow
 
     @property
     def weight(self) -> Array:
         return self.scale**-2.0
+
+    def contains(self, u: Array) -> bool:
+        """Whether the states of a point u are in their window."""
+        return bool(self.states.contains(u[:-1], self.scale[:-1]))
+
+    def leads_out(self, u: Array, tangent: Array) -> bool:
+        """Whether a direction from a point on an edge of the window leaves it."""
+        low, high = np.array(self.states.lower), np.array(self.states.upper)
+        slack = ON_EDGE * self.scale[:-1]
+        out = (u[:-1] <= low + slack) & (tangent[:-1] < 0)
+        return bool(np.any(out | (u[:-1] >= high - slack) & (tangent[:-1] > 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,12 +109,14 @@ def walk(
     pieces: list[Piece] = []
     joins: list[int] = []
     first = Piece(region, start[None], tangent[None])
+    low, high = np.array(window.states.lower), np.array(window.states.upper)
+    middle, periods = window.states.middle(), np.zeros(field.n)
     step = continuation.step
     while len(pieces) < PIECES:
         signs = field.signs[region] if bounded else np.zeros(field.compiled.m)
         u, tangents, status, step = loops.loop("trace")(
             field.compiled.address, region, field.values, start, tangent, signs,
-            window.weight, window.lower, window.upper, continuation.reach * window.scale[:-1],
+            window.weight, window.lower, window.upper, low, high, middle, periods,
             max(step, 10 * continuation.smallest_step), continuation.smallest_step,
             continuation.largest_step, continuation.largest_turn, continuation.tolerance,
             continuation.iterations, continuation.points, not joins,
@@ -111,7 +128,8 @@ def walk(
         met = None
         if status in (loops.INTERFACE, loops.SMALL_STEP):
             end = two_fold_ahead(field, region, u, window.scale)
-            if end is not None and window.lower <= end[-1] <= window.upper:
+            inside = end is not None and window.lower <= end[-1] <= window.upper
+            if end is not None and inside and window.contains(end):
                 pieces.append(Piece(region, *cut_at_two_fold(u, tangents, end, window.scale)))
                 return Walk(tuple(pieces), tuple(joins), _two_fold(field, region, end))
         if status == loops.INTERFACE:
@@ -119,13 +137,13 @@ def walk(
             if met is None:
                 status = loops.SMALL_STEP
                 u, tangents = u[:-1], tangents[:-1]
+            elif not window.contains(met[1]):
+                status = loops.WINDOW
             elif not window.lower <= met[1][-1] <= window.upper:
                 status = loops.RANGE
-        if status == loops.RANGE:
-            u, tangents = _cut_at_range(field, region, u, tangents, window)
+        if status in (loops.RANGE, loops.WINDOW):
+            u, tangents, status = _cut(field, region, u, tangents, window, status)
         if status != loops.INTERFACE or met is None:
-            if status == loops.WINDOW:
-                u, tangents = u[:-1], tangents[:-1]
             pieces.append(Piece(region, u, tangents))
             closed = status == loops.CLOSED
             if closed:
@@ -143,6 +161,8 @@ def walk(
             inner = outcome.code == "two-fold" and field.modes[region].sides is not None
             last = None if inner else interface
             return Walk(tuple(pieces), tuple(joins), outcome, last=last)
+        if window.leads_out(corner, beyond[1]):
+            return Walk(tuple(pieces), tuple(joins), _left(field, corner, window), last=interface)
         joins.append(interface)
         region, tangent = beyond
         start = corner
@@ -292,6 +312,48 @@ def _led_into(
     return (beyond, tangent if ahead > 0 else -tangent), _closed()
 
 
+def _cut(
+    field: FrozenField, region: int, u: Array, tangents: Array, window: Window, status: int
+) -> tuple[Array, Array, int]:
+    """Replace the last row, beyond the range or the window, by the first point on an edge."""
+    if not window.contains(u[-1]):
+        edge = _on_window(field, region, u, tangents, window)
+        if edge is None and status == loops.WINDOW:
+            return u[:-1], tangents[:-1], loops.WINDOW
+        if edge is not None and window.lower <= edge[-1] <= window.upper:
+            if np.abs((edge - u[-2]) / window.scale).max() < 1e-13:
+                return u[:-1], tangents[:-1], loops.WINDOW
+            tangent = field.tangent(region, edge, window.weight)[0]
+            u[-1], tangents[-1] = edge, _oriented(tangent, tangents[-1], window)
+            return u, tangents, loops.WINDOW
+    u, tangents = _cut_at_range(field, region, u, tangents, window)
+    return u, tangents, loops.RANGE
+
+
+def _on_window(
+    field: FrozenField, region: int, u: Array, tangents: Array, window: Window
+) -> Array | None:
+    """Where the last step leaves the window of the states: at the first of the edges passed."""
+    before, after = u[-2], u[-1]
+    length = float(np.linalg.norm((after - before) / window.scale))
+    best: tuple[float, Array] | None = None
+    for k in range(field.n):
+        for bound, side in ((window.states.lower[k], -1.0), (window.states.upper[k], 1.0)):
+            if not side * (after[k] - bound) > 0:
+                continue
+            part = float(np.clip((bound - before[k]) / (after[k] - before[k]), 0.0, 1.0))
+            normal = np.zeros(len(after))
+            normal[k] = 1.0
+            guess = before + part * (after - before)
+            found = field.refined(region, guess, window.scale, normal=normal, point=bound * normal)
+            ahead = float(((found.u - before) * window.weight) @ tangents[-2])
+            if found.converged and -1e-6 <= ahead <= 1.5 * length:
+                found.u[k] = bound
+                if window.contains(found.u) and (best is None or ahead < best[0]):
+                    best = ahead, found.u
+    return None if best is None else best[1]
+
+
 def _cut_at_range(
     field: FrozenField, region: int, u: Array, tangents: Array, window: Window
 ) -> tuple[Array, Array]:
@@ -355,6 +417,27 @@ def _full(field: FrozenField, u: Array, continuation: Continuation) -> Outcome:
     )
 
 
+def _left(field: FrozenField, u: Array, window: Window) -> Outcome:
+    """What is said of a branch that ends on an edge of the window of the states."""
+    bounds = np.array([window.states.lower, window.states.upper]).T
+    off = np.abs(u[:-1, None] - bounds) / window.scale[:-1, None]
+    k, side = np.unravel_index(np.argmin(np.where(np.isfinite(off), off, np.inf)), off.shape)
+    name, bound = field.model.states[k], bounds[k, side]
+    if window.states.given[k][side]:
+        return Outcome(
+            "left the window",
+            f"reached {name} = {bound:g}, an edge of the window, at {_where(field, u)}.",
+            True,
+        )
+    return Outcome(
+        "left the window",
+        f"{name} reached {bound:.6g} at {field.parameter} = {u[-1]:.6g}, {MARGIN:g} times the size "
+        "of the equilibria from which branches are traced, and may go to infinity; "
+        f"window={{'{name}': (low, high)}} sets other bounds.",
+        False,
+    )
+
+
 def _outcome(
     status: int,
     field: FrozenField,
@@ -378,13 +461,7 @@ def _outcome(
     if status == loops.CLOSED:
         return _closed()
     if status == loops.WINDOW:
-        k = int(np.argmax(np.abs(u[:-1]) / window.scale[:-1]))
-        return Outcome(
-            "left the window",
-            f"|{field.model.states[k]}| grew beyond {continuation.reach * window.scale[k]:.3g} "
-            f"near {where}; raise Continuation(reach=…) to follow it further.",
-            False,
-        )
+        return _left(field, u, window)
     if status == loops.FULL:
         return _full(field, u, continuation)
     return Outcome(

@@ -22,6 +22,7 @@ from fastslow.results.points import Corrector, Equilibrium, SpecialPoints
 from fastslow.results.result import LIVE, Result
 from fastslow.results.selecting import limits_of
 from fastslow.results.tables import Table
+from fastslow.results.windows import LEFT, StateWindow
 
 #: The usual end of the search for branches.
 SEARCHED = Outcome("searched", "every start was followed.", True)
@@ -62,6 +63,9 @@ class Diagram(Table, Result):
         Of a model frozen along a path, each slow quantity as text in the parameter.
     settings : mapping
         How the branches were traced.
+    window : StateWindow, optional
+        The ranges of the states within which they were: what lies beyond was
+        neither looked for nor traced, and "complete" says nothing of it.
 
     Examples
     --------
@@ -88,6 +92,7 @@ class Diagram(Table, Result):
     outcome: Outcome = SEARCHED
     path: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, float] = field(default_factory=dict)
+    window: StateWindow | None = None
 
     def __len__(self) -> int:
         return len(self.branches)
@@ -260,11 +265,17 @@ class Diagram(Table, Result):
     def _repr_html_(self) -> str:
         return diagram_html(self)
 
+    @property
+    def _within(self) -> str:
+        """The window, where it was asked for or has cut a branch off."""
+        cut = any(o.code == LEFT for branch in self.branches for o in branch.outcomes)
+        return f", {self.window}" if self.window and (self.window.chosen or cut) else ""
+
     def __repr__(self) -> str:
         low, high = self.over
         lines = [
-            f"Diagram of {', '.join(self.states)} over {self.parameter} in [{low:g}, {high:g}] "
-            f"({self.coverage})"
+            f"Diagram of {', '.join(self.states)} over {self.parameter} in [{low:g}, {high:g}]"
+            f"{self._within} ({self.coverage})"
         ]
         if not self.outcome:
             lines.append(f"   {self.outcome}")

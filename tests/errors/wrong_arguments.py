@@ -51,7 +51,19 @@ NEAR = [
     ({"x": "0"}, Wrong, "x = '0'; expected a finite number"),
 ]
 
+WINDOW = [
+    *MAPPING,
+    ({"omga": (0, 1)}, Unknown, "unknown state of the window 'omga'"),
+    ({"x": (1, 0)}, Wrong, "window of x = (1, 0); expected two numbers, the lower one first"),
+    ({"x": (1, 0)}, Wrong, "did you mean (0, 1)?"),
+    ({"x": 3}, Wrong, "window of x = 3; expected two numbers"),
+    ({"x": (0, "1")}, Wrong, "window of x = (0, '1'); expected two numbers"),
+    ({"x": (NAN, 1)}, Wrong, "window of x = (nan, 1); expected two numbers"),
+]
+
 BY_FUNCTION = {
+    "continue_equilibria.window": WINDOW,
+    "equilibria.window": WINDOW,
     "Branch.intersections.other": a("Branch"),
     "Branch.nearest.values": [
         ({"omga": 1.0}, Unknown, "unknown state or parameter 'omga'"),

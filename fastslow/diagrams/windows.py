@@ -1,0 +1,77 @@
+"""Equilibria in a window of the states, and the edges of the window as equations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import sympy as sp
+
+from fastslow.diagrams.fields import FrozenField
+from fastslow.model.structure import real
+from fastslow.results.branches import Branch
+from fastslow.results.points import Equilibrium
+from fastslow.results.windows import LEFT, StateWindow
+
+#: For each state, whether its lower and its upper bound are meant.
+Sides = tuple[tuple[bool, bool], ...]
+
+#: A component below this many times its rounding error counts as zero.
+NOISE = 100.0
+
+
+def edges_of(window: StateWindow, sides: Sides) -> tuple[sp.Expr, ...]:
+    """Functions that vanish on the finite edges among some bounds of a window.
+
+    Examples
+    --------
+    >>> from fastslow.results.windows import state_window
+    >>> edges_of(state_window(("x", "y"), {"y": (0, 0.5)}), ((True, True), (False, True)))
+    (y - 1/2,)
+    """
+    found = []
+    for k, name in enumerate(window.states):
+        for bound, meant in zip((window.lower[k], window.upper[k]), sides[k], strict=True):
+            if meant and np.isfinite(bound):
+                found.append(real(name) - sp.Rational(bound))
+    return tuple(found)
+
+
+def known(field: FrozenField, points: Sequence[Equilibrium]) -> np.ndarray:
+    """Which components of equilibria are more than rounding, shape (m, n)."""
+    found = [
+        np.abs(e.state)
+        > NOISE
+        * field.rounding(
+            field.regions.index(e.region), np.append(e.state, e.parameters[field.parameter])
+        )
+        for e in points
+    ]
+    return np.reshape(found, (-1, field.n)).astype(bool)
+
+
+def within(
+    field: FrozenField, window: StateWindow, points: Sequence[Equilibrium]
+) -> list[Equilibrium]:
+    """Those equilibria that lie in a window.
+
+    What is off an edge by rounding lies on it; it is judged by the size of the
+    state among these equilibria, by one where all are zero.
+    """
+    if not window.chosen:
+        return list(points)
+    states = np.reshape([e.state for e in points], (-1, field.n))
+    size = np.where(known(field, points), np.abs(states), 0.0).max(axis=0, initial=0.0)
+    inside = window.contains(states, np.where(size > 0, size, 1.0))
+    return [e for e, kept in zip(points, inside, strict=True) if kept]
+
+
+def edges_left(window: StateWindow, branches: Sequence[Branch]) -> Sides:
+    """The bounds at which branches have left a window."""
+    bounds = np.array([window.lower, window.upper]).T
+    met = np.zeros(bounds.shape, dtype=bool)
+    for branch in branches:
+        for outcome, row in zip(branch.outcomes, (0, -1), strict=True):
+            if outcome.code == LEFT:
+                met |= branch.state[row][:, None] == bounds
+    return tuple((bool(low), bool(high)) for low, high in met)

@@ -1,0 +1,224 @@
+"""Windows in the states: branches that leave them, by closed forms and NumPy's roots."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+
+x, y, v, p = sp.symbols("x y v p")
+TENTH = sp.Rational(1, 10)
+
+
+def traced(rates, over=(-1, 1), **options):
+    return fs.continue_equilibria(fs.Model(rates, parameters={p: 0.3}), p, over, **options)
+
+
+def rows(diagram):
+    return sum(map(len, diagram))
+
+
+def codes(diagram):
+    return [[o.code for o in branch.outcomes] for branch in diagram]
+
+
+# ---------------------------------------------------------------- to infinity
+
+LEFT, END = "left the window", "end of range"
+
+
+def test_a_quadratic_whose_root_goes_through_infinity():
+    """x = (1 ± √(1 − 2p/5))/(2p): three curves, two of them with a pole at p = 0."""
+    diagram = traced({x: p * x**2 - x + TENTH})
+    assert codes(diagram) == [[END, LEFT], [END, END], [LEFT, END]]
+    assert rows(diagram) < 600
+    assert diagram.coverage == "complete"
+    assert "x in [" in repr(diagram)
+    for branch, side in zip(diagram, (1, -1, 1), strict=True):
+        root = np.sqrt(1 - 0.4 * branch["p"])
+        expected = 0.2 / (1 + root) if side < 0 else (1 + root) / (2 * branch["p"])
+        np.testing.assert_allclose(branch["x"], expected, rtol=1e-13)
+    low, high = diagram.window["x"]
+    assert diagram[0]["x"][-1] == low
+    assert diagram[2]["x"][0] == high
+
+
+def test_a_hyperbola():
+    diagram = traced({x: 1 - p * x})
+    assert codes(diagram) == [[END, LEFT], [LEFT, END]]
+    assert rows(diagram) < 600
+    for branch in diagram:
+        np.testing.assert_allclose(branch["x"] * branch["p"], 1, rtol=1e-13)
+        assert branch.special("LP") == ()
+        assert "may go to infinity" in str(branch.outcome)
+
+
+def test_an_end_at_infinity_is_no_regular_end():
+    (branch, _) = traced({x: 1 - p * x})
+    assert not branch.outcome
+    (branch, _) = traced({x: 1 - p * x}, window={x: (-50, 50)})
+    assert branch.outcome
+    assert branch["x"][-1] == -50
+
+
+@pytest.mark.parametrize("state", [1e-6, 1e6])
+@pytest.mark.parametrize("parameter", [1e-6, 1e6])
+def test_the_default_window_has_no_units(state, parameter):
+    X, P = x / state, p / parameter
+    diagram = traced({x: P * X**2 - X + TENTH}, (-parameter, parameter))
+    plain = traced({x: p * x**2 - x + TENTH})
+    assert codes(diagram) == codes(plain)
+    for branch, other in zip(diagram, plain, strict=True):
+        assert len(branch) == len(other)
+        np.testing.assert_allclose(branch["x"] / state, other["x"], rtol=1e-9)
+        np.testing.assert_allclose(branch["p"] / parameter, other["p"], rtol=1e-9, atol=1e-15)
+
+
+def test_bratu():
+    """u'' + p exp(u) = 0: the upper branch goes to infinity as p → 0."""
+    n = 7
+    states = sp.symbols(f"u1:{n + 1}")
+    padded = (0, *states, 0)
+    rates = {
+        u: (padded[k] - 2 * u + padded[k + 2]) * (n + 1) ** 2 + p * sp.exp(u)
+        for k, u in enumerate(states)
+    }
+    diagram = traced(rates, (0, 4))
+    assert rows(diagram) < 900
+    assert len(diagram.folds) == 1
+    # Keller and Antman (1969): the fold of the boundary value problem is at 3.5138
+    assert diagram.folds[0]["p"] == pytest.approx(3.51, abs=0.03)
+
+
+def numbers(seed):
+    """Coefficients of a cubic in x, of degree two in p, whose first one vanishes within (−1, 1)."""
+    generator = np.random.default_rng(seed)
+    table = generator.integers(-5, 6, (4, 3))
+    table[0] = [4, int(generator.integers(-4, 5)), -1]
+    return table
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_cubics_with_poles(seed):
+    table = numbers(seed)
+    rate = sum(int(c) * x ** (3 - i) * p ** (2 - j) for (i, j), c in np.ndenumerate(table))
+    diagram = traced({x: rate})
+    assert diagram.coverage == "complete"
+    assert any(LEFT in ends for ends in codes(diagram))
+    assert rows(diagram) < 400 * len(diagram)
+    low, high = diagram.window["x"]
+    for value in np.random.default_rng(seed).uniform(-1, 1, 40):
+        roots = np.roots([np.polyval(c, value) for c in table])
+        real = np.sort(roots.real[np.abs(roots.imag) < 1e-9 * np.maximum(1, abs(roots))])
+        found = np.sort([e["x"] for e in diagram.at(p=value)])
+        np.testing.assert_allclose(found, real[(real >= low) & (real <= high)], rtol=1e-6)
+
+
+def test_what_comes_back_is_traced():
+    """x = 1/((p − 1/4)² + 10⁻⁹) − 1/((p + 1/4)² + 10⁻⁹): both peaks are beyond the window."""
+    tiny = sp.Rational(1, 10**9)
+    first, second = (p - sp.Rational(1, 4)) ** 2 + tiny, (p + sp.Rational(1, 4)) ** 2 + tiny
+    diagram = traced({x: first * second * x - second - first})
+    assert diagram.coverage == "complete"
+    assert sorted(codes(diagram)) == [[END, LEFT], [LEFT, END], [LEFT, LEFT]]
+    assert diagram.at(p=0.0)[0]["x"] == pytest.approx(2 / (1 / 16 + 1e-9), rel=1e-12)
+
+
+# ---------------------------------------------------------------- windows asked for
+
+
+def test_a_window_cuts_a_fold():
+    diagram = traced({x: p + x**2}, window={x: (-0.5, 0.25)})
+    (branch,) = diagram
+    assert branch["x"][[0, -1]].tolist() == [-0.5, 0.25]
+    np.testing.assert_allclose(branch["p"][[0, -1]], [-0.25, -0.0625], atol=1e-15)
+    assert codes(diagram) == [[LEFT, LEFT]]
+    assert all(branch.outcomes)
+    assert diagram.coverage == "complete"
+    assert len(diagram.folds) == 1
+    assert "x in [-0.5, 0.25]" in repr(diagram)
+
+
+def test_a_window_at_the_fold_itself():
+    (branch,) = traced({x: p + x**2}, window={x: (0, None)})
+    assert branch["x"].min() == 0
+    assert branch["x"].max() == 1
+    assert len(branch) < 300
+
+
+@pytest.mark.parametrize(("edge", "count"), [(0, 1), (1e-14, 1), (-1e-6, 2), (1e-6, 1)])
+def test_an_edge_tangent_to_the_branch(edge, count):
+    """x = −p² touches 0 and does not cross it; an edge just below cuts it in two."""
+    diagram = traced({x: x + p**2}, window={x: (None, edge)})
+    assert len(diagram) == count
+    assert diagram.coverage == "complete"
+    if count == 2:
+        ends = sorted([diagram[0]["p"][-1], diagram[1]["p"][0]])
+        np.testing.assert_allclose(ends, [-1e-3, 1e-3], rtol=1e-9)
+    assert rows(diagram) < 400
+
+
+def test_a_window_between_all_starts():
+    """Of x² = −p only 0.5 ≤ x ≤ 0.6 is wanted, which no usual start is on."""
+    diagram = traced({x: p + x**2}, window={"x": (0.5, 0.6)})
+    np.testing.assert_allclose(np.sort(diagram[0]["p"][[0, -1]]), [-0.36, -0.25], atol=1e-15)
+
+
+def test_a_window_that_excludes_all():
+    diagram = traced({x: p + x**2}, window={x: (5, 6)})
+    assert len(diagram) == 0
+    assert diagram.coverage == "complete"
+    assert diagram.window["x"] == (5, 6)
+
+
+def test_a_second_state_and_no_bound():
+    """y = 1/p follows x: its bound is met first, however far x may go."""
+    diagram = traced({x: 1 - p * x, y: x / 2 - y}, window={y: (-3, 3), x: (-np.inf, np.inf)})
+    np.testing.assert_allclose([b["y"][e] for b, e in zip(diagram, (-1, 0), strict=True)], [-3, 3])
+    np.testing.assert_allclose(diagram[0]["p"][-1], -1 / 6, rtol=1e-14)
+
+
+def test_a_vertical_branch():
+    """At p = 0 all of y = 0, x is an equilibrium: the line ends on the edges."""
+    diagram = traced({x: p * (1 - x), y: -y}, window={x: (-2, 3)})
+    vertical = [b for b in diagram if np.ptp(b["x"]) > 1]
+    for branch in vertical:
+        assert sorted(branch["x"][[0, -1]].tolist()) == [-2, 3]
+
+
+def test_in_a_filippov_model():
+    """The pseudo-equilibria y = 2p of a switched plane end on the window's edge."""
+    rates = {x: sp.Piecewise((-1, x > 0), (1, True)), y: 2 * p - y}
+    diagram = traced(rates, window={y: (-0.5, 0.5)})
+    (branch,) = diagram
+    assert branch.regions == ("S1|S2",)
+    np.testing.assert_allclose(branch["p"][[0, -1]], [-0.25, 0.25], atol=1e-15)
+    assert codes(diagram) == [[LEFT, LEFT]]
+
+
+def test_an_interface_and_an_edge_in_one_step():
+    """|x| = p + 1/2 with the edge just before, at and behind the corner."""
+    for edge in (-1e-4, 0.0, 1e-4):
+        (branch,) = traced({x: p + sp.Rational(1, 2) - sp.Abs(x)}, window={x: (edge, None)})
+        assert branch["x"].min() == edge
+        assert set(branch.regions) == ({"S1", "S2"} if edge < 0 else {"S1"})
+
+
+def test_equilibria_without_negative_concentrations():
+    """Two competitors: of four equilibria those with both densities at least 0."""
+    rates = {x: x * (1 - x - p * y), y: y * (1 - y - p * x)}
+    model = fs.Model(rates, parameters={p: -2})
+    assert len(fs.equilibria(model)) == 4
+    kept = fs.equilibria(model, window={x: (0, None), "y": (0, None)})
+    assert sorted(e.state.tolist() for e in kept) == [[0, 0], [0, 1], [1, 0]]
+    diagram = fs.continue_equilibria(model, p, (-3, 3), window={x: (0, None), y: (0, None)})
+    assert min(b.state.min() for b in diagram) >= -1e-14
+
+
+def test_the_window_is_kept_in_a_file(tmp_path):
+    diagram = traced({x: 1 - p * x}, window={x: (None, 50)})
+    diagram.save(tmp_path / "hyperbola.npz")
+    again = fs.load(tmp_path / "hyperbola.npz")
+    assert again.window == diagram.window
+    assert repr(again) == repr(diagram)
+    assert again.window.given == ((False, True),)
