@@ -136,7 +136,6 @@ BY_PARAMETER = {
     "progress": FLAG,
     "radius": [*NUMBER, (2, Wrong, "radius = 2; expected a number between 0 and 1")],
     "rate": NUMBER,
-    "reach": POSITIVE,
     "region": [*TEXT, ("S9", Unknown, "unknown region 'S9'; did you mean 'S1'?")],
     "regions": [
         *MAPPING,
