@@ -291,17 +291,19 @@ class FrozenField:
         return [np.flatnonzero(same[k] | (np.arange(count) == k)).tolist() for k in range(count)]
 
     def rounding(self, region: int, u: Array) -> Array:
-        """Bound on the rounding error of each state at an equilibrium, shape (n,).
+        """Bound on the error of each state at an equilibrium, shape (n,).
 
-        ε |J⁻¹| (|J| |x| + |F_p| |p|), in the units of the states; infinite where J is singular.
+        |J⁻¹| (|F| + ε (|J| |x| + |F_p| |p|)), of what is left and of rounding, in the
+        units of the states; infinite where J is singular.
         """
-        _, slopes, _, _ = self.at(region, u)
+        rates, slopes, _, _ = self.at(region, u)
         jacobian = slopes[:, : self.n]
         try:
             inverse = np.linalg.inv(jacobian)
         except np.linalg.LinAlgError:
             return np.full(self.n, np.inf)
-        return np.asarray(np.finfo(float).eps * np.abs(inverse) @ (np.abs(slopes) @ np.abs(u)))
+        rounding = np.finfo(float).eps * (np.abs(slopes) @ np.abs(u))
+        return np.asarray(np.abs(inverse) @ (np.abs(rates) + rounding))
 
     def tangent(self, region: int, u: Array, weight: Array) -> tuple[Array, bool]:
         """Null vector of [F_x F_p], unit in the weighted norm, and whether it is the only one."""

@@ -26,6 +26,7 @@ from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.assembly import Curve, branch_of, joined, rising
 from fastslow.diagrams.equations import region_equations
 from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.seeds import Seeds
 from fastslow.diagrams.solving import point_at
 from fastslow.diagrams.starts import starts_of
 from fastslow.diagrams.walking import Piece, Window, beside, on_interface, walk
@@ -59,6 +60,7 @@ ADMISSIBLE = Outcome(
     marks=items(finite),
     virtual=flag,
     window=mapping,
+    from_points=items(),
 )
 def continue_equilibria(
     model: Model,
@@ -69,6 +71,7 @@ def continue_equilibria(
     marks: Sequence[float] = (),
     virtual: bool = False,
     window: Mapping[Any, tuple[float | None, float | None]] | None = None,
+    from_points: Sequence[Any] | None = None,
 ) -> Diagram:
     """Trace every branch of equilibria of a frozen model over a parameter range.
 
@@ -97,6 +100,10 @@ def continue_equilibria(
         the edge. None in place of an end leaves the default there, an infinite
         end is no bound. The default is 10⁴ times the size of the equilibria from
         which branches are traced, and ``diagram.window`` records it.
+    from_points : sequence, optional
+        Trace only the branches through these points, and look for no others: each an
+        Equilibrium, a SpecialPoint (of a branch point both branches), or a mapping
+        of every state and the parameter to a value near an equilibrium.
 
     Returns
     -------
@@ -109,7 +116,8 @@ def continue_equilibria(
     ModelError
         If the model is not frozen, or a slow quantity has no value.
     ArgumentError
-        If a range is empty, reversed or not finite, or a mark lies outside.
+        If a range is empty, reversed or not finite, a mark lies outside, or a given
+        point is no equilibrium or lies outside the range or the window.
 
     Examples
     --------
@@ -134,7 +142,11 @@ def continue_equilibria(
     field = _field(model, name)
     continuation = continuation or Continuation()
     asked = state_window(model.states, window)
-    starts = starts_of(field, lower, upper, continuation.starts, asked)
+    starts = (
+        starts_of(field, lower, upper, continuation.starts, asked)
+        if from_points is None
+        else Seeds(field, (lower, upper), from_points, asked, virtual)
+    )
     within = Window(lower, upper, starts.scale, starts.window)
     branches: list[Branch] = []
     for admissible in (True, False) if virtual else (True,):
@@ -145,7 +157,8 @@ def continue_equilibria(
                 if not any(_passes(field, b, start, value, within) for b in branches):
                     curve = _traced(field, start, value, within, continuation, admissible)
                     branches += _branches(field, curve, within, marks, admissible)
-        branches += _switched(field, branches, within, continuation, marks, admissible)
+        if from_points is None:
+            branches += _switched(field, branches, within, continuation, marks, admissible)
     full = len(branches) >= continuation.branches
     missed = starts.missed(branches)
     sound = all(o.success or o.code == LEFT for branch in branches for o in branch.outcomes)
@@ -163,10 +176,33 @@ def continue_equilibria(
         _interface_values(field),
         _text(model),
         corrector,
-        _too_many(continuation) if full else _continuum(name, missed) if missed else SEARCHED,
+        _ending(name, full, missed, continuation, from_points),
         {quantity: str(law) for quantity, law in model.path.items()},
         asdict(continuation),
         starts.window,
+    )
+
+
+def _ending(
+    name: str,
+    full: bool,
+    missed: Sequence[tuple[str, float]],
+    continuation: Continuation,
+    from_points: Sequence[Any] | None,
+) -> Outcome:
+    """How the search for branches ended."""
+    if full:
+        return _too_many(continuation)
+    if missed:
+        return _continuum(name, missed)
+    if from_points is None:
+        return SEARCHED
+    count = len(from_points)
+    return Outcome(
+        "from points",
+        f"only branches through the {count} given point{'s' if count > 1 else ''} were traced; "
+        "no others were looked for.",
+        True,
     )
 
 

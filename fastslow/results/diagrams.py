@@ -277,7 +277,7 @@ class Diagram(Table, Result):
             f"Diagram of {', '.join(self.states)} over {self.parameter} in [{low:g}, {high:g}]"
             f"{self._within} ({self.coverage})"
         ]
-        if not self.outcome:
+        if self.outcome.code != SEARCHED.code:
             lines.append(f"   {self.outcome}")
         for number, branch in enumerate(self.branches):
             last = number == len(self.branches) - 1

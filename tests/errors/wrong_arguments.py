@@ -63,6 +63,19 @@ WINDOW = [
 
 BY_FUNCTION = {
     "continue_equilibria.window": WINDOW,
+    "continue_equilibria.from_points": [
+        (3, Wrong, "from_points = 3; expected a sequence"),
+        ([], Wrong, "expected at least one point of a branch"),
+        (
+            [0.5],
+            Wrong,
+            "from_points[0] = 0.5; expected an Equilibrium, a SpecialPoint or a mapping",
+        ),
+        ([{"x": 0.5}], Wrong, "from_points[0] has no value of p"),
+        ([{"x": 0.5, "q": 1}], Unknown, "unknown state or parameter of from_points[0] 'q'"),
+        ([{"x": NAN, "p": 0}], Wrong, "from_points[0]['x'] = nan; expected a finite number"),
+        ([{"x": 0.5, "p": 7}], Wrong, "from_points[0]: p = 7 is outside the range [-1, 1]"),
+    ],
     "equilibria.window": WINDOW,
     "Branch.intersections.other": a("Branch"),
     "Branch.nearest.values": [
