@@ -7,7 +7,6 @@ equations alone: parameter values arrive as an array.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +17,7 @@ from fastslow.compiled.functions import without_recurrence
 from fastslow.compiled.recurrences import Recurrences, scalar_code
 from fastslow.compiled.store import load_generated
 from fastslow.model.model import Model
+from fastslow.model.motions import Motion, drift, motions_of, regions_of
 from fastslow.model.structure import TIME, real
 
 _HEADER = '''"""{what} for {modes} modes of {states} states."""
@@ -50,8 +50,8 @@ class CompiledSeries:
 
     Called with a mode, ``inputs = (t, states, slow states)`` and the parameter
     array, the function fills rows of ``order + 1`` coefficients: states and
-    slow states, slow quantities, interface functions, the two drifts that
-    decide where sliding ends, then work space. In a gradient mode ``inputs``
+    slow states, slow quantities, interface functions, two bounds for each interface
+    that is slid along (see `Motion`), then work space. In a gradient mode ``inputs``
     goes on with the slow quantities, and the output is h, the sum of the
     moduli of its terms, and its gradient by states and slow states. A mode
     beyond all these is the first of them again with only `SHORT` coefficients.
@@ -67,7 +67,7 @@ class CompiledSeries:
     n_states, n_forcing, n_interfaces, n_rows : int
         Numbers of rows: states with slow states, slow quantities, interfaces, and all.
     signs : ndarray of int64, shape (n_modes, n_interfaces)
-        Side of each interface in every mode, 0 on the interface that is slid along.
+        Side of each interface in every mode, 0 on interfaces that are slid along.
     modes : tuple of str
         Region names; sliding between A and B is named ``"A|B"``.
     continuous : ndarray of bool, shape (n_interfaces,)
@@ -76,6 +76,8 @@ class CompiledSeries:
         Functions without a Taylor recurrence. Where there are any, the compiled function
         fills the values of all rows and the rates of states and interface functions alone,
         and its last coefficient is NaN.
+    undecided : tuple of (str, str)
+        Intersections of discontinuities along which no sliding is derived, and why.
     """
 
     address: int
@@ -89,6 +91,7 @@ class CompiledSeries:
     modes: tuple[str, ...]
     continuous: NDArray[np.bool_]
     values_only: tuple[str, ...] = ()
+    undecided: tuple[tuple[str, str], ...] = ()
 
     @property
     def method(self) -> str:
@@ -104,24 +107,13 @@ class CompiledSeries:
 
 
 @dataclass(frozen=True)
-class Mode:
-    """One smooth motion: where it holds, its rates, its slow quantities and sliding drifts."""
-
-    name: str
-    signs: tuple[int, ...]
-    rates: tuple[sp.Expr, ...]
-    laws: tuple[sp.Expr, ...]
-    drifts: tuple[sp.Expr, ...] = ()
-
-
-@dataclass(frozen=True)
 class Equations:
     """Everything that the generated source depends on."""
 
     states: tuple[sp.Symbol, ...]
     quantities: tuple[sp.Symbol, ...]
     interfaces: tuple[sp.Expr, ...]
-    modes: tuple[Mode, ...]
+    modes: tuple[Motion, ...]
     order: int
 
     @property
@@ -142,7 +134,7 @@ class Equations:
 
         modes = tuple(
             replace(
-                mode, rates=rename(mode.rates), laws=rename(mode.laws), drifts=rename(mode.drifts)
+                mode, rates=rename(mode.rates), laws=rename(mode.laws), bounds=rename(mode.bounds)
             )
             for mode in self.modes
         )
@@ -155,6 +147,11 @@ class Equations:
         )
 
     @property
+    def n_bounds(self) -> int:
+        """Number of rows for the bounds of sliding, the same in every mode."""
+        return max(2, *(len(mode.bounds) for mode in self.modes), 0)
+
+    @property
     def moving(self) -> set[sp.Symbol]:
         """All symbols that change with time."""
         return {*self.states, *self.quantities, TIME}
@@ -164,7 +161,7 @@ class Equations:
         """Names of functions for which a Taylor series cannot be generated."""
         used = [*self.interfaces]
         for mode in self.modes:
-            used += [*mode.rates, *mode.laws, *mode.drifts]
+            used += [*mode.rates, *mode.laws, *mode.bounds]
         return tuple(sorted(set().union(*(without_recurrence(e, self.moving) for e in used))))
 
 
@@ -189,12 +186,12 @@ def compile_series(model: Model, order: int) -> CompiledSeries:
     """
     equations = equations_of(model, order)
     if equations not in _compiled:
-        sliding = tuple(_sliding_modes(equations, model))
-        whole = replace(equations, modes=equations.modes + sliding)
+        motions = motions_of(model)
+        whole = replace(equations, modes=(*motions.regions, *motions.sliding))
         if whole.without_recurrence:
             whole = replace(whole, order=min(order, COLLOCATION))
         _compiled[equations] = _compile(
-            whole, np.array(list(model.continuous.values()), dtype=bool)
+            whole, np.array(list(model.continuous.values()), dtype=bool), motions.undecided
         )
     return _compiled[equations]
 
@@ -202,70 +199,20 @@ def compile_series(model: Model, order: int) -> CompiledSeries:
 def equations_of(model: Model, order: int) -> Equations:
     """What the generated source of a model depends on, its regions alone as modes."""
     names = (*model.states, *model.slow_states)
-    modes = tuple(
-        Mode(
-            region.name,
-            tuple(region.signs.values()),
-            tuple(region.rates[n] for n in names),
-            tuple(region.forcing.values()),
-        )
-        for region in model.regions.values()
-    )
     return Equations(
         tuple(map(real, names)),
         tuple(map(real, model.forcing)),
         tuple(i.function for i in model.interfaces.values()),
-        modes,
+        regions_of(model),
         order,
     )
 
 
-def _sliding_modes(equations: Equations, model: Model) -> Iterator[Mode]:
-    """Filippov's sliding motion along each discontinuity, for each pair of regions at it.
-
-    With the drifts a, b of h in the regions h > 0 and h < 0 the motion is
-    (1 - alpha) f_above + alpha f_below, alpha = a / (a - b) (Filippov 1988).
-    """
-    by_signs = {mode.signs: mode for mode in equations.modes}
-    for j, name in enumerate(model.interfaces):
-        pairs = []
-        for signs, above in by_signs.items():
-            below = by_signs.get((*signs[:j], -signs[j], *signs[j + 1 :]))
-            if signs[j] > 0 and below is not None:
-                pairs.append((above, below))
-        if not pairs or model.continuous[name]:
-            continue
-        for above, below in pairs:
-            a = _drift(equations, equations.interfaces[j], above)
-            b = _drift(equations, equations.interfaces[j], below)
-            if sp.expand(a - b) == 0:
-                # h drifts alike on both sides: the flow always crosses
-                continue
-            share = _short(a / (a - b))
-            rates = tuple(
-                f if f == g else _short(f + share * (g - f))
-                for f, g in zip(above.rates, below.rates, strict=True)
-            )
-            signs = (*above.signs[:j], 0, *above.signs[j + 1 :])
-            yield Mode(f"{above.name}|{below.name}", signs, rates, above.laws, (a, b))
-
-
-def _drift(equations: Equations, function: sp.Expr, mode: Mode) -> sp.Expr:
-    """Rate of change of an interface function along a mode."""
-    rates = dict(zip(equations.states, mode.rates, strict=True))
-    rates.update(
-        (w, law.diff(TIME)) for w, law in zip(equations.quantities, mode.laws, strict=True)
-    )
-    drift = function.diff(TIME) + sum(function.diff(s) * rate for s, rate in rates.items())
-    return sp.expand(drift)
-
-
-def _short(expression: sp.Expr) -> sp.Expr:
-    """Cancel common terms of a small expression, so that exact zeros stay exact."""
-    return sp.cancel(expression) if sp.count_ops(expression) <= 150 else expression
-
-
-def _compile(equations: Equations, continuous: NDArray[np.bool_]) -> CompiledSeries:
+def _compile(
+    equations: Equations,
+    continuous: NDArray[np.bool_],
+    undecided: tuple[tuple[str, str], ...],
+) -> CompiledSeries:
     parameters = equations.parameters
     source, n_rows = _source(equations.renamed(), len(parameters))
     module = load_generated(source, "series")
@@ -283,6 +230,7 @@ def _compile(equations: Equations, continuous: NDArray[np.bool_]) -> CompiledSer
         tuple(mode.name for mode in equations.modes),
         continuous,
         equations.without_recurrence,
+        undecided,
     )
 
 
@@ -315,17 +263,17 @@ def _source(equations: Equations, n_parameters: int) -> tuple[str, int]:
     return header + text, n_rows
 
 
-def mode_source(equations: Equations, mode: Mode) -> tuple[list[str], int]:
+def mode_source(equations: Equations, mode: Motion) -> tuple[list[str], int]:
     """Source lines that fill the series of one mode, and the number of its rows."""
     m, q, p = (len(g) for g in (equations.states, equations.quantities, equations.interfaces))
-    targets = [*mode.laws, *equations.interfaces, *mode.drifts]
+    targets = [*mode.laws, *equations.interfaces, *mode.bounds]
     symbols = {s: i for i, s in enumerate(equations.states)}
     outputs = dict(enumerate(targets, start=m))
     reserved: dict[sp.Expr, int] = {}
     for row, expression in outputs.items():
         if expression not in symbols:
             reserved.setdefault(expression, row)
-    work = Recurrences(equations.order, symbols, TIME, reserved, m + q + p + 2)
+    work = Recurrences(equations.order, symbols, TIME, reserved, m + q + p + equations.n_bounds)
     for symbol, law in zip(equations.quantities, mode.laws, strict=True):
         work.name(symbol, work.row(law))
     rates = [work.row(rate) for rate in mode.rates]
@@ -348,15 +296,17 @@ def mode_source(equations: Equations, mode: Mode) -> tuple[list[str], int]:
     return body, work.next
 
 
-def _values_source(equations: Equations, mode: Mode) -> tuple[list[str], int]:
+def _values_source(equations: Equations, mode: Motion) -> tuple[list[str], int]:
     """What a mode fills without recurrences: values, and rates of states and interfaces."""
     columns, m, q = equations.order + 1, len(equations.states), len(equations.quantities)
+    names = [s.name for s in equations.states]
+    laws = dict(zip((s.name for s in equations.quantities), mode.laws, strict=True))
     outputs = {i * columns + 1: rate for i, rate in enumerate(mode.rates)}
     for row, h in enumerate(equations.interfaces, start=m + q):
         outputs[row * columns] = h
-        outputs[row * columns + 1] = _drift(equations, h, mode)
+        outputs[row * columns + 1] = drift(h, names, mode.rates, laws)
     n_rows = m + q + len(equations.interfaces)
-    outputs |= {(n_rows + k) * columns: drift for k, drift in enumerate(mode.drifts)}
+    outputs |= {(n_rows + k) * columns: drift for k, drift in enumerate(mode.bounds)}
     shared, results = sp.cse(
         list(outputs.values()), symbols=sp.numbered_symbols("s", real=True), list=True
     )
@@ -370,7 +320,7 @@ def _values_source(equations: Equations, mode: Mode) -> tuple[list[str], int]:
         f"W[{place}] = {scalar_code(value)}" for place, value in zip(outputs, results, strict=True)
     ]
     # what no recurrence gives
-    return [*body, f"W[{equations.order}] = math.nan"], n_rows + 2
+    return [*body, f"W[{equations.order}] = math.nan"], n_rows + equations.n_bounds
 
 
 def _gradient_source(equations: Equations, function: sp.Expr) -> list[str]:

@@ -7,12 +7,9 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from fastslow.model.interfaces import Region, vanishes_on
 from fastslow.model.model import Model
+from fastslow.model.motions import Motion, motions_of
 from fastslow.model.structure import real
-
-#: Operations up to which a quotient is cancelled, so that exact zeros stay exact.
-SHORT = 150
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +66,10 @@ class Mode:
 
 
 def modes_of(model: Model) -> tuple[Mode, ...]:
-    """Every region of a frozen model, then sliding and escaping for each discontinuity.
+    """Every region of a frozen model, then sliding and escaping along each discontinuity.
+
+    Sliding along several interfaces at once is no mode of a branch; the equilibria
+    within it are found one value at a time (see `fastslow.diagrams.equilibrium_sets`).
 
     Examples
     --------
@@ -80,16 +80,9 @@ def modes_of(model: Model) -> tuple[Mode, ...]:
     ['S1', 'S2']
     """
     functions = tuple(i.function for i in model.interfaces.values())
-    regions = tuple(
-        Mode(
-            region.name,
-            tuple(region.rates[n] for n in model.states),
-            functions,
-            tuple(region.signs[i] for i in model.interfaces),
-        )
-        for region in model.regions.values()
-    )
-    sliding = tuple(_sliding(model, functions))
+    motions = motions_of(model, at_once=1)
+    regions = tuple(Mode(m.name, m.rates, functions, m.signs) for m in motions.regions)
+    sliding = tuple(mode for m in motions.sliding for mode in _both(model, functions, m))
     if not sliding:
         return regions
     # the rows of the drifts bound no region: a constant stands for them
@@ -98,67 +91,20 @@ def modes_of(model: Model) -> tuple[Mode, ...]:
     return (*longer, *sliding)
 
 
-def drift(model: Model, function: sp.Expr, rates: Sequence[sp.Expr]) -> sp.Expr:
-    """Lie derivative ∇h·f of an interface function along rates.
-
-    Examples
-    --------
-    >>> x, y = real("x"), real("y")
-    >>> model = Model({x: y, y: -x})
-    >>> drift(model, x - y**2, [y, -x])
-    2*x*y + y
-    """
-    terms = (function.diff(real(n)) * f for n, f in zip(model.states, rates, strict=True))
-    return sp.expand(sp.Add(*terms))
-
-
-def _sliding(model: Model, functions: Sequence[sp.Expr]) -> Iterator[Mode]:
-    regions = list(model.regions.values())
-    for number, (name, function) in enumerate(zip(model.interfaces, functions, strict=True)):
-        for above, upper in enumerate(regions):
-            below = _across(regions, upper, name)
-            if upper.signs[name] < 0 or below is None:
-                continue
-            f = [upper.rates[n] for n in model.states]
-            g = [regions[below].rates[n] for n in model.states]
-            a, b = drift(model, function, f), drift(model, function, g)
-            if _alike(a, b, function):
-                # the flow crosses wherever it meets the interface transversally
-                continue
-            share = _short(a / (a - b))
-            toward = [function.diff(real(n)) for n in model.states]
-            rates = tuple(
-                (r if r == s else _short(r + share * (s - r))) - function * normal
-                for r, s, normal in zip(f, g, toward, strict=True)
-            )
-            signs = tuple(0 if i == name else upper.signs[i] for i in model.interfaces)
-            for escaping in (False, True):
-                away = -1 if escaping else 1
-                yield Mode(
-                    f"{upper.name}|{regions[below].name}" + " (escaping)" * escaping,
-                    rates,
-                    (*functions, -a, b),
-                    (*signs, away, away),
-                    Sides(number, above, below, escaping, (a, b)),
-                )
-
-
-def _across(regions: Sequence[Region], region: Region, name: str) -> int | None:
-    """The region that differs in the sign of one interface only."""
-    for number, other in enumerate(regions):
-        if [i for i in region.signs if region.signs[i] != other.signs[i]] == [name]:
-            return number
-    return None
-
-
-def _alike(a: sp.Expr, b: sp.Expr, function: sp.Expr) -> bool:
-    """Whether the drifts on both sides are equal on the interface."""
-    difference = sp.expand(a - b)
-    return difference == 0 or vanishes_on(difference, function)
-
-
-def _short(expression: sp.Expr) -> sp.Expr:
-    """Cancel common terms of a short expression with exact numbers."""
-    if expression.has(sp.Float) or sp.count_ops(expression) > SHORT:
-        return expression
-    return sp.cancel(expression)
+def _both(model: Model, functions: Sequence[sp.Expr], motion: Motion) -> Iterator[Mode]:
+    """Sliding along one interface, and escaping from it."""
+    (number,), (above, below) = motion.slides, motion.corners
+    a, b = motion.bounds
+    h = functions[number]
+    rates = tuple(
+        rate - h * h.diff(real(name)) for name, rate in zip(model.states, motion.rates, strict=True)
+    )
+    for escaping in (False, True):
+        away = -1 if escaping else 1
+        yield Mode(
+            motion.name + " (escaping)" * escaping,
+            rates,
+            (*functions, -a, b),
+            (*motion.signs, away, away),
+            Sides(number, above, below, escaping, (a, b)),
+        )

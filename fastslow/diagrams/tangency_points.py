@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from fastslow.arguments import instance, mapping, takes
 from fastslow.continuation.location import newton
 from fastslow.diagrams.equations import DEGREE, STARTS, real_roots
-from fastslow.diagrams.modes import Mode, drift, modes_of
+from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.model import Model, number
+from fastslow.model.motions import drift
 from fastslow.model.structure import real
 from fastslow.results.tangencies import Tangencies, Tangency
 from fastslow.symbolic.elimination import eliminate
@@ -162,7 +163,7 @@ class Contact:
     def equations(self) -> tuple[sp.Expr, sp.Expr]:
         """Functions h and L h of the two unknown states."""
         h = self.mode.rows[self.interface]
-        first = drift(self.model, h, self.mode.rates)
+        first = drift(h, self.model.states, self.mode.rates)
         return tuple(sp.expand(e.subs(self.numbers)) for e in (h, first))
 
     @cached_property
@@ -173,10 +174,11 @@ class Contact:
     def _details(self) -> Any:
         """L²h, L h across the interface, and every h, of the unknowns."""
         h, rates = self.mode.rows[self.interface], self.mode.rates
-        second = drift(self.model, drift(self.model, h, rates), rates)
+        names = self.model.states
+        second = drift(drift(h, names, rates), names, rates)
         other = self.across.rates if self.across is not None else rates
         rows = [i.function for i in self.model.interfaces.values()]
-        whole = [second, drift(self.model, h, other), *rows]
+        whole = [second, drift(h, names, other), *rows]
         exact = [e.subs(self.numbers) for e in whole]
         return sp.lambdify([real(n) for n in self.unknown], exact, "numpy")
 

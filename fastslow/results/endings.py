@@ -19,8 +19,12 @@ def outcome_of(
     start_size: float,
     modes: tuple[str, ...],
     limits: tuple[int, int],
+    undecided: tuple[tuple[str, str], ...] = (),
 ) -> Outcome:
-    """The outcome of a run, from the code of the loop (see `fastslow.simulation.driver`)."""
+    """The outcome of a run, from the code of the loop (see `fastslow.simulation.driver`).
+
+    ``undecided`` names intersections of interfaces without a sliding motion, and why.
+    """
     time = f"t = {end[0]:.10g}"
     if code == 0:
         return Outcome("end of time", f"reached {time}, the end of the time asked for.", True)
@@ -61,23 +65,26 @@ def outcome_of(
     if code == 5:
         return Outcome(
             "not unique",
-            f"at {time} several solutions go on: the fields on the sides of an interface point "
-            "away from it; start a little off the interface to choose one.",
+            f"at {time} the forward motion is not unique: several solutions go on, because the "
+            "fields on the sides of an interface point away from it; start a little off the "
+            "interface to choose one.",
             False,
         )
-    if code == 6 and mode >= 0:
+    if code == 6 and mode >= 0 and undecided:
+        reasons = "; ".join(f"at {where} {why}" for where, why in undecided)
         return Outcome(
-            "not unique",
-            f"at {time}, after {modes[mode]}, the flow slides on several interfaces at once, where "
-            "Filippov's motion is not unique; perturb a parameter or the initial state to see "
-            "which interface comes first.",
+            "not decided",
+            f"at {time}, after {modes[mode]}, the flow reaches several discontinuities at once, "
+            f"where no sliding motion is defined: {reasons}.",
             False,
         )
     if code == 6:
+        since = f", after {modes[mode]}," if mode >= 0 else ""
         return Outcome(
             "no way on",
-            f"no region's motion goes on from the initial state at {time}: it lies outside every "
-            "region, or on several interfaces that all attract; start a little off them.",
+            f"at {time}{since} no motion goes on: the state lies outside every region, or on "
+            "several interfaces where neither a region nor sliding continues; start a little "
+            "off them, or perturb a parameter.",
             False,
         )
     return Outcome(

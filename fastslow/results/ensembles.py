@@ -77,6 +77,8 @@ class Ensemble(Table, Result):
         The model as text.
     settings : mapping
         How they were simulated.
+    undecided : tuple of (str, str)
+        Intersections of discontinuities along which no sliding is derived, and why.
 
     Examples
     --------
@@ -115,6 +117,7 @@ class Ensemble(Table, Result):
     constants: Mapping[str, float] = field(default_factory=dict)
     equations: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict)
+    undecided: tuple[tuple[str, str], ...] = ()
 
     _row = "trajectory"
 
@@ -143,6 +146,7 @@ class Ensemble(Table, Result):
                 float(size[i]),
                 self.modes,
                 self.limits,
+                self.undecided,
             )
             for i in range(len(self))
         )

@@ -56,7 +56,9 @@ def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
     n_rates = n_states + n_interfaces
     start, scale = np.empty(n_rates), np.empty(n_rates)
     rates, defect = np.empty((n_rates, n)), np.empty((n_rates, n + 1))
-    values = np.empty((n_forcing + 2, n + 2))
+    # each interface may be slid along, between two bounds
+    n_bounds = min(2 * n_interfaces, W.shape[0] // columns - drift)
+    values = np.empty((n_forcing + n_bounds, n + 2))
     finite = 0.0
     for i in range(n_rates):
         row = columns * (i if i < n_states else i + n_forcing)
@@ -112,7 +114,7 @@ def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
         return np.nan
     if taken > 12:
         growth = min(growth, 0.9)
-    for k in range(drift + 2):
+    for k in range(drift + n_bounds):
         for j in range(2 if k < n_states else 1, columns):
             W[k * columns + j] = 0.0
     work = np.empty(n + 1)
@@ -123,7 +125,7 @@ def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
         for k in range(n):
             W[row + k + 1] = work[k] * power / (k + 1)
             power /= h
-    for i in range(n_forcing + 2):
+    for i in range(values.shape[0]):
         row = columns * (n_states + i if i < n_forcing else drift + i - n_forcing)
         to_powers(values[i], F[table], n + 1, work)
         power = 1.0
@@ -244,7 +246,7 @@ def check(
     point,
     out,
 ):
-    """Evaluate the rates between the points of a step, and the slow quantities and drifts there.
+    """Evaluate the rates between the points of a step, slow quantities and bounds of sliding.
 
     Returns
     -------
@@ -269,7 +271,7 @@ def check(
                     total += TO_F[table, j, k] * rates[i, k]
             point[1 + i] = start[i] + h * total
         call_address(address, mode, point, parameters, out)
-        for k in range(n_forcing + 2):
+        for k in range(values.shape[0]):
             row = n_states + k if k < n_forcing else drift + k - n_forcing
             values[k, j] = out[row * columns]
             finite += 0.0 * values[k, j] if k < n_forcing else 0.0

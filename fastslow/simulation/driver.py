@@ -6,7 +6,7 @@ import numpy as np
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
-from fastslow.simulation.events import find_event, holds, put_on
+from fastslow.simulation.events import find_event, holds, put_on_all
 from fastslow.simulation.extremes import widen_extremes
 from fastslow.simulation.implicit_steps import (
     DAMPING,
@@ -380,14 +380,13 @@ def drive(
         inputs[0] = t
         for j in range(n_interfaces):
             hit[j] = signs[mode, j] == 0
-            if hit[j]:
-                put_on(address, n_modes, j, inputs, parameters, gradient, n_states)
             # a motion that rests on an interface may leave it in the next step: look again
             on[j] = rests[j]
             choosing = choosing or rests[j]
         if interface >= 0:
             hit[interface] = choosing = True
-            put_on(address, n_modes, interface, inputs, parameters, gradient, n_states)
+        put_on_all(address, n_modes, hit, inputs, parameters, gradient, n_states)
+        if interface >= 0:
             crowd = crowd + 1 if t - last_event <= 1e-13 * max(abs(t), whole) else 0
             last_event = t
             if crowd == CROWD:

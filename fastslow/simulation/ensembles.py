@@ -239,6 +239,7 @@ def simulate_many(
         {n: v for n, v in model.parameters.items() if n not in swept},
         model.equations,
         resolved.recorded(),
+        tuple(dict.fromkeys(u for *_, compiled, _ in groups for u in compiled.undecided)),
     )
 
 

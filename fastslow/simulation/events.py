@@ -6,7 +6,13 @@ import numpy as np
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
-from fastslow.simulation.modes import BEGINNING, interface_noise, scaled
+from fastslow.simulation.modes import (
+    BEGINNING,
+    bounds_of,
+    interface_noise,
+    scaled,
+    turned_round,
+)
 from fastslow.simulation.polynomials import (
     EPSILON,
     ONE,
@@ -50,11 +56,13 @@ def find_event(
         rests[j] = False
         sign = signs[mode, j]
         if sign == 0:
+            row, several = bounds_of(signs, mode, j, drift)
+            turned = turned_round(W, row, several, order + 1)
             for k in range(2):
-                scaled(W, drift + k, order, h, b)
+                scaled(W, row + k, order, h, b)
                 small = 32.0 * EPSILON * abs(b[0])
                 start = ZERO
-                if b[0] * (2 * k - 1) <= 0.0:
+                if b[0] * (2 * k - 1) * turned <= 0.0:
                     start = first_strong(b, ONE, order, small)
                     if start > order:
                         continue
@@ -146,3 +154,50 @@ def put_on(address, n_modes, j, inputs, parameters, gradient, n_states):
     if square > 0.0:
         for i in range(n_states):
             inputs[1 + i] -= gradient[0] * gradient[2 + i] / square
+
+
+@part
+def put_on_all(address, n_modes, hit, inputs, parameters, gradient, n_states):
+    """Move the state onto every interface that is marked, by the least-norm Newton step.
+
+    Of interfaces that coincide, or whose gradients depend on one another, the first decide.
+    """
+    count = ZERO
+    for j in range(hit.shape[0]):
+        count += hit[j]
+    if count == 0:
+        return
+    if count == 1:
+        for j in range(hit.shape[0]):
+            if hit[j]:
+                put_on(address, n_modes, j, inputs, parameters, gradient, n_states)
+        return
+    # gradients made orthogonal one after the other (Gram and Schmidt), each with what is
+    # left of its function's value once the moves along those before are made
+    basis, move = np.zeros((count, n_states)), np.zeros(n_states)
+    kept = ZERO
+    for j in range(hit.shape[0]):
+        if not hit[j]:
+            continue
+        call_address(address, n_modes + j, inputs, parameters, gradient)
+        value = whole = left = 0.0
+        value = gradient[0]
+        for i in range(n_states):
+            whole += gradient[2 + i] * gradient[2 + i]
+            value += gradient[2 + i] * move[i]
+            basis[kept, i] = gradient[2 + i]
+        for k in range(kept):
+            along = size = 0.0
+            for i in range(n_states):
+                along += basis[kept, i] * basis[k, i]
+                size += basis[k, i] * basis[k, i]
+            for i in range(n_states):
+                basis[kept, i] -= along / size * basis[k, i]
+        for i in range(n_states):
+            left += basis[kept, i] * basis[kept, i]
+        if left > 1e-12 * whole:
+            for i in range(n_states):
+                move[i] -= value * basis[kept, i] / left
+            kept += 1
+    for i in range(n_states):
+        inputs[1 + i] += move[i]

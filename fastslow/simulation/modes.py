@@ -268,7 +268,9 @@ def choose_mode(
                     scaled(W, first_h + j, order, BEGINNING * shared, b)
                     score = min(score, agreement(b, order, noise[j], signs[mode, j]))
                 else:
-                    score = min(score, slides(W, drift, order, BEGINNING * shared, noise[j], b))
+                    row, several = bounds_of(signs, mode, j, drift)
+                    length = BEGINNING * shared
+                    score = min(score, slides(W, row, several, order, length, noise[j], b))
             if score > best_score:
                 best, best_score, equals = mode, score, 1
             elif score == best_score and best != NO_MODE:
@@ -282,18 +284,42 @@ def choose_mode(
 
 
 @part
-def slides(W, drift, order, h, noise, b):
-    """Whether the fields of both sides point at the interface, a < 0 < b, now or next.
+def bounds_of(signs, mode, j, first):
+    """The first of the two rows that bound sliding along an interface, and whether others slide.
 
-    A drift that moves h by less than its noise decides as little here as it
-    does of the motion to that side: where sliding ends, one of them goes on.
+    The rows follow one another in the order of the interfaces that are slid along.
+    """
+    before = count = ZERO
+    for i in range(signs.shape[1]):
+        if signs[mode, i] == 0:
+            before += i < j
+            count += 1
+    return first + 2 * before, count > 1
+
+
+@part
+def slides(W, row, several, order, h, noise, b):
+    """Whether sliding goes on along an interface: its two bounds have opposite signs, now or next.
+
+    Along a single interface these are the drifts on both sides, and both point at the
+    interface, a < 0 < b; along several, the weight of one lies between −1 and 1 in
+    either order of the signs. A drift that moves h by less than its noise decides as
+    little here as it does of the motion to that side: where sliding ends, one of
+    them goes on.
     """
     columns = order + 1
-    small = 32.0 * EPSILON * (abs(W[drift * columns]) + abs(W[(drift + 1) * columns]))
+    small = 32.0 * EPSILON * (abs(W[row * columns]) + abs(W[(row + 1) * columns]))
     small = max(small, noise / h)
+    turned = turned_round(W, row, several, columns)
     for k in range(2):
-        scaled(W, drift + k, order, h, b)
+        scaled(W, row + k, order, h, b)
         first = first_strong(b, ZERO, order, small)
-        if first > order or b[first] * (2 * k - 1) < 0.0:
+        if first > order or b[first] * (2 * k - 1) * turned < 0.0:
             return DISAGREES
     return AGREES
+
+
+@part
+def turned_round(W, row, several, columns):
+    """−1 where the first of two bounds is the positive one, else 1."""
+    return -1.0 if several and W[row * columns] > W[(row + 1) * columns] else 1.0

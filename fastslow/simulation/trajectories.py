@@ -225,7 +225,14 @@ def simulate(
         period,
         between,
         outcome_of(
-            code, mode, end, n_steps, float(np.abs(begin).max()), compiled.modes, resolved.limits
+            code,
+            mode,
+            end,
+            n_steps,
+            float(np.abs(begin).max()),
+            compiled.modes,
+            resolved.limits,
+            compiled.undecided,
         ),
         (span[0], float(end[0])),
         end,

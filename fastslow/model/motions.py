@@ -1,0 +1,346 @@
+"""The smooth motions of a model: its regions, and sliding along its discontinuities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+from math import prod
+
+import sympy as sp
+
+from fastslow.model.interfaces import vanishes_on
+from fastslow.model.model import Model
+from fastslow.model.structure import TIME, real
+
+#: Operations up to which a quotient is cancelled, so that exact zeros stay exact.
+SHORT = 150
+
+#: Operations up to which a drift is expanded, for the same reason.
+EXPANDED = 2000
+
+#: Motions up to which sliding on one more interface at a time is derived: every motion is
+#: compiled, and m contacts with dry friction have 3**m.
+MOST = 128
+
+Pattern = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One smooth motion: that of a region, or sliding along one or several interfaces.
+
+    Sliding along the interfaces I with the rates f₀ + Σ bᵢ sᵢ, sᵢ = sign hᵢ, solves
+    0 = ḣ_I = a + B s for s, with B_ij = ∇hᵢ·b_j, and holds where every |sᵢ| < 1
+    (Filippov 1988). Its name joins the two regions that it lies between: those
+    in which all functions hᵢ are positive, and negative.
+
+    Parameters
+    ----------
+    name : str
+    signs : tuple of int
+        Sign of every interface function; 0 along the interfaces that are slid along.
+    rates : tuple of sympy.Expr
+        Of states and slow states.
+    laws : tuple of sympy.Expr
+        Of the slow quantities.
+    corners : tuple of int
+        Numbers of the regions around: 2**m of them for sliding along m interfaces, the
+        one where all are positive first.
+    bounds : tuple of sympy.Expr
+        Two for each interface that is slid along: the drift of hᵢ along the motion with
+        sᵢ = 1 and along that with sᵢ = −1, both sliding along the other interfaces. One
+        is negative and one positive just where |sᵢ| < 1.
+    weights : tuple of sympy.Expr
+        sᵢ for each of them.
+    """
+
+    name: str
+    signs: Pattern
+    rates: tuple[sp.Expr, ...]
+    laws: tuple[sp.Expr, ...]
+    corners: tuple[int, ...] = ()
+    bounds: tuple[sp.Expr, ...] = ()
+    weights: tuple[sp.Expr, ...] = ()
+
+    @property
+    def slides(self) -> tuple[int, ...]:
+        """Numbers of the interfaces that are slid along."""
+        return tuple(j for j, sign in enumerate(self.signs) if sign == 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """All smooth motions of a model: regions, then sliding along one, two, … interfaces.
+
+    Parameters
+    ----------
+    regions, sliding : tuple of Motion
+    undecided : tuple of (str, str)
+        Intersections of discontinuities for which no sliding motion is derived, and why.
+    """
+
+    regions: tuple[Motion, ...]
+    sliding: tuple[Motion, ...]
+    undecided: tuple[tuple[str, str], ...] = ()
+
+
+def regions_of(model: Model) -> tuple[Motion, ...]:
+    """The motion of every region of a model."""
+    return tuple(
+        Motion(
+            region.name,
+            tuple(region.signs[i] for i in model.interfaces),
+            tuple(region.rates[n] for n in (*model.states, *model.slow_states)),
+            tuple(region.forcing[n] for n in model.forcing),
+            (number,),
+        )
+        for number, region in enumerate(model.regions.values())
+    )
+
+
+def motions_of(model: Model, *, at_once: int | None = None, most: int = MOST) -> Motions:
+    """Derive the smooth motions of a model.
+
+    Parameters
+    ----------
+    model : Model
+    at_once : int, optional
+        Number of interfaces slid along at once, at most.
+    most : int
+        Number of motions past which sliding on more interfaces at once is not derived.
+
+    Examples
+    --------
+    >>> x, y, v = sp.symbols("x y v")
+    >>> both = motions_of(Model({x: -sp.sign(x) + y, y: -2 * sp.sign(y)}))
+    >>> [m.name for m in both.sliding]
+    ['S1|S3', 'S2|S4', 'S1|S2', 'S3|S4', 'S1|S4']
+    >>> both.sliding[-1].weights
+    (y, 0)
+
+    Across a continuous interface, or one that is crossed at the same speed, nothing slides:
+
+    >>> motions_of(Model({x: -sp.Abs(x)})).sliding
+    ()
+    """
+    return _Derivation(model, most).motions(at_once)
+
+
+def drift(
+    function: sp.Expr,
+    names: Sequence[str],
+    rates: Sequence[sp.Expr],
+    laws: Mapping[str, sp.Expr] | None = None,
+) -> sp.Expr:
+    """Rate of change of a function along rates, ∂h/∂t + ∇h·f.
+
+    Examples
+    --------
+    >>> x, y = real("x"), real("y")
+    >>> drift(x - y**2, ["x", "y"], [y, -x])
+    2*x*y + y
+    """
+    moving = dict(zip(names, rates, strict=True))
+    moving |= {name: law.diff(TIME) for name, law in (laws or {}).items()}
+    terms = [function.diff(TIME)]
+    for name, rate in moving.items():
+        slope = function.diff(real(name))
+        if slope != 0:
+            terms.append(slope * rate)
+    total = sp.Add(*terms)
+    return sp.expand(total) if sp.count_ops(total) <= EXPANDED else total
+
+
+class _Derivation:
+    """The regions of one model by their sign patterns, and what slides between them."""
+
+    def __init__(self, model: Model, most: int) -> None:
+        self.model, self.most = model, most
+        self.names = (*model.states, *model.slow_states)
+        self.functions = tuple(i.function for i in model.interfaces.values())
+        self.regions = regions_of(model)
+        self.numbers = {region.signs: k for k, region in enumerate(self.regions)}
+        self.undecided: list[tuple[str, str]] = []
+
+    def motions(self, at_once: int | None) -> Motions:
+        jumping = [j for j, name in enumerate(self.model.interfaces) if self._jumps(j, name)]
+        sliding: list[Motion] = []
+        for m in range(1, min(len(jumping), at_once or len(jumping)) + 1):
+            faces = [
+                (along, corners)
+                for along in combinations(jumping, m)
+                for corners in self._faces(along)
+            ]
+            if m > 1 and len(self.regions) + len(sliding) + len(faces) > self.most:
+                why = f"more than {self.most} smooth motions; {m} interfaces at once are too many"
+                self.undecided.append((f"{m} of {len(jumping)} interfaces", why))
+                break
+            sliding += [s for face in faces if (s := self._slide(*face)) is not None]
+        return Motions(self.regions, tuple(sliding), tuple(self.undecided))
+
+    def _jumps(self, j: int, name: str) -> bool:
+        """Whether any rate may jump across an interface."""
+        pairs = list(self._faces((j,)))
+        alike = all(
+            self.regions[a].rates == self.regions[b].rates
+            and self.regions[a].laws == self.regions[b].laws
+            for a, b in pairs
+        )
+        return bool(pairs) and not alike and not self.model.continuous[name]
+
+    def _faces(self, along: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+        """The regions around every common zero of some interfaces, + before −."""
+        for signs in self.numbers:
+            if all(signs[j] > 0 for j in along):
+                corners = []
+                for side in product((1, -1), repeat=len(along)):
+                    corner = list(signs)
+                    for j, s in zip(along, side, strict=True):
+                        corner[j] = s
+                    corners.append(self.numbers.get(tuple(corner)))
+                if None not in corners:
+                    yield tuple(k for k in corners if k is not None)
+
+    def _slide(self, along: tuple[int, ...], corners: tuple[int, ...]) -> Motion | None:
+        if len(along) == 1:
+            return self._along_one(along[0], corners)
+        return self._along_several(along, corners)
+
+    def _drift(self, j: int, rates: Sequence[sp.Expr], laws: Sequence[sp.Expr]) -> sp.Expr:
+        by_name = dict(zip(self.model.forcing, laws, strict=True))
+        return drift(self.functions[j], self.names, rates, by_name)
+
+    def _along_one(self, j: int, corners: tuple[int, ...]) -> Motion | None:
+        """Filippov's convex combination (1 − α) f₁ + α f₂ with α = a/(a − b)."""
+        above, below = (self.regions[k] for k in corners)
+        a, b = (self._drift(j, side.rates, side.laws) for side in (above, below))
+        if _vanishes(a - b, [self.functions[j]]):
+            # the flow crosses wherever it meets the interface transversally
+            return None
+        share = _short(a / (a - b))
+        rates = [
+            f if f == g else _short(f + share * (g - f))
+            for f, g in zip(above.rates, below.rates, strict=True)
+        ]
+        return self._sliding((j,), corners, rates, (a, b), (_short(1 - 2 * share),))
+
+    def _along_several(self, along: tuple[int, ...], corners: tuple[int, ...]) -> Motion | None:
+        """The rates f₀ + Σ bᵢ sᵢ with the weights that keep every hᵢ, by Cramer's rule."""
+        count = len(along)
+        sides = list(product((1, -1), repeat=count))
+        heights = [self.functions[j] for j in along]
+        values = [(*self.regions[k].rates, *self.regions[k].laws) for k in corners]
+        parts: dict[tuple[int, ...], list[sp.Expr]] = {}
+        for used in product((0, 1), repeat=count):
+            factors = [prod(s for s, u in zip(side, used, strict=True) if u) for side in sides]
+            columns = zip(*values, strict=True)
+            parts[used] = [_mean(factors, column) for column in columns]
+        mixed = [part for used, part in parts.items() if sum(used) > 1]
+        if not all(_vanishes(e, heights) for part in mixed for e in part):
+            self._undecided(along, "the rates there are no sum of one jump for each interface")
+            return None
+        units = [tuple(int(i == k) for i in range(count)) for k in range(count)]
+        n = len(self.names)
+        base, laws = parts[(0,) * count][:n], self.regions[corners[0]].laws
+        jumps = [parts[unit][:n] for unit in units]
+        a = sp.Matrix([self._drift(j, base, laws) for j in along])
+        matrix = sp.Matrix(
+            [[drift(self.functions[j].subs(TIME, 0), self.names, b) for b in jumps] for j in along]
+        )
+        whole = _determinant(matrix)
+        if _vanishes(whole, heights):
+            self._undecided(along, "the jumps of their drifts are a singular matrix")
+            return None
+        weights, bounds = [], []
+        for i in range(count):
+            replaced = matrix.copy()
+            replaced[:, i] = -a
+            share = _determinant(replaced)
+            others = [k for k in range(count) if k != i]
+            minor = _determinant(matrix.extract(others, others))
+            over = 1 if _vanishes(minor, heights) else minor
+            weights.append(_short(share / whole))
+            if over == 1:
+                bounds += [_short(share / whole - 1), _short(share / whole + 1)]
+            else:
+                bounds += [_short((whole - share) / over), _short((-whole - share) / over)]
+        rates = [
+            _short(sp.Add(f, *(b[k] * s for b, s in zip(jumps, weights, strict=True))))
+            for k, f in enumerate(base)
+        ]
+        return self._sliding(along, corners, rates, tuple(bounds), tuple(weights))
+
+    def _undecided(self, along: tuple[int, ...], why: str) -> None:
+        names = list(self.model.interfaces)
+        entry = (" and ".join(f"{names[j]} = 0" for j in along), why)
+        if entry not in self.undecided:
+            self.undecided.append(entry)
+
+    def _sliding(
+        self,
+        along: tuple[int, ...],
+        corners: tuple[int, ...],
+        rates: list[sp.Expr],
+        bounds: tuple[sp.Expr, ...],
+        weights: tuple[sp.Expr, ...],
+    ) -> Motion:
+        first, last = self.regions[corners[0]], self.regions[corners[-1]]
+        for j in along:
+            held = self._held(self.functions[j])
+            if held is not None:
+                # what is slid along is one state: it does not move at all
+                rates[held] = sp.Integer(0)
+        signs = tuple(0 if j in along else sign for j, sign in enumerate(first.signs))
+        name = f"{first.name}|{last.name}"
+        return Motion(name, signs, tuple(rates), first.laws, corners, bounds, weights)
+
+    def _held(self, function: sp.Expr) -> int | None:
+        """The state that keeps a constant value where a function vanishes, if it is one."""
+        moving = {real(n) for n in (*self.names, *self.model.forcing)} | {TIME}
+        used = function.free_symbols & moving
+        if len(used) != 1:
+            return None
+        name = next(iter(used)).name
+        return self.names.index(name) if name in self.names else None
+
+
+def _mean(factors: Sequence[int], values: Sequence[sp.Expr]) -> sp.Expr:
+    first = values[0]
+    if all(value == first for value in values):
+        return first if all(f == 1 for f in factors) else sp.Integer(0)
+    total = sp.Add(*(f * v for f, v in zip(factors, values, strict=True)))
+    total = total / len(values)
+    return sp.expand(total) if sp.count_ops(total) <= EXPANDED else total
+
+
+def _vanishes(expression: sp.Expr, heights: Sequence[sp.Expr]) -> bool:
+    """Whether an expression is zero where some functions are, each solved for one symbol."""
+    expression = sp.expand(expression) if sp.count_ops(expression) <= EXPANDED else expression
+    if expression == 0:
+        return True
+    left = list(heights)
+    while len(left) > 1:
+        height = left.pop(0)
+        for symbol in sorted(height.free_symbols, key=lambda s: s.name):
+            slope = height.diff(symbol)
+            if slope != 0 and symbol not in slope.free_symbols:
+                root = sp.expand(symbol - height / slope)
+                expression = expression.subs(symbol, root)
+                left = [h.subs(symbol, root) for h in left]
+                break
+    return vanishes_on(expression, left[0])
+
+
+def _determinant(matrix: sp.Matrix) -> sp.Expr:
+    if matrix.is_diagonal() or matrix.is_upper or matrix.is_lower:
+        return sp.Mul(*matrix.diagonal())
+    value = matrix.det(method="berkowitz")
+    return sp.expand(value) if sp.count_ops(value) <= EXPANDED else value
+
+
+def _short(expression: sp.Expr) -> sp.Expr:
+    """Cancel common terms of a short expression with exact numbers."""
+    if expression.has(sp.Float) or sp.count_ops(expression) > SHORT:
+        return expression
+    return sp.cancel(expression)

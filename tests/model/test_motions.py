@@ -1,0 +1,87 @@
+"""The smooth motions of a model: regions, and sliding along its discontinuities."""
+
+import numpy as np
+import sympy as sp
+
+import fastslow as fs
+from fastslow.compiled.series import compile_series
+from fastslow.diagrams.modes import modes_of
+from fastslow.model.motions import motions_of
+
+x, y, z, v, p = sp.symbols("x y z v p", real=True)
+
+
+def names(model, **options):
+    return [motion.name for motion in motions_of(model, **options).sliding]
+
+
+def test_an_interface_crossed_at_one_speed_has_no_sliding_motion_anywhere():
+    # y' jumps across x = 0, but x' does not there
+    model = fs.Model({x: sp.Piecewise((1 + x, x > 0), (1, True)), y: sp.sign(x) - y})
+    assert not model.continuous["x"]
+    assert names(model) == []
+    assert compile_series(model, 16).modes == ("S1", "S2")
+    assert [mode.name for mode in modes_of(model)] == ["S1", "S2"]
+
+
+def test_a_continuous_model_slides_nowhere():
+    f = sp.Max(x - y, 0) / (1 + sp.Max(x + y, 2 * x))
+    assert names(fs.Model({x: -f, y: f - y})) == []
+
+
+def test_runs_and_diagrams_have_the_same_sliding_motions():
+    model = fs.Model({x: v, v: -x - sp.sign(v) / 2 - sp.sign(x) + p}, parameters={p: 0})
+    compiled = compile_series(model, 16).modes
+    sliding = [m.name for m in modes_of(model) if m.sides is not None and not m.sides.escaping]
+    assert sliding == list(compiled[4:6])
+    # along x = 0 nothing slides: x' = v does not jump there, but does along both at v = 0
+    assert len(compiled) == 6
+
+
+def test_weights_of_sliding_along_two_interfaces():
+    # with the weights s in place of the signs both functions keep still
+    rates = {x: p - 2 * sp.sign(x) - sp.sign(y), y: x + sp.sign(x) - 3 * sp.sign(y)}
+    model = fs.Model(rates, parameters={p: 1}, interfaces={"x": x, "y": y})
+    both = motions_of(model).sliding[-1]
+    assert both.signs == (0, 0)
+    assert both.rates == (0, 0)
+    first, second = both.weights
+    left = [p - 2 * first - second, x + first - 3 * second]
+    assert [sp.simplify(e) for e in left] == [0, 0]
+    # each bound is the drift of one function while the other is slid along
+    one = {m.signs: m for m in motions_of(model, at_once=1).sliding}
+    at = {x: 0, y: 0}
+    assert sp.simplify((both.bounds[0] - one[1, 0].rates[0]).subs(at)) == 0
+    assert sp.simplify((both.bounds[3] - one[0, -1].rates[1]).subs(at)) == 0
+
+
+def test_products_of_signs_are_left_undecided():
+    rates = {x: -sp.sign(x) * (2 + sp.sign(y)), y: -sp.sign(y)}
+    model = fs.Model(rates, interfaces={"x": x, "y": y})
+    motions = motions_of(model)
+    assert [m.signs.count(0) for m in motions.sliding] == [1, 1, 1, 1]
+    assert motions.undecided == (
+        ("x = 0 and y = 0", "the rates there are no sum of one jump for each interface"),
+    )
+
+
+def test_parallel_interfaces_are_not_slid_along_together():
+    rates = {x: -sp.sign(x - 1) - sp.sign(x + 1) + y, y: -y}
+    assert all(m.signs.count(0) == 1 for m in motions_of(fs.Model(rates)).sliding)
+
+
+def test_the_number_of_motions_has_a_limit():
+    states = sp.symbols("x1:5")
+    chain = fs.Model({s: -sp.sign(s) + sum(states) for s in states})
+    assert len(motions_of(chain).sliding) == 3**4 - 2**4
+    few = motions_of(chain, most=60)
+    assert np.unique([m.signs.count(0) for m in few.sliding]).tolist() == [1]
+    assert "more than 60" in few.undecided[0][1]
+
+
+def test_sliding_that_the_first_derivatives_do_not_determine_is_left_undecided():
+    # x' = v does not depend on the signs: nothing keeps both x and v
+    model = fs.Model({x: v, v: -sp.sign(x) - sp.sign(v) / 2})
+    ((where, why),) = motions_of(model).undecided
+    assert "= 0 and " in where
+    assert "singular" in why
