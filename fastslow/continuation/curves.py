@@ -73,6 +73,17 @@ class Frame:
         weight[: self.size] = self.scale[: self.size] ** -2.0
         return weight
 
+    def stretch(self, z: Array, along: Array) -> float:
+        """How much longer a step may be where states are larger than their unit.
+
+        The same relative change of a large state is then one step, so that a
+        curve that goes to infinity has as many rows in every decade.
+        """
+        size = self.scale[: self.size].copy()
+        states = self.size - 2
+        size[:states] = np.maximum(size[:states], np.abs(z[:states]))
+        return float(1.0 / np.linalg.norm(along[: self.size] / size))
+
     def outside(self, z: Array) -> bool:
         plane = z[self.size - 2 : self.size]
         return bool(np.any(plane < self.lower) or np.any(plane > self.upper))
@@ -202,9 +213,10 @@ def follow(
         if stop(z):
             return np.array(rows), np.array(tangents), STOPPED
         if used <= 3 and cosine > np.cos(0.5 * continuation.largest_turn):
-            step = min(1.5 * step, continuation.largest_step)
+            step *= 1.5
         elif used >= 6:
             step *= 0.7
+        step = min(step, continuation.largest_step * frame.stretch(z, turned))
     return np.array(rows), np.array(tangents), FULL
 
 

@@ -104,7 +104,7 @@ def branch_of(
     region = np.repeat(names, [len(t[0]) for t in tables])
     if not curve.closed:
         special, at_row = _with_ends(field, curve, special, at_row, rows)
-    source = Source(field.model, window.scale[:-1], window.states)
+    source = Source(field.model, _sizes(u[:, :-1], window.scale[:-1]), window.states)
     return Branch(
         field.model.states,
         field.parameter,
@@ -120,6 +120,12 @@ def branch_of(
         admissible,
         dict(field.model.parameters),
     )
+
+
+def _sizes(states: Array, scale: Array) -> Array:
+    """Typical size of every state on a branch; its unit where it is zero on most of it."""
+    typical = np.median(np.abs(states), axis=0)
+    return np.where(typical > 1e-12 * scale, typical, scale)
 
 
 def _special(

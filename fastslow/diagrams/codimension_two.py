@@ -2,30 +2,42 @@
 
 Each has a test function that changes sign along the curve; the point itself is
 solved for as the curve's equations and the test together (Kuznetsov 2004,
-sections 8.7 and 10.3).
+sections 8.7 and 10.3). Every test is a pure number: it does not change with the
+units of states and time, nor with the rates of states that do not take part.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.continuation import curves
 from fastslow.continuation.curves import Frame
 from fastslow.continuation.location import newton
-from fastslow.diagrams.defining import Defining, OnInterface, Pair
-from fastslow.diagrams.detection import pair_sums
+from fastslow.continuation.settings import Continuation
+from fastslow.continuation.zeros import ROUNDING, Bracket, Node, brackets
+from fastslow.diagrams.defining import Defining, OnInterface, Pair, row_sizes
 from fastslow.diagrams.normal_forms import (
     Vector,
     cusp_form,
-    first_lyapunov,
     fold_form,
     forms_at,
+    lyapunov_terms,
 )
 
 Array = NDArray[np.float64]
+
+#: A pair is imaginary where the product of both is more than this part of their sizes.
+IMAGINARY = 1e-9
+
+#: Halvings of a bracket after which Newton's method is tried again.
+TRIALS = (0, 2, 5, 10, 20, 40)
+
+#: A test that is still this large after the last halvings jumps there and has no zero.
+JUMP = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +49,8 @@ class Criterion:
     code : str
         What its zero is.
     value : callable
-        z to a number that is smooth near the zero.
+        z to the test, which is smooth near its zeros, and the size of the terms that it
+        is the sum of: less than rounding of that size is zero.
     genuine : callable
         Whether a zero at z is one of that kind.
     region : int
@@ -47,7 +60,7 @@ class Criterion:
     """
 
     code: str
-    value: Callable[[Array], float]
+    value: Callable[[Array], tuple[float, float]]
     genuine: Callable[[Array], bool]
     region: int
     interface: int | None = None
@@ -63,6 +76,36 @@ class Found:
     residual: float
     converged: bool
     correction: float
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A traced curve: its equations, its rows, and how points between them are computed."""
+
+    system: Defining
+    z: Array
+    frame: Frame
+    continuation: Continuation
+
+    def between(self, row: int, part: float) -> Array | None:
+        """The point of the curve after a part of the step behind a row."""
+        a, b = self.z[row], self.z[row + 1]
+        chord = b - a
+        length = float(np.sqrt((chord**2) @ self.frame.weight))
+        if length == 0.0:
+            return None
+        guess = a + part * chord
+        found = curves.corrected(self.system, guess, chord / length, self.frame, self.continuation)
+        return None if found is None else found[0]
+
+    def at(self, node: Node) -> Array:
+        """The point of a node, from the chord where the curve cannot be reached."""
+        if node.part == 0.0:
+            return np.asarray(self.z[node.row])
+        z = self.between(node.row, node.part)
+        if z is None:
+            z = self.z[node.row] + node.part * (self.z[node.row + 1] - self.z[node.row])
+        return np.asarray(z)
 
 
 def criteria(system: Defining, others: list[int]) -> list[Criterion]:
@@ -87,72 +130,101 @@ def criteria(system: Defining, others: list[int]) -> list[Criterion]:
     return found
 
 
-def search(
-    system: Defining,
-    rows: Array,
-    watched: list[Criterion],
-    frame: Frame,
-    known_values: Mapping[str, Array],
-) -> Iterator[Found]:
-    """All points at which a test changes sign between rows, solved for.
+def search(rows: Rows, watched: list[Criterion]) -> Iterator[Found]:
+    """All points at which a test vanishes with a change of sign, solved for.
 
     Parameters
     ----------
-    system : Defining
-    rows : ndarray, shape (M, N + 1)
+    rows : Rows
     watched : list of Criterion
-    frame : Frame
-    known_values : mapping
-        Code to test values at the rows that are at hand already.
     """
     for criterion in watched:
-        values = known_values.get(criterion.code)
-        if values is None:
-            values = np.array([criterion.value(z) for z in rows])
-        finite = np.abs(values[np.isfinite(values)])
-        # the median, because some tests have poles; one that vanishes all along says nothing
-        size = float(np.median(finite)) if finite.size else 0.0
-        if size < 1e-12:
+        table = np.array([criterion.value(z) for z in rows.z])
+        unit = _unit(table)
+        if unit == 0.0:
+            # one that vanishes all along says nothing
             continue
-        known = np.flatnonzero(np.isfinite(values) & (np.abs(values) > 1e-11 * size))
-        for k in np.flatnonzero(values[known][:-1] * values[known][1:] < 0):
-            before, after = int(known[k]), int(known[k + 1])
-            if after - before > 2 or not np.all(np.isfinite(values[before : after + 1])):
-                continue
-            point = _solved(system, rows, values, before, after, criterion, frame)
+
+        def value(z: Array, criterion: Criterion = criterion, unit: float = unit) -> float:
+            test, size = criterion.value(z)
+            return 0.0 if abs(test) <= ROUNDING * size else test / unit
+
+        def at(row: int, part: float, value: Callable[[Array], float] = value) -> float | None:
+            z = rows.between(row, part)
+            return None if z is None else value(z)
+
+        for bracket in brackets(np.array([value(z) for z in rows.z]), at):
+            point = _solved(rows, bracket, criterion, unit, at)
             if point is not None:
                 yield point
 
 
+def _unit(table: Array) -> float:
+    """Typical size of a test's terms along a curve; 0 where the test is rounding throughout."""
+    tests, sizes = table.T
+    known = np.isfinite(tests) & np.isfinite(sizes)
+    if not np.any(np.abs(tests[known]) > ROUNDING * sizes[known]):
+        return 0.0
+    # the median, because some tests have poles
+    return float(np.median(sizes[known])) or float(sizes[known].max())
+
+
 def _solved(
-    system: Defining,
-    rows: Array,
-    values: Array,
-    before: int,
-    after: int,
+    rows: Rows,
+    bracket: Bracket,
     criterion: Criterion,
-    frame: Frame,
+    unit: float,
+    at: Callable[[int, float], float | None],
 ) -> Found | None:
-    share = values[before] / (values[before] - values[after])
-    guess = rows[before] + share * (rows[after] - rows[before])
+    """The zero within a bracket, which is halved until Newton's method stays inside."""
+    low, high = bracket.before, bracket.after
+    first: Found | None = None
+    for halvings in range(TRIALS[-1] + 1):
+        if halvings in TRIALS:
+            found, inside = _newton(rows, low, high, criterion, unit)
+            if inside and found.converged:
+                return found if criterion.genuine(found.z) else None
+            first = first or found
+        place = 0.5 * (low.place + high.place)
+        row = min(int(place), high.row if high.part > 0 else high.row - 1)
+        test = at(row, place - row)
+        if test is None or not np.isfinite(test):
+            break
+        middle = Node(row, place - row, test)
+        if test * low.value > 0:
+            low = middle
+        else:
+            high = middle
+    if first is None or min(abs(low.value), abs(high.value)) > JUMP:
+        # a pole, or a jump from one sign to the other
+        return None
+    return replace(first, converged=False) if criterion.genuine(first.z) else None
+
+
+def _newton(
+    rows: Rows, low: Node, high: Node, criterion: Criterion, unit: float
+) -> tuple[Found, bool]:
+    """Newton's method from within a bracket of tests in some unit, and whether it stayed there."""
+    system, frame = rows.system, rows.frame
+    a, b = rows.at(low), rows.at(high)
+    share = low.value / (low.value - high.value)
+    guess = a + share * (b - a)
     guide = system.renewed(guess)
-    unit = abs(values[before] - values[after])
+    unit *= abs(low.value - high.value)
 
     def equations(z: Array) -> Array:
-        if z.ndim > 1:
-            return np.array([equations(one) for one in z])
-        return np.append(system.residual(z, guide), criterion.value(z) / unit)
+        return np.append(system.residual(z, guide), criterion.value(z)[0] / unit)
 
     z, residual, converged, correction = newton(equations, guess, frame.scale)
-    width = system.width
-    apart = np.abs((z - rows[before]) / frame.scale)[:width].max()
-    length = np.abs((rows[after] - rows[before]) / frame.scale)[:width].max()
-    if not np.all(np.isfinite(z)) or apart > 3.0 * length:
-        return None
+    if not np.all(np.isfinite(z)):
+        return Found(low.row, criterion, guess, residual, False, correction), False
     z = system.renewed(z)
-    if not criterion.genuine(z):
-        return None
-    return Found(before, criterion, z, residual, converged, correction)
+    chord, gap = ((p - a)[: frame.size] / frame.scale[: frame.size] for p in (b, z))
+    length = float(np.linalg.norm(chord))
+    part = float(gap @ chord) / length**2 if length > 0 else 0.0
+    aside = float(np.linalg.norm(gap - part * chord))
+    inside = -0.05 <= part <= 1.05 and aside <= 0.5 * length + 1e-9
+    return Found(low.row, criterion, z, residual, converged, correction), inside
 
 
 def _always(_: Array) -> bool:
@@ -160,47 +232,85 @@ def _always(_: Array) -> bool:
 
 
 def _interface_tests(system: Defining) -> Iterator[Criterion]:
+    """Where folds and Hopf points meet an interface, or the edge of sliding along it."""
     field, region = system.field, system.region
     code = {"LP": "BF", "HB": "BH"}.get(system.code)
     if code is None:
         return
-    for k in range(len(field.interfaces)):
+    sides = field.modes[region].sides
+    for k in range(field.signs.shape[1]):
         if field.signs[region, k] == 0:
             continue
 
-        def height(z: Array, k: int = k) -> float:
-            return float(field.at(region, z[: system.width])[2][k])
+        def height(z: Array, k: int = k) -> tuple[float, float]:
+            return float(system.heights(z)[k]), 1.0
 
         def genuine(z: Array, k: int = k) -> bool:
             imaginary = not isinstance(system, Pair) or z[system.width] > 0
             return bool(imaginary) and system.inside(z, but=k)
 
-        yield Criterion(code, height, genuine, region, k)
+        # of a sliding motion the last two rows are the drifts of both sides
+        interface = k if sides is None or k < len(field.interfaces) else sides.interface
+        yield Criterion(code, height, genuine, region, interface)
 
 
-def _nulls(matrix: Array, v: Array) -> Array:
-    """Left null vector, in a direction that is smooth along the curve."""
-    n = len(matrix)
+def left_null(slopes: Array, v: Array) -> Array:
+    """Left null vector of F_x, in a direction that is smooth along the curve.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (n, n + 2)
+        [F_x F_p], by which the rows are scaled, so that fast states do not blur it.
+    v : ndarray, shape (n,)
+        The right null vector.
+    """
+    size = row_sizes(slopes)
+    matrix = slopes[:, : len(v)] / size[:, None]
     left, _, _ = np.linalg.svd(matrix)
-    w = left[:, -1]
+    w = left[:, -1] / size
     # bordering by the right null vector orients it: the determinant keeps its sign
-    bordered = np.block([[matrix, w[:, None]], [v[None, :], np.zeros((1, 1))]])
-    side = np.sign(np.linalg.det(bordered[: n + 1, : n + 1]))
-    return np.asarray(w * (side if side != 0 else 1.0))
+    bordered = np.block([[matrix, left[:, -1:]], [v[None, :], np.zeros((1, 1))]])
+    side = np.linalg.slogdet(bordered)[0]
+    return np.asarray(w / np.linalg.norm(w) * (side if side != 0 else 1.0))
+
+
+def smallest_sum(values: Vector) -> float:
+    """The smallest sum of a pair in units of itself, with the sign of the product of all sums."""
+    first, second = (values[k] for k in np.triu_indices(len(values), 1))
+    sums = (first + second) / np.maximum(np.abs(first) + np.abs(second), np.finfo(float).tiny)
+    # complex sums come with their conjugates
+    real = sums[np.abs(sums.imag) <= 1e-9 * np.abs(sums)].real
+    return float(np.prod(np.sign(real)) * np.abs(sums).min())
+
+
+def smallest_value(matrix: Array) -> float:
+    """The smallest singular value of a matrix with rows of length one, with its determinant's sign.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (n, n + 2)
+        [F_x F_p]; the determinant is that of F_x, a row's length that of all.
+    """
+    inner = (matrix / row_sizes(matrix)[:, None])[:, : len(matrix)]
+    least = float(np.linalg.svd(inner, compute_uv=False)[-1])
+    return float(np.linalg.slogdet(inner)[0]) * least
 
 
 def _fold_tests(system: Defining) -> Iterator[Criterion]:
     n, w, region = system.n, system.width, system.region
 
-    def quadratic(z: Array) -> float:
-        matrix, v = system.jacobian(z), z[w : w + n]
-        raw = (system.unit * v).astype(complex)
-        bent = forms_at(system.field, region, z[:w]).form(raw, raw).real / system.unit
-        return float(_nulls(matrix, v) @ bent)
-
-    def overlap(z: Array) -> float:
+    def quadratic(z: Array) -> tuple[float, float]:
         v = z[w : w + n]
-        return float(_nulls(system.jacobian(z), v) @ v)
+        raw = (system.unit * v).astype(complex)
+        forms = forms_at(system.field, region, z[:w])
+        bent = forms.form(raw, raw).real / system.unit
+        terms = np.abs(forms.second) @ np.abs(raw) @ np.abs(raw) / system.unit
+        null = left_null(system.at(z)[1], v)
+        return float(null @ bent), float(np.abs(null) @ terms)
+
+    def overlap(z: Array) -> tuple[float, float]:
+        v = z[w : w + n]
+        return float(left_null(system.at(z)[1], v) @ v), 1.0
 
     yield Criterion("CP", quadratic, _always, region)
     if n < 2:
@@ -214,22 +324,28 @@ def _fold_tests(system: Defining) -> Iterator[Criterion]:
         return np.asarray(values[np.argsort(np.abs(values))[1:]])
 
     yield Criterion(
-        "ZH", lambda z: float(pair_sums(rest(z))), lambda z: _imaginary(rest(z)), region
+        "ZH", lambda z: (smallest_sum(rest(z)), 1.0), lambda z: _imaginary(rest(z)), region
     )
 
 
 def _pair_tests(system: Pair) -> Iterator[Criterion]:
     n, w, region = system.n, system.width, system.region
 
-    def hopf(z: Array) -> bool:
-        size = max(1e-300, float(np.abs(system.jacobian(z)).max()) ** 2)
-        return float(z[w]) > 1e-9 * size
+    def turning(z: Array) -> tuple[float, float]:
+        rate = system.rate(z)
+        return float(z[w]) / (rate**2 if rate > 0 else 1.0), 1.0
 
-    yield Criterion("BT", lambda z: float(z[w]), _always, region)
-    yield Criterion("GH", lambda z: _coefficient(system, z), hopf, region)
+    def hopf(z: Array) -> bool:
+        return turning(z)[0] > IMAGINARY
+
+    def lyapunov(z: Array) -> tuple[float, float]:
+        return _lyapunov(system, z)
+
+    yield Criterion("BT", turning, _always, region)
+    yield Criterion("GH", lyapunov, hopf, region)
     if n < 3:
         return
-    yield Criterion("ZH", lambda z: float(np.linalg.det(system.jacobian(z))), hopf, region)
+    yield Criterion("ZH", lambda z: (smallest_value(system.at(z)[1]), 1.0), hopf, region)
     if n < 4:
         return
 
@@ -242,7 +358,10 @@ def _pair_tests(system: Pair) -> Iterator[Criterion]:
         return np.array(kept)
 
     yield Criterion(
-        "HH", lambda z: float(pair_sums(rest(z))), lambda z: hopf(z) and _imaginary(rest(z)), region
+        "HH",
+        lambda z: (smallest_sum(rest(z)), 1.0),
+        lambda z: hopf(z) and _imaginary(rest(z)),
+        region,
     )
 
 
@@ -250,20 +369,20 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
     field, n, width = system.field, system.n, system.width
 
     def matrix(z: Array) -> Array:
-        return field.curve(region, z[:width])[1][:, :n]
+        slopes = field.curve(region, z[:width])[1]
+        return np.asarray(slopes * system.scales / system.unit[:, None])
 
     def eigenvalues(z: Array) -> Vector:
-        return np.linalg.eigvals(matrix(z))
+        return np.linalg.eigvals(matrix(z)[:, :n])
 
-    def determinant(z: Array) -> float:
-        return float(np.linalg.det(matrix(z)))
-
-    yield Criterion("BF", determinant, _always, region, system.interface)
+    yield Criterion(
+        "BF", lambda z: (smallest_value(matrix(z)), 1.0), _always, region, system.interface
+    )
     if n < 2:
         return
     yield Criterion(
         "BH",
-        lambda z: float(pair_sums(eigenvalues(z))),
+        lambda z: (smallest_sum(eigenvalues(z)), 1.0),
         lambda z: _imaginary(eigenvalues(z)),
         region,
         system.interface,
@@ -271,11 +390,12 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
 
 
 def _imaginary(values: Vector) -> bool:
-    """Whether the pair with the smallest sum is imaginary."""
-    first, second = np.triu_indices(len(values), 1)
-    k = int(np.argmin(np.abs(values[first] + values[second])))
-    size = max(float(np.abs(values).max()), 1e-300)
-    return bool((values[first[k]] * values[second[k]]).real > 1e-9 * size**2)
+    """Whether the pair with the smallest sum, in units of itself, is imaginary."""
+    first, second = (values[k] for k in np.triu_indices(len(values), 1))
+    size = np.maximum(np.abs(first), np.abs(second))
+    size[size == 0] = 1.0
+    k = int(np.argmin(np.abs(first + second) / size))
+    return bool((first[k] * second[k]).real > IMAGINARY * size[k] ** 2)
 
 
 def coefficients(system: Defining, found: Found) -> dict[str, float]:
@@ -303,10 +423,20 @@ def along(system: Defining, rows: Array) -> Array:
 
 
 def _coefficient(system: Defining, z: Array) -> float:
-    n, w, region = system.n, system.width, system.region
-    hopf = isinstance(system, Pair) and z[w] > 0
-    if not hopf and system.code != "LP":
+    if isinstance(system, Pair):
+        value, size = _lyapunov(system, z)
+        return 0.0 if abs(value) <= ROUNDING * size else value
+    if system.code != "LP":
         return np.nan
-    raw = system.field.curve(region, z[:w])[1][:, :n]
-    forms = forms_at(system.field, region, z[:w])
-    return first_lyapunov(forms, raw, float(np.sqrt(z[w]))) if hopf else fold_form(forms, raw)
+    u = z[: system.width]
+    raw = system.field.curve(system.region, u)[1][:, : system.n]
+    return fold_form(forms_at(system.field, system.region, u), raw)
+
+
+def _lyapunov(system: Pair, z: Array) -> tuple[float, float]:
+    """First Lyapunov coefficient and the size of its terms; NaN for neutral saddles."""
+    w, region = system.width, system.region
+    if not z[w] > 0:
+        return np.nan, np.nan
+    raw = system.field.curve(region, z[:w])[1][:, : system.n]
+    return lyapunov_terms(forms_at(system.field, region, z[:w]), raw, float(np.sqrt(z[w])))

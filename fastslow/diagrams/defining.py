@@ -1,8 +1,10 @@
 """Equations that define folds, Hopf points, branch points and boundary equilibria.
 
 In all of them z = (states, two parameters, extra unknowns), and each is a
-regular system at a generic point (Kuznetsov 2004, chapter 10). The Jacobian
-is scaled by the units of the states, so that null vectors are comparable.
+regular system at a generic point (Kuznetsov 2004, chapter 10). Rates and
+Jacobian are scaled by the units of the states and the spans of the parameters,
+so that what is left has no unit but that of time, in which the equations are
+homogeneous: neither the units of a model nor its time scale matter.
 """
 
 from __future__ import annotations
@@ -18,6 +20,9 @@ from fastslow.diagrams.fields import FrozenField
 
 Array = NDArray[np.float64]
 
+#: A point this near to an interface, relative to the terms of its function, is on it.
+ON = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class Defining(ABC):
@@ -30,11 +35,14 @@ class Defining(ABC):
     region : int
     unit : ndarray, shape (n,)
         Unit of every state.
+    span : ndarray, shape (2,)
+        Length of the range of both parameters.
     """
 
     field: FrozenField
     region: int
     unit: Array
+    span: Array
 
     #: What the points are.
     code: ClassVar[str]
@@ -56,36 +64,63 @@ class Defining(ABC):
         """Length of (states, parameters)."""
         return self.n + 2
 
+    @property
+    def scales(self) -> Array:
+        """Units of (states, parameters)."""
+        return np.append(self.unit, self.span)
+
+    def extras(self, z: Array) -> Array:
+        """Units of the extra unknowns, by their values at a first point."""
+        return np.ones(len(z) - self.width)
+
     def at(self, z: Array) -> tuple[Array, Array]:
-        """Rates and their derivatives, states in their units, at points z of shape (…, N + 1)."""
+        """Rates and their derivatives in units of states and parameters, at z (…, N + 1)."""
         u = z[..., : self.width]
         rows = u.reshape(-1, self.width)
         rates, slopes, _, _ = self.field.at(self.region, rows)
-        units = np.append(self.unit, np.ones(2))
-        scaled = slopes * units / self.unit[:, None]
+        scaled = slopes * self.scales / self.unit[:, None]
         lead = u.shape[:-1]
-        return rates.reshape(*lead, self.n), scaled.reshape(*lead, self.n, self.width)
+        return (rates / self.unit).reshape(*lead, self.n), scaled.reshape(*lead, self.n, self.width)
 
     def jacobian(self, z: Array) -> Array:
         """The state Jacobian in the units of the states, shape (…, n, n)."""
         return self.at(z)[1][..., : self.n]
 
+    def balanced(self, z: Array) -> Array:
+        """The state Jacobian at one point, every row in units of [F_x F_p]."""
+        slopes = self.at(z)[1]
+        return np.asarray(slopes[:, : self.n] / row_sizes(slopes)[:, None])
+
     def renewed(self, z: Array) -> Array:
         return z
 
     def inside(self, z: Array, but: int | None = None) -> bool:
-        """Whether a point lies in the closure of the region, one interface left aside."""
+        """Whether a point lies in the closure of the region, one interface left aside.
+
+        Of sliding, also where both fields point away from the interface: the
+        pseudo-equilibria of escaping are those of the same equations.
+        """
         heights = self.heights(z)
         if but is not None:
             heights[but] = 0.0
-        return bool(np.all(heights >= -1e-9))
+        if self.field.modes[self.region].sides is not None:
+            drifts = heights[-2:]
+            one_way = np.all(drifts >= -ON) or np.all(drifts <= ON)
+            return bool(one_way and np.all(heights[:-2] >= -ON))
+        return bool(np.all(heights >= -ON))
 
     def heights(self, z: Array) -> Array:
         """What bounds the region, positive inside and relative to its terms, at a point."""
         u = z[: self.width]
         _, _, h, gradients = self.field.at(self.region, u)
-        size = np.maximum(1.0, np.abs(gradients) @ np.maximum(np.abs(u), 1.0))
-        return np.asarray(self.field.signs[self.region] * h / size)
+        size = np.abs(gradients) @ np.maximum(np.abs(u), self.scales)
+        return np.asarray(self.field.signs[self.region] * h / np.where(size > 0, size, 1.0))
+
+
+def row_sizes(matrix: Array) -> Array:
+    """Length of every row, 1 where there is none: fast states are as long as slow ones then."""
+    size = np.linalg.norm(matrix, axis=1)
+    return np.where(size > 0, size, 1.0)
 
 
 class Fold(Defining):
@@ -94,7 +129,7 @@ class Fold(Defining):
     code: ClassVar[str] = "LP"
 
     def start(self, u: Array) -> Array:
-        _, _, right = np.linalg.svd(self.jacobian(u))
+        _, _, right = np.linalg.svd(self.balanced(u))
         return np.concatenate([u, right[-1]])
 
     def residual(self, z: Array, guide: Array) -> Array:
@@ -120,15 +155,38 @@ class Pair(Defining):
     code: ClassVar[str] = "HB"
 
     def start(self, u: Array, squared: float | None = None) -> Array:
-        """Give z for a point, with the pair whose product is nearest to ``squared``."""
-        matrix = self.jacobian(u)
+        """Give z for a point, with the product of the pair.
+
+        By default the pair is the one with the smallest sum in units of itself.
+        """
         if squared is None:
-            values = np.linalg.eigvals(matrix)
-            first, second = np.triu_indices(self.n, 1)
-            sums, products = values[first] + values[second], values[first] * values[second]
-            squared = float(products[np.argmin(np.abs(sums))].real)
-        _, _, right = np.linalg.svd(matrix @ matrix + squared * np.eye(self.n))
-        return np.concatenate([u, [squared], right[-1], right[-2]])
+            values = np.linalg.eigvals(self.jacobian(u))
+            first, second = (values[k] for k in np.triu_indices(self.n, 1))
+            size = np.maximum(np.abs(first) + np.abs(second), np.finfo(float).tiny)
+            squared = float((first * second).real[np.argmin(np.abs(first + second) / size)])
+        plane = self._plane(u, squared)
+        return np.concatenate([u, [squared], plane[0], plane[1]])
+
+    def _plane(self, z: Array, kappa: float) -> Array:
+        """Two vectors that span the null plane of J² + κ, shape (2, n)."""
+        matrix = self.jacobian(z)
+        square = matrix @ matrix + kappa * np.eye(self.n)
+        # the rows in units of their terms, so that fast states do not blur the plane
+        size = (np.abs(matrix) @ np.abs(matrix)).sum(axis=1, keepdims=True) + abs(kappa)
+        _, _, right = np.linalg.svd(square / np.where(size > 0, size, 1.0))
+        return np.asarray(right[[-1, -2]])
+
+    def rate(self, z: Array) -> float:
+        """How fast the pair is: the norm of the Jacobian in its plane, at least √|κ|."""
+        plane = np.linalg.qr(self._plane(z[: self.width], float(z[self.width])).T)[0]
+        inner = plane.T @ self.jacobian(z) @ plane
+        return float(max(np.linalg.norm(inner), np.sqrt(abs(z[self.width]))))
+
+    def extras(self, z: Array) -> Array:
+        units = np.ones(len(z) - self.width)
+        rate = self.rate(z)
+        units[0] = rate**2 if rate > 0 else 1.0
+        return units
 
     def residual(self, z: Array, guide: Array) -> Array:
         rates, slopes = self.at(z)
@@ -146,10 +204,9 @@ class Pair(Defining):
         n, w = self.n, self.width
         u, kappa, v = z[:w], z[w], z[w + 1 : w + 1 + n]
         v = v / np.linalg.norm(v)
-        matrix = self.jacobian(u)
-        _, _, right = np.linalg.svd(matrix @ matrix + kappa * np.eye(n))
         # the other direction of the null plane, at right angles to v
-        plane = right[-2:] - np.outer(right[-2:] @ v, v)
+        plane = self._plane(u, kappa)
+        plane = plane - np.outer(plane @ v, v)
         other = plane[np.argmax(np.linalg.norm(plane, axis=1))]
         other = other / np.linalg.norm(other)
         if other @ z[w + 1 + n :] < 0:
@@ -169,6 +226,12 @@ class Crossing(Defining):
     def start(self, u: Array) -> Array:
         left, _, _ = np.linalg.svd(self.at(u)[1][:, : self.n + 1])
         return np.concatenate([u, left[:, -1], [0.0]])
+
+    def extras(self, z: Array) -> Array:
+        units = np.ones(len(z) - self.width)
+        rate = np.abs(z[self.width : -1]) @ np.abs(self.at(z)[1]).sum(axis=1)
+        units[-1] = rate if rate > 0 else 1.0
+        return units
 
     def residual(self, z: Array, guide: Array) -> Array:
         rates, slopes = self.at(z)

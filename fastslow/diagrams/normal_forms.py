@@ -188,6 +188,13 @@ def first_lyapunov(forms: Multilinear, jacobian: Array, frequency: float) -> flo
     >>> round(first_lyapunov(forms, np.array([[0.0, -1.0], [1.0, 0.0]]), 1.0), 14)
     -0.75
     """
+    value, size = lyapunov_terms(forms, jacobian, frequency)
+    # what cancels to rounding is zero: the Hopf point is degenerate
+    return 0.0 if abs(value) <= 1e-12 * size else value
+
+
+def lyapunov_terms(forms: Multilinear, jacobian: Array, frequency: float) -> tuple[float, float]:
+    """First Lyapunov coefficient as summed, and the sum of the absolute values of its terms."""
     n = len(jacobian)
     q = _eigenvector(jacobian, 1j * frequency)
     p = _eigenvector(jacobian.T, -1j * frequency)
@@ -197,17 +204,14 @@ def first_lyapunov(forms: Multilinear, jacobian: Array, frequency: float) -> flo
         straight = np.linalg.solve(jacobian, forms.form(q, conjugate))
         turning = np.linalg.solve(2j * frequency * np.eye(n) - jacobian, forms.form(q, q))
     except np.linalg.LinAlgError:
-        return np.nan
+        return np.nan, np.nan
     terms = [
         np.vdot(p, forms.form(q, q, conjugate)),
         -2.0 * np.vdot(p, forms.form(q, straight)),
         np.vdot(p, forms.form(conjugate, turning)),
     ]
-    total = sum(terms).real
-    # what cancels to rounding is zero: the Hopf point is degenerate
-    if abs(total) <= 1e-12 * sum(map(abs, terms)):
-        return 0.0
-    return float(total / (2.0 * frequency))
+    unit = 2.0 * frequency
+    return float(sum(terms).real / unit), float(sum(map(abs, terms)) / unit)
 
 
 def _eigenvector(matrix: Array, value: complex) -> Vector:

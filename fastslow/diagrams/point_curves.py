@@ -13,7 +13,7 @@ from fastslow.arguments import flag, formula, instance, interval, items, mapping
 from fastslow.continuation import curves
 from fastslow.continuation.curves import Frame
 from fastslow.continuation.settings import Continuation
-from fastslow.diagrams.codimension_two import Found, along, coefficients, criteria, search
+from fastslow.diagrams.codimension_two import Found, Rows, along, coefficients, criteria, search
 from fastslow.diagrams.curve_ends import outcome_of
 from fastslow.diagrams.defining import Crossing, Defining, Fold, OnInterface, Pair
 from fastslow.diagrams.fields import FrozenField
@@ -24,6 +24,12 @@ from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
+
+#: A branch point's β beyond this part of its unit: no symmetry keeps the branch point.
+ISOLATED = 1e-7
+
+#: A component of a tangent below this, in scaled units, does not tell its direction.
+LEVEL = 1e-3
 
 
 @takes(
@@ -102,7 +108,7 @@ def continue_points(
             f"the point {point.label} at {first} = {u[-2]:g}, {second} = {u[-1]:g} lies outside "
             f"over={dict(over)}"
         )
-    system, start = _system(field, region, code, point, u)
+    system, start = _system(field, region, code, point, u, upper - lower)
     frame = _frame(system, start, lower, upper)
     landing = curves.landed(system, start, frame)
     if landing is None:
@@ -174,29 +180,28 @@ def _region_of(field: FrozenField, point: SpecialPoint) -> int:
 
 
 def _system(
-    field: FrozenField, region: int, code: str, point: SpecialPoint, u: Array
+    field: FrozenField, region: int, code: str, point: SpecialPoint, u: Array, span: Array
 ) -> tuple[Defining, Array]:
     """The defining system with its first z, the states in units of their diagram."""
     unit = np.maximum(np.abs(u[: field.n]), point.source.unit)
     if code == "LP":
-        fold = Fold(field, region, unit)
+        fold = Fold(field, region, unit, span)
         return fold, fold.start(u)
     if code == "HB":
-        pair = Pair(field, region, unit)
+        pair = Pair(field, region, unit, span)
         squared = point.frequency**2 if point.frequency is not None else None
         return pair, pair.start(u, 0.0 if point.code == "BT" else squared)
     if code == "BP":
-        crossing = Crossing(field, region, unit)
+        crossing = Crossing(field, region, unit, span)
         return crossing, crossing.start(u)
     if point.interface not in field.interfaces:
         raise ArgumentError(f"the point {point.label} lies on no interface of the model")
-    edge = OnInterface(field, region, unit, field.interfaces.index(point.interface))
+    edge = OnInterface(field, region, unit, span, field.interfaces.index(point.interface))
     return edge, edge.start(u)
 
 
 def _frame(system: Defining, start: Array, lower: Array, upper: Array) -> Frame:
-    extras = np.maximum(1.0, np.abs(start[system.width :]))
-    scale = np.concatenate([system.unit, upper - lower, extras])
+    scale = np.concatenate([system.scales, system.extras(start)])
     return Frame(system.width, scale, lower, upper)
 
 
@@ -213,7 +218,7 @@ def _traced(
     inside = _inside(system, start)
 
     def stop(z: Array) -> bool:
-        if isinstance(system, Crossing) and abs(z[-1]) > 1e-7:
+        if isinstance(system, Crossing) and abs(z[-1]) > ISOLATED * frame.scale[-1]:
             return True
         return not virtual and inside and not _inside(system, z)
 
@@ -222,7 +227,7 @@ def _traced(
         return np.delete(heights, system.interface if isinstance(system, OnInterface) else [])
 
     bounds = others if isinstance(system, OnInterface) else None
-    direction = curves.tangent(system, start, frame)
+    direction = _oriented(curves.tangent(system, start, frame), frame)
     rows, tangents, last = curves.follow(
         system, start, direction, frame, continuation, stop, bounds
     )
@@ -236,7 +241,7 @@ def _traced(
     watched = criteria(system, _meeting(system))
     coefficient = along(system, rows)
     found = sorted(
-        search(system, rows, watched, frame, {"GH": coefficient} if system.code == "HB" else {}),
+        search(Rows(system, rows, frame, continuation), watched),
         key=lambda f: (f.row, float((f.z - rows[f.row]) * frame.weight @ tangents[f.row])),
     )
     found = _told_apart(found, frame)
@@ -283,6 +288,14 @@ def _traced(
     )
 
 
+def _oriented(direction: Array, frame: Frame) -> Array:
+    """The direction in which the first parameter rises, else the second, else the first state."""
+    leading = (direction / frame.scale)[: frame.size]
+    order = np.append(leading[-2:], leading[:-2])
+    place = np.flatnonzero(np.abs(order) > LEVEL)
+    return -direction if place.size and order[place[0]] < 0 else direction
+
+
 def _up_to_interfaces(
     found: list[Found], spots: list[int], count: int, first: str, last: str
 ) -> slice:
@@ -316,6 +329,7 @@ def _told_apart(found: list[Found], frame: Frame) -> list[Found]:
         width = frame.size
         near = any(
             np.abs((point.z - k.z) / frame.scale)[:width].max() < 1e-6
+            and point.criterion is not k.criterion
             and {point.criterion.code, k.criterion.code} != {"BF", "BH"}
             and (k.criterion.code == point.criterion.code or "BT" in (k.criterion.code,))
             and k.criterion.region == point.criterion.region

@@ -1,0 +1,179 @@
+"""Brackets of the zeros of a test function along a sampled curve, two within one step included.
+
+Between two rows a smooth test may vanish twice although its signs at the rows agree. Its
+absolute value then has a minimum there, so one of the rows beside that step is the smallest
+of its neighbours. The minimum beside each such row is computed by parabolic interpolation;
+where the test has the other sign there, the step is divided.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Values below this part of the test's size are rounding and count as zero.
+ROUNDING = 1e-12
+
+#: Evaluations spent on one minimum.
+EVALUATIONS = 30
+
+#: A minimum has been reached where this many evaluations do not halve the value.
+SETTLED = 5
+
+#: Smallest part of a step that is divided.
+NARROWEST = 1e-9
+
+#: Parts of a step with a change of sign that are sampled, so that three zeros are told from one.
+QUARTERS = (0.25, 0.5, 0.75)
+
+#: The test at the point of the curve after a part of the step behind a row.
+Between = Callable[[int, float], float | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A point of the curve: the row behind which it is, the part of that step, the test."""
+
+    row: int
+    part: float
+    value: float
+
+    @property
+    def place(self) -> float:
+        return self.row + self.part
+
+
+@dataclass(frozen=True, eq=False)
+class Bracket:
+    """Two points with tests of opposite sign, between which there is one zero."""
+
+    before: Node
+    after: Node
+
+
+def brackets(values: Array, between: Between) -> Iterator[Bracket]:
+    """All changes of sign of a test, in order along the curve.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+        The test at the rows in units of its size; not finite where it has no value.
+    between : callable
+        A row and a part of the step behind it to the test there, None where the curve
+        cannot be reached.
+
+    Examples
+    --------
+    >>> def between(row, part):
+    ...     return (row + part - 1.5) ** 2 - 0.01
+    >>> values = np.array([between(row, 0.0) for row in range(4)])
+    >>> [[round(n.place, 6) for n in (b.before, b.after)] for b in brackets(values, between)]
+    [[1.0, 1.5], [1.5, 2.0]]
+    """
+    for run in _runs(values):
+        nodes = [Node(int(row), 0.0, float(values[row])) for row in run]
+        nodes = _quartered(nodes, between)
+        lowest = [n for k in range(len(nodes)) if (n := _beyond(nodes, k, between)) is not None]
+        nodes = sorted({n.place: n for n in (*nodes, *lowest)}.values(), key=lambda n: n.place)
+        for one, other in itertools.pairwise(nodes):
+            if one.value * other.value < 0:
+                yield Bracket(one, other)
+
+
+def _runs(values: Array) -> Iterator[NDArray[np.intp]]:
+    """Rows with a value that is not rounding; a single row on a zero is left out of its run."""
+    finite = np.isfinite(values)
+    known = np.flatnonzero(finite & (np.abs(np.where(finite, values, 0.0)) > ROUNDING))
+    start = 0
+    for k in range(1, len(known) + 1):
+        joined = k < len(known) and (
+            known[k] - known[k - 1] == 1 or (known[k] - known[k - 1] == 2 and finite[known[k] - 1])
+        )
+        if not joined:
+            if k - start > 1:
+                yield known[start:k]
+            start = k
+
+
+def _quartered(nodes: list[Node], between: Between) -> list[Node]:
+    """The nodes with three more in every step that changes the sign."""
+    result = [nodes[0]]
+    for one, other in itertools.pairwise(nodes):
+        if one.value * other.value < 0 and other.row == one.row + 1:
+            for part in QUARTERS:
+                found = between(one.row, part)
+                if found is not None and np.isfinite(found) and found != 0:
+                    result.append(Node(one.row, part, found))
+        result.append(other)
+    return result
+
+
+def _beyond(nodes: list[Node], k: int, between: Between) -> Node | None:
+    """A point with the other sign beside a node that is the smallest of its neighbours."""
+    here = nodes[k]
+    sign = np.sign(here.value)
+    # a neighbour of the other sign bounds what is looked at, as an end of the curve does
+    near = [n for n in nodes[max(k - 1, 0) : k + 2] if n is not here and n.value * sign > 0]
+    if not near or any(abs(n.value) < abs(here.value) for n in near):
+        return None
+
+    def at(place: float) -> Node | None:
+        row = min(int(np.floor(place)), nodes[-1].row - (nodes[-1].part == 0.0))
+        found = between(row, place - row)
+        return None if found is None or not np.isfinite(found) else Node(row, place - row, found)
+
+    if len(near) == 2:
+        low, high = near
+    else:
+        # a point beside an end shows which way the test goes
+        low, high = here, near[0]
+        probe = at(here.place + 0.1 * (high.place - here.place))
+        if probe is None or probe.value * sign < 0:
+            return probe
+        if probe.value * sign >= here.value * sign:
+            return None
+        low, here = here, probe
+        if low.place > high.place:
+            low, high = high, low
+    return _lowest(low, here, high, float(sign), at)
+
+
+def _lowest(
+    low: Node, middle: Node, high: Node, sign: float, at: Callable[[float], Node | None]
+) -> Node | None:
+    """A point with the other sign between two with a smaller one between them."""
+    best: list[float] = []
+    for count in range(EVALUATIONS):
+        a, b, c = (n.place for n in (low, middle, high))
+        fa, fb, fc = (n.value * sign for n in (low, middle, high))
+        # the parabola through the three
+        left, right = (b - a) * (fb - fc), (b - c) * (fb - fa)
+        bend = ((fc - fb) / (c - b) - (fb - fa) / (b - a)) / (c - a)
+        slope = (fb - fa) / (b - a) + bend * (b - a)
+        promised = fb - slope**2 / (4.0 * bend) if bend > 0 else fb
+        best.append(fb)
+        # near a zero the values fall by large factors, near a minimum above it they do not
+        settled = len(best) > SETTLED and fb > 0.5 * best[-1 - SETTLED]
+        if (settled and promised > 0.5 * fb) or c - a < NARROWEST:
+            return None
+        place = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right) if bend > 0 else b
+        wide = max(b - a, c - b)
+        if not a < place < c or abs(place - b) < 1e-3 * wide or count % 4 == 3:
+            # a step into the longer part
+            place = b - 0.4 * (b - a) if b - a > c - b else b + 0.4 * (c - b)
+        found = at(place)
+        if found is None or found.value * sign < 0:
+            return found
+        if found.value * sign < fb:
+            low, middle, high = (low, found, middle) if place < b else (middle, found, high)
+        elif place < b:
+            low = found
+        else:
+            high = found
+    return None
