@@ -19,8 +19,8 @@ from fastslow.continuation.settings import Continuation
 
 Array = NDArray[np.float64]
 
-#: States beyond this multiple of their scale end a curve.
-REACH = 1e6
+#: What is beyond a bound by less than this part of its unit is on it.
+ON_EDGE = 1e-9
 
 #: How a trace ends.
 FULL, RANGE, SMALL_STEP, WINDOW, CLOSED, STOPPED, BOUND = (
@@ -58,8 +58,8 @@ class Frame:
         Leading entries of z in which arclength is measured.
     scale : ndarray, shape (N + 1,)
         Unit of every entry.
-    lower, upper : ndarray, shape (2,)
-        Range of the last two of the leading entries.
+    lower, upper : ndarray, shape (size,)
+        Range of every leading entry; infinite where there is none.
     """
 
     size: int
@@ -84,9 +84,13 @@ class Frame:
         size[:states] = np.maximum(size[:states], np.abs(z[:states]))
         return float(1.0 / np.linalg.norm(along[: self.size] / size))
 
-    def outside(self, z: Array) -> bool:
-        plane = z[self.size - 2 : self.size]
-        return bool(np.any(plane < self.lower) or np.any(plane > self.upper))
+    def passed(self, z: Array) -> NDArray[np.bool_]:
+        """Which ranges a point is outside of, shape (2, size): below and above."""
+        leading = z[: self.size]
+        slack = ON_EDGE * np.maximum(np.abs(leading), self.scale[: self.size])
+        # the ranges of both parameters have no rounding to allow for
+        slack[-2:] = 0.0
+        return np.stack([leading < self.lower - slack, leading > self.upper + slack])
 
 
 def slopes(system: System, z: Array, guide: Array, scale: Array) -> Array:
@@ -171,7 +175,8 @@ def follow(
     Returns
     -------
     z, tangents : ndarray, shape (M, N + 1)
-        With ``RANGE`` the last row is exactly on the edge of the range.
+        With ``RANGE`` and ``WINDOW`` the last row is exactly on the edge of the range of
+        a parameter or of a state.
     status : str
     """
     rows, tangents = [start], [direction]
@@ -190,12 +195,13 @@ def follow(
             step *= 0.5
             continue
         z, used = found
-        if frame.outside(z):
-            edge = _on_edge(system, last, z, frame)
-            if edge is not None:
-                rows.append(edge)
+        if np.any(passed := frame.passed(z)):
+            met = _on_edge(system, last, z, frame, passed)
+            if met is not None:
+                rows.append(met[0])
                 tangents.append(turned)
-            return np.array(rows), np.array(tangents), RANGE
+            states = not passed[:, -2:].any() if met is None else met[1]
+            return np.array(rows), np.array(tangents), WINDOW if states else RANGE
         if bounds is not None and np.any(bounds(z) < 0):
             edge = _on_bound(system, last, z, frame, bounds)
             if edge is not None:
@@ -204,9 +210,6 @@ def follow(
             return np.array(rows), np.array(tangents), BOUND
         rows.append(z)
         tangents.append(turned)
-        states = frame.size - 2
-        if np.any(np.abs(z[:states]) > REACH * frame.scale[:states]):
-            return np.array(rows), np.array(tangents), WINDOW
         if len(rows) > 4 and _returns(start, direction, last, along, turned, step, frame):
             rows[-1], tangents[-1] = start, direction
             return np.array(rows), np.array(tangents), CLOSED
@@ -220,29 +223,28 @@ def follow(
     return np.array(rows), np.array(tangents), FULL
 
 
-def _on_edge(system: System, inside: Array, outside: Array, frame: Frame) -> Array | None:
-    """Where the curve meets the edge of the range between two points."""
-    best: tuple[float, Array] | None = None
-    for k in range(2):
-        entry = frame.size - 2 + k
-        for bound in (frame.lower[k], frame.upper[k]):
-            before, after = inside[entry] - bound, outside[entry] - bound
-            if before == after or before * after > 0 or before == 0:
-                continue
-            share = before / (before - after)
-            guess = inside + share * (outside - inside)
-            guide = system.renewed(guess)
+def _on_edge(
+    system: System, inside: Array, outside: Array, frame: Frame, passed: NDArray[np.bool_]
+) -> tuple[Array, bool] | None:
+    """Where the curve meets the first edge between two points, and whether it is a state's."""
+    best: tuple[float, Array, bool] | None = None
+    for side, entry in np.argwhere(passed):
+        bound = (frame.lower, frame.upper)[side][entry]
+        before, after = inside[entry] - bound, outside[entry] - bound
+        share = float(np.clip(before / (before - after), 0.0, 1.0))
+        guess = inside + share * (outside - inside)
+        guide = system.renewed(guess)
 
-            def equations(
-                z: Array, guide: Array = guide, entry: int = entry, bound: float = bound
-            ) -> Array:
-                return np.append(system.residual(z, guide), z[entry] - bound)
+        def equations(
+            z: Array, guide: Array = guide, entry: int = entry, bound: float = bound
+        ) -> Array:
+            return np.append(system.residual(z, guide), z[entry] - bound)
 
-            z, _, converged, _ = newton(equations, guess, frame.scale)
-            if converged and (best is None or share < best[0]):
-                z[entry] = bound
-                best = share, system.renewed(z)
-    return None if best is None else best[1]
+        z, _, converged, _ = newton(equations, guess, frame.scale)
+        if converged and (best is None or share < best[0]):
+            z[entry] = bound
+            best = share, system.renewed(z), bool(entry < frame.size - 2)
+    return None if best is None else best[1:]
 
 
 def _on_bound(

@@ -302,11 +302,9 @@ def _fold_tests(system: Defining) -> Iterator[Criterion]:
     def quadratic(z: Array) -> tuple[float, float]:
         v = z[w : w + n]
         raw = (system.unit * v).astype(complex)
-        forms = forms_at(system.field, region, z[:w])
-        bent = forms.form(raw, raw).real / system.unit
-        terms = np.abs(forms.second) @ np.abs(raw) @ np.abs(raw) / system.unit
+        bent = forms_at(system.field, region, z[:w]).form(raw, raw).real / system.unit
         null = left_null(system.at(z)[1], v)
-        return float(null @ bent), float(np.abs(null) @ terms)
+        return float(null @ bent), float(np.abs(null) @ np.abs(bent))
 
     def overlap(z: Array) -> tuple[float, float]:
         v = z[w : w + n]

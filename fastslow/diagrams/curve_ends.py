@@ -8,11 +8,14 @@ from numpy.typing import NDArray
 from fastslow.continuation import curves
 from fastslow.diagrams.defining import Crossing, Defining
 from fastslow.results.outcome import Outcome
+from fastslow.results.windows import StateWindow, left_window
 
 Array = NDArray[np.float64]
 
 
-def outcome_of(status: str, system: Defining, z: Array, names: tuple[str, str]) -> Outcome:
+def outcome_of(
+    status: str, system: Defining, z: Array, names: tuple[str, str], window: StateWindow
+) -> Outcome:
     """What the status of a trace means, in words."""
     plane = z[system.width - 2 : system.width]
     where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, plane, strict=True))
@@ -39,11 +42,7 @@ def outcome_of(status: str, system: Defining, z: Array, names: tuple[str, str]) 
             "left the region", f"the points leave region {_region(system)} at {where}.", True
         )
     if status == curves.WINDOW:
-        return Outcome(
-            "left the window",
-            f"a state grew without bound near {where}.",
-            False,
-        )
+        return left_window(window, z[: system.n], system.unit, where)
     if status == curves.FULL:
         return Outcome(
             "too many points",

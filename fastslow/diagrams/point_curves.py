@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from fastslow.model.model import Model
 from fastslow.results.point_branches import PointBranch
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint, SpecialPoints
+from fastslow.results.windows import StateWindow, state_window
 
 Array = NDArray[np.float64]
 
@@ -39,6 +40,7 @@ LEVEL = 1e-3
     code=text,
     continuation=instance(Continuation),
     virtual=flag,
+    window=mapping,
 )
 def continue_points(
     point: SpecialPoint,
@@ -48,6 +50,7 @@ def continue_points(
     code: str | None = None,
     continuation: Continuation | None = None,
     virtual: bool = True,
+    window: Mapping[Any, tuple[float | None, float | None]] | None = None,
 ) -> PointBranch:
     """Trace a curve of special points in the plane of two parameters.
 
@@ -71,6 +74,9 @@ def continue_points(
     virtual : bool
         Whether the curve goes on beyond an interface as one of virtual points;
         the rows say which they are.
+    window : mapping, optional
+        State to its range (low, high), as in `continue_equilibria`: a curve that leaves
+        it ends exactly on the edge. The default is the window of the point's diagram.
 
     Returns
     -------
@@ -108,15 +114,20 @@ def continue_points(
             f"the point {point.label} at {first} = {u[-2]:g}, {second} = {u[-1]:g} lies outside "
             f"over={dict(over)}"
         )
+    within = _window(point, window)
+    if not within.contains(point.state, point.source.unit):
+        raise ArgumentError(
+            f"the point {point.label} lies outside the window {within}; window= sets other bounds"
+        )
     system, start = _system(field, region, code, point, u, upper - lower)
-    frame = _frame(system, start, lower, upper)
+    frame = _frame(system, start, (lower, upper), within)
     landing = curves.landed(system, start, frame)
     if landing is None:
         raise ArgumentError(
             f"the point {point.label} does not lie on a curve of {code} points of region "
             f"{field.regions[region]}: Newton's method did not converge from it"
         )
-    return _traced(system, landing, frame, continuation, point, (first, second), virtual)
+    return _traced(system, landing, frame, continuation, point, (first, second), virtual, within)
 
 
 def _names(parameters: Sequence[Any]) -> tuple[str, str]:
@@ -138,6 +149,18 @@ def _ranges(names: tuple[str, str], over: Mapping[Any, tuple[float, float]]) -> 
         bounds.append(interval(f"over['{name}']", given[name]))
     table = np.array(bounds)
     return table[:, 0], table[:, 1]
+
+
+def _window(point: SpecialPoint, given: Mapping[Any, Any] | None) -> StateWindow:
+    """The window asked for; where it has no bounds, those of the point's diagram."""
+    known: StateWindow = point.source.window
+    asked = state_window(known.states, given)
+    lower, upper, meant = list(known.lower), list(known.upper), list(known.given)
+    for k, (low, high) in enumerate(asked.given):
+        lower[k] = asked.lower[k] if low else lower[k]
+        upper[k] = asked.upper[k] if high else upper[k]
+        meant[k] = (low or meant[k][0], high or meant[k][1])
+    return replace(known, lower=tuple(lower), upper=tuple(upper), given=tuple(meant))
 
 
 def _curve_code(point: SpecialPoint, code: str | None) -> str:
@@ -200,8 +223,12 @@ def _system(
     return edge, edge.start(u)
 
 
-def _frame(system: Defining, start: Array, lower: Array, upper: Array) -> Frame:
+def _frame(system: Defining, start: Array, over: tuple[Array, Array], window: StateWindow) -> Frame:
     scale = np.concatenate([system.scales, system.extras(start)])
+    lower, upper = (
+        np.concatenate([states, plane])
+        for states, plane in zip((window.lower, window.upper), over, strict=True)
+    )
     return Frame(system.width, scale, lower, upper)
 
 
@@ -213,6 +240,7 @@ def _traced(
     point: SpecialPoint,
     names: tuple[str, str],
     virtual: bool,
+    window: StateWindow,
 ) -> PointBranch:
     field, region = system.field, system.region
     inside = _inside(system, start)
@@ -280,7 +308,10 @@ def _traced(
         coefficient,
         SpecialPoints(special),
         tuple(spots),
-        (outcome_of(first, system, rows[0], names), outcome_of(last, system, rows[-1], names)),
+        (
+            outcome_of(first, system, rows[0], names, window),
+            outcome_of(last, system, rows[-1], names, window),
+        ),
         last == curves.CLOSED,
         dict(field.model.parameters),
         field.model.equations,

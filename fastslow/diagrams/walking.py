@@ -13,7 +13,7 @@ from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.two_folds import cut_at_two_fold, two_fold_ahead
 from fastslow.results.outcome import Outcome
-from fastslow.results.windows import MARGIN, ON_EDGE, StateWindow
+from fastslow.results.windows import ON_EDGE, StateWindow, left_window
 
 Array = NDArray[np.float64]
 
@@ -419,23 +419,8 @@ def _full(field: FrozenField, u: Array, continuation: Continuation) -> Outcome:
 
 def _left(field: FrozenField, u: Array, window: Window) -> Outcome:
     """What is said of a branch that ends on an edge of the window of the states."""
-    bounds = np.array([window.states.lower, window.states.upper]).T
-    off = np.abs(u[:-1, None] - bounds) / window.scale[:-1, None]
-    k, side = np.unravel_index(np.argmin(np.where(np.isfinite(off), off, np.inf)), off.shape)
-    name, bound = field.model.states[k], bounds[k, side]
-    if window.states.given[k][side]:
-        return Outcome(
-            "left the window",
-            f"reached {name} = {bound:g}, an edge of the window, at {_where(field, u)}.",
-            True,
-        )
-    return Outcome(
-        "left the window",
-        f"{name} reached {bound:.6g} at {field.parameter} = {u[-1]:.6g}, {MARGIN:g} times the size "
-        "of the equilibria from which branches are traced, and may go to infinity; "
-        f"window={{'{name}': (low, high)}} sets other bounds.",
-        False,
-    )
+    where = f"{field.parameter} = {u[-1]:.6g}"
+    return left_window(window.states, u[:-1], window.scale[:-1], where)
 
 
 def _outcome(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import real_number, shown
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.outcome import Outcome
 
 Array = NDArray[np.float64]
 
@@ -207,3 +208,31 @@ def _range(name: str, ends: Any) -> tuple[float, float]:
         hint = f"; did you mean ({high:g}, {low:g})?" if low > high else ""
         raise ArgumentError(f"window of {name} = {shown(ends)}; expected {expected}{hint}")
     return low, high
+
+
+def left_window(window: StateWindow, state: Array, unit: Array, where: str) -> Outcome:
+    """What is said of a curve that ends at a state on an edge of a window.
+
+    Parameters
+    ----------
+    window : StateWindow
+    state, unit : ndarray, shape (n,)
+        The last state, and the unit of each.
+    where : str
+        The values of the parameters there.
+    """
+    bounds = np.array([window.lower, window.upper]).T
+    off = np.abs(state[:, None] - bounds) / unit[:, None]
+    k, side = np.unravel_index(np.argmin(np.where(np.isfinite(off), off, np.inf)), off.shape)
+    name, bound = window.states[k], bounds[k, side]
+    if window.given[k][side]:
+        return Outcome(
+            LEFT, f"reached {name} = {bound:g}, an edge of the window, at {where}.", True
+        )
+    return Outcome(
+        LEFT,
+        f"{name} reached {bound:.6g} at {where}, {MARGIN:g} times the size of the equilibria from "
+        f"which branches are traced, and may go to infinity; window={{'{name}': (low, high)}} "
+        "sets other bounds.",
+        False,
+    )
