@@ -227,10 +227,12 @@ def left_window(window: StateWindow, state: Array, unit: Array, where: str) -> O
     name, bound = window.states[k], bounds[k, side]
     if window.given[k][side]:
         return Outcome(
-            LEFT, f"reached {name} = {bound:g}, an edge of the window, at {where}.", True
+            "left the window",
+            f"reached {name} = {bound:g}, an edge of the window, at {where}.",
+            True,
         )
     return Outcome(
-        LEFT,
+        "left the window",
         f"{name} reached {bound:.6g} at {where}, {MARGIN:g} times the size of the equilibria from "
         f"which branches are traced, and may go to infinity; window={{'{name}': (low, high)}} "
         "sets other bounds.",

@@ -197,6 +197,10 @@ BY_FUNCTION = {
         ("p", Wrong, "parameters = 'p'; expected a sequence"),
         (("p", "omga"), fs.FastSlowError, "omga"),
     ],
+    "continue_points.window": [
+        *WINDOW,
+        ({"x": (5, 6)}, Wrong, "lies outside the window x in [5, 6]; window= sets other bounds"),
+    ],
     "delay_scaling.level": LEVEL,
     "delay_scaling.rates": [
         ([1e-3], Wrong, "expected at least two positive speeds"),
