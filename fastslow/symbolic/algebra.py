@@ -6,11 +6,15 @@ budget is only expanded, and what is past expansion is left as it is.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import itertools
 import math
 
 import sympy as sp
+
+from fastslow.symbolic.polynomials import PastBudgetError
+from fastslow.symbolic.rational import quotient
 
 #: Longest sum, in terms, that is factored or cancelled.
 TERMS = 200
@@ -37,12 +41,18 @@ MEMORY = 2048
 def spread(expression: sp.Expr) -> sp.Expr:
     """Expand with exponentials kept whole; too long an expression is left as it is.
 
+    A sum in a denominator stays below the whole numerator, so that a quotient does not
+    become a sum of quotients.
+
     Examples
     --------
     >>> x, a = sp.symbols("x a")
-    >>> spread(x * (a + sp.exp(x + a)))
-    a*x + x*exp(a + x)
+    >>> spread(x * (a + sp.exp(x + a))), spread((x + a) * x / (x + 1))
+    (a*x + x*exp(a + x), (a*x + x**2)/(x + 1))
     """
+    found = None if whole(expression) else quotient(expression)
+    if found is not None:
+        return found.expanded()
     if expression.is_Atom or longer(expression, PARTS) or growth(expression) > EXPANDED:
         return expression
     return sp.expand(expression, power_exp=False, log=False)
@@ -61,17 +71,23 @@ def longer(expression: sp.Basic, parts: int) -> bool:
 
 
 def compressed(expression: sp.Expr) -> bool:
-    """Whether products or powers of sums stand in a sum.
+    """Whether products or powers of sums stand above a denominator.
 
     Examples
     --------
     >>> x, y = sp.symbols("x y")
     >>> compressed(x * (x + y) + 1), compressed(x**2 + x * y + 1 / (x + y))
     (True, False)
+    >>> compressed((x**2 + x * y) / (x + y) ** 2)
+    False
     """
-    pieces = [p for term in sp.Add.make_args(expression) for p in sp.Mul.make_args(term)]
-    bases = [p.base if p.is_Pow and p.exp.is_positive else p for p in pieces]
-    return any(b.is_Add and b != expression for b in bases)
+    terms = sp.Add.make_args(expression)
+    for term in terms:
+        pieces = [p.as_base_exp() for p in sp.Mul.make_args(term)]
+        sums = [(b, e) for b, e in pieces if b.is_Add and not e.is_negative]
+        if len(sums) > 1 or any(e != 1 for _, e in sums) or (sums and len(terms) > 1):
+            return True
+    return False
 
 
 def growth(expression: sp.Expr) -> float:
@@ -109,6 +125,8 @@ def light(expression: sp.Expr) -> bool:
     >>> light(x**3 - sp.exp(x)), light(sp.tanh(x) - sp.cosh(x / 2))
     (True, False)
     """
+    if not generators(expression) and not irrational(expression):
+        return quotient(expression) is not None
     if longer(expression, PARTS):
         return False
     kinds = generators(expression)
@@ -143,6 +161,9 @@ def tidy(expression: sp.Expr) -> sp.Expr:
     >>> tidy((x**2 - 1) / (x - 1))
     x + 1
     """
+    found = quotient(sp.sympify(expression))
+    if found is not None:
+        return found.expanded()
     if longer(expression, PARTS):
         return expression
     expanded = spread(sp.sympify(expression))
@@ -165,6 +186,9 @@ def numerator(expression: sp.Expr) -> sp.Expr:
     >>> numerator(x + 1 / (x + 1))
     x**2 + x + 1
     """
+    found = quotient(sp.sympify(expression))
+    if found is not None:
+        return found.numerator.as_expr()
     expanded = spread(sp.sympify(expression))
     if all(not p.exp.is_negative for p in expanded.atoms(sp.Pow)) or not light(expression):
         return expanded
@@ -173,16 +197,24 @@ def numerator(expression: sp.Expr) -> sp.Expr:
 
 @functools.lru_cache(maxsize=MEMORY)
 def factors(expression: sp.Expr) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ...]]:
-    """Constant and irreducible factors with powers; past the budget, the expression itself.
+    """Constant and irreducible factors with powers, those of a denominator with negative ones.
+
+    Past the budget it is the expression itself.
 
     Examples
     --------
     >>> x = sp.Symbol("x")
     >>> factors(2 * x**2 - 2)
-    (2, ((x - 1, 1), (x + 1, 1)))
+    (2, ((x + 1, 1), (x - 1, 1)))
     """
     if expression.is_number:
         return expression, ()
+    found = quotient(expression)
+    if found is not None:
+        try:
+            return found.factors()
+        except PastBudgetError:
+            return sp.S.One, ((expression, 1),)
     if not light(expression):
         pieces: list[tuple[sp.Expr, int]] = []
         constant = sp.S.One
@@ -217,6 +249,13 @@ def shortest(expression: sp.Expr) -> sp.Expr:
     >>> shortest(x**3 - a * x**2 + a * x - a**2).func is sp.Mul
     True
     """
+    found = quotient(expression)
+    if found is not None:
+        forms = [expression, found.expanded()]
+        # what is over the budget of factoring is long in any form
+        with contextlib.suppress(PastBudgetError):
+            forms.append(found.factored())
+        return min(forms[::-1], key=lambda e: (sp.count_ops(e), len(str(e))))
     if not light(expression):
         return expression
     if generators(expression) or irrational(expression):

@@ -9,6 +9,7 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from fastslow.symbolic.algebra import factors, light, longer, spread, tidy, undefined
+from fastslow.symbolic.rational import quotient
 
 #: Parts of an expression up to which more than the signs of its terms is tried.
 PARTS = 300
@@ -304,8 +305,11 @@ def parts(expression: sp.Expr) -> list[tuple[sp.Expr, int]]:
     >>> from fastslow.model.structure import real
     >>> x = real("x")
     >>> parts((x**2 - 1) / 3)
-    [(x - 1, 1), (x + 1, 1), (3, 1)]
+    [(1/3, 1), (x + 1, 1), (x - 1, 1)]
     """
+    if quotient(expression) is not None:
+        constant, pieces = factors(expression)
+        return [(f, abs(p)) for f, p in ((constant, 1), *pieces) if f != 1]
     ready = sp.together(expression) if light(expression) else expression
     found: list[tuple[sp.Expr, int]] = []
     for part in ready.as_numer_denom() if light(expression) else (ready,):

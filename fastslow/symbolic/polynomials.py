@@ -1,0 +1,287 @@
+"""Greatest common divisors and factors of sparse polynomials in many symbols.
+
+A polynomial that is linear in one of its symbols, as most are in some parameter, is
+irreducible once the common divisor of its two coefficients is taken out. That settles
+in a few divisions what general algorithms need long for; only what is linear in no
+symbol goes to SymPy. What is past the budget raises, so that the answer depends on the
+polynomial alone.
+"""
+
+from __future__ import annotations
+
+import math
+
+import sympy as sp
+from sympy.polys.domains import ZZ
+from sympy.polys.heuristicgcd import heugcd
+from sympy.polys.polyerrors import HeuristicGCDFailed
+from sympy.polys.rings import PolyElement
+
+#: Most terms of a polynomial that is formed.
+TERMS = 3000
+
+#: Most products of terms in one multiplication.
+PRODUCTS = 60_000
+
+#: Bits of the integers that a heuristic common divisor may reach.
+BITS = 200_000
+
+#: Most terms of a polynomial that SymPy factors, and most terms times symbols.
+FACTORED, FACTORED_MANY = 200, 1000
+
+#: Integer points at which a polynomial is tried for irreducibility (Hilbert).
+TRIALS = 3
+
+
+class PastBudgetError(Exception):
+    """A polynomial is longer than what is computed with."""
+
+
+def product(one: PolyElement, two: PolyElement) -> PolyElement:
+    """Multiply within the budget.
+
+    Raises
+    ------
+    PastBudgetError
+    """
+    if len(one) * len(two) > PRODUCTS:
+        raise PastBudgetError
+    result = one * two
+    if len(result) > TERMS:
+        raise PastBudgetError
+    return result
+
+
+def used(poly: PolyElement) -> list[int]:
+    """Numbers of the generators that occur."""
+    return [k for k in range(poly.ring.ngens) if any(m[k] for m in poly)]
+
+
+def degree(poly: PolyElement, k: int) -> int:
+    """Degree in generator k."""
+    return max((m[k] for m in poly), default=0)
+
+
+def coefficients(poly: PolyElement, k: int) -> dict[int, PolyElement]:
+    """Power of generator k to its coefficient."""
+    found: dict[int, PolyElement] = {}
+    for monomial, value in poly.items():
+        rest = (*monomial[:k], 0, *monomial[k + 1 :])
+        found.setdefault(monomial[k], poly.ring.zero)[rest] = value
+    return found
+
+
+def content(poly: PolyElement, k: int) -> PolyElement:
+    """Greatest common divisor of the coefficients with respect to generator k."""
+    total = poly.ring.zero
+    for part in sorted(coefficients(poly, k).values(), key=len):
+        total = gcd(total, part)
+        if total == 1:
+            break
+    return total
+
+
+def divided(poly: PolyElement, by: PolyElement) -> PolyElement | None:
+    """Exact quotient, None where there is a remainder."""
+    if by == 1:
+        return poly
+    if len(by) == 1:
+        ((low, factor),) = by.items()
+        result = poly.ring.zero
+        for monomial, value in poly.items():
+            lowered = tuple(a - b for a, b in zip(monomial, low, strict=True))
+            if min(lowered, default=0) < 0 or value % factor:
+                return None
+            result[lowered] = value // factor
+        return result
+    if any(degree(poly, k) < degree(by, k) for k in used(by)):
+        return None
+    if not _may_divide(poly, by):
+        return None
+    quotient, rest = poly.div(by)
+    return quotient if not rest else None
+
+
+def _may_divide(poly: PolyElement, by: PolyElement) -> bool:
+    """Whether the values at an integer point divide; a quick test before a long division."""
+    point = [sp.prime(k + 4) for k in range(poly.ring.ngens)]
+    below = _value(by, point)
+    return below == 0 or _value(poly, point) % below == 0
+
+
+def _value(poly: PolyElement, point: list[int]) -> int:
+    return sum(
+        int(c) * math.prod(p**e for p, e in zip(point, m, strict=True) if e)
+        for m, c in poly.items()
+    )
+
+
+def gcd(one: PolyElement, two: PolyElement) -> PolyElement:
+    """Greatest common divisor over the integers, with a positive leading coefficient.
+
+    Raises
+    ------
+    PastBudgetError
+        Where only a computation with huge integers would decide it.
+
+    Examples
+    --------
+    >>> from sympy.polys.rings import ring
+    >>> _, x, y, a = ring("x y a", ZZ)
+    >>> gcd((x + a * y) * (x - 1), (x + a * y) * (y**2 + a))
+    x + y*a
+    """
+    if not one or not two:
+        return _positive(one or two)
+    if len(one) == 1 or len(two) == 1:
+        return _monomial_gcd(one, two)
+    first, second = _monomial_content(one), _monomial_content(two)
+    common = _monomial_gcd(first, second)
+    return product(common, _gcd(divided(one, first), divided(two, second)))
+
+
+def _gcd(one: PolyElement, two: PolyElement) -> PolyElement:
+    """As `gcd`, for two without a common monomial factor of their own."""
+    ring = one.ring
+    if len(one) > len(two):
+        one, two = two, one
+    if len(one) == 1:
+        return ring.one
+    mine, theirs = used(one), used(two)
+    for poly, other, alone in (
+        (one, two, set(mine) - set(theirs)),
+        (two, one, set(theirs) - set(mine)),
+    ):
+        if alone:
+            return gcd(content(poly, min(alone)), other)
+    if divided(two, one) is not None:
+        return _positive(one)
+    for poly, other in ((one, two), (two, one)):
+        k = next((k for k in mine if degree(poly, k) == 1), None)
+        if k is not None:
+            # without its content it is irreducible: it divides the other one or shares nothing
+            inside = content(poly, k)
+            bare = divided(poly, inside)
+            rest = gcd(inside, content(other, k))
+            if divided(other, bare) is None:
+                return rest
+            return _positive(product(rest, bare))
+    bits = max(_height(one), _height(two)).bit_length() + 2
+    for k in mine:
+        bits *= min(degree(one, k), degree(two, k)) + 1
+    if bits > BITS:
+        raise PastBudgetError
+    try:
+        return _positive(heugcd(one, two)[0])
+    except HeuristicGCDFailed:
+        raise PastBudgetError from None
+
+
+def _height(poly: PolyElement) -> int:
+    return max(abs(int(c)) for c in poly.values())
+
+
+def _positive(poly: PolyElement) -> PolyElement:
+    return -poly if poly and poly.LC < 0 else poly
+
+
+def _monomial_content(poly: PolyElement) -> PolyElement:
+    """Greatest monomial, with its integer, that divides every term."""
+    low = tuple(map(min, zip(*poly, strict=True)))
+    return poly.ring.from_dict({low: ZZ(math.gcd(*map(int, poly.values())))})
+
+
+def _monomial_gcd(one: PolyElement, two: PolyElement) -> PolyElement:
+    first, second = _monomial_content(one), _monomial_content(two)
+    ((low, a),), ((high, b),) = first.items(), second.items()
+    powers = tuple(map(min, low, high))
+    return one.ring.from_dict({powers: ZZ(math.gcd(int(a), int(b)))})
+
+
+def factor(poly: PolyElement) -> tuple[int, list[tuple[PolyElement, int]]]:
+    """Integer factor, and irreducible factors with their powers; a long one may stay whole.
+
+    Raises
+    ------
+    PastBudgetError
+
+    Examples
+    --------
+    >>> from sympy.polys.rings import ring
+    >>> _, x, y, a = ring("x y a", ZZ)
+    >>> factor(-2 * (x + a * y) ** 2 * (x**2 - y**2) * a)
+    (-2, [(a, 1), (x + y, 1), (x + y*a, 2), (x - y, 1)])
+    """
+    inside = _monomial_content(poly)
+    ((powers, number),) = inside.items()
+    ring = poly.ring
+    found = [(g, e) for g, e in zip(ring.gens, powers, strict=True) if e]
+    rest = divided(poly, inside)
+    sign = 1
+    if rest.LC < 0:
+        rest, sign = -rest, -1
+    for part, power in _factors(rest):
+        if part.LC < 0:
+            part, sign = -part, sign * (-1) ** power
+        found.append((part, power))
+    merged: dict[frozenset[tuple[tuple[int, ...], int]], tuple[PolyElement, int]] = {}
+    for part, power in found:
+        # the hash of a PolyElement goes stale when it is changed in place
+        key = frozenset((m, int(c)) for m, c in part.items())
+        merged[key] = (part, power + merged[key][1] if key in merged else power)
+    ordered = sorted(merged.values(), key=lambda p: (len(p[0]), sum(p[0].LM), str(p[0])))
+    return sign * int(number), ordered
+
+
+def _factors(poly: PolyElement) -> list[tuple[PolyElement, int]]:
+    """Factors of a polynomial without monomial content."""
+    if len(poly) == 1:
+        return []
+    inside = sorted(used(poly), key=lambda k: degree(poly, k))
+    for k in inside:
+        common = content(poly, k)
+        if common != 1 and common != -1:
+            return [*_factors(common), *_factors(divided(poly, common))]
+    if degree(poly, inside[0]) == 1:
+        return [(poly, 1)]
+    k = inside[0]
+    repeated = gcd(poly, poly.diff(poly.ring.gens[k]))
+    if repeated != 1:
+        once = divided(poly, repeated)
+        return [*_factors(once), *_factors(repeated)]
+    if _irreducible(poly, k) or len(poly) > FACTORED or len(poly) * len(inside) > FACTORED_MANY:
+        return [(poly, 1)]
+    return [(p, int(e)) for p, e in poly.factor_list()[1]]
+
+
+def _irreducible(poly: PolyElement, k: int) -> bool:
+    """Whether a primitive polynomial is seen to be irreducible at an integer point."""
+    size = degree(poly, k)
+    for trial in range(TRIALS):
+        point = [sp.prime(3 * trial + 2 * j + 3) for j in range(poly.ring.ngens)]
+        row = [0] * (size + 1)
+        for monomial, value in poly.items():
+            others = (p**e for j, (p, e) in enumerate(zip(point, monomial, strict=True)) if j != k)
+            row[size - monomial[k]] += int(value) * math.prod(others)
+        if row[0] and sp.Poly(row, sp.Dummy()).is_irreducible:
+            return True
+    return False
+
+
+def square_root(poly: PolyElement) -> PolyElement | None:
+    """Square root of a polynomial that is a square, else None.
+
+    Examples
+    --------
+    >>> from sympy.polys.rings import ring
+    >>> _, x, y = ring("x y", ZZ)
+    >>> square_root((x - 2 * y) ** 2), square_root(x**2 + y**2)
+    (x - 2*y, None)
+    """
+    number, parts = factor(poly)
+    if number < 0 or math.isqrt(number) ** 2 != number or any(e % 2 for _, e in parts):
+        return None
+    result = poly.ring.one * math.isqrt(number)
+    for part, power in parts:
+        result *= part ** (power // 2)
+    return result

@@ -1,0 +1,264 @@
+"""Rational functions over one denominator, cancelled, with roots reduced.
+
+An expression in symbols and roots of rational expressions becomes a quotient of two
+sparse polynomials; one square root goes to the numerator, as A/D + (B/D) √R.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import sympy as sp
+from sympy.polys.domains import ZZ
+from sympy.polys.rings import PolyElement, PolyRing
+
+from fastslow.symbolic.polynomials import (
+    PastBudgetError,
+    coefficients,
+    degree,
+    divided,
+    factor,
+    gcd,
+    product,
+    used,
+)
+
+#: Quotients that are kept for the next question about them.
+MEMORY = 4096
+
+#: Largest power of a sum that is multiplied out.
+POWER = 24
+
+#: Parts of an expression that is read.
+PARTS = 4000
+
+
+@dataclass(frozen=True)
+class Quotient:
+    """Numerator and denominator without a common factor.
+
+    Parameters
+    ----------
+    numerator, denominator : PolyElement
+        Over the integers; the leading coefficient of the denominator is positive.
+    roots : dict
+        Number of a generator that is a root to (radicand, index): its power of that
+        index is the radicand, a polynomial of the same ring.
+    """
+
+    numerator: PolyElement
+    denominator: PolyElement
+    roots: dict[int, tuple[PolyElement, int]]
+
+    @property
+    def polynomial(self) -> bool:
+        """Whether the denominator is one term."""
+        return len(self.denominator) == 1
+
+    def expanded(self) -> sp.Expr:
+        """A sum of terms where the denominator is one term, else one quotient.
+
+        Examples
+        --------
+        >>> x, a = sp.symbols("x a")
+        >>> quotient((x**2 - a**2) / (x - a) + 1 / a).expanded()
+        a + x + 1/a
+        """
+        if self.polynomial:
+            below = self.denominator.as_expr()
+            return sp.Add(*(t / below for t in sp.Add.make_args(self.numerator.as_expr())))
+        try:
+            number, parts = factor(self.denominator)
+        except PastBudgetError:
+            return self.numerator.as_expr() / self.denominator.as_expr()
+        below = sp.Mul(*(p.as_expr() ** e for p, e in parts))
+        inside = sp.Add(*(t / number for t in sp.Add.make_args(self.numerator.as_expr())))
+        return inside / below
+
+    def factored(self) -> sp.Expr:
+        """Numerator and denominator as products of irreducible factors.
+
+        Examples
+        --------
+        >>> x, a = sp.symbols("x a")
+        >>> quotient(x**2 - a**2 + x - a).factored()
+        -(a - x)*(a + x + 1)
+        """
+        number, parts = self.factors()
+        whole = [(p, e) for p, e in parts if not (p.is_Add and len(parts) == 1 and e == 1)]
+        if whole != list(parts):
+            return self.expanded()
+        return number * sp.Mul(*(p**e for p, e in parts))
+
+    def factors(self) -> tuple[sp.Rational, tuple[tuple[sp.Expr, int], ...]]:
+        """Constant and irreducible factors; those of the denominator have negative powers.
+
+        Raises
+        ------
+        PastBudgetError
+        """
+        if not self.numerator:
+            return sp.S.Zero, ()
+        (above, over), (below, under) = factor(self.numerator), factor(self.denominator)
+        pieces = [(p.as_expr(), e) for p, e in over] + [(p.as_expr(), -e) for p, e in under]
+        return sp.Rational(above, below), tuple(pieces)
+
+
+@functools.lru_cache(maxsize=MEMORY)
+def quotient(expression: sp.Expr) -> Quotient | None:
+    """Give the cancelled quotient of an expression.
+
+    Returns
+    -------
+    Quotient or None
+        None for what is not rational in symbols and roots, and past the budget.
+
+    Examples
+    --------
+    >>> x, a = sp.symbols("x a")
+    >>> found = quotient(1 / (x + sp.sqrt(a)) + 1 / (x - sp.sqrt(a)))
+    >>> found.numerator, found.denominator
+    (-2*x, a - x**2)
+    """
+    if any(k > PARTS for k, _ in enumerate(sp.preorder_traversal(expression))):
+        return None
+    kernels = _kernels(expression)
+    if kernels is None:
+        return None
+    try:
+        return _Reader(kernels).read(expression)
+    except PastBudgetError:
+        return None
+
+
+def _kernels(expression: sp.Expr) -> list[sp.Expr] | None:
+    """Symbols and roots that an expression is rational in, None if it is not."""
+    found: set[sp.Expr] = set()
+    waiting: list[sp.Basic] = [expression]
+    while waiting:
+        node = waiting.pop()
+        if node.is_Symbol:
+            found.add(node)
+        elif node.is_Rational:
+            continue
+        elif node.is_Add or node.is_Mul:
+            waiting += node.args
+        elif node.is_Pow and node.exp.is_Integer:
+            waiting.append(node.base)
+        elif node.is_Pow and node.exp.is_Rational:
+            if node.base.is_Rational and not node.base.is_Integer:
+                return None
+            found.add(sp.Pow(node.base, sp.Rational(1, node.exp.q)))
+            waiting.append(node.base)
+        else:
+            return None
+    return sorted(found, key=lambda s: (not s.is_Symbol, sp.count_ops(s), str(s)))
+
+
+class _Reader:
+    """An expression as a quotient in one ring."""
+
+    def __init__(self, kernels: list[sp.Expr]) -> None:
+        names = kernels or [sp.Dummy()]
+        self.ring = PolyRing(names, ZZ)
+        self.place = dict(zip(names, self.ring.gens, strict=True))
+        self.roots: dict[int, tuple[PolyElement, int]] = {}
+        for k, kernel in enumerate(kernels):
+            if kernel.is_Pow:
+                over, under = self.value(kernel.base)
+                if under == 1:
+                    self.roots[k] = (over, int(kernel.exp.q))
+
+    def read(self, expression: sp.Expr) -> Quotient:
+        over, under = self.value(expression)
+        square = [k for k in used(under) if k in self.roots]
+        if len(square) == 1 and self.roots[square[0]][1] == 2:
+            (k,) = square
+            parts = coefficients(under, k)
+            low = parts.get(0, self.ring.zero)
+            conjugate = low - self.ring.gens[k] * parts[1]
+            over = self.reduced(product(over, conjugate))
+            under = self.reduced(product(under, conjugate))
+            over, under = self.cancelled(over, under)
+        return Quotient(over, under, self.roots)
+
+    def value(self, node: sp.Expr) -> tuple[PolyElement, PolyElement]:
+        ring = self.ring
+        if node in self.place:
+            return self.place[node], ring.one
+        if node.is_Rational:
+            return ring.one * int(node.p), ring.one * int(node.q)
+        if node.is_Add:
+            return self.sum(node)
+        if node.is_Mul:
+            over, under = ring.one, ring.one
+            for argument in node.args:
+                a, b = self.value(argument)
+                a, under = self.cancelled(a, under)
+                over, b = self.cancelled(over, b)
+                over, under = self.reduced(product(over, a)), self.reduced(product(under, b))
+            # roots that were multiplied may have left a common factor
+            return self.cancelled(over, under) if self.roots else (over, under)
+        if node.exp.is_Integer:
+            power = int(node.exp)
+            if abs(power) > POWER and not node.base.is_Symbol:
+                raise PastBudgetError
+            over, under = self.value(node.base)
+            if power < 0:
+                over, under = under, over
+            return self.power(over, abs(power)), self.power(under, abs(power))
+        base = self.place[sp.Pow(node.base, sp.Rational(1, node.exp.q))]
+        power = self.power(base, abs(int(node.exp.p)))
+        return (power, ring.one) if node.exp > 0 else (ring.one, power)
+
+    def sum(self, node: sp.Expr) -> tuple[PolyElement, PolyElement]:
+        grouped: list[tuple[PolyElement, PolyElement]] = []
+        for argument in node.args:
+            a, b = self.value(argument)
+            for j, (one, two) in enumerate(grouped):
+                if two == b:
+                    grouped[j] = (one + a, two)
+                    break
+            else:
+                grouped.append((a, b))
+        over, under = grouped[0]
+        for a, b in grouped[1:]:
+            shared = gcd(under, b)
+            left, right = divided(under, shared), divided(b, shared)
+            over = self.reduced(product(over, right) + product(a, left))
+            under = self.reduced(product(under, right))
+        return self.cancelled(over, under)
+
+    def power(self, base: PolyElement, power: int) -> PolyElement:
+        if len(base) == 1:
+            return self.reduced(base**power)
+        result = self.ring.one
+        for _ in range(power):
+            result = self.reduced(product(result, base))
+        return result
+
+    def reduced(self, poly: PolyElement) -> PolyElement:
+        """Powers of roots replaced by their radicands, innermost last."""
+        for k in sorted(self.roots, reverse=True):
+            inside, index = self.roots[k]
+            while degree(poly, k) >= index:
+                total = self.ring.zero
+                for power, part in coefficients(poly, k).items():
+                    if power >= index:
+                        part = product(part, inside) * self.ring.gens[k] ** (power - index)
+                        total += part
+                    else:
+                        total += part * self.ring.gens[k] ** power
+                poly = total
+        return poly
+
+    def cancelled(self, over: PolyElement, under: PolyElement) -> tuple[PolyElement, PolyElement]:
+        if not over:
+            return over, self.ring.one
+        if not under:
+            raise PastBudgetError
+        shared = gcd(over, under)
+        if shared != 1:
+            over, under = divided(over, shared), divided(under, shared)
+        return (-over, -under) if under.LC < 0 else (over, under)
