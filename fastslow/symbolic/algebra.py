@@ -55,7 +55,15 @@ def spread(expression: sp.Expr) -> sp.Expr:
         return found.expanded()
     if expression.is_Atom or longer(expression, PARTS) or growth(expression) > EXPANDED:
         return expression
-    return sp.expand(expression, power_exp=False, log=False)
+    kept = {
+        p: sp.Dummy(real=True)
+        for p in expression.atoms(sp.Pow)
+        if p.exp.is_Rational and not p.exp.is_Integer and p.base.is_Add
+    }
+    # SymPy takes whole powers out of a root and multiplies them out
+    bare = expression.xreplace(kept)
+    expanded = sp.expand(bare, power_exp=False, log=False)
+    return expanded.xreplace({new: p for p, new in kept.items()})
 
 
 def longer(expression: sp.Basic, parts: int) -> bool:

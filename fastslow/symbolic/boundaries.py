@@ -10,10 +10,12 @@ from sympy.logic.boolalg import Boolean
 
 from fastslow.model.structure import real
 from fastslow.results.named import Named
-from fastslow.symbolic.algebra import adjugate, determinant, spread, tidy
+from fastslow.symbolic.algebra import adjugate, determinant, spread, tidy, undefined
+from fastslow.symbolic.candidates import Candidates, settled
 from fastslow.symbolic.critical import Setting
-from fastslow.symbolic.inequalities import implied
+from fastslow.symbolic.inequalities import conjunction, implied
 from fastslow.symbolic.location import neat
+from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.solution_families import Family, families
 from fastslow.symbolic.stability import jacobian
 from fastslow.symbolic.univariate import Root, roots, solved_for
@@ -137,52 +139,80 @@ def boundary_forms(
     """
     found: list[BoundaryForm] = []
     for own, other in (sides,) if continuous else (sides, sides[::-1]):
-        for place, left in _places(function, own):
+        for place in _places(function, own):
             outward = function if own is sides[0] else -function
-            found.append(_form(interface, outward, own, other, continuous, place, left))
+            found.append(_form(interface, outward, own, other, continuous, place))
     return [f for f in found if f.admissible != sp.false]
 
 
-def _places(
-    function: sp.Expr, own: Setting
-) -> list[tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Expr, ...]]]:
-    """Where the rates of a region and h vanish: values of states and of one parameter."""
+@dataclass(frozen=True)
+class _Place:
+    """Values of states and parameters, what must not be negative, and what is left to hold."""
+
+    values: dict[sp.Symbol, sp.Expr]
+    radicands: tuple[sp.Expr, ...]
+    left: tuple[sp.Expr, ...]
+
+
+def _places(function: sp.Expr, own: Setting) -> list[_Place]:
+    """Where the rates of a region and h vanish: values of states and of parameters.
+
+    One parameter is solved for, and more where the equations ask for it. What
+    contradicts the assumed signs is left out.
+    """
     used = set().union(function.free_symbols, *(r.free_symbols for r in own.rates.values()))
-    best: list[tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Expr, ...]]] = []
+    best: list[_Place] = []
     for parameter in own.candidates:
         if parameter not in used:
             continue
         names = (*own.states, parameter.name)
         signs = own.signs.without(parameter)
-        others = tuple(c for c in own.candidates if c != parameter)
+        others = own.candidates.without(parameter)
         result = []
         for family in families({**own.rates, parameter.name: function}, names, signs, others):
-            result += _solutions(family, names)
-        sign = own.signs.known.get(parameter, 0)
-        result = [
-            (place, left)
-            for place, left in result
-            if not (sign and own.signs.sign(sign * place[parameter]) in (0, -1))
-            and not any(own.signs.nonzero(e) for e in left)
-        ]
-        if result and not any(left for _, left in result):
+            result += _solutions(family, names, own, others)
+        result = [p for p in result if not _contradicts(p, own.signs)]
+        if result and not any(p.left for p in result):
             return result
         best = best or result
     return best
 
 
+def _contradicts(place: _Place, signs: Signs) -> bool:
+    """Whether the assumed signs of parameters exclude a place."""
+    for symbol, value in place.values.items():
+        side = signs.known.get(symbol)
+        if side is not None and symbol != value and signs.sign(side * value) in (0, -1):
+            return True
+    return any(signs.nonzero(e) for e in place.left) or any(
+        signs.sign(e) == -1 for e in place.radicands
+    )
+
+
 def _solutions(
-    family: Family, names: tuple[str, ...]
-) -> list[tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Expr, ...]]]:
+    family: Family, names: tuple[str, ...], own: Setting, others: Candidates
+) -> list[_Place]:
     unknown = family.unknown
     options: list[Root | None] = list(family.roots) if family.roots is not None else [None]
     found = []
     for root in options:
         inner = {unknown: root.value} if root is not None and unknown is not None else {}
         state = family.elimination.state(inner, names)
-        place = {real(n): neat(e) for n, e in zip(names, state, strict=True)}
         left = () if root is not None else family.equations
-        found.append((place, (*left, *family.condition)))
+        under = root.radicands if root is not None else ()
+        for place, radicands, rest in settled(family.condition, others, own.signs):
+            values = {
+                real(n): neat(e.subs(place)) for n, e in zip(names, state, strict=True)
+            } | place
+            if any(undefined(e) for e in values.values()):
+                continue
+            found.append(
+                _Place(
+                    values,
+                    (*(e.subs(place) for e in under), *radicands),
+                    (*(e.subs(place) for e in left), *rest),
+                )
+            )
     return found
 
 
@@ -192,9 +222,9 @@ def _form(
     own: Setting,
     other: Setting,
     continuous: bool,
-    place: dict[sp.Symbol, sp.Expr],
-    left: tuple[sp.Expr, ...],
+    found: _Place,
 ) -> BoundaryForm:
+    place, left = found.values, found.left
     states = [real(n) for n in own.states]
     names = (own.region, other.region)
     matrices = [_at(jacobian(s.rates, s.states), place) for s in (own, other)]
@@ -216,7 +246,8 @@ def _form(
         clarke = None
     sign = own.signs.sign(test)
     inside = [tidy(e.xreplace(place)) for e in own.inside]
-    admissible = own.holds(e for e in inside if e != 0)
+    inside = [e for e in inside if e != 0]
+    admissible = conjunction((own.real(found.radicands), own.holds(inside)), own.signs)
     zeros = [*own.rates.values(), outward]
     if continuous:
         zeros += other.rates.values()

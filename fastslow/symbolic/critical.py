@@ -11,6 +11,7 @@ from sympy.logic.boolalg import Boolean
 from fastslow.model.structure import real
 from fastslow.results.named import Named
 from fastslow.symbolic.algebra import spread, tidy, undefined
+from fastslow.symbolic.candidates import Candidates
 from fastslow.symbolic.forms import CriticalPoint
 from fastslow.symbolic.inequalities import conjunction, general, implied, nonnegative
 from fastslow.symbolic.location import Located, locate, neat, parameters_where
@@ -33,7 +34,7 @@ class Setting:
     inside : tuple of sympy.Expr
         Positive in the region.
     signs : Signs
-    candidates : tuple of Symbol
+    candidates : Candidates
         Parameters to solve for, slow quantities first.
     geometry : tuple of Symbol
         Parameters of the interfaces, whose signs are never set aside.
@@ -44,7 +45,7 @@ class Setting:
     rates: Named[sp.Expr]
     inside: tuple[sp.Expr, ...]
     signs: Signs
-    candidates: tuple[sp.Symbol, ...]
+    candidates: Candidates
     geometry: tuple[sp.Symbol, ...]
 
     def holds(self, expressions: Iterable[sp.Expr]) -> Boolean:
@@ -77,7 +78,7 @@ def fold_condition(family: Family) -> sp.Expr | None:
     unknown = family.unknown
     if unknown is None:
         return None
-    if family.curve is not None:
+    if family.curve is not None and not family.bent:
         return tidy(family.curve.diff(unknown))
     (equation,) = family.equations
     if equation.is_polynomial(unknown) and sp.degree(equation, unknown) < 2:
@@ -166,11 +167,11 @@ def _passes(other: Family, point: CriticalPoint, setting: Setting) -> bool:
 def cusps(family: Family, setting: Setting) -> list[CriticalPoint]:
     """Where two folds of a curve meet: first and second derivative vanish along it."""
     unknown, curve, parameter = family.unknown, family.curve, family.parameter
-    if unknown is None or curve is None or parameter is None:
+    if unknown is None or curve is None or parameter is None or family.bent:
         return []
     first, second = tidy(curve.diff(unknown)), tidy(curve.diff(unknown, 2))
     points = []
-    others = tuple(c for c in setting.candidates if c != parameter)
+    others = setting.candidates.without(parameter)
     for located in locate(family, second, setting.signs, setting.candidates):
         if located.equations or unknown not in located.place:
             continue

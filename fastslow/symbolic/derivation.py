@@ -16,6 +16,7 @@ from fastslow.model.structure import TIME, real
 from fastslow.results.named import Named
 from fastslow.symbolic.assumptions import read_signs
 from fastslow.symbolic.boundaries import BoundaryForm, boundary_forms
+from fastslow.symbolic.candidates import Candidates
 from fastslow.symbolic.critical import Setting
 from fastslow.symbolic.forms import Continuum, CriticalPoint
 from fastslow.symbolic.inequalities import needed
@@ -160,7 +161,9 @@ def derive(model: Model, assume: Any = None) -> Derivation:
 
 
 def _settings(model: Model, functions: dict[str, sp.Expr], signs: Signs) -> dict[str, Setting]:
-    candidates = tuple(real(n) for n in (*model.free, *model.parameters))
+    candidates = Candidates(
+        tuple(real(n) for n in model.free), tuple(real(n) for n in model.parameters)
+    )
     moving = {real(n) for n in (*model.states, *model.free)}
     used = set().union(set(), *(h.free_symbols for h in functions.values()))
     geometry = tuple(sorted(used - moving, key=lambda s: s.name))

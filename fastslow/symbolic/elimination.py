@@ -10,7 +10,16 @@ import sympy as sp
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.structure import real
 from fastslow.results.named import Named
-from fastslow.symbolic.algebra import generators, growth, light, longer, numerator, spread, whole
+from fastslow.symbolic.algebra import (
+    generators,
+    growth,
+    light,
+    longer,
+    numerator,
+    spread,
+    tidy,
+    whole,
+)
 
 #: Orders of elimination that are compared before the best so far is taken.
 ORDERS = 40
@@ -258,7 +267,7 @@ def _flat(expression: sp.Expr) -> sp.Expr:
     expanded = spread(expression)
     if whole(expanded) or not light(expression):
         return expanded
-    return sp.cancel(sp.together(expanded))
+    return tidy(expression)
 
 
 def _tidy(equation: sp.Expr) -> sp.Expr:

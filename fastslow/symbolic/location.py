@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from fastslow.symbolic.algebra import generators, irrational, light, longer, shortest, spread, tidy
+from fastslow.symbolic.algebra import (
+    generators,
+    irrational,
+    light,
+    longer,
+    numerator,
+    shortest,
+    spread,
+    tidy,
+    undefined,
+)
+from fastslow.symbolic.candidates import Candidates, chosen
 from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.solution_families import Family
 from fastslow.symbolic.univariate import Root, factors_in, roots, solved_for
@@ -70,9 +81,12 @@ def locate(
     >>> [point.place[x] for point in locate(cubic, q - 3 * x**2, signs, [w, q])]
     [sqrt(3)*sqrt(q)/3, -sqrt(3)*sqrt(q)/3]
     """
+    candidates = candidates if isinstance(candidates, Candidates) else Candidates((), (*candidates,))
     unknown = family.unknown
     if unknown is None and family.elimination.unknowns:
         return [Located({}, equations=(*family.equations, family.reduced(condition)))]
+    if family.bent:
+        return _on_bent_curve(family, condition, signs, candidates)
     reduced = family.reduced(condition)
     if longer(reduced, PARTS):
         return [Located({}, equations=(*family.equations, reduced))]
@@ -104,15 +118,50 @@ def _on_curve(
             return [
                 Located(
                     {unknown: r.value, parameter: neat(curve.subs(unknown, r.value))},
-                    (r.radicand,),
+                    r.radicands,
                 )
                 for r in closed
             ]
-    other = solved_for(factor, [c for c in candidates if c not in (parameter, unknown)], signs)
+    other = solved_for(factor, candidates.without(parameter, unknown), signs)
     if other is None:
         return [Located({parameter: curve}, equations=(factor,))]
     symbol, value, _ = other
     return [Located({symbol: value, parameter: neat(curve.subs(symbol, value))})]
+
+
+def _on_bent_curve(
+    family: Family, condition: sp.Expr, signs: Signs, candidates: Candidates
+) -> list[Located]:
+    """On a curve given by a root: from the two equations, with the parameter eliminated.
+
+    What belongs to the other root does not fulfil the condition here and is left out.
+    """
+    unknown, parameter, curve = family.unknown, family.parameter, family.curve
+    assert unknown is not None
+    assert parameter is not None
+    assert curve is not None
+    (equation,) = family.equations
+    free = numerator(replace(family, parameter=None, curve=None).reduced(condition))
+    whole = equation.is_polynomial(parameter) and free.is_polynomial(parameter)
+    if not whole or max(sp.degree(e, parameter) for e in (equation, free)) > RESULTANT:
+        return [Located({parameter: curve}, family.radicands, (free.subs(parameter, curve),))]
+    both = sp.resultant(equation, free, parameter) if parameter in free.free_symbols else free
+    found = []
+    for factor in _open(both, [unknown, *candidates], signs):
+        closed = roots(factor, unknown, signs) if unknown in factor.free_symbols else None
+        places = [({unknown: r.value}, r.radicands) for r in closed or ()]
+        if closed is None:
+            other = solved_for(factor, candidates.without(parameter, unknown), signs)
+            places = [({other[0]: other[1]}, ())] if other is not None else []
+            if other is None:
+                found.append(Located({parameter: curve}, family.radicands, (factor,)))
+        for place, radicands in places:
+            value = neat(curve.subs(place))
+            if undefined(value) or not vanishes(free.subs(place).subs(parameter, value), signs):
+                continue
+            under = tuple(neat(r.subs(place)) for r in family.radicands)
+            found.append(Located({**place, parameter: value}, (*radicands, *under)))
+    return found
 
 
 def _at_root(
@@ -122,15 +171,15 @@ def _at_root(
     assert unknown is not None
     at = reduced.xreplace({unknown: root.value})
     if longer(at, PARTS):
-        return [Located({unknown: root.value}, (root.radicand,), (at,))]
+        return [Located({unknown: root.value}, root.radicands, (at,))]
     at = tidy(at)
     if irrational(at):
         (equation,) = family.equations
         polys = equation.is_polynomial(unknown) and reduced.is_polynomial(unknown)
         if not polys or sp.degree(reduced, unknown) > RESULTANT:
-            return [Located({unknown: root.value}, (root.radicand,), (at,))]
+            return [Located({unknown: root.value}, root.radicands, (at,))]
         at = sp.resultant(equation, reduced, unknown)
-    found = parameters_where(at, {unknown: root.value}, (root.radicand,), signs, candidates)
+    found = parameters_where(at, {unknown: root.value}, root.radicands, signs, candidates)
     return [
         point
         for point in found
@@ -157,32 +206,19 @@ def parameters_where(
     """
     if longer(condition, PARTS):
         return [Located(dict(known), radicands, (condition,))]
+    candidates = candidates if isinstance(candidates, Candidates) else Candidates((), (*candidates,))
     result = []
     for factor in _open(condition, list(candidates), signs):
-        solved = solved_for(factor, candidates, signs)
-        if solved is not None:
-            options = [Root(solved[1])]
-            symbol = solved[0]
-        else:
-            symbol, options = _nonlinear(factor, candidates, signs)
-        if symbol is None:
+        choice = chosen(factor, candidates, signs)
+        if choice is None:
             result.append(Located(dict(known), radicands, (factor,)))
-        for option in options:
-            place = {s: neat(e.subs(symbol, option.value)) for s, e in known.items()}
-            under = tuple(neat(r.subs(symbol, option.value)) for r in radicands)
-            result.append(Located({**place, symbol: option.value}, (*under, option.radicand)))
+            continue
+        for option in choice.values:
+            value = {choice.symbol: option.value}
+            place = {s: neat(e.subs(value)) for s, e in known.items()}
+            under = tuple(neat(r.subs(value)) for r in radicands)
+            result.append(Located({**place, **value}, (*under, *option.radicands)))
     return result
-
-
-def _nonlinear(
-    factor: sp.Expr, candidates: Sequence[sp.Symbol], signs: Signs
-) -> tuple[sp.Symbol | None, list[Root]]:
-    for symbol in candidates if light(factor) else ():
-        if symbol in factor.free_symbols:
-            closed = roots(factor, symbol, signs)
-            if closed is not None:
-                return symbol, closed
-    return None, []
 
 
 def _open(condition: sp.Expr, symbols: Sequence[sp.Symbol], signs: Signs) -> list[sp.Expr]:

@@ -30,6 +30,9 @@ MEMORY = 4096
 #: Largest power of a sum that is multiplied out.
 POWER = 24
 
+#: Roots of a higher index are not reduced.
+INDEX = 4
+
 #: Parts of an expression that is read.
 PARTS = 4000
 
@@ -149,11 +152,18 @@ def _kernels(expression: sp.Expr) -> list[sp.Expr] | None:
         elif node.is_Pow and node.exp.is_Rational:
             if node.base.is_Rational and not node.base.is_Integer:
                 return None
-            found.add(sp.Pow(node.base, sp.Rational(1, node.exp.q)))
+            found.add(_root(node))
             waiting.append(node.base)
         else:
             return None
     return sorted(found, key=lambda s: (not s.is_Symbol, sp.count_ops(s), str(s)))
+
+
+def _root(power: sp.Pow) -> sp.Expr:
+    """The root that a power is a power of; one of a high index is a symbol of its own."""
+    if power.exp.q > INDEX:
+        return sp.Pow(power.base, abs(power.exp))
+    return sp.Pow(power.base, sp.Rational(1, power.exp.q))
 
 
 class _Reader:
@@ -167,7 +177,7 @@ class _Reader:
         for k, kernel in enumerate(kernels):
             if kernel.is_Pow:
                 over, under = self.value(kernel.base)
-                if under == 1:
+                if under == 1 and kernel.exp.p == 1 and kernel.exp.q <= INDEX:
                     self.roots[k] = (over, int(kernel.exp.q))
 
     def read(self, expression: sp.Expr) -> Quotient:
@@ -208,8 +218,8 @@ class _Reader:
             if power < 0:
                 over, under = under, over
             return self.power(over, abs(power)), self.power(under, abs(power))
-        base = self.place[sp.Pow(node.base, sp.Rational(1, node.exp.q))]
-        power = self.power(base, abs(int(node.exp.p)))
+        base = self.place[_root(node)]
+        power = base if node.exp.q > INDEX else self.power(base, abs(int(node.exp.p)))
         return (power, ring.one) if node.exp > 0 else (ring.one, power)
 
     def sum(self, node: sp.Expr) -> tuple[PolyElement, PolyElement]:

@@ -12,6 +12,7 @@ from fastslow.results.named import Named
 from fastslow.results.point_types import point_name
 from fastslow.symbolic.algebra import tidy
 from fastslow.symbolic.boundaries import BoundaryForm
+from fastslow.symbolic.candidates import settled
 from fastslow.symbolic.critical import (
     Setting,
     cusps,
@@ -26,6 +27,7 @@ from fastslow.symbolic.inequalities import (
     conjunction,
     implied,
     isolated,
+    nonnegative,
     positive,
     sign_within,
 )
@@ -39,7 +41,7 @@ from fastslow.symbolic.stability import (
     stability_of_matrix,
     stability_of_tests,
 )
-from fastslow.symbolic.univariate import Root, roots, solved_for
+from fastslow.symbolic.univariate import Root, roots
 from fastslow.symbolic.verification import OPEN, checked, weakest
 
 
@@ -140,7 +142,8 @@ def derive_region(setting: Setting, boundary: tuple[BoundaryForm, ...]) -> Regio
     for family in isolated_ones:
         inner = _stability_along(family, whole, setting)
         forms += _equilibria(family, inner, setting)
-        others = [f for f in isolated_ones if f is not family]
+        # the other root of the same equation is no other family
+        others = [f for f in isolated_ones if f.elimination is not family.elimination]
         points += folds(family, others, whole, setting) + cusps(family, setting)
         reason = _no_hopf(inner)
         if reason:
@@ -161,7 +164,7 @@ def derive_region(setting: Setting, boundary: tuple[BoundaryForm, ...]) -> Regio
         setting.rates,
         tuple(dict.fromkeys(e for f in found for e in (*f.equations, *f.condition))),
         tuple(forms),
-        tuple(_continuum(f, whole, setting) for f in found if _continuous(f)),
+        tuple(c for f in found if _continuous(f) for c in _continua(f, whole, setting)),
         matrix,
         whole,
         coded("LP"),
@@ -255,17 +258,18 @@ def _form(family: Family, root: Root | None, inner: Stability, setting: Setting)
     explicit = root is not None or not family.elimination.unknowns
     values = {real(n): e for n, e in state.items()}
     if explicit:
-        exists = setting.real([root.radicand]) if root is not None else sp.true
+        exists = setting.real(root.radicands) if root is not None else sp.true
         inside = [tidy(e.xreplace(values)) for e in setting.inside]
         admissible = conjunction((exists, setting.holds(inside)), signs)
         check = checked(setting.rates.values(), values, signs)
         stability = _at(inner, place, setting, inside) if place else inner
         possible = implied(admissible, signs)
     else:
-        exists, stability, possible = sp.true, inner, None
+        stability, possible = inner, None
         inside = [family.reduced(e) for e in setting.inside]
         order = [*family.elimination.unknowns, *setting.candidates]
-        admissible = sp.And(*(isolated(e, signs, order) for e in inside))
+        exists = sp.And(*(nonnegative(e, signs, order) for e in family.radicands))
+        admissible = sp.And(exists, *(isolated(e, signs, order) for e in inside))
         curve_at = {s: e for s, e in curve.items() if e is not None}
         equations = () if curve_at else family.equations
         unknowns = family.elimination.unknowns
@@ -309,7 +313,7 @@ def _at(
 def _range(family: Family, inside: list[sp.Expr], setting: Setting) -> Boolean | None:
     """Give the admissible part of a curve that is monotone in its region, by its parameter."""
     unknown, curve, parameter = family.unknown, family.curve, family.parameter
-    if unknown is None or curve is None or parameter is None:
+    if unknown is None or curve is None or parameter is None or family.bent:
         return None
     rising = sign_within(tidy(curve.diff(unknown)), unknown, inside, setting.signs)
     if rising not in (1, -1):
@@ -323,15 +327,20 @@ def _range(family: Family, inside: list[sp.Expr], setting: Setting) -> Boolean |
     return sp.And(*conditions) if conditions else None
 
 
-def _continuum(family: Family, whole: Stability, setting: Setting) -> Continuum:
-    place: dict[sp.Symbol, sp.Expr] = {}
-    left = []
-    for equation in family.condition:
-        solved = solved_for(equation.subs(place), setting.candidates, setting.signs)
-        if solved is None:
-            left.append(equation)
-        else:
-            place[solved[0]] = solved[1]
+def _continua(family: Family, whole: Stability, setting: Setting) -> list[Continuum]:
+    """Every way in which a family of equilibria that are not isolated exists."""
+    ways = settled(family.condition, setting.candidates, setting.signs)
+    return [_continuum(family, whole, setting, *way) for way in ways]
+
+
+def _continuum(
+    family: Family,
+    whole: Stability,
+    setting: Setting,
+    place: dict[sp.Symbol, sp.Expr],
+    radicands: tuple[sp.Expr, ...],
+    left: tuple[sp.Expr, ...],
+) -> Continuum:
     state = state_at(family, setting, place)
     values = {**place, **{real(n): e for n, e in state.items()}}
     inside = tuple(tidy(e.xreplace(values)) for e in setting.inside)
@@ -342,16 +351,18 @@ def _continuum(family: Family, whole: Stability, setting: Setting) -> Continuum:
         if factor.has(EIGENVALUE):
             closed = roots(factor, EIGENVALUE, setting.signs)
             eigenvalues += [r.value for r in closed or () for _ in range(power)]
+    equations = tuple(e.subs(place) for e in family.equations)
+    conditions = [isolated(e, setting.signs, order) for e in inside]
     check = OPEN
-    if not left and not family.equations:
+    if not left and not equations:
         check = checked(setting.rates.values(), values, setting.signs)
     return Continuum(
         setting.region,
         family.elimination.unknowns,
         state,
         Named("parameter", {s.name: e for s, e in place.items()}),
-        (*left, *family.equations),
-        tuple(isolated(e, setting.signs, order) for e in inside),
+        (*left, *equations),
+        tuple(c for c in (*conditions, setting.real(radicands)) if c != sp.true),
         tuple(eigenvalues),
         check,
     )

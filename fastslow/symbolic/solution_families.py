@@ -19,10 +19,11 @@ from fastslow.symbolic.algebra import (
     tidy,
     undefined,
 )
+from fastslow.symbolic.candidates import Candidates, chosen
 from fastslow.symbolic.elimination import Elimination, Nonzero, eliminate
 from fastslow.symbolic.linear import cramer
 from fastslow.symbolic.signs import Signs
-from fastslow.symbolic.univariate import DEGREE, Root, factors_in, roots, solved_for
+from fastslow.symbolic.univariate import DEGREE, Root, factors_in, roots
 
 #: Terms in all coefficients together, up to which a discriminant is formed.
 COEFFICIENTS = 12
@@ -54,6 +55,10 @@ class Family:
         Equations without any unknown: the family exists only where they vanish.
     note : str
         Why it stayed implicit, and what was divided by.
+    bent : bool
+        Whether the parameter does not stand affinely, so that the curve is one of several.
+    radicands : tuple of sympy.Expr
+        None of them negative along the curve.
     """
 
     elimination: Elimination
@@ -63,6 +68,8 @@ class Family:
     discriminant: sp.Expr | None = None
     condition: tuple[sp.Expr, ...] = ()
     note: str = ""
+    bent: bool = False
+    radicands: tuple[sp.Expr, ...] = ()
 
     @property
     def unknown(self) -> sp.Symbol | None:
@@ -111,20 +118,22 @@ def families(
     >>> [f.curve for f in families({"x": w - x**3}, ["x"], Signs({}), [w])]
     [x**3]
     """
+    candidates = candidates if isinstance(candidates, Candidates) else Candidates((), (*candidates,))
     direct = cramer(rates, states)
     if isinstance(direct, tuple):
         values, below = direct
         solved = Elimination((), (), Named("solved state", values), (below,))
-        return [_solved(solved, signs, candidates)]
+        return _solved(solved, signs, candidates)
     if direct is not None:
         unknowns = tuple(real(n) for n in states)
         whole = Elimination(tuple(rates.values()), unknowns, Named("solved state", {}))
         return [Family(whole, note=direct)]
     poles = _poles(rates, states)
     return [
-        _solved(elimination, signs, candidates)
+        family
         for elimination in split(rates, states, signs)
         if not poles or _keeps(elimination, poles)
+        for family in _solved(elimination, signs, candidates)
     ]
 
 
@@ -235,7 +244,7 @@ def _keeps(elimination: Elimination, divided: Sequence[sp.Expr]) -> bool:
     return all(e != 0 and not undefined(e) for e in left)
 
 
-def _solved(elimination: Elimination, signs: Signs, candidates: Sequence[sp.Symbol]) -> Family:
+def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> list[Family]:
     unknowns = elimination.unknowns
     free = [e for e in elimination.remaining if not e.free_symbols & set(unknowns)]
     bound = [e for e in elimination.remaining if e.free_symbols & set(unknowns)]
@@ -246,14 +255,20 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Sequence[sp.Symb
         note = "found where " + ", ".join(f"{_short(d)} ≠ 0" for d in divided)
     if not slim.is_univariate:
         if bound:
-            note = _and(note, f"{len(bound)} equations are left; given as they are")
-        return Family(slim, condition=tuple(free), note=note)
+            left = "1 equation is" if len(bound) == 1 else f"{len(bound)} equations are"
+            note = _and(note, f"{left} left; given as it is" if len(bound) == 1 else f"{left} left; given as they are")
+        return [Family(slim, condition=tuple(free), note=note)]
     (equation,), (unknown,) = slim.remaining, unknowns
     closed = roots(equation, unknown, signs)
     if closed is not None and sp.degree(equation, unknown) == 1:
-        return _linear(slim, closed[0].value, free, note, signs)
-    solved = solved_for(equation, [c for c in candidates if c != unknown], signs)
-    parameter, curve, slope = solved if solved else (None, None, None)
+        return [_linear(slim, closed[0].value, free, note, signs)]
+    choice = chosen(equation, candidates.without(unknown), signs)
+    if choice is not None and choice.slope is None and (closed is not None or not choice.values):
+        # the unknown has a closed form; a root of the parameter would only be longer
+        choice = None
+    parameter = choice.symbol if choice is not None else None
+    curve = choice.values[0].value if choice is not None else None
+    slope = choice.slope if choice is not None else None
     if slope is not None and not signs.nonzero(slope) and slope.free_symbols & {unknown}:
         note = _and(note, f"the curve holds where {_short(slope)} ≠ 0")
     discriminant = None
@@ -267,7 +282,7 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Sequence[sp.Symb
             note = _and(note, f"degree {poly.degree()} in {unknown}: {long}; given implicitly")
     elif curve is None:
         note = _and(note, f"not a polynomial in {unknown}; given implicitly")
-    return Family(
+    whole = Family(
         slim,
         parameter,
         curve,
@@ -276,6 +291,12 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Sequence[sp.Symb
         tuple(free),
         note,
     )
+    if choice is None or choice.slope is not None:
+        return [whole]
+    return [
+        replace(whole, curve=value.value, bent=True, radicands=value.radicands)
+        for value in choice.values
+    ]
 
 
 def _linear(

@@ -28,11 +28,19 @@ class Root:
     radicand : sympy.Expr
         Must not be negative for the root to be real (1 where it always is).
     multiplicity : int
+    further : tuple of sympy.Expr
+        What else must not be negative.
     """
 
     value: sp.Expr
     radicand: sp.Expr = sp.S.One
     multiplicity: int = 1
+    further: tuple[sp.Expr, ...] = ()
+
+    @property
+    def radicands(self) -> tuple[sp.Expr, ...]:
+        """All that must not be negative, without what is a positive number."""
+        return tuple(e for e in (self.radicand, *self.further) if not e.is_positive)
 
 
 def factors_in(equation: sp.Expr, unknowns: Sequence[sp.Symbol]) -> list[tuple[sp.Expr, int]]:
