@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from fastslow.simulation.trajectories import simulate
     from fastslow.sweeps.refinement import refined_map
     from fastslow.symbolic.derivation import Derivation, derive
-    from fastslow.symbolic.reduction import reduce_to
+    from fastslow.symbolic.reduction import reduce_states
     from fastslow.symbolic.scaling import disagreements, nondimensionalise
     from fastslow.symbolic.sources import export
     from fastslow.warming import warm
@@ -107,7 +107,7 @@ _HOME = {
     "plot": "",
     "predict_delay": "passage.delay_laws",
     "read_auto": "results.auto_files",
-    "reduce_to": "symbolic.reduction",
+    "reduce_states": "symbolic.reduction",
     "refined_map": "sweeps.refinement",
     "regime_map": "passage.regimes",
     "simulate": "simulation.trajectories",
@@ -164,7 +164,7 @@ __all__ = [
     "plot",
     "predict_delay",
     "read_auto",
-    "reduce_to",
+    "reduce_states",
     "refined_map",
     "regime_map",
     "simulate",

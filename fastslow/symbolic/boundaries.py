@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import sympy as sp
@@ -289,6 +290,18 @@ def _singular(names: tuple[str, str], determinants: list[sp.Expr], own: Setting)
     return Named("region", conditions)
 
 
+def _weight(taken: Collection[str]) -> sp.Symbol:
+    """The Clarke weight, q where the model has no q of its own.
+
+    Examples
+    --------
+    >>> _weight({"x"}), _weight({"q", "q_c"})
+    (q, q_1)
+    """
+    others = (f"q_{k}" for k in itertools.count(1))
+    return real(next(n for n in itertools.chain(("q", "q_c"), others) if n not in taken))
+
+
 def _clarke(
     names: tuple[str, str],
     matrices: list[sp.ImmutableDenseMatrix],
@@ -296,8 +309,7 @@ def _clarke(
     own: Setting,
 ) -> ClarkeForm:
     first, second = matrices
-    symbols = first.free_symbols | second.free_symbols
-    weight = real("q") if real("q") not in symbols else real("q_c")
+    weight = _weight({*own.states, *(c.name for c in own.candidates)})
     path = (weight * first + (1 - weight) * second).applyfunc(sp.expand)
     one, two = determinants
     # the jump of the Jacobian has rank one, so the determinant is affine in q

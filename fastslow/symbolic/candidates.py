@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import sympy as sp
 
@@ -42,8 +43,13 @@ class Candidates(Sequence[sp.Symbol]):
     def __len__(self) -> int:
         return len(self.first) + len(self.others)
 
-    def __getitem__(self, index: object) -> sp.Symbol:  # type: ignore[override]
-        return (*self.first, *self.others)[index]  # type: ignore[index]
+    def __getitem__(self, index: Any) -> Any:
+        return (*self.first, *self.others)[index]
+
+    @classmethod
+    def of(cls, symbols: Iterable[sp.Symbol]) -> Candidates:
+        """Give candidates as they are, other symbols as candidates of equal rank."""
+        return symbols if isinstance(symbols, Candidates) else cls((), tuple(symbols))
 
     def without(self, *symbols: sp.Symbol | None) -> Candidates:
         """Give the same without some of them."""

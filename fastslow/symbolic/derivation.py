@@ -9,8 +9,8 @@ from typing import Any
 import sympy as sp
 from sympy.core.relational import Relational
 
-from fastslow.arguments import instance, takes
-from fastslow.errors import ArgumentError
+from fastslow.arguments import formula, instance, takes
+from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
 from fastslow.results.named import Named
@@ -100,8 +100,8 @@ class Derivation:
         return summary(self)
 
 
-@takes(model=instance(Model))
-def derive(model: Model, assume: Any = None) -> Derivation:
+@takes(model=instance(Model), parameter=formula)
+def derive(model: Model, assume: Any = None, *, parameter: Any = None) -> Derivation:
     """Derive equilibria, stability, folds and boundary equilibria in closed form.
 
     Signs of parameters are assumed as they are at the model's values and are
@@ -116,6 +116,9 @@ def derive(model: Model, assume: Any = None) -> Derivation:
     assume : mapping, relation, str or an iterable of these, optional
         Signs in place of those of the values: ``{"A": "negative"}``, ``"A < 0"``,
         ``"A < -D**2"``; the word ``"real"`` assumes nothing.
+    parameter : str or Symbol, optional
+        What equilibria, folds, Hopf points and boundary equilibria are solved for first,
+        wherever that is possible in closed form. Default: the frozen slow quantities.
 
     Returns
     -------
@@ -128,7 +131,7 @@ def derive(model: Model, assume: Any = None) -> Derivation:
     ArgumentError
         If the model is not frozen, or an assumption cannot be read.
     UnknownNameError
-        If an assumption names no parameter.
+        If an assumption or ``parameter`` names no parameter.
 
     Examples
     --------
@@ -137,6 +140,9 @@ def derive(model: Model, assume: Any = None) -> Derivation:
     ...     parameters={k: 2}).frozen())
     >>> law["S1"].equilibria[0].parameter["w"], law.assumptions
     (k*x**3, (k > 0,))
+    >>> cubic = Model({x: w - k * x**3}, forcing={w: sp.sin(sp.Symbol("t"))}, parameters={k: 2})
+    >>> derive(cubic.frozen(), parameter="k")["S1"].equilibria[0].parameter
+    {k: w/x**3}
     """
     slow = (*model.forcing, *model.slow_states)
     if slow:
@@ -149,7 +155,7 @@ def derive(model: Model, assume: Any = None) -> Derivation:
             raise ArgumentError(f"derive: the rate of {name} contains time; expected none")
     signs = read_signs(model.parameters, assume)
     functions = {n: _exact(i.function) for n, i in model.interfaces.items()}
-    settings = _settings(model, functions, signs)
+    settings = _settings(model, functions, signs, _candidates(model, parameter))
     boundary: list[BoundaryForm] = []
     for name, function in functions.items():
         for above, below in _pairs(model, name):
@@ -160,10 +166,21 @@ def derive(model: Model, assume: Any = None) -> Derivation:
     return Derivation(model.states, model.free, signs.conditions, Named("region", regions), found)
 
 
-def _settings(model: Model, functions: dict[str, sp.Expr], signs: Signs) -> dict[str, Setting]:
-    candidates = Candidates(
-        tuple(real(n) for n in model.free), tuple(real(n) for n in model.parameters)
-    )
+def _candidates(model: Model, parameter: Any) -> Candidates:
+    """Parameters to solve for: the one asked for, the frozen slow quantities, the others."""
+    valid = [*model.free, *(n for n in model.parameters if n not in model.free)]
+    first = list(model.free)
+    if parameter is not None:
+        if str(parameter) not in valid:
+            raise unknown_name("parameter", parameter, valid)
+        first = [str(parameter), *(n for n in first if n != str(parameter))]
+    others = [n for n in valid if n not in first]
+    return Candidates(tuple(map(real, first)), tuple(map(real, others)))
+
+
+def _settings(
+    model: Model, functions: dict[str, sp.Expr], signs: Signs, candidates: Candidates
+) -> dict[str, Setting]:
     moving = {real(n) for n in (*model.states, *model.free)}
     used = set().union(set(), *(h.free_symbols for h in functions.values()))
     geometry = tuple(sorted(used - moving, key=lambda s: s.name))

@@ -42,6 +42,8 @@ class EquilibriumForm:
         How it is known that the rates vanish on substitution: ``"exact"``,
         ``"50 digits"`` (at fixed points), or empty where it is not known.
     note : str
+    conditions : tuple of sympy.Expr
+        What the parameters must fulfil besides, = 0.
     """
 
     region: str
@@ -58,6 +60,7 @@ class EquilibriumForm:
     discriminant: sp.Expr | None
     check: str
     note: str = ""
+    conditions: tuple[sp.Expr, ...] = ()
 
     @property
     def verified(self) -> bool:

@@ -253,6 +253,8 @@ def conjunction(conditions: Iterable[Boolean], signs: Signs) -> Boolean:
 
 def _tighter(one: Boolean, other: Boolean, signs: Signs) -> bool:
     """Whether one bound on a symbol is strictly inside the other."""
+    if isinstance(other, sp.Ne) and isinstance(one, (sp.Gt, sp.Lt)):
+        return (other.lhs, other.rhs) in ((one.lhs, one.rhs), (one.rhs, one.lhs))
     for upper in (True, False):
         kinds = (sp.Lt, sp.Le) if upper else (sp.Gt, sp.Ge)
         if isinstance(one, kinds) and isinstance(other, kinds) and one.lhs == other.lhs:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -19,6 +19,7 @@ from fastslow.symbolic.algebra import (
     undefined,
 )
 from fastslow.symbolic.candidates import Candidates, chosen
+from fastslow.symbolic.rational import quotient
 from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.solution_families import Family
 from fastslow.symbolic.univariate import Root, factors_in, roots, solved_for
@@ -29,6 +30,9 @@ PARTS = 500
 
 #: Resultants are formed up to this degree of the eliminated unknown.
 RESULTANT = 6
+
+#: A quotient of products is given where it has so many times the operations of a sum.
+SHORTER = 0.75
 
 Place = dict[sp.Symbol, sp.Expr]
 
@@ -53,7 +57,7 @@ class Located:
 
 
 def locate(
-    family: Family, condition: sp.Expr, signs: Signs, candidates: Sequence[sp.Symbol]
+    family: Family, condition: sp.Expr, signs: Signs, candidates: Iterable[sp.Symbol]
 ) -> list[Located]:
     """Solve condition = 0 on a family, for its unknown or for one more parameter.
 
@@ -63,7 +67,7 @@ def locate(
     condition : sympy.Expr
         In states and parameters.
     signs : Signs
-    candidates : sequence of Symbol
+    candidates : Candidates or iterable of Symbol
         Parameters to solve for, best first.
 
     Returns
@@ -81,7 +85,7 @@ def locate(
     >>> [point.place[x] for point in locate(cubic, q - 3 * x**2, signs, [w, q])]
     [sqrt(3)*sqrt(q)/3, -sqrt(3)*sqrt(q)/3]
     """
-    candidates = candidates if isinstance(candidates, Candidates) else Candidates((), (*candidates,))
+    candidates = Candidates.of(candidates)
     unknown = family.unknown
     if unknown is None and family.elimination.unknowns:
         return [Located({}, equations=(*family.equations, family.reduced(condition)))]
@@ -102,11 +106,26 @@ def locate(
     result = []
     for root in family.roots:
         result += _at_root(family, root, reduced, signs, candidates)
+    if any(point.equations for point in result):
+        return _by_another(family, condition, signs, candidates) or result
     return result
 
 
+def _by_another(
+    family: Family, condition: sp.Expr, signs: Signs, candidates: Candidates
+) -> list[Located]:
+    """With a parameter that stands affinely in the equation, the unknown left free."""
+    (equation,) = family.equations
+    other = solved_for(equation, candidates.without(family.unknown), signs)
+    if other is None:
+        return []
+    curve = replace(family, parameter=other[0], curve=other[1])
+    found = locate(curve, condition, signs, candidates)
+    return [] if any(point.equations for point in found) else found
+
+
 def _on_curve(
-    family: Family, factor: sp.Expr, signs: Signs, candidates: Sequence[sp.Symbol]
+    family: Family, factor: sp.Expr, signs: Signs, candidates: Candidates
 ) -> list[Located]:
     unknown, parameter, curve = family.unknown, family.parameter, family.curve
     assert unknown is not None
@@ -165,7 +184,7 @@ def _on_bent_curve(
 
 
 def _at_root(
-    family: Family, root: Root, reduced: sp.Expr, signs: Signs, candidates: Sequence[sp.Symbol]
+    family: Family, root: Root, reduced: sp.Expr, signs: Signs, candidates: Candidates
 ) -> list[Located]:
     unknown = family.unknown
     assert unknown is not None
@@ -193,7 +212,7 @@ def parameters_where(
     known: Place,
     radicands: tuple[sp.Expr, ...],
     signs: Signs,
-    candidates: Sequence[sp.Symbol],
+    candidates: Iterable[sp.Symbol],
 ) -> list[Located]:
     """Solve a condition on parameters alone for one of them, and put it into what is known.
 
@@ -206,7 +225,7 @@ def parameters_where(
     """
     if longer(condition, PARTS):
         return [Located(dict(known), radicands, (condition,))]
-    candidates = candidates if isinstance(candidates, Candidates) else Candidates((), (*candidates,))
+    candidates = Candidates.of(candidates)
     result = []
     for factor in _open(condition, list(candidates), signs):
         choice = chosen(factor, candidates, signs)
@@ -237,6 +256,10 @@ def neat(expression: sp.Expr) -> sp.Expr:
     """
     if expression.has(sp.polys.rootoftools.ComplexRootOf):
         return expression
+    found = quotient(expression) if irrational(expression) else None
+    if found is not None:
+        flat, whole = found.expanded(), found.factored()
+        return whole if sp.count_ops(whole) < SHORTER * sp.count_ops(flat) else flat
     if irrational(expression) and light(expression) and not generators(expression):
         expanded = spread(expression)
         return min(expanded, spread(sp.together(expanded)), key=sp.count_ops)

@@ -217,6 +217,7 @@ def factor(poly: PolyElement) -> tuple[int, list[tuple[PolyElement, int]]]:
     ring = poly.ring
     found = [(g, e) for g, e in zip(ring.gens, powers, strict=True) if e]
     rest = divided(poly, inside)
+    assert rest is not None
     sign = 1
     if rest.LC < 0:
         rest, sign = -rest, -1

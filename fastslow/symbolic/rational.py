@@ -86,7 +86,7 @@ class Quotient:
         --------
         >>> x, a = sp.symbols("x a")
         >>> quotient(x**2 - a**2 + x - a).factored()
-        -(a - x)*(a + x + 1)
+        (-a + x)*(a + x + 1)
         """
         number, parts = self.factors()
         whole = [(p, e) for p, e in parts if not (p.is_Add and len(parts) == 1 and e == 1)]
@@ -122,7 +122,7 @@ def quotient(expression: sp.Expr) -> Quotient | None:
     >>> x, a = sp.symbols("x a")
     >>> found = quotient(1 / (x + sp.sqrt(a)) + 1 / (x - sp.sqrt(a)))
     >>> found.numerator, found.denominator
-    (-2*x, a - x**2)
+    (2*x, x**2 - a)
     """
     if any(k > PARTS for k, _ in enumerate(sp.preorder_traversal(expression))):
         return None
@@ -156,7 +156,11 @@ def _kernels(expression: sp.Expr) -> list[sp.Expr] | None:
             waiting.append(node.base)
         else:
             return None
-    return sorted(found, key=lambda s: (not s.is_Symbol, sp.count_ops(s), str(s)))
+    symbols = [s for s in found if s.is_Symbol]
+    # in the order of SymPy, on which the signs of factors depend
+    ordered = sp.Poly(sp.Add(*symbols)).gens if symbols else ()
+    roots = sorted(found - set(symbols), key=lambda s: (sp.count_ops(s), str(s)))
+    return [*ordered, *roots]
 
 
 def _root(power: sp.Pow) -> sp.Expr:

@@ -15,7 +15,7 @@ from fastslow.symbolic.reading import read_formula
 
 
 @takes(rates=mapping, combinations=mapping)
-def reduce_to(rates: Mapping[Any, Any], combinations: Mapping[Any, Any]) -> Named[sp.Expr]:
+def reduce_states(rates: Mapping[Any, Any], combinations: Mapping[Any, Any]) -> Named[sp.Expr]:
     """Rates of linear combinations of states, where these need no other state.
 
     Parameters
@@ -38,7 +38,7 @@ def reduce_to(rates: Mapping[Any, Any], combinations: Mapping[Any, Any]) -> Name
     Examples
     --------
     >>> a, b, u, k = sp.symbols("a b u k")
-    >>> reduce_to({a: -k * (a - b), b: k * (a - b)}, {u: a - b})
+    >>> reduce_states({a: -k * (a - b), b: k * (a - b)}, {u: a - b})
     {u: -2*k*u}
     """
     known = {str(s): real(str(s)) for s in rates}

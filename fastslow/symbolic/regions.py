@@ -292,6 +292,7 @@ def _form(family: Family, root: Root | None, inner: Stability, setting: Setting)
         family.discriminant,
         check,
         family.note,
+        family.condition,
     )
 
 

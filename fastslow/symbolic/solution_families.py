@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -22,6 +22,7 @@ from fastslow.symbolic.algebra import (
 from fastslow.symbolic.candidates import Candidates, chosen
 from fastslow.symbolic.elimination import Elimination, Nonzero, eliminate
 from fastslow.symbolic.linear import cramer
+from fastslow.symbolic.naming import WIDTH
 from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.univariate import DEGREE, Root, factors_in, roots
 
@@ -94,7 +95,7 @@ def families(
     rates: Mapping[str, sp.Expr],
     states: Sequence[str],
     signs: Signs,
-    candidates: Sequence[sp.Symbol],
+    candidates: Iterable[sp.Symbol],
 ) -> list[Family]:
     """All families of solutions of rate = 0.
 
@@ -105,7 +106,7 @@ def families(
     states : sequence of str
     signs : Signs
         Used to tell which coefficients may be divided by.
-    candidates : sequence of Symbol
+    candidates : Candidates or iterable of Symbol
         Parameters that a family may be solved for, best first.
 
     Returns
@@ -118,7 +119,7 @@ def families(
     >>> [f.curve for f in families({"x": w - x**3}, ["x"], Signs({}), [w])]
     [x**3]
     """
-    candidates = candidates if isinstance(candidates, Candidates) else Candidates((), (*candidates,))
+    candidates = Candidates.of(candidates)
     direct = cramer(rates, states)
     if isinstance(direct, tuple):
         values, below = direct
@@ -255,8 +256,8 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
         note = "found where " + ", ".join(f"{_short(d)} ≠ 0" for d in divided)
     if not slim.is_univariate:
         if bound:
-            left = "1 equation is" if len(bound) == 1 else f"{len(bound)} equations are"
-            note = _and(note, f"{left} left; given as it is" if len(bound) == 1 else f"{left} left; given as they are")
+            many = f"{len(bound)} equations are left; given as they are"
+            note = _and(note, "1 equation is left" if len(bound) == 1 else many)
         return [Family(slim, condition=tuple(free), note=note)]
     (equation,), (unknown,) = slim.remaining, unknowns
     closed = roots(equation, unknown, signs)
@@ -315,7 +316,8 @@ def _linear(
 
 
 def _short(expression: sp.Expr) -> str:
-    return "(a long expression)" if longer(expression, PARTS) else str(expression)
+    long = longer(expression, PARTS) or len(str(expression)) > WIDTH // 2
+    return "(a long expression)" if long else str(expression)
 
 
 def _and(first: str, second: str) -> str:

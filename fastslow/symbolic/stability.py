@@ -160,9 +160,17 @@ def stability_of_tests(
     positive: ConditionOf,
 ) -> Stability:
     """Stability from given Routh-Hurwitz expressions."""
-    signs = tuple(sign(e) for e in tests)
-    open_ones = [positive(e) for e, s in zip(tests, signs, strict=True) if s is None]
-    return Stability(coefficients, tests, signs, tuple(dict.fromkeys(open_ones)))
+    signs: list[int | None] = []
+    open_ones: list[Boolean] = []
+    for test in tests:
+        side = sign(test)
+        condition = positive(test) if side is None else None
+        if condition in (sp.true, sp.false):
+            side = 1 if condition else -1
+        elif condition is not None:
+            open_ones.append(condition)
+        signs.append(side)
+    return Stability(coefficients, tests, tuple(signs), tuple(dict.fromkeys(open_ones)))
 
 
 def hurwitz(coefficients: Sequence[sp.Expr], order: int) -> sp.Expr:

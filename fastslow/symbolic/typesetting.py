@@ -9,10 +9,10 @@ import sympy as sp
 
 from fastslow.model.structure import real
 from fastslow.results.point_types import point_name
-from fastslow.symbolic.algebra import longer
 from fastslow.symbolic.forms import Continuum, CriticalPoint, EquilibriumForm
+from fastslow.symbolic.naming import WIDTH, named, text
 from fastslow.symbolic.stability import Stability
-from fastslow.symbolic.wording import PARTS
+from fastslow.symbolic.wording import folds, names_of
 
 if TYPE_CHECKING:
     from fastslow.symbolic.boundaries import BoundaryForm
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 #: A heading and its formulas.
 Block = tuple[str, list[str]]
+
+#: What stands before a formula, the formula, and what stands behind it.
+Item = tuple[str, sp.Basic, str]
 
 
 def derivation_latex(law: Derivation) -> str:
@@ -43,46 +46,79 @@ def derivation_display(law: Derivation) -> str:
 
 def _blocks(law: Derivation) -> list[Block]:
     blocks: list[Block] = []
+    taken = names_of(law)
     if law.assumptions:
         blocks.append(("Assumptions", [_comma(law.assumptions)]))
     for region in law.regions.values():
-        blocks.append((f"Region {region.name}", _region(region)))
+        blocks.append((f"Region {region.name}", _region(region, taken)))
     for form in law.boundary_equilibria:
         joined = " and ".join(form.regions)
-        blocks.append((f"Boundary equilibrium between {joined}", _boundary(form)))
+        blocks.append((f"Boundary equilibrium between {joined}", _boundary(form, taken)))
     return blocks
 
 
-def _region(region: RegionForms) -> list[str]:
+def _region(region: RegionForms, taken: set[str]) -> list[str]:
     lines = [_comma(region.conditions)] if region.conditions else []
     lines += [rf"\dot{{{_tex(real(n))}}} = {_tex(e)}" for n, e in region.rates.items()]
     for form in region.equilibria:
-        lines += _equilibrium(form)
+        lines += _equilibrium(form, taken)
     for continuum in region.continua:
-        lines.append(_continuum(continuum))
+        lines += _continuum(continuum, taken)
     lines.append(rf"J = {_tex(region.jacobian)}")
     lines += _stability(region.stability)
     for point in (*region.folds, *region.branch_points, *region.cusps, *region.hopf):
-        lines.append(_point(point))
+        lines += _point(point, taken)
     if region.no_hopf:
         lines.append(r"\text{no Hopf bifurcation}")
     return lines
 
 
-def _equilibrium(form: EquilibriumForm) -> list[str]:
-    values = [f"{_tex(real(n))} = {_tex(e)}" for n, e in form.parameter.items()]
-    if form.kind == "implicit":
-        values += [f"{_tex(e)} = 0" for e in form.equations]
-    values += [f"{_tex(real(n))} = {_tex(e)}" for n, e in form.state.items() if e != real(n)]
-    lines = [
-        r"\text{equilibrium: } " + r",\quad ".join(values) + _when(form.exists, form.admissible)
-    ]
+def _equilibrium(form: EquilibriumForm, taken: set[str]) -> list[str]:
+    given = () if form.kind == "implicit" else form.parameter.items()
+    items = _values([*given, *form.state.items()])
+    items += _zeros((*(form.equations if form.kind == "implicit" else ()), *form.conditions))
+    lines = _set(r"\text{equilibrium: } ", items, taken, form.exists, form.admissible)
     if form.parameter_range is not None:
         lines.append(r"\text{admissible range: } " + _tex(form.parameter_range))
     if form.discriminant is not None:
         lines.append(rf"\Delta = {_tex(form.discriminant)}")
     if form.stability.verdict != "depends":
         lines.append(rf"\text{{{form.stability.verdict} in the region}}")
+    return lines
+
+
+def _values(values: Iterable[tuple[str, sp.Expr]]) -> list[Item]:
+    return [(f"{_tex(real(n))} = ", e, "") for n, e in values if e != real(n)]
+
+
+def _zeros(equations: Iterable[sp.Expr]) -> list[Item]:
+    return [("", e, " = 0") for e in equations]
+
+
+def _set(
+    head: str,
+    items: list[Item],
+    taken: set[str],
+    exists: sp.Basic = sp.true,
+    admissible: sp.Basic = sp.true,
+) -> list[str]:
+    """One line, or several where it is long, with names for what it repeats."""
+    plain = admissible not in (sp.true, sp.false)
+    formulas = [e for _, e, _ in items] + ([admissible] if plain else [])
+    size = sum(len(text(e)) for e in formulas)
+    defined: list[tuple[sp.Symbol, sp.Basic]] = []
+    if size > WIDTH:
+        formulas, defined = named(formulas, taken)
+    when = formulas[-1] if plain else admissible
+    shown = [a + _tex(e) + b for (a, _, b), e in zip(items, formulas, strict=False)]
+    lines = [head + r",\quad ".join(shown)]
+    if size > WIDTH:
+        # each value has a line of its own
+        lines = [head + shown[0], *(rf"\quad {s}" for s in shown[1:])] if shown else [head]
+    lines[-1] += _when(exists, when)
+    if defined:
+        means = r",\quad ".join(f"{_tex(s)} = {_tex(e)}" for s, e in defined)
+        lines.append(r"\quad \text{with } " + means)
     return lines
 
 
@@ -100,30 +136,27 @@ def _stability(stability: Stability) -> list[str]:
     ]
 
 
-def _continuum(continuum: Continuum) -> str:
-    values = [f"{_tex(real(n))} = {_tex(e)}" for n, e in continuum.parameters.items()]
-    values += [f"{_tex(real(n))} = {_tex(e)}" for n, e in continuum.state.items() if e != real(n)]
-    values += [_tex(c) for c in continuum.conditions]
+def _continuum(continuum: Continuum, taken: set[str]) -> list[str]:
+    items = _values([*continuum.parameters.items(), *continuum.state.items()])
+    items += _zeros(continuum.equations) + [("", c, "") for c in continuum.conditions]
+    lines = _set(r"\text{continuum of equilibria: } ", items, taken)
     numbers = ", ".join(_tex(e) for e in continuum.eigenvalues)
-    text = r"\text{continuum of equilibria: } " + r",\quad ".join(values)
-    return text + (rf",\quad \lambda \in \{{{numbers}\}}" if numbers else "")
+    if numbers:
+        lines[-1] += rf",\quad \lambda \in \{{{numbers}\}}"
+    return lines
 
 
-def _point(point: CriticalPoint) -> str:
-    values = {**point.parameters, **point.state}
-    shown = [f"{_tex(real(n))} = {_tex(e)}" for n, e in values.items() if e != real(n)]
-    shown += [f"{_tex(e)} = 0" for e in point.equations]
+def _point(point: CriticalPoint, taken: set[str]) -> list[str]:
+    items = _values([*point.parameters.items(), *point.state.items()]) + _zeros(point.equations)
     if point.frequency_squared is not None:
-        shown.append(rf"\omega^2 = {_tex(point.frequency_squared)}")
-    name = point_name(point.code)
-    return rf"\text{{{name}: }} " + r",\quad ".join(shown) + _when(point.exists, point.admissible)
+        items.append((r"\omega^2 = ", point.frequency_squared, ""))
+    head = rf"\text{{{point_name(point.code)}: }} "
+    return _set(head, items, taken, point.exists, point.admissible)
 
 
-def _boundary(form: BoundaryForm) -> list[str]:
-    values = {**form.parameters, **form.state}
-    shown = [f"{_tex(real(n))} = {_tex(e)}" for n, e in values.items() if e != real(n)]
-    shown += [f"{_tex(e)} = 0" for e in form.equations]
-    lines = [r",\quad ".join(shown) + _when(sp.true, form.admissible)]
+def _boundary(form: BoundaryForm, taken: set[str]) -> list[str]:
+    items = _values([*form.parameters.items(), *form.state.items()]) + _zeros(form.equations)
+    lines = _set("", items, taken, sp.true, form.admissible)
     if form.clarke is not None:
         path = form.clarke
         q = _tex(path.weight)
@@ -156,6 +189,6 @@ def _comma(conditions: Iterable[sp.Basic]) -> str:
 
 
 def _tex(expression: sp.Basic) -> str:
-    if longer(expression, PARTS):
+    if not isinstance(expression, sp.MatrixBase) and folds(expression):
         return r"\langle\text{a long expression}\rangle"
     return str(sp.latex(expression))

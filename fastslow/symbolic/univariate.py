@@ -51,7 +51,7 @@ def factors_in(equation: sp.Expr, unknowns: Sequence[sp.Symbol]) -> list[tuple[s
     >>> from fastslow.model.structure import real
     >>> x, a = real("x"), real("a")
     >>> factors_in(a * x * (x**2 - a), [x])
-    [(x, 1), (a - x**2, 1)]
+    [(x, 1), (-a + x**2, 1)]
     """
     expanded = numerator(equation)
     inside = [u for u in unknowns if u in expanded.free_symbols]

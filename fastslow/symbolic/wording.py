@@ -1,7 +1,9 @@
-"""A derivation as plain text, a few lines for each region."""
+"""A derivation as text, in lines that can be read."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import sympy as sp
@@ -9,6 +11,7 @@ import sympy as sp
 from fastslow.model.structure import real
 from fastslow.results.point_types import point_name
 from fastslow.symbolic.algebra import longer
+from fastslow.symbolic.naming import WIDTH, named, text
 
 if TYPE_CHECKING:
     from fastslow.symbolic.boundaries import BoundaryForm
@@ -16,83 +19,221 @@ if TYPE_CHECKING:
     from fastslow.symbolic.forms import Continuum, CriticalPoint, EquilibriumForm
     from fastslow.symbolic.regions import RegionForms
 
-#: Longer expressions are not printed; the objects hold them whole.
+#: Longer expressions, in parts of their tree, are not printed; the objects hold them whole.
 PARTS = 600
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A stretch of text around at most one formula.
+
+    Parameters
+    ----------
+    before : str
+    formula : sympy.Basic or None
+    after : str
+    separator : str
+        Between this piece and the one before it.
+    """
+
+    before: str
+    formula: sp.Basic | None = None
+    after: str = ""
+    separator: str = ", "
+
+    def shown(self, formula: sp.Basic | None) -> str:
+        """The text with the formula given in place of its own."""
+        if formula is None:
+            return self.before
+        if not folds(formula):
+            printed = text(formula)
+        else:
+            kind = "condition" if isinstance(formula, sp.logic.boolalg.Boolean) else "expression"
+            printed = f"(a long {kind})"
+        return f"{self.before}{printed}{self.after}"
 
 
 def summary(law: Derivation) -> str:
     """Give what was derived, region by region."""
     frozen = f" with {', '.join(law.free)} frozen" if law.free else ""
     assumed = ", ".join(map(str, law.assumptions)) or "nothing"
-    lines = [f"Derivation of {', '.join(law.states)}{frozen}; assumed: {assumed}"]
+    taken = names_of(law)
+    lines = _wrapped(
+        f"Derivation of {', '.join(law.states)}{frozen}; assumed:", assumed.split(", "), "  "
+    )
     for region in law.regions.values():
-        lines += _region(region)
-    lines += [f"  {_boundary(b)}" for b in law.boundary_equilibria]
+        lines += _region(region, taken)
+    for form in law.boundary_equilibria:
+        lines += entry(_boundary(form), taken, "  ")
     return "\n".join(lines)
 
 
-def shown(expression: object) -> str:
-    """Give an expression as text, or a note where it is too long to read.
+def names_of(law: Derivation) -> set[str]:
+    """Names that the model uses, which no subexpression may get."""
+    names = {*law.states, *law.free, *law.regions}
+    for region in law.regions.values():
+        for rate in region.rates.values():
+            names |= {s.name for s in rate.free_symbols}
+        for condition in region.conditions:
+            names |= {s.name for s in condition.free_symbols}
+    for form in law.boundary_equilibria:
+        if form.clarke is not None:
+            names.add(form.clarke.weight.name)
+    return names
+
+
+def entry(pieces: Sequence[Piece], taken: set[str], indent: str) -> list[str]:
+    """Lines of one entry; what a long one repeats is given a name in a last line.
 
     Examples
     --------
-    >>> shown(sp.Symbol("x") + 1)
-    'x + 1'
+    >>> a = sp.Symbol("a")
+    >>> entry([Piece("fold: x = ", a + 1), Piece("y = ", a - 1)], {"a"}, "  ")
+    ['  fold: x = a + 1, y = a - 1']
     """
-    if isinstance(expression, sp.Basic) and longer(expression, PARTS):
-        return "(a long expression)"
-    return str(expression)
-
-
-def _region(region: RegionForms) -> list[str]:
-    where = ", ".join(map(str, region.conditions)) or "everywhere"
-    lines = [f"  {region.name}: {where}"]
-    lines += [f"    {_equilibrium(e)}" for e in region.equilibria]
-    lines += [f"    {_continuum(c)}" for c in region.continua]
-    points = (*region.folds, *region.branch_points, *region.cusps, *region.hopf)
-    lines += [f"    {_point(p)}" for p in points]
-    if region.no_hopf:
-        lines.append(f"    no Hopf: {region.no_hopf}")
-    lines += [f"    note: {note}" for note in region.notes]
+    formulas = [p.formula for p in pieces]
+    whole = _joined(pieces, [p.shown(f) for p, f in zip(pieces, formulas, strict=True)])
+    folded = any(f is not None and folds(f) for f in formulas)
+    if len(indent) + len(whole) <= WIDTH and not folded:
+        return [indent + whole]
+    inside = [f for f in formulas if f is not None]
+    short, defined = named(inside, taken)
+    replaced = iter(short)
+    texts = [p.shown(None if p.formula is None else next(replaced)) for p in pieces]
+    lines = _lines(pieces, texts, indent)
+    used = set().union(set(), *(e.free_symbols for e in short if not folds(e)))
+    meaning = []
+    for symbol, value in reversed(defined):
+        if symbol in used:
+            used |= value.free_symbols
+            meaning.append(Piece(f"{symbol} = ", value))
+    meaning.reverse()
+    if meaning:
+        first = Piece(f"with {meaning[0].before}", meaning[0].formula)
+        parts = [first, *meaning[1:]]
+        lines += _lines(parts, [p.shown(p.formula) for p in parts], indent + "    ")
     return lines
 
 
-def _equilibrium(form: EquilibriumForm) -> str:
-    fixed = [f"{n} = {shown(e)}" for n, e in form.state.items() if e != real(n)]
-    text = ", ".join([*(f"{n} = {shown(e)}" for n, e in form.parameter.items()), *fixed])
+def folds(formula: sp.Basic) -> bool:
+    """Whether a formula is too long to be printed."""
+    return longer(formula, PARTS) or len(text(formula)) > WIDTH
+
+
+def _joined(pieces: Sequence[Piece], texts: Sequence[str]) -> str:
+    result = texts[0]
+    for piece, part in zip(pieces[1:], texts[1:], strict=True):
+        result += piece.separator + part
+    return result
+
+
+def _lines(pieces: Sequence[Piece], texts: Sequence[str], indent: str) -> list[str]:
+    """Pieces one after another, with a new line where one does not fit."""
+    lines = [indent + texts[0]]
+    for piece, part in zip(pieces[1:], texts[1:], strict=True):
+        if len(lines[-1]) + len(piece.separator) + len(part) <= WIDTH:
+            lines[-1] += piece.separator + part
+        else:
+            lines[-1] += piece.separator.rstrip()
+            lines.append(f"{indent}    {part}")
+    return lines
+
+
+def _wrapped(head: str, words: Sequence[str], indent: str) -> list[str]:
+    pieces = [Piece(f"{head} {words[0]}"), *(Piece(w) for w in words[1:])]
+    lines = _lines(pieces, [p.before for p in pieces], "")
+    return [lines[0], *(indent + line for line in lines[1:])]
+
+
+def _region(region: RegionForms, taken: set[str]) -> list[str]:
+    where = ", ".join(text(c) for c in region.conditions) or "everywhere"
+    lines = _wrapped(f"  {region.name}:", where.split(", "), "  ")
+    for form in region.equilibria:
+        lines += entry(_equilibrium(form), taken, "    ")
+    for continuum in region.continua:
+        lines += entry(_continuum(continuum), taken, "    ")
+    for point in (*region.folds, *region.branch_points, *region.cusps, *region.hopf):
+        lines += entry(_point(point), taken, "    ")
+    if region.no_hopf:
+        lines += _sentence("no Hopf: ", region.no_hopf)
+    for note in region.notes:
+        lines += _sentence("note: ", note)
+    return lines
+
+
+def _sentence(head: str, sentence: str) -> list[str]:
+    words = sentence.split(" ")
+    pieces = [Piece(head + words[0]), *(Piece(w, separator=" ") for w in words[1:])]
+    return _lines(pieces, [p.before for p in pieces], "    ")
+
+
+def _values(head: str, values: Sequence[tuple[str, sp.Expr]]) -> list[Piece]:
+    """Each value after its name, the first after the head."""
+    pieces = [Piece(f"{n} = ", e) for n, e in values if e != real(n)]
+    if not pieces:
+        return [Piece(head)]
+    return [Piece(head + pieces[0].before, pieces[0].formula), *pieces[1:]]
+
+
+def _zeros(equations: Sequence[sp.Expr]) -> list[Piece]:
+    return [Piece("", e, " = 0", ", " if k else "; where ") for k, e in enumerate(equations)]
+
+
+def _equilibrium(form: EquilibriumForm) -> list[Piece]:
+    given = () if form.kind == "implicit" else form.parameter.items()
+    pieces = _values("equilibrium: ", [*given, *form.state.items()])
     if form.kind == "implicit":
-        text = ", ".join([*(f"{shown(e)} = 0" for e in form.equations), *fixed])
-    text = f"equilibrium: {text}; {form.stability.verdict}"
-    if form.stability.verdict == "depends":
-        text += " on " + ", ".join(map(shown, form.stability.conditions))
-    return text + _when(form.exists, form.admissible)
+        pieces += _zeros(form.equations)
+    pieces += _zeros(form.conditions)
+    verdict = form.stability.verdict
+    if verdict == "depends":
+        first, *rest = form.stability.conditions
+        pieces.append(Piece("depends on ", first, separator="; "))
+        pieces += [Piece("", condition) for condition in rest]
+    else:
+        pieces.append(Piece(verdict, separator="; "))
+    return [*pieces, *_when(form.exists, form.admissible)]
 
 
-def _when(exists: sp.Basic, admissible: sp.Basic) -> str:
+def _when(exists: sp.Basic, admissible: sp.Basic) -> list[Piece]:
     if admissible == sp.false:
-        return "; virtual" if exists != sp.false else "; never real"
-    return f"; admissible iff {shown(admissible)}" if admissible != sp.true else ""
+        return [Piece("virtual" if exists != sp.false else "never real", separator="; ")]
+    if admissible == sp.true:
+        return []
+    return [Piece("admissible iff ", admissible, separator="; ")]
 
 
-def _continuum(continuum: Continuum) -> str:
-    at = ", ".join(f"{n} = {shown(e)}" for n, e in continuum.parameters.items()) or "all parameters"
-    fixed = ", ".join(f"{n} = {shown(e)}" for n, e in continuum.state.items() if e != real(n))
-    free = ", ".join(map(str, continuum.free))
-    return f"continuum at {at}: any {free}" + (f", {fixed}" if fixed else "")
+def _continuum(continuum: Continuum) -> list[Piece]:
+    at = _values("continuum at ", list(continuum.parameters.items()))
+    if len(at) == 1 and at[0].formula is None:
+        at = [Piece("continuum at all parameters")]
+    bound = set().union(set(), *(e.free_symbols for e in continuum.equations))
+    free = [str(s) for s in continuum.free if s not in bound]
+    pieces = [*at]
+    values = [(n, e) for n, e in continuum.state.items() if e != real(n)]
+    first = [Piece(f"any {', '.join(free)}")] if free else []
+    rest = [*first, *(Piece(f"{n} = ", e) for n, e in values)]
+    if rest:
+        rest[0] = Piece(rest[0].before, rest[0].formula, separator=": ")
+    return [*pieces, *rest, *_zeros(continuum.equations)]
 
 
-def _point(point: CriticalPoint) -> str:
-    values = {**point.parameters, **point.state}
-    text = ", ".join(f"{n} = {shown(e)}" for n, e in values.items() if e != real(n))
-    if point.equations:
-        text = ", ".join([text, *(f"{shown(e)} = 0" for e in point.equations)]).strip(", ")
-    return f"{point_name(point.code)}: {text}{_when(point.exists, point.admissible)}"
+def _point(point: CriticalPoint) -> list[Piece]:
+    name = point_name(point.code)
+    pieces = _values(f"{name}: ", [*point.parameters.items(), *point.state.items()])
+    return [*pieces, *_zeros(point.equations), *_when(point.exists, point.admissible)]
 
 
-def _boundary(form: BoundaryForm) -> str:
-    values = {**form.parameters, **form.state}
-    text = ", ".join(f"{n} = {shown(e)}" for n, e in values.items() if e != real(n))
-    text = f"boundary equilibrium on {form.interface} = 0 ({' | '.join(form.regions)}): {text}"
+def _boundary(form: BoundaryForm) -> list[Piece]:
+    head = f"boundary equilibrium on {form.interface} = 0 ({' | '.join(form.regions)}): "
+    pieces = _values(head, [*form.parameters.items(), *form.state.items()])
+    bound = set().union(set(), *(e.free_symbols for e in (*form.equations, *form.state.values())))
+    free = [n for n, e in form.state.items() if e == real(n) and real(n) not in bound - {e}]
+    left = set().union(set(), *(e.free_symbols for e in form.equations))
+    free = [n for n in free if real(n) not in left]
+    if free:
+        pieces.append(Piece(f"any {', '.join(free)}"))
+    pieces += _zeros(form.equations)
     if form.clarke is not None:
-        text += f"; Clarke determinant {shown(form.clarke.determinant)}"
-    return f"{text}; {form.type}" + _when(sp.true, form.admissible)
+        pieces.append(Piece("Clarke determinant ", form.clarke.determinant, separator="; "))
+    return [*pieces, Piece(form.type, separator="; "), *_when(sp.true, form.admissible)]

@@ -14,7 +14,7 @@ import sympy as sp
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
 from fastslow.results.named import Named
-from fastslow.symbolic.reduction import reduce_to
+from fastslow.symbolic.reduction import reduce_states
 from fastslow.symbolic.scaling import (
     Identification,
     disagreements,
@@ -120,7 +120,9 @@ def twist_equation() -> sp.Expr:
     model, ratio = two_inertia_model(), real("N")
     load = {real("w"): model.forcing["w"]}
     rates = {real(name): rate.subs(load) for name, rate in model.rates.items()}
-    return reduce_to(rates, {"theta": outer - inner / ratio, "v": v_outer - v_inner / ratio})["v"]
+    return reduce_states(rates, {"theta": outer - inner / ratio, "v": v_outer - v_inner / ratio})[
+        "v"
+    ]
 
 
 def _spring(twist: sp.Expr) -> sp.Expr:

@@ -185,7 +185,7 @@ def analyses(r):
         "derive": {"model": logistic()},
         "disagreements": {"one": {"A": k}, "other": {"A": k}},
         "nondimensionalise": {"model": logistic(), "ones": [("x", "x"), ("x", "x**2")]},
-        "reduce_to": {"rates": {a: -k * (a - b), b: k * (a - b)}, "combinations": {u: a - b}},
+        "reduce_states": {"rates": {a: -k * (a - b), b: k * (a - b)}, "combinations": {u: a - b}},
         "export": {"model": logistic(), "format": "numpy"},
         "predict_delay": {"point": fold, "rate": 1e-3},
         "hopf_exit": {"diagram": r["turning"], "point": r["hopf"], "entry": -1, "rate": 0.05},

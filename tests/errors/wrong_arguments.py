@@ -241,7 +241,7 @@ BY_FUNCTION = {
     "plot.time_series.interfaces": SIDES,
     "predict_delay.level": LEVEL,
     "read_auto.parameter": TEXT,
-    "reduce_to.rates": MAPPING,
+    "reduce_states.rates": MAPPING,
     "refined_map.levels": [
         *COUNT,
         (100, Wrong, "levels = 100; expected a whole number from 0 to 60"),

@@ -7,7 +7,7 @@ import sympy as sp
 from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
-from fastslow.symbolic.reduction import reduce_to
+from fastslow.symbolic.reduction import reduce_states
 from fastslow.symbolic.scaling import disagreements, identify, nondimensionalise
 from fastslow.systems.geartrain import dimensionless_model, gear_scaling, physical_model
 
@@ -37,7 +37,7 @@ def at_paper(expressions):
     return {n: float(e.subs(place)) for n, e in expressions.items()}
 
 
-def test_two_inertias_reduce_to_the_twist_equation(scaling):
+def test_two_inertias_reduce_states_the_twist_equation(scaling):
     assert scaling.reduced
 
 
@@ -116,13 +116,13 @@ def test_van_der_pol_scaling():
 
 def test_reduction_needs_a_closed_set():
     p, q = sp.symbols("p q")
-    assert dict(reduce_to({p: q, q: -p}, {"u": p, "s": q})) == {"u": real("s"), "s": -real("u")}
+    assert dict(reduce_states({p: q, q: -p}, {"u": p, "s": q})) == {"u": real("s"), "s": -real("u")}
     with pytest.raises(ArgumentError, match="needs q"):
-        reduce_to({p: q, q: -p}, {"u": p})
+        reduce_states({p: q, q: -p}, {"u": p})
     with pytest.raises(ArgumentError, match="depend"):
-        reduce_to({p: q, q: -p}, {"u": p, "s": 2 * p})
+        reduce_states({p: q, q: -p}, {"u": p, "s": 2 * p})
     with pytest.raises(ArgumentError, match="linear"):
-        reduce_to({p: q, q: -p}, {"u": p * q})
+        reduce_states({p: q, q: -p}, {"u": p * q})
 
 
 def test_bad_scaling_requests():
@@ -139,6 +139,6 @@ def test_modes_of_two_coupled_oscillators():
     # the difference of two equal masses: eigenfrequency √3 of the antisymmetric mode
     x1, x2, v1, v2 = sp.symbols("x1 x2 v1 v2")
     rates = {x1: v1, v1: -2 * x1 + x2, x2: v2, v2: -2 * x2 + x1}
-    reduced = reduce_to(rates, {"d": x1 - x2, "e": v1 - v2})
+    reduced = reduce_states(rates, {"d": x1 - x2, "e": v1 - v2})
     matrix = np.array([[float(e.diff(real(s))) for s in ("d", "e")] for e in reduced.values()])
     assert np.abs(np.linalg.eigvals(matrix).imag) == pytest.approx([3**0.5, 3**0.5], rel=1e-15)
