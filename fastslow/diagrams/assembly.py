@@ -15,7 +15,7 @@ from fastslow.diagrams.two_folds import two_fold_residual
 from fastslow.diagrams.walking import Piece, Walk, Window
 from fastslow.results.branches import Branch
 from fastslow.results.outcome import Outcome
-from fastslow.results.points import ClarkePath, SpecialPoint, SpecialPoints
+from fastslow.results.points import NEUTRAL, ClarkePath, SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,8 @@ def branch_of(
         found, finite = special_points(field, piece, window, marks)
         eigenvalues = field.with_infinite(piece.region, finite)
         if found:
-            points = [_point(field, piece, d, window) for d in found]
+            largest = np.abs(finite).max(axis=-1, initial=0.0)
+            points = [_point(field, piece, d, window, float(largest[d.row])) for d in found]
             places = [d.row + 1 for d in found]
             u = np.insert(u, places, [d.located.u for d in found], axis=0)
             tangents = np.insert(tangents, places, [p.tangent for p in points], axis=0)
@@ -137,6 +138,7 @@ def _special(
         "regions": (field.regions[region],),
         "residual": float(np.abs(rates).max()),
         "converged": True,
+        "eigenvalues": field.eigenvalues(region, u),
         **more,
     }
     return SpecialPoint(
@@ -144,13 +146,15 @@ def _special(
         states=field.model.states,
         state=u[:-1].copy(),
         parameters={**field.model.parameters, field.parameter: float(u[-1])},
-        eigenvalues=field.eigenvalues(region, u),
         tangent=tangent.copy(),
         **entries,  # type: ignore[arg-type]
     )
 
 
-def _point(field: FrozenField, piece: Piece, detected: Detected, window: Window) -> SpecialPoint:
+def _point(
+    field: FrozenField, piece: Piece, detected: Detected, window: Window, beside: float
+) -> SpecialPoint:
+    """A special point; ``beside`` is the largest eigenvalue at the row before."""
     located = detected.located
     tangent, single = field.tangent(piece.region, located.u, window.weight)
     before = piece.tangents[detected.row]
@@ -158,12 +162,18 @@ def _point(field: FrozenField, piece: Piece, detected: Detected, window: Window)
         tangent = before
     elif (tangent * window.weight) @ before < 0:
         tangent = -tangent
+    eigenvalues = field.eigenvalues(piece.region, located.u)
+    finite = np.isfinite(eigenvalues)
+    if np.all(np.abs(eigenvalues[finite]) <= NEUTRAL * beside):
+        # all rounding, as the only one at a fold: no unit is left by which to tell its sign
+        eigenvalues = np.where(finite, 0.0, eigenvalues)
     return _special(
         field,
         detected.code,
         piece.region,
         located.u,
         tangent,
+        eigenvalues=eigenvalues,
         residual=located.residual,
         converged=located.converged,
         coefficient=detected.coefficient,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,11 +17,23 @@ from fastslow.continuation.loops import loop
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
+from fastslow.model.structure import real
+from fastslow.model.units import natural_units
 from fastslow.results.windows import StateWindow
 
 Array = NDArray[np.float64]
 
 _NONE = np.empty(0)
+
+#: A point belongs to the closure of a region where every switching function is beyond zero by
+#: less than this part of its terms: Newton's method leaves some 1e-15, ill conditioned ones 1e-11.
+CLOSURE = 1e-9
+
+#: A state below this part of its natural unit may be zero but for rounding.
+DOUBTFUL = 1e-8
+
+#: A state is zero when it is below what so many units in the last place of all terms make.
+ROUNDINGS = 16 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +123,57 @@ class FrozenField:
     @cached_property
     def n(self) -> int:
         return len(self.model.states)
+
+    @cached_property
+    def units(self) -> Array:
+        """Natural units of the states and of the varying parameters, shape (n + k,)."""
+        return self.units_at(None)
+
+    def units_at(self, size: float | None) -> Array:
+        """The same where the (first) varying parameter is of a given size.
+
+        Rates that are homogeneous leave the size of the states to that of the parameter.
+        """
+        octave = None if not size else round(math.log2(size))
+        if octave not in self._units:
+            names = (*self.model.states, *self.varying)
+            functions = [i.function for i in self.model.interfaces.values()]
+            values = {real(n): v for n, v in self.model.parameters.items()}
+            if octave is not None:
+                values[real(self.parameter)] = 2.0**octave
+            units = natural_units(names, self.model.regions.values(), functions, values)
+            self._units[octave] = np.array([units[n] for n in names])
+        return self._units[octave]
+
+    @cached_property
+    def _units(self) -> dict[int | None, Array]:
+        return {}
+
+    def sizes(self, points: Sequence[tuple[int, Array]]) -> Array:
+        """Unit of each state by equilibria known, or the natural one where all are zero.
+
+        Parameters
+        ----------
+        points : sequence of (int, ndarray of shape (n + 1,))
+            Regions and points u.
+        """
+        table = np.abs(np.reshape([u for _, u in points], (-1, self.n + 1)))
+        largest = table.max(axis=0, initial=0.0)
+        size, natural = largest[:-1], self.units_at(float(largest[-1]))[: self.n]
+        doubtful = size <= DOUBTFUL * natural
+        if doubtful.any():
+            noise = np.max([self._noise(*point) for point in points], axis=0, initial=0.0)
+            size = np.where(doubtful & (size <= noise), natural, size)
+        return size
+
+    @np.errstate(all="ignore")
+    def _noise(self, region: int, u: Array) -> Array:
+        """What rounding in the terms of the rates amounts to in each state of an equilibrium."""
+        _, slopes = self.curve(region, u)
+        if not np.isfinite(slopes).all():
+            return np.zeros(self.n)
+        inverse = np.abs(np.linalg.pinv(slopes[:, : self.n]))
+        return np.asarray(ROUNDINGS * inverse @ (np.abs(slopes) @ np.abs(u)))
 
     @cached_property
     def _layout(self) -> tuple[int, int, int, int, int, Callable[..., Array]]:
@@ -230,7 +294,7 @@ class FrozenField:
         # least-norm steps where the equations are singular
         return with_condition(lambda u: self.curve(region, u), condition, start, scale)
 
-    def slides_into(self, region: int, beyond: int, point: Array) -> int | None:
+    def slides_into(self, region: int, beyond: int, point: Array, unit: Array) -> int | None:
         """The sliding or escaping motion that an equilibrium of a region on an interface enters.
 
         None where both fields are tangent to it (a two-fold), or nothing slides.
@@ -239,26 +303,30 @@ class FrozenField:
             if mode.sides is None or {mode.sides.above, mode.sides.below} != {region, beyond}:
                 continue
             _, _, h, slopes = self.at(number, point)
-            size = np.abs(slopes) @ np.maximum(np.abs(point), 1.0)
+            size = np.abs(slopes) @ np.maximum(np.abs(point), unit)
             # the drift of the region itself vanishes: the other one decides
             other = -1 if mode.sides.above == region else -2
-            if self.signs[number, other] * h[other] > 1e-9 * max(size[other], 1e-300):
+            if self.signs[number, other] * h[other] > CLOSURE * size[other]:
                 return number
         return None
 
-    def virtual(self, region: int, u: Array) -> bool:
+    def virtual(self, region: int, u: Array, unit: Array | None = None) -> bool:
         """Whether a zero of a region's rates lies outside it; of sliding, outside escaping too."""
         sides = self.modes[region].sides
         twins = [region]
         if sides is not None:
             twins.append(region - 1 if sides.escaping else region + 1)
-        return not any(self.admissible(k, u) for k in twins)
+        return not any(self.admissible(k, u, unit) for k in twins)
 
-    def admissible(self, region: int, u: Array, tolerance: float = 1e-9) -> bool:
-        """Whether a point lies in the closure of a region."""
+    def admissible(self, region: int, u: Array, unit: Array | None = None) -> bool:
+        """Whether a point lies in the closure of a region.
+
+        ``unit`` of the states and the parameter says what a component that is zero
+        but for rounding is compared with; the natural ones where it is not given.
+        """
         _, _, h, slopes = self.at(region, u)
-        size = np.maximum(1.0, np.abs(slopes) @ np.maximum(np.abs(u), 1.0))
-        return bool(np.all(self.signs[region] * h >= -tolerance * size))
+        size = np.abs(slopes) @ np.maximum(np.abs(u), self.units if unit is None else unit)
+        return bool(np.all(self.signs[region] * h >= -CLOSURE * size))
 
     def neighbour(self, region: int, interface: int) -> int | None:
         """The region across an interface, and across those that coincide with it, if any.
@@ -282,7 +350,8 @@ class FrozenField:
         Told by their ratio at points in general position, as x − D and x + D at D = 0.
         """
         count = len(self.interfaces)
-        points = np.random.default_rng(0).normal(size=(5, self.n + self.compiled.k))
+        points = np.random.default_rng(0).normal(size=(6, self.n + self.compiled.k)) * self.units
+        points *= 10.0 ** np.arange(0.0, -24.0, -4.0)[:, None]
         with np.errstate(all="ignore"):
             h = self.at(0, points)[2][:, :count]
         products = h[:, :, None] * h[0][None, None, :]

@@ -94,17 +94,22 @@ def solve_at(field: FrozenField, value: float, virtual: bool = False) -> Equilib
 
     A virtual pseudo-equilibrium, where the flow crosses, is listed with the sliding motion.
     """
-    found: list[Equilibrium] = []
     complete = True
+    solved: list[tuple[int, bool, list[Array]]] = []
     for number, equations in enumerate(region_equations(field)):
         complete &= equations.complete
         whole = equations.continuum(value)
         states = equations.edges(value) if whole else equations.states(value)
+        solved.append((number, whole, states))
+    known = [(number, np.append(s, value)) for number, _, states in solved for s in states]
+    unit = np.append(field.sizes(known), abs(value))
+    found: list[Equilibrium] = []
+    for number, whole, states in solved:
         sides = field.modes[number].sides
         for state in states:
             u = np.append(state, value)
-            admissible = field.admissible(number, u)
-            wanted = virtual and not (sides and sides.escaping) and field.virtual(number, u)
+            admissible = field.admissible(number, u, unit)
+            wanted = virtual and not (sides and sides.escaping) and field.virtual(number, u, unit)
             if admissible or wanted:
                 found.append(point_at(field, number, u, admissible, continuum=whole))
     return Equilibria(_distinct(found), "complete" if complete else "found")

@@ -24,6 +24,10 @@ Array = NDArray[np.float64]
 #: Critical values nearer to each other than this part of the range are one, up to rounding.
 SAME = 1e-10
 
+#: Where a state is typically below this part of its largest size, it is zero but at a few
+#: equilibria, and these set its unit.
+FAINT = 1e-14
+
 
 class Starts:
     """Equilibria from which branches are traced, solved for once at each value."""
@@ -139,11 +143,17 @@ class Starts:
     @cached_property
     def scale(self) -> Array:
         """Unit of each state, the size of its equilibria, and the length of the range."""
-        n = self._field.n
+        n, name = self._field.n, self._field.parameter
         both = [e for v in self._first for k in (True, False) for e in self._asked_at(v, k)]
         table = np.reshape([e.state for e in both], (-1, n))
-        states = table[self.window.contains(table)]
-        size = np.abs(states).max(axis=0, initial=0.0)
+        inside = self.window.contains(table)
+        states = table[inside]
+        points = [
+            (self._field.regions.index(e.region), np.append(e.state, e.parameters[name]))
+            for e, kept in zip(both, inside, strict=True)
+            if kept
+        ]
+        largest = size = self._field.sizes(points)
         # a few equilibria near a pole are far away and must not set the unit
         wide = typical(states, ROUNDING * size)
         middle = np.median(states, axis=0) if len(states) else np.zeros(n)
@@ -151,7 +161,7 @@ class Starts:
         size = np.minimum(size, np.abs(middle) + wide)
         # far from zero it is the differences that count
         moved = np.where(spread > ROUNDING * size, np.maximum(spread, 1e-3 * size), size)
-        size = np.where(size > 1e-14 * max(size.max(initial=0.0), 1e-300), moved, 1.0)
+        size = np.where(size > FAINT * largest, moved, largest)
         return np.append(size, self._over[1] - self._over[0])
 
 

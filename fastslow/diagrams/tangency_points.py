@@ -21,6 +21,7 @@ from fastslow.model.interfaces import vanishes_on
 from fastslow.model.model import Model, number
 from fastslow.model.motions import drift
 from fastslow.model.structure import real
+from fastslow.model.units import natural_units
 from fastslow.results.tangencies import Tangencies, Tangency
 from fastslow.symbolic.elimination import eliminate
 
@@ -160,6 +161,14 @@ class Contact:
         return tuple(n for n in self.model.states if n not in self.held)
 
     @cached_property
+    def units(self) -> Array:
+        """Natural units of the two unknown states."""
+        functions = [i.function for i in self.model.interfaces.values()]
+        values = {real(n): float(v) for n, v in {**self.model.parameters, **self.held}.items()}
+        units = natural_units(self.unknown, self.model.regions.values(), functions, values)
+        return np.array([units[name] for name in self.unknown])
+
+    @cached_property
     def equations(self) -> tuple[sp.Expr, sp.Expr]:
         """Functions h and L h of the two unknown states."""
         h = self.mode.rows[self.interface]
@@ -204,9 +213,9 @@ class Contact:
         if not left.is_polynomial or left.divisors:
             return self._searched(), False
         if len(left.unknowns) < 2:
-            values = [_roots(e, s) for e, s in zip(left.remaining, left.unknowns, strict=True)]
+            values = [self._roots(e, s) for e, s in zip(left.remaining, left.unknowns, strict=True)]
         else:
-            values = [_roots(sp.resultant(*left.remaining, o), s)
+            values = [self._roots(sp.resultant(*left.remaining, o), s)
                       for s, o in zip(symbols, symbols[::-1], strict=True)]  # fmt: skip
         if any(v is None for v in values):
             return self._searched(), False
@@ -217,11 +226,24 @@ class Contact:
                 guesses.append(np.array(formula(*roots), dtype=float))
         return self._polished(guesses, MOVED), True
 
+    @staticmethod
+    def _roots(equation: sp.Expr, symbol: sp.Symbol) -> list[float] | None:
+        """Real roots of a polynomial; None where it is zero or its degree is too high."""
+        polynomial = sp.Poly(equation, symbol)
+        if polynomial.is_zero or polynomial.degree() > DEGREE:
+            return None
+        coefficients = polynomial.all_coeffs()
+        shares = np.abs([float(c / coefficients[0]) for c in coefficients])
+        # Fujiwara's bound: in this unit no root is beyond two, and no coefficient beyond one
+        unit = max((float(s) ** (1.0 / k) for k, s in enumerate(shares) if k), default=1.0) or 1.0
+        scaled = [float(c / coefficients[0]) / unit**k for k, c in enumerate(coefficients)]
+        return [unit * r for r in real_roots(np.array(scaled))]
+
     def _searched(self) -> list[Array]:
         """From many states, a fixed sequence spread over several scales."""
         generator = np.random.default_rng(20231)
         spread = 10.0 ** generator.uniform(-2, 1.5, (STARTS, 1))
-        starts = generator.standard_normal((STARTS, 2)) * spread
+        starts = generator.standard_normal((STARTS, 2)) * spread * self.units
         return self._polished([np.zeros(2), *starts], np.inf)
 
     @np.errstate(all="ignore")
@@ -229,13 +251,14 @@ class Contact:
         """Newton's last digits; what leads away or nowhere was no solution."""
         kept: list[Array] = []
         for guess in guesses:
-            scale = np.maximum(1.0, np.abs(guess))
+            scale = np.maximum(self.units, np.abs(guess))
             state, _, _, size = newton(lambda z: self._values(z), guess, scale)
             near = bool(np.all(np.abs(state - guess) <= reach * scale))
             # at a double root the last corrections stay near the root of the rounding
             if not (near and size < 1e-6 and self._holds(state)):
                 continue
-            apart = (np.abs(state - o).max() / max(1.0, np.abs(o).max()) for o in kept)
+            gaps = (np.abs(state - o) / np.maximum(self.units, np.abs(o)) for o in kept)
+            apart = (float(gap.max()) for gap in gaps)
             if min(apart, default=1.0) > 1e-6:
                 kept.append(state)
         return sorted(kept, key=lambda s: tuple(s))
@@ -245,11 +268,15 @@ class Contact:
 
     def _holds(self, state: Array) -> bool:
         """Whether both equations hold, up to rounding in their terms."""
-        step = 1e-6 * np.maximum(1.0, np.abs(state))
-        moved = [self._values(state + step * e) for e in ([1, 0], [0, 1])]
-        value = self._values(state)
-        terms = sum(np.abs(m - value) for m in moved) / 1e-6
-        return bool(np.all(np.abs(value) <= SMALL * np.maximum(1.0, terms)))
+        terms = self._terms(self._function, state)
+        return bool(np.all(np.abs(self._values(state)) <= SMALL * terms))
+
+    def _terms(self, function: Any, state: Array) -> Array:
+        """What the terms of functions of the unknowns amount to at a state, by differences."""
+        step = 1e-6 * np.maximum(self.units, np.abs(state))
+        value = np.array(function(*state), dtype=float)
+        moved = [np.array(function(*(state + step * e)), dtype=float) for e in np.eye(2)]
+        return np.abs(value) + sum(np.abs(m - value) for m in moved) / 1e-6
 
     @np.errstate(all="ignore")
     def points(self) -> list[Tangency]:
@@ -257,9 +284,10 @@ class Contact:
         found = []
         for state in self.solved[0]:
             second, other, *heights = np.array(self._details(*state), dtype=float)
-            size = max(1.0, float(np.abs(state).max()))
+            size = self._terms(self._details, state)
             bounds = np.array(self.mode.signs[: len(heights)]) * np.array(heights)
-            if np.any(np.delete(bounds, self.interface) < -SMALL * size):
+            outside = bounds < -SMALL * size[2:]
+            if np.any(np.delete(outside, self.interface)):
                 continue
             bends = self.mode.signs[self.interface] * second
             place = dict(zip(self.unknown, state, strict=True)) | dict(self.held)
@@ -271,18 +299,9 @@ class Contact:
                     np.array([place[name] for name in self.model.states]),
                     dict(self.model.parameters),
                     float(second),
-                    bool(bends > 0) if abs(bends) > SMALL * size else None,
-                    self._jumps and abs(float(other)) <= SMALL * size,
+                    bool(bends > 0) if abs(bends) > SMALL * size[0] else None,
+                    self._jumps and abs(float(other)) <= SMALL * size[1],
                     float(np.abs(self._values(state)).max()),
                 )
             )
         return found
-
-
-def _roots(equation: sp.Expr, symbol: sp.Symbol) -> list[float] | None:
-    """Real roots of a polynomial; None where it vanishes identically or its degree is too high."""
-    polynomial = sp.Poly(equation, symbol)
-    if polynomial.is_zero or polynomial.degree() > DEGREE:
-        return None
-    size = max(abs(c) for c in polynomial.all_coeffs())
-    return real_roots(np.array([float(c / size) for c in polynomial.all_coeffs()]))

@@ -164,12 +164,13 @@ def continue_equilibria(
     sound = all(o.success or o.code == LEFT for branch in branches for o in branch.outcomes)
     traced = sound and not full and not missed
     corrector = _corrector(field)
+    labelled = _labelled(branches, name, within)
     return Diagram(
         model.states,
         name,
         (lower, upper),
         dict(field.model.parameters),
-        tuple(replace(branch, corrector=corrector) for branch in _labelled(branches)),
+        tuple(replace(branch, corrector=corrector) for branch in labelled),
         "complete" if traced and starts.prove(branches) else "found",
         field.interfaces,
         field.regions,
@@ -293,7 +294,7 @@ def _switched(
                 continue
             if not window.contains(near.u):
                 continue
-            if field.admissible(region, near.u) != admissible:
+            if field.admissible(region, near.u, window.scale) != admissible:
                 continue
             start = point_at(field, region, near.u, admissible)
             if any(_passes(field, b, start, value, window) for b in (*branches, *found)):
@@ -313,7 +314,7 @@ def _branches(
         return [branch_of(field, curve, window, marks, True)]
     found = []
     (piece,) = curve.pieces
-    inside = np.array([not field.virtual(piece.region, u) for u in piece.u])
+    inside = np.array([not field.virtual(piece.region, u, window.scale) for u in piece.u])
     edges = np.flatnonzero(np.diff(inside)) + 1
     for rows in np.split(np.arange(len(inside)), edges):
         if inside[rows[0]] or len(rows) < 2:
@@ -376,15 +377,20 @@ def _passes(
     return False
 
 
-def _labelled(branches: list[Branch]) -> tuple[Branch, ...]:
+def _labelled(branches: list[Branch], name: str, window: Window) -> tuple[Branch, ...]:
     """Labels LP1, LP2, … in order along the branches; a shared branch point has one label."""
+
+    def near(one: SpecialPoint, other: SpecialPoint) -> bool:
+        here, there = (np.append(p.state, p.parameters[name]) for p in (one, other))
+        return bool(np.all(np.abs(here - there) <= 1e-7 * np.maximum(window.scale, np.abs(here))))
+
     counts: dict[str, int] = {}
     shared: list[SpecialPoint] = []
     done = []
     for branch in branches:
         points = []
         for point in branch.special:
-            known = next((s for s in shared if point.code == "BP" and _near(s, point)), None)
+            known = next((s for s in shared if point.code == "BP" and near(s, point)), None)
             if known is None:
                 counts[point.code] = counts.get(point.code, 0) + 1
             label = known.label if known else f"{point.code}{counts[point.code]}"
@@ -393,12 +399,6 @@ def _labelled(branches: list[Branch]) -> tuple[Branch, ...]:
                 shared.append(points[-1])
         done.append(replace(branch, special=SpecialPoints(points)))
     return tuple(done)
-
-
-def _near(one: SpecialPoint, other: SpecialPoint) -> bool:
-    first = np.array([*one.state, *one.parameters.values()])
-    second = np.array([*other.state, *other.parameters.values()])
-    return bool(np.all(np.abs(first - second) <= 1e-7 * np.maximum(1.0, np.abs(first))))
 
 
 @lru_cache(maxsize=64)

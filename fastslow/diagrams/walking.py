@@ -58,6 +58,10 @@ class Window:
         out = (u[:-1] <= low + slack) & (tangent[:-1] < 0)
         return bool(np.any(out | (u[:-1] >= high - slack) & (tangent[:-1] > 0)))
 
+    def size(self, u: Array) -> Array:
+        """Size of each component of a point: its modulus, or its unit where that is larger."""
+        return np.maximum(np.abs(u), self.scale)
+
 
 @dataclass(frozen=True, eq=False)
 class Piece:
@@ -238,7 +242,7 @@ def _enter(
     if sides is None or row < len(field.interfaces):
         return _cross(field, region, row, corner, window)
     _, _, h, slopes = field.at(region, corner)
-    size = np.abs(slopes) @ np.maximum(np.abs(corner), 1.0)
+    size = np.abs(slopes) @ window.size(corner)
     if np.all(np.abs(h[-2:]) <= 1e-9 * size[-2:]):
         return None, _two_fold(field, region, corner)
     # the first drift belongs to the region above, whose equilibrium this is
@@ -269,7 +273,7 @@ def _cross(
             "no region beyond", f"no region lies beyond {name} = 0 at {where}.", False
         )
     rates, slopes = field.curve(beyond, corner)
-    bound = 1e-8 * np.maximum(1.0, np.abs(slopes) @ np.maximum(1.0, np.abs(corner)))
+    bound = 1e-8 * (np.abs(slopes) @ window.size(corner))
     if np.all(np.abs(rates) <= bound):
         return _led_into(field, beyond, interface, interface, corner, window)
     if field.modes[region].sides is not None:
@@ -279,7 +283,7 @@ def _cross(
             "meet; the motion along both at once is not unique.",
             False,
         )
-    along = field.slides_into(region, beyond, corner)
+    along = field.slides_into(region, beyond, corner, window.scale)
     if along is None:
         return None, Outcome(
             "two-fold",

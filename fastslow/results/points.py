@@ -37,7 +37,7 @@ def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
     """
     values = np.asarray(eigenvalues)
     size = np.where(np.isinf(values.real), 0.0, np.abs(values))
-    scale = np.maximum(1.0, size.max(axis=-1))
+    scale = size.max(axis=-1)
     largest = values.real.max(axis=-1)
     small = NEUTRAL * scale
     return np.where(largest < -small, "stable", np.where(largest > small, "unstable", "neutral"))
@@ -59,7 +59,7 @@ def type_of(eigenvalues: ArrayLike) -> str:
     """
     values = np.asarray(eigenvalues, dtype=complex)
     infinite = np.isinf(values.real)
-    scale = max(1.0, float(np.abs(values[~infinite]).max(initial=0.0)))
+    scale = float(np.abs(values[~infinite]).max(initial=0.0))
     if np.isnan(scale) or np.any(np.abs(values.real) <= NEUTRAL * scale):
         return "non-hyperbolic"
     pseudo = "pseudo-" if infinite.any() else ""

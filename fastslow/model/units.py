@@ -1,0 +1,188 @@
+"""Natural units of the states and parameters of a model, read off its equations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from fastslow.model.interfaces import Region
+from fastslow.model.structure import real
+
+#: Functions whose value has the magnitude of their argument.
+_ALIKE = (sp.Abs, sp.Max, sp.Min)
+
+#: Weight, beside that of the equations, by which a unit that they leave open is one.
+_UNDETERMINED = 1e-9
+
+#: Smaller coefficients count as zero: no choice of units brings a term that matters here.
+NEGLIGIBLE = 1e-60
+
+_CONSTANT = ""
+
+
+def natural_units(
+    names: Sequence[str],
+    regions: Iterable[Region],
+    functions: Iterable[sp.Expr],
+    values: Mapping[sp.Symbol, float],
+) -> dict[str, float]:
+    """Units in which the terms of each sum in the equations are of comparable size.
+
+    The logarithms of the units solve a linear least-squares problem: every term of a
+    sum has the magnitude of the sum, and the argument of a transcendental function
+    has magnitude one. This extends the scaling of polynomial systems by Meintjes and
+    Morgan (1987), which centres the logarithms of the coefficients, to other
+    expressions. A state measured in another unit has its natural unit multiplied
+    by the same factor, up to rounding to a power of two, so tolerances in
+    these units do not depend on the units of the model. A quantity whose size the
+    equations leave open, as in linear homogeneous rates, has unit 1.
+
+    Parameters
+    ----------
+    names : sequence of str
+        States and parameters; the unit of one with a value is its size.
+    regions : iterable of Region
+    functions : iterable of sympy.Expr
+        Switching functions.
+    values : mapping
+        Value of every parameter that has one, by symbol.
+
+    Returns
+    -------
+    dict
+        Name to its unit, a power of two.
+
+    References
+    ----------
+    K. Meintjes and A. P. Morgan, Applied Mathematics and Computation 22, 333-361, 1987.
+
+    Examples
+    --------
+    >>> x, w = real("x"), real("w")
+    >>> region = Region("S1", {}, (), {"x": w + 1e6 * x - 1e-6 * x**3}, {})
+    >>> natural_units(["x", "w"], [region], [], {})
+    {'x': 1048576.0, 'w': 1099511627776.0}
+    """
+    sums = _Sums({real(n): n for n in names if real(n) not in values}, values)
+    for region in regions:
+        for rate in (*region.rates.values(), *region.forcing.values()):
+            sums.magnitude(rate)
+    for function in functions:
+        sums.magnitude(function)
+    logs = sums.solved()
+    known = {str(s): math.log2(abs(v)) for s, v in values.items() if v}
+    return {n: _power(logs.get(n, known.get(n, 0.0))) for n in names}
+
+
+def _power(log: float) -> float:
+    """The nearest power of two, within the range of normal numbers with some to spare."""
+    return float(2.0 ** round(min(max(log, -500.0), 500.0)))
+
+
+#: A logarithm to base two as a linear form: unknown (or constant) to its coefficient.
+_Form = dict[str, float]
+
+
+@dataclass
+class _Sums:
+    """The equations that the magnitudes of the terms of every sum obey."""
+
+    unknowns: dict[sp.Symbol, str]
+    values: Mapping[sp.Symbol, float]
+    equations: list[_Form] = field(default_factory=list)
+    known: dict[sp.Expr, _Form | None] = field(default_factory=dict)
+
+    def magnitude(self, expression: sp.Expr) -> _Form | None:
+        """The logarithm of the size of an expression; None where it is zero or unknown."""
+        if expression not in self.known:
+            self.known[expression] = self._form(expression)
+        return self.known[expression]
+
+    def _form(self, e: sp.Expr) -> _Form | None:
+        if e.is_Symbol:
+            if e in self.unknowns:
+                return {self.unknowns[e]: 1.0}
+            return _constant(self.values[e]) if e in self.values else None
+        if e.is_number:
+            return _constant(e)
+        if e.is_Mul:
+            factors = [self.magnitude(a) for a in e.args]
+            known = [f for f in factors if f is not None]
+            return _total(known) if len(known) == len(factors) else None
+        if e.is_Pow:
+            base, exponent = self.magnitude(e.base), _number(e.exp, self.values)
+            if exponent is None:
+                self._dimensionless(e.exp)
+                return {}
+            return None if base is None else {k: exponent * c for k, c in base.items()}
+        if e.is_Add:
+            return self._sum(e)
+        inner = [self.magnitude(a) for a in e.args if isinstance(a, sp.Expr)]
+        if isinstance(e, _ALIKE):
+            return next((f for f in inner if f is not None), None)
+        for argument in e.args:
+            if not isinstance(e, sp.sign | sp.Heaviside):
+                self._dimensionless(argument)
+        return {}
+
+    def _sum(self, e: sp.Expr) -> _Form | None:
+        forms = [f for f in map(self.magnitude, e.args) if f is not None]
+        if len(forms) < 2:
+            return forms[0] if forms else None
+        name = f"{_CONSTANT}{len(self.known)}:{len(self.equations)}"
+        for form in forms:
+            self.equations.append(_total([form, {name: -1.0}]))
+        return {name: 1.0}
+
+    def _dimensionless(self, e: object) -> None:
+        form = self.magnitude(e) if isinstance(e, sp.Expr) else None
+        if form:
+            self.equations.append(form)
+
+    def solved(self) -> dict[str, float]:
+        """Least-squares solution of least norm."""
+        columns = sorted({k for e in self.equations for k in e} - {_CONSTANT})
+        if not columns:
+            return {}
+        place = {name: k for k, name in enumerate(columns)}
+        matrix = np.zeros((len(self.equations), len(columns)))
+        right = np.zeros(len(self.equations))
+        for row, equation in enumerate(self.equations):
+            for name, coefficient in equation.items():
+                if name == _CONSTANT:
+                    right[row] -= coefficient
+                else:
+                    matrix[row, place[name]] += coefficient
+        normal = matrix.T @ matrix
+        normal[np.diag_indices_from(normal)] += _UNDETERMINED * len(matrix)
+        logs = np.linalg.solve(normal, matrix.T @ right)
+        return dict(zip(columns, logs.tolist(), strict=True))
+
+
+def _total(forms: Iterable[_Form]) -> _Form:
+    total: _Form = {}
+    for form in forms:
+        for name, coefficient in form.items():
+            total[name] = total.get(name, 0.0) + coefficient
+    return total
+
+
+def _number(e: sp.Expr, values: Mapping[sp.Symbol, float]) -> float | None:
+    try:
+        number = complex(e.subs(values)) if e.free_symbols else complex(e)
+    except (TypeError, ValueError, ArithmeticError):
+        return None
+    return number.real if math.isfinite(abs(number)) else None
+
+
+def _constant(value: Any) -> _Form | None:
+    try:
+        size = abs(complex(value))
+    except (TypeError, ValueError, ArithmeticError):
+        return None
+    return {_CONSTANT: math.log2(size)} if NEGLIGIBLE < size < 1.0 / NEGLIGIBLE else None
