@@ -23,6 +23,9 @@ from fastslow.results.windows import StateWindow
 
 Array = NDArray[np.float64]
 
+#: Stands for the varying parameter in a model that has none; no user's symbol has this name.
+IDLE = "(none)"
+
 _NONE = np.empty(0)
 
 #: A point belongs to the closure of a region where every switching function is beyond zero by

@@ -10,16 +10,14 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import flag, instance, mapping, takes
 from fastslow.diagrams.equations import region_equations, same
-from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.equilibrium_sets import in_a_set, sets_of
+from fastslow.diagrams.fields import IDLE, FrozenField
 from fastslow.diagrams.windows import within
 from fastslow.model.model import Model
 from fastslow.results.points import Equilibria, Equilibrium
 from fastslow.results.windows import state_window
 
 Array = NDArray[np.float64]
-
-#: Stands for the varying parameter in a model that has none; no user's symbol has this name.
-IDLE = "(none)"
 
 
 @takes(model=instance(Model), values=mapping, virtual=flag, window=mapping)
@@ -40,7 +38,9 @@ def equilibria(
     backlash at zero load) is given by its ends, with ``continuum=True``.
 
     Where the rates jump across an interface, the pseudo-equilibria of the sliding
-    field along it are listed too, with the region ``"S1|S2"`` (Filippov 1988).
+    field along it are listed too, with the region ``"S1|S2"`` (Filippov 1988). A set of
+    them, such as the states at which dry friction holds a block, is in the
+    attribute ``sets``; in the list are its two ends or corners, with ``continuum=True``.
 
     Parameters
     ----------
@@ -79,21 +79,31 @@ def equilibria(
     [[2.0], [-2.0]]
     >>> equilibria(Model({x: w - x - sp.sign(x)}, parameters={w: 0.5}))
     [Equilibrium(x = 0; in S1|S2; stable pseudo-node)]
+    >>> v = sp.Symbol("v")
+    >>> equilibria(Model({x: v, v: 1 - x - sp.sign(v) / 2})).sets
+    (EquilibriumSet(0.5 ≤ x ≤ 1.5, v = 0; S1|S2 (sticking) on v = 0, dimension 1),)
     """
     given = model.with_parameters(values, **named)
     name = next(iter(given.parameters), IDLE)
     value = given.parameters[name] if given.parameters else 0.0
     asked = state_window(model.states, window)
     field = FrozenField(given, name)
-    found = solve_at(field, value, virtual)
-    return Equilibria(within(field, asked, found), found.coverage)
+    # sets may exist at this value of every parameter alone
+    found = solve_at(field, value, virtual, FrozenField(given, IDLE))
+    inside = [one for one in found.sets if asked.meets(one.lower, one.upper)]
+    return Equilibria(within(field, asked, found), found.coverage, inside)
 
 
-def solve_at(field: FrozenField, value: float, virtual: bool = False) -> Equilibria:
+def solve_at(
+    field: FrozenField, value: float, virtual: bool = False, still: FrozenField | None = None
+) -> Equilibria:
     """Equilibria of every region at a value of the field's parameter, and pseudo-equilibria.
 
     A virtual pseudo-equilibrium, where the flow crosses, is listed with the sliding motion.
+    Sets of equilibria are those of the field over its parameter, or of ``still``, in which
+    nothing varies.
     """
+    along = field if still is None else still
     complete = True
     solved: list[tuple[int, bool, list[Array]]] = []
     for number, equations in enumerate(region_equations(field)):
@@ -110,9 +120,12 @@ def solve_at(field: FrozenField, value: float, virtual: bool = False) -> Equilib
             u = np.append(state, value)
             admissible = field.admissible(number, u, unit)
             wanted = virtual and not (sides and sides.escaping) and field.virtual(number, u, unit)
-            if admissible or wanted:
+            if (admissible and not in_a_set(along, u, unit[:-1])) or (wanted and not admissible):
                 found.append(point_at(field, number, u, admissible, continuum=whole))
-    return Equilibria(_distinct(found), "complete" if complete else "found")
+    sets = sets_of(along, value)
+    found += [corner for one in sets for corner in one.equilibria]
+    complete &= all(one.exact for one in sets)
+    return Equilibria(_distinct(found), "complete" if complete else "found", sets)
 
 
 def point_at(
@@ -135,8 +148,8 @@ def point_at(
 def _distinct(points: list[Equilibrium]) -> list[Equilibrium]:
     """Each admissible state once: on an interface two regions share it; a continuum wins.
 
-    Ends of a continuum of pseudo-equilibria stand beside the equilibria of the
-    regions at the same states, which are isolated there.
+    Ends of a continuum of pseudo-equilibria that is no `EquilibriumSet` stand beside the
+    equilibria of the regions at the same states.
     """
     kept: list[Equilibrium] = []
     for point in sorted(points, key=lambda p: not p.continuum):

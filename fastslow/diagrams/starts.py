@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.diagrams.critical import critical_values
 from fastslow.diagrams.equations import region_equations
+from fastslow.diagrams.equilibrium_sets import covered
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.solving import solve_at
 from fastslow.diagrams.windows import Sides, edges_left, edges_of, known, within
@@ -41,7 +42,11 @@ class Starts:
         # the golden ratio keeps the values clear of each other and of round numbers
         parts = [(0.5 + k * 0.6180339887498949) % 1.0 for k in range(inside)]
         spread = [lower + p * (upper - lower) for p in parts]
-        equations = self._equations = tuple(dict.fromkeys(region_equations(field)))
+        # what is in exact sets of equilibria is found with them
+        sets = covered(field, lower, upper)
+        equations = self._equations = tuple(
+            e for e in dict.fromkeys(region_equations(field)) if e.region not in sets
+        )
         self._edges = edges_of(window, window.given)
         between = [critical_values(e, lower, upper, self._edges) for e in equations]
         self.complete = all(b is not None for b in between)
@@ -67,8 +72,10 @@ class Starts:
         """Equilibria within the bounds that were asked for."""
         if value not in self._found:
             solved = solve_at(self._field, value, virtual=True)
-            self._found[value] = within(self._field, self._asked, solved)
-        return [e for e in self._found[value] if e.admissible == admissible and not e.continuum]
+            # no branch runs through what is in a set of equilibria
+            single = [e for e in solved if not e.continuum and e.region in self._field.regions]
+            self._found[value] = within(self._field, self._asked, single)
+        return [e for e in self._found[value] if e.admissible == admissible]
 
     @cached_property
     def window(self) -> StateWindow:

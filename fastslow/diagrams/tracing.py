@@ -25,6 +25,7 @@ from fastslow.continuation.loops import loop
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.assembly import Curve, branch_of, joined, rising
 from fastslow.diagrams.equations import region_equations
+from fastslow.diagrams.equilibrium_sets import bands_of
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.seeds import Seeds
 from fastslow.diagrams.solving import point_at
@@ -79,7 +80,8 @@ def continue_equilibria(
     interface the boundary equilibrium is solved for exactly and the branch
     goes on in the region beyond, turning back in the parameter where it must.
     Where the rates jump it goes on as a pseudo-equilibrium of the sliding field,
-    and ends at a two-fold.
+    and ends at a two-fold. Sets of equilibria, such as the states at which dry friction
+    holds a block, are the ``bands`` of the diagram.
 
     Parameters
     ----------
@@ -181,6 +183,7 @@ def continue_equilibria(
         {quantity: str(law) for quantity, law in model.path.items()},
         asdict(continuation),
         starts.window,
+        bands_of(field, lower, upper) if from_points is None else (),
     )
 
 

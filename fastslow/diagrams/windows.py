@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -39,14 +40,14 @@ def edges_of(window: StateWindow, sides: Sides) -> tuple[sp.Expr, ...]:
 
 def known(field: FrozenField, points: Sequence[Equilibrium]) -> np.ndarray:
     """Which components of equilibria are more than rounding, shape (m, n)."""
-    found = [
-        np.abs(e.state)
-        > NOISE
-        * field.rounding(
-            field.regions.index(e.region), np.append(e.state, e.parameters[field.parameter])
-        )
-        for e in points
-    ]
+    found = []
+    for e in points:
+        rounding: Any = 0.0
+        # sliding along several interfaces is no mode of the field
+        if e.region in field.regions:
+            u = np.append(e.state, e.parameters.get(field.parameter, 0.0))
+            rounding = NOISE * field.rounding(field.regions.index(e.region), u)
+        found.append(np.abs(e.state) > rounding)
     return np.reshape(found, (-1, field.n)).astype(bool)
 
 

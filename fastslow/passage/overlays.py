@@ -20,6 +20,7 @@ from fastslow.passage.sheets import courses_of
 from fastslow.passage.slow_quantities import SlowQuantity, slow_quantity
 from fastslow.passage.spikes import refined, turns_of
 from fastslow.passage.stays import Measured, Stay, measured, stays_of
+from fastslow.passage.sticking import along_edges, bands_at, with_sticking
 from fastslow.passage.transitions import Passage, leaving, passages_within, steep_parts
 from fastslow.results.diagrams import Diagram
 from fastslow.results.moments import Moment
@@ -121,6 +122,11 @@ def overlay(
             phases.append(nxt)
             _hand_over(p, after, transitions[before:], followed)
     distance, lag, relaxation = _distances(p, followed)
+    rests = bands_at(diagram, run, m.slow)
+    band, away = along_edges(diagram, run, m.slow, rests, m.extent, radius)
+    band[(rests < 0) & (followed >= 0)] = -1
+    followed[rests >= 0], lag[rests >= 0] = -1, np.nan
+    distance = np.where(band >= 0, away, distance)
     return Overlay(
         diagram,
         run,
@@ -134,11 +140,12 @@ def overlay(
         distance,
         lag,
         relaxation,
-        tuple(q for q in phases if q.end > q.start),
+        with_sticking([q for q in phases if q.end > q.start], diagram, run, rests, band),
         tuple(with_laws(p, transitions)),
         bursting_of(bursts, transitions),
         _turning(p),
         _outcome(diagram, run, slow),
+        band,
     )
 
 

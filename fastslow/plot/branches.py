@@ -17,6 +17,7 @@ from fastslow.plot.arguments import axis_quantity, figure_width, line_colour, li
 from fastslow.plot.bands import Bands, draw_bands
 from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
+from fastslow.plot.equilibrium_sets import draw_sets
 from fastslow.plot.labels import place
 from fastslow.plot.legends import explained
 from fastslow.plot.quantities import Quantity, along_branch, of_diagram
@@ -48,6 +49,8 @@ class DiagramDrawing(Drawing):
         What the horizontal axis shows.
     shown : tuple of Quantity
         What the axes show, the horizontal one first.
+    sets : tuple of Artist
+        Sets of equilibria within discontinuities: filled bands and their edges.
     """
 
     state: str
@@ -58,12 +61,15 @@ class DiagramDrawing(Drawing):
     legend: Legend | None
     x: str = ""
     shown: tuple[Quantity, ...] = ()
+    sets: tuple[Artist, ...] = ()
 
     @property
     def handles(self) -> list[Artist]:
-        """What a legend shows: each stability and each code once."""
+        """What a legend shows: each stability, kind of equilibrium set and code once."""
         shown = {str(line.get_label()): line for line in self.lines}
-        return [*(shown[kind] for kind in LINES if kind in shown), *self.markers]
+        sets = {str(one.get_label()): one for one in self.sets}
+        named = [one for label, one in sets.items() if not label.startswith("_")]
+        return [*(shown[kind] for kind in LINES if kind in shown), *named, *self.markers]
 
 
 @takes(
@@ -98,7 +104,9 @@ def diagram(
     """Draw the branches of equilibria over their parameter.
 
     Stable branches are solid, unstable ones dashed, neutral ones dash-dotted
-    (a continuum of equilibria, such as a gap), virtual ones dotted and faint.
+    (a continuum of equilibria, such as a gap), virtual ones dotted and faint. A set of
+    equilibria within a discontinuity, such as the states at which dry friction holds a
+    block, is filled between its edges.
 
     Parameters
     ----------
@@ -203,6 +211,7 @@ def draw_branches(
         for kind, rows in runs(branch):
             look = {"color": color, "zorder": 2.0, "label": kind, **LINES[kind], **style}
             lines += ax.plot(x[rows], y[rows], **look)
+    sets = draw_sets(ax, diagram, shown, color)
     markers, labels = draw_points(ax, worth_a_marker(branches), shown, label)
     across, up = shown
     ax.set_xlabel(across.label)
@@ -215,13 +224,13 @@ def draw_branches(
     met = [b for b in diagram.branches if b.admissible]
     levelled = {state for state, _ in diagram.interface_values.values()}
     for quantity, vertical in ((across, True), (up, False)):
-        if interfaces and met and quantity.column in levelled:
-            heights = np.concatenate([b[quantity.column] for b in met])
-            regions = np.concatenate([b.region for b in met])
+        if interfaces and (met or diagram.bands) and quantity.column in levelled:
+            heights = np.concatenate([np.empty(0), *(b[quantity.column] for b in met)])
+            regions = np.concatenate([np.empty(0, dtype=str), *(b.region for b in met)])
             values = diagram.interface_values
             bands = draw_bands(
                 ax, quantity.column, values, heights, regions, vertical=vertical, label=label
             )
     return DiagramDrawing(
-        ax, up.text, tuple(lines), markers, labels, bands, None, across.text, shown
+        ax, up.text, tuple(lines), markers, labels, bands, None, across.text, shown, sets
     )

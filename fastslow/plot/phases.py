@@ -89,7 +89,8 @@ def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text]) -> None:
 
 def _text(phase: Phase) -> str:
     if phase.kind == "quiescent":
-        return " ".join(phase.sheets)
+        # along the edge of a band of equilibria
+        return " ".join("edge" if name.startswith("edge of ") else name for name in phase.sheets)
     if phase.kind == "spiking":
         return f"{phase.spikes} spikes"
-    return "outside" if phase.kind == "outside" else ""
+    return phase.kind if phase.kind in ("outside", "sticking") else ""

@@ -66,6 +66,7 @@ PHASES: dict[str, dict[str, Any]] = {
     "transit": {"facecolor": PURPLE},
     "excursion": {"facecolor": ORANGE},
     "transient": {"facecolor": "#EBEBEB"},
+    "sticking": {"facecolor": "#BFBFBF"},
     "outside": {"facecolor": "white", "hatch": "/////", "edgecolor": GREY},
 }
 

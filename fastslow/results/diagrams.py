@@ -14,6 +14,7 @@ from fastslow.arguments import flag, position, takes, text, whole
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results import formulas, stretches
 from fastslow.results.branches import Branch
+from fastslow.results.equilibrium_sets import EquilibriumBand
 from fastslow.results.levels import asked, chosen, passages
 from fastslow.results.markup import diagram_html
 from fastslow.results.nearness import nearest_of
@@ -63,6 +64,9 @@ class Diagram(Table, Result):
         Of a model frozen along a path, each slow quantity as text in the parameter.
     settings : mapping
         How the branches were traced.
+    bands : tuple of EquilibriumBand
+        Sets of equilibria within discontinuities over the parameter, such as the
+        sticking band of dry friction.
     window : StateWindow, optional
         The ranges of the states within which they were: what lies beyond was
         neither looked for nor traced, and "complete" says nothing of it.
@@ -93,6 +97,7 @@ class Diagram(Table, Result):
     path: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, float] = field(default_factory=dict)
     window: StateWindow | None = None
+    bands: tuple[EquilibriumBand, ...] = ()
 
     def __len__(self) -> int:
         return len(self.branches)
@@ -148,7 +153,8 @@ class Diagram(Table, Result):
         Where the branch is vertical at that value its two ends are given, with
         ``continuum=True``. With the model attached each is solved for to
         rounding; a diagram read from a file interpolates and says so
-        (``interpolated=True``).
+        (``interpolated=True``). A set of equilibria (see ``bands``) is given by its ends
+        or corners, with ``continuum=True``.
 
         Parameters
         ----------
@@ -176,12 +182,15 @@ class Diagram(Table, Result):
             for branch in self.branches
             for point in passages(branch, where, self.parameters, self.corrector)
         ]
+        sets = (band.set_at(where) for band in self.bands)
+        found += [corner for one in sets if one is not None for corner in one.equilibria]
         return chosen(found, stable, region, self._known_regions)
 
     @property
     def _known_regions(self) -> tuple[str, ...]:
         # pseudo-equilibria lie in no region of the model
-        return tuple(dict.fromkeys([*self.regions, *(r for b in self.branches for r in b.regions)]))
+        sliding = (*(r for b in self.branches for r in b.regions), *(b.region for b in self.bands))
+        return tuple(dict.fromkeys([*self.regions, *sliding]))
 
     @takes(stable=flag, region=text, code=text)
     def select(
@@ -228,7 +237,10 @@ class Diagram(Table, Result):
             if region is None or region in branch.regions
             for part in branch.select(stable=stable, region=region, code=code, between=between)
         )
-        return replace(self, branches=branches, over=over)
+        bands = [band for band in self.bands if region in (None, band.region) and code is None]
+        cut = (band.between(*over) for band in bands if stable in (None, band.is_stable))
+        kept = tuple(band for band in cut if band is not None)
+        return replace(self, branches=branches, over=over, bands=kept)
 
     @takes(at_least=whole(1))
     def bistable(self, at_least: int = 2) -> NDArray[np.float64]:
@@ -287,4 +299,5 @@ class Diagram(Table, Result):
                 if point.code != "EP":
                     at = f"{self.parameter} = {point.parameters[self.parameter]:.6g}"
                     lines.append(f"{stem}   {point.label}: {at}, {point.description}")
+        lines += [f"   {band!r}" for band in self.bands]
         return "\n".join(lines)

@@ -92,7 +92,10 @@ def encoded(value: Any, path: str, arrays: dict[str, Array]) -> Any:
         return _array(value, path, arrays)
     if isinstance(value, list | tuple):
         items = [encoded(v, f"{path}/{k}", arrays) for k, v in enumerate(value)]
-        return _sequence(value, items, path)
+        node = _sequence(value, items, path)
+        if isinstance(value, Equilibria) and value.sets:
+            node["sets"] = encoded(value.sets, f"{path}/sets", arrays)
+        return node
     if isinstance(value, Mapping):
         return _mapping(value, path, arrays)
     if classes().get(type(value).__name__) is type(value):
@@ -201,7 +204,10 @@ def _built(node: dict[str, Any], arrays: Arrays) -> Any:
     for name, build in _SEQUENCES.items():
         if name in node:
             items = [decoded(value, arrays) for value in node[name]]
-            return build(items, node["coverage"]) if "coverage" in node else build(items)
+            if "coverage" not in node:
+                return build(items)
+            sets = [decoded(node["sets"], arrays)] if "sets" in node else []
+            return build(items, node["coverage"], *sets)
     raise BrokenError(f"it holds something unknown ({', '.join(node)})")
 
 

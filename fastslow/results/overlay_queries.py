@@ -42,7 +42,7 @@ def measured(lay: Overlay, moments: list[Moment]) -> list[Moment]:
     together = (lay.followed[row] == lay.followed[after]) & np.isfinite(near) & np.isfinite(far)
     distance = np.where(together, near + part * np.where(together, far - near, 0.0), near)
     slow = lay.slow[row] + part * (lay.slow[after] - lay.slow[row])
-    found = []
+    found, labels = [], lay.labels
     for k, moment in enumerate(moments):
         number = int(lay.followed[row[k]])
         sheet = None if number < 0 else lay.sheets[number]
@@ -60,7 +60,7 @@ def measured(lay: Overlay, moments: list[Moment]) -> list[Moment]:
                 slow={lay.parameter: float(slow[k]), **others},
                 parameters={**lay.diagram.parameters, **moment.parameters},
                 parameter=lay.parameter,
-                sheet="" if sheet is None else sheet.label,
+                sheet=str(labels[row[k]]),
                 branch=None if sheet is None else sheet.branch,
                 distance=float(distance[k]),
             )
@@ -93,7 +93,8 @@ def moments_of(
 
 def known_sheet(lay: Overlay, sheet: str | None) -> None:
     """Refuse a label that no sheet has; "" is for none followed."""
-    labels = dict.fromkeys(s.label for s in lay.sheets)
+    bands = [name for band in lay.diagram.bands for name in (band.name, band.edge)]
+    labels = dict.fromkeys([*(s.label for s in lay.sheets), *bands])
     if sheet and sheet not in labels:
         raise unknown_name("sheet", sheet, labels)
 
@@ -133,6 +134,7 @@ def rows_of(lay: Overlay, wanted: slice) -> Overlay:
         # a rhythm is that of the whole
         bursting=None,
         turning=tuple(m for m in lay.turning if begin <= m.time <= end),
+        band=None if lay.band is None else lay.band[rows],
     )
 
 
@@ -156,8 +158,7 @@ def parts_of(
     wanted = np.ones(len(lay), dtype=bool)
     if sheet is not None:
         known_sheet(lay, sheet)
-        labels = np.array([*(s.label for s in lay.sheets), ""])
-        wanted &= labels[lay.followed] == sheet
+        wanted &= lay.labels == sheet
     if region is not None:
         known_region(lay.run, region)
         wanted &= regions_at(lay.run, lay.time) == region

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import among, position, takes, text
 from fastslow.results import overlay_queries
+from fastslow.results.crossings import regions_at
 from fastslow.results.diagrams import Diagram
 from fastslow.results.formulas import evaluated
 from fastslow.results.moments import Moment, in_blocks, sample
@@ -76,6 +77,9 @@ class Overlay(Table, Result):
         Where the slow quantity turns back.
     outcome : Outcome
         Whether the diagram covers the run.
+    band : ndarray of int, shape (N,), optional
+        Index into the diagram's ``bands`` where the run rests in one, as a block that
+        sticks by dry friction does, or slips along its edge; else −1.
     """
 
     diagram: Diagram
@@ -95,6 +99,7 @@ class Overlay(Table, Result):
     bursting: Bursting | None
     turning: tuple[Moment, ...]
     outcome: Outcome = MEASURED
+    band: NDArray[np.intp] | None = None
 
     _row = "t"
     _places = ("t",)
@@ -108,21 +113,37 @@ class Overlay(Table, Result):
         )
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Time t, the slow quantity, states, distance, lag, and the label of the sheet followed."""
-        labels = np.array([*(sheet.label for sheet in self.sheets), ""])
+        """Time t, the slow quantity, states, distance, lag, and what is followed."""
         return {
             "t": self.time,
             self.parameter: self.slow,
             **{name: self.state[:, k] for k, name in enumerate(self.diagram.states)},
             "distance": self.distance,
             "lag": self.lag,
-            "sheet": labels[self.followed],
+            "sheet": self.labels,
         }
 
     @property
     def parameter(self) -> str:
         """The slow quantity, the parameter of the diagram."""
         return self.diagram.parameter
+
+    @property
+    def labels(self) -> NDArray[np.str_]:
+        """What is followed at each sample, "" for nothing.
+
+        The label of a sheet; ``"S1|S2 (sticking)"`` where the run rests in a band of
+        equilibria, and ``"edge of S1|S2"`` where it slips along the edge of the band.
+        """
+        labels = np.array([*(sheet.label for sheet in self.sheets), ""])[self.followed]
+        if self.band is None or not self.diagram.bands:
+            return labels
+        names = np.array([band.name for band in self.diagram.bands])
+        edges = np.array([band.edge for band in self.diagram.bands])
+        regions = np.array([band.region for band in self.diagram.bands])
+        rests = regions_at(self.run, self.time) == regions[self.band]
+        kept = np.where(rests, names[self.band], edges[self.band])
+        return np.where(self.band >= 0, kept, labels)
 
     @property
     def delays(self) -> NDArray[np.float64]:
@@ -280,12 +301,14 @@ class Overlay(Table, Result):
         return overlay_queries.nearest_on(self, values)
 
     def shares(self) -> dict[str, float]:
-        """Part of the time on each sheet that is followed, and in ``""`` on none."""
+        """Part of the time on each sheet or in each band, and in ``""`` on none."""
         weight = np.diff(self.time)
         total = float(weight.sum()) or 1.0
-        labels = ["", *(s.label for s in self.sheets)]
-        times = np.bincount(self.followed[:-1] + 1, weight, len(labels)) / total
-        return {k: float(v) for k, v in zip(labels, times, strict=True) if v > 0}
+        labels = self.labels[:-1]
+        known = [s.label for s in self.sheets]
+        known += [name for band in self.diagram.bands for name in (band.name, band.edge)]
+        times = {k: weight[labels == k].sum() / total for k in dict.fromkeys(["", *known])}
+        return {k: float(v) for k, v in times.items() if v > 0}
 
     def summary(self) -> str:
         """The story in words and numbers: sheets, phases, rhythm, and every transition."""
@@ -300,12 +323,13 @@ class Overlay(Table, Result):
         )
         if not self.outcome:
             yield f"  {self.outcome}"
-        if not self.sheets:
+        if not self.sheets and not self.diagram.bands:
             yield "  the diagram has no stable sheet"
         elif not self.diagram.folds:
             yield "  the diagram has no fold"
         for label, share in self.shares().items():
             yield f"  on {label or 'no sheet'}: {share:.1%} of the time{self._behind(label)}"
+        yield from self._sticking()
         yield from self._spiking()
         if self.bursting is not None:
             yield f"  {self.bursting}"
@@ -322,6 +346,14 @@ class Overlay(Table, Result):
             return ""
         middle = float(np.median(lags))
         return f", typically {abs(middle):.3g} {'behind' if middle >= 0 else 'ahead'} in time"
+
+    def _sticking(self) -> Iterator[str]:
+        """How often the run rests in each band."""
+        met = [phase for phase in self.phases if phase.kind == "sticking"]
+        for name in dict.fromkeys(phase.sheets[0] for phase in met):
+            lengths = [phase.duration for phase in met if phase.sheets[0] == name]
+            count = len(lengths)
+            yield f"  in {name}: {count} time{'' if count == 1 else 's'}, {_range(lengths)} long"
 
     def _spiking(self) -> Iterator[str]:
         """Spiking phases that are alike, in one line each."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,9 @@ from fastslow.results.point_columns import columns_of_points
 from fastslow.results.point_types import POINT_TYPES, point_name
 from fastslow.results.result import LIVE, Result
 from fastslow.results.tables import Table
+
+if TYPE_CHECKING:
+    from fastslow.results.equilibrium_sets import EquilibriumSet
 
 #: An eigenvalue counts as zero when its real part is below this times the largest modulus.
 NEUTRAL = 1e-10
@@ -172,11 +175,20 @@ class Equilibria(list[Equilibrium]):
     ----------
     coverage : str
         ``"complete"`` when the list is proved to hold all of them, else ``"found"``.
+    sets : tuple of EquilibriumSet
+        Sets of equilibria within discontinuities (a block that sticks by dry friction);
+        their corners are in the list, with ``continuum=True``.
     """
 
-    def __init__(self, items: list[Equilibrium] | None = None, coverage: str = "found") -> None:
+    def __init__(
+        self,
+        items: list[Equilibrium] | None = None,
+        coverage: str = "found",
+        sets: Sequence[EquilibriumSet] = (),
+    ) -> None:
         super().__init__(items or [])
         self.coverage = coverage
+        self.sets = tuple(sets)
 
 
 @dataclass(frozen=True, eq=False)

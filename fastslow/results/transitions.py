@@ -30,7 +30,16 @@ KINDS = {
 
 
 #: Every kind of phase.
-PHASES = ("quiescent", "spiking", "jump", "transit", "excursion", "transient", "outside")
+PHASES = (
+    "quiescent",
+    "spiking",
+    "jump",
+    "transit",
+    "excursion",
+    "transient",
+    "outside",
+    "sticking",
+)
 
 
 @dataclass(frozen=True)
@@ -199,7 +208,8 @@ class Phase:
         ``"quiescent"`` (follows a sheet), ``"spiking"`` (two oscillations or more away from
         the sheets), ``"jump"`` (from one sheet to the next), ``"transit"`` (the same across a
         gap), ``"excursion"`` (from a sheet and back to it), ``"transient"`` (at the start or
-        the end of the run, near no sheet) or ``"outside"`` (the diagram does not go so far).
+        the end of the run, near no sheet), ``"outside"`` (the diagram does not go so far) or
+        ``"sticking"`` (rests in a band of equilibria).
     sheets : tuple of str
         Labels of the sheets followed, in order; for spiking that settles on a sheet, that one.
     spikes : int

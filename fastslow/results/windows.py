@@ -88,6 +88,10 @@ class StateWindow:
         inside = (state >= np.array(self.lower) - slack) & (state <= np.array(self.upper) + slack)
         return np.asarray(inside.all(axis=-1))
 
+    def meets(self, lower: Array, upper: Array) -> bool:
+        """Whether a box of states has a part in the window."""
+        return bool(np.all((upper >= np.array(self.lower)) & (lower <= np.array(self.upper))))
+
     def around(self, points: Array, known: NDArray[np.bool_] | None = None) -> StateWindow:
         """The window with defaults in place of the bounds that were not asked for.
 

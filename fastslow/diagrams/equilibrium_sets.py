@@ -1,0 +1,523 @@
+"""Sets of equilibria within discontinuities: where 0 is in the convex hull of the fields.
+
+On the interfaces that a sliding motion slides along, its rates and the weights s of the
+fields are functions of the states. Where the rates vanish all along, as v = 0 keeps a block
+with x' = v still, |s_i| ≤ 1 bounds a set of equilibria: an interval, or a polytope
+where everything is affine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import pairwise, product
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+from scipy.optimize import brentq, linprog
+
+from fastslow.diagrams.equations import exact, real_roots, region_equations
+from fastslow.diagrams.fields import IDLE, FrozenField
+from fastslow.model.motions import Motion, motions_of
+from fastslow.model.structure import real
+from fastslow.results.equilibrium_sets import EquilibriumBand, EquilibriumSet
+
+Array = NDArray[np.float64]
+
+#: A set followed over values of the parameter.
+Run = list[tuple[float, EquilibriumSet]]
+
+#: Values of the parameter at which a band is computed, besides its ends.
+ROWS = 129
+
+#: The same for sets of more dimensions than one, each of whose ranges is a linear programme.
+FEWER = 33
+
+#: Where ends are searched for in the free state if no polynomial gives them and the model's
+#: states have no window: from minus to plus this.
+REACH = 10.0
+
+#: Places in between at which functions that are no polynomials are looked at.
+PLACES = 1001
+
+#: How far a weight may exceed 1 on an edge that was solved for.
+EDGE = 1e-6
+
+#: What counts as zero, relative to the size of the terms.
+SMALL = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """The equilibria of one sliding motion as functions of free coordinates and the parameter.
+
+    Parameters
+    ----------
+    field : FrozenField
+    motion : Motion
+    free : tuple of Symbol
+        States that stay free, d of them.
+    solved : tuple of sympy.Expr
+        Every state as a function of these and the parameter.
+    bounds : tuple of sympy.Expr
+        Functions that are not negative in the set: 1 ∓ sᵢ for every weight, and those of the
+        other interfaces with their signs.
+    turned : sympy.Expr
+        Negative where the sliding motion attracts: b of a single interface, else −1.
+    """
+
+    field: FrozenField
+    motion: Motion
+    free: tuple[sp.Symbol, ...]
+    solved: tuple[sp.Expr, ...]
+    bounds: tuple[sp.Expr, ...]
+    turned: sp.Expr
+
+    @property
+    def dimension(self) -> int:
+        return len(self.free)
+
+    @cached_property
+    def _symbols(self) -> tuple[sp.Symbol, ...]:
+        return (real(self.field.parameter), *self.free)
+
+    @cached_property
+    def _states(self) -> Callable[..., Any]:
+        return sp.lambdify(self._symbols, list(self.solved), "numpy")
+
+    @cached_property
+    def _bounds(self) -> Callable[..., Any]:
+        return sp.lambdify(self._symbols, list(self.bounds), "numpy")
+
+    @cached_property
+    def _turned(self) -> Callable[..., Any]:
+        return sp.lambdify(self._symbols, self.turned, "math")
+
+    @cached_property
+    def affine(self) -> bool:
+        """Whether states and bounds are affine in the free coordinates."""
+        free = set(self.free)
+        return all(
+            not (e.diff(c).free_symbols & free)
+            for e in (*self.solved, *self.bounds)
+            for c in self.free
+        )
+
+    @cached_property
+    def _polynomials(self) -> tuple[Callable[..., Any], ...] | None:
+        """Coefficients of the bounds' numerators in the only free state, of polynomials."""
+        forms = [sp.together(e).as_numer_denom()[0] for e in self.bounds]
+        if self.dimension != 1 or not all(e.is_polynomial(*self.free) for e in forms):
+            return None
+        p = real(self.field.parameter)
+        return tuple(
+            sp.lambdify(p, [sp.N(c, 17) for c in sp.Poly(e, *self.free).all_coeffs()], "math")
+            for e in forms
+        )
+
+    @property
+    def exact(self) -> bool:
+        """Whether the set at a value is sure to be found whole."""
+        return self.affine or self._polynomials is not None
+
+    def state(self, value: float, *free: float) -> Array:
+        return np.array([float(s) for s in self._states(value, *free)])
+
+    def values(self, value: float, *free: Any) -> Array:
+        """The bounds at one place or, of the only free state, at several, shape (bounds, …)."""
+        with np.errstate(all="ignore"):
+            found = self._bounds(value, *free)
+        return np.array(np.broadcast_arrays(*found, *free)[: len(found)], dtype=float)
+
+    def sets(self, value: float) -> list[EquilibriumSet]:
+        """The sets at a value of the parameter, those of dimension 1 from below to above."""
+        if self.dimension == 0:
+            if not (self.values(value) >= -SMALL).all():
+                return []
+            state = self.state(value)
+            return [self._made(value, (), state, state, state[None])]
+        if self.affine:
+            found = self._polytope(value)
+            return [] if found is None else [found]
+        if self.dimension == 1:
+            return [self._interval(value, *piece) for piece in self._pieces(value)]
+        return []
+
+    def _interval(self, value: float, low: float, high: float) -> EquilibriumSet:
+        """A set of dimension 1 between two values of the free state."""
+        inside = np.linspace(low, high, 65) if np.isfinite(high - low) else np.array([low, high])
+        with np.errstate(all="ignore"):
+            table = np.array(np.broadcast_arrays(*self._states(value, inside), inside)[:-1]).T
+        known = [(c,) for c in (low, high) if np.isfinite(c)]
+        middle = (float(np.mean(known)),) if known else (0.0,)
+        corners = [self.state(value, *free) for free in known or [middle]]
+        return self._made(value, middle, table.min(axis=0), table.max(axis=0), np.array(corners))
+
+    def _made(
+        self, value: float, middle: tuple[float, ...], lower: Array, upper: Array, corners: Array
+    ) -> EquilibriumSet:
+        model, name = self.field.model, self.field.parameter
+        attracting = bool(self._turned(value, *middle) < 0)
+        finite = self._finite(np.append(self.state(value, *middle), value))
+        across = np.full(len(self.motion.slides), -np.inf if attracting else np.inf, dtype=complex)
+        names = tuple(model.interfaces)
+        return EquilibriumSet(
+            model.states,
+            self.motion.name,
+            tuple(names[j] for j in self.motion.slides),
+            self.dimension,
+            {**model.parameters, **({} if name == IDLE else {name: value})},
+            lower,
+            upper,
+            corners,
+            np.concatenate([finite, across]),
+            attracting,
+            attracting and self._decays(finite),
+            self.exact,
+        )
+
+    def _decays(self, finite: NDArray[np.complex128]) -> bool:
+        """Whether all eigenvalues but those along the set have a negative real part."""
+        real_parts = finite.real[np.argsort(np.abs(finite))][self.dimension :]
+        least = SMALL * np.abs(finite).max(initial=0.0)
+        return bool((real_parts < -least).all())
+
+    def _finite(self, u: Array) -> NDArray[np.complex128]:
+        """Eigenvalues of the sliding motion along its interfaces at (states, parameter)."""
+        matrix, gradients = (np.array(m, dtype=float) for m in self._slopes(*u))
+        if not (np.isfinite(matrix).all() and np.isfinite(gradients).all()):
+            return np.full(len(u) - 1 - len(gradients), np.nan, dtype=complex)
+        along = np.linalg.qr(gradients.T, mode="complete")[0][:, len(gradients) :]
+        return np.linalg.eigvals(along.T @ matrix @ along).astype(complex)
+
+    @cached_property
+    def _slopes(self) -> Callable[..., Any]:
+        names = [real(n) for n in self.field.model.states]
+        numbers = _numbers(self.field)
+        rates = sp.Matrix([exact(r).subs(numbers) for r in self.motion.rates])
+        heights = sp.Matrix([exact(h).subs(numbers) for h in _heights(self.field, self.motion)])
+        both = [rates.jacobian(names).tolist(), heights.jacobian(names).tolist()]
+        return sp.lambdify([*names, real(self.field.parameter)], both, "numpy")
+
+    def _polytope(self, value: float) -> EquilibriumSet | None:
+        """Ranges of the states by linear programming, corners by solving for the weights."""
+        d = self.dimension
+        origin, base = self.values(value, *[0.0] * d), self.state(value, *[0.0] * d)
+        units = np.eye(d)
+        rows = np.array([self.values(value, *unit) - origin for unit in units]).T
+        moves = np.array([self.state(value, *unit) - base for unit in units]).T
+        if d == 1:
+            ends = _interval(origin, rows[:, 0])
+            return None if ends is None else self._interval(value, *ends)
+        size = np.maximum(np.abs(rows).max(axis=1), np.finfo(float).tiny)
+        system, right = -rows / size[:, None], origin / size
+        lower, upper = base.copy(), base.copy()
+        for k, move in enumerate(moves):
+            if not move.any():
+                continue
+            for sign, into in ((1.0, lower), (-1.0, upper)):
+                found = linprog(
+                    sign * move, A_ub=system, b_ub=right, bounds=[(None, None)] * d, method="highs"
+                )
+                if found.status == 2:
+                    return None
+                into[k] = -sign * np.inf if found.status == 3 else base[k] + move @ found.x
+        corners = list(self._corners(rows, origin))
+        states = [self.state(value, *free) for free in corners]
+        middle = tuple(np.mean(corners, axis=0)) if corners else (0.0,) * d
+        return self._made(value, middle, lower, upper, np.array(states or [base]))
+
+    def _corners(self, rows: Array, origin: Array) -> list[tuple[float, ...]]:
+        """Where every weight is ±1, if there are as many as free coordinates."""
+        m, found = len(self.motion.slides), []
+        if m != self.dimension or np.linalg.matrix_rank(rows[: 2 * m : 2]) < m:
+            return []
+        # the bounds come in pairs 1 - s, 1 + s
+        for side in product((0, 1), repeat=m):
+            chosen = [2 * i + k for i, k in enumerate(side)]
+            free = np.linalg.solve(rows[chosen], -origin[chosen])
+            if (rows @ free + origin >= -SMALL * (1.0 + np.abs(origin))).all():
+                found.append(tuple(free.tolist()))
+        return found
+
+    def _pieces(self, value: float) -> list[tuple[float, float]]:
+        """Intervals of the free coordinate in which no bound is negative."""
+        ends: list[float] = []
+        if self._polynomials is not None:
+            for coefficients in self._polynomials:
+                ends += real_roots(np.atleast_1d(np.array(coefficients(value), dtype=float)))
+            ends = [-np.inf, *sorted(set(ends)), np.inf]
+        else:
+            grid = np.linspace(-REACH, REACH, PLACES)
+            for k, row in enumerate(self.values(value, grid)):
+                for i in np.flatnonzero(row[1:] * row[:-1] < 0):
+                    ends.append(
+                        brentq(lambda c, k=k: self.values(value, c)[k], grid[i], grid[i + 1])
+                    )
+            ends = sorted(set(ends))
+        inside = []
+        for low, high in pairwise(ends):
+            place = 0.5 * (max(low, min(high, 0.0) - 1e3) + min(high, max(low, 0.0) + 1e3))
+            if (self.values(value, place) >= 0).all():
+                inside.append((low, high))
+        joined: list[tuple[float, float]] = []
+        for low, high in inside:
+            if joined and joined[-1][1] == low:
+                joined[-1] = joined[-1][0], high
+            else:
+                joined.append((low, high))
+        return joined
+
+    def contains(self, u: Array, unit: Array | float) -> bool:
+        """Whether a point (states, parameter) is in the set, its edges included.
+
+        ``unit`` is the size of every state, by which rounding is judged.
+        """
+        value = float(u[-1])
+        names = self.field.model.states
+        free = [float(u[names.index(c.name)]) for c in self.free]
+        state = self.state(value, *free)
+        near = SMALL * np.maximum(unit, np.abs(u[:-1]))
+        if not np.all(np.abs(state - u[:-1]) <= 10 * near):
+            return False
+        return bool((self.values(value, *free) >= -EDGE).all())
+
+
+def _interval(origin: Array, slope: Array) -> tuple[float, float] | None:
+    """Where origin + slope c >= 0."""
+    size = np.maximum(np.abs(origin), np.abs(slope))
+    still = np.abs(slope) <= 1e-14 * size
+    if (origin[still] < 0).any():
+        return None
+    ends = -origin[~still] / slope[~still]
+    low = float(ends[slope[~still] > 0].max(initial=-np.inf))
+    high = float(ends[slope[~still] < 0].min(initial=np.inf))
+    return (low, high) if low < high else None
+
+
+def _numbers(field: FrozenField) -> dict[sp.Symbol, sp.Rational]:
+    values = field.model.parameters
+    return {real(n): sp.Rational(v) for n, v in values.items() if n != field.parameter}
+
+
+def _heights(field: FrozenField, motion: Motion) -> list[sp.Expr]:
+    functions = [i.function for i in field.model.interfaces.values()]
+    return [functions[j] for j in motion.slides]
+
+
+@lru_cache(maxsize=64)
+def families_of(field: FrozenField) -> tuple[Family, ...]:
+    """The families of equilibria of a field's sliding motions that are no isolated points.
+
+    With sliding along several interfaces isolated equilibria too, which no branch
+    runs through.
+    """
+    found = (_family(field, motion) for motion in motions_of(field.model).sliding)
+    return tuple(family for family in found if family is not None)
+
+
+def _family(field: FrozenField, motion: Motion) -> Family | None:
+    numbers = _numbers(field)
+    names = field.model.states
+    functions = [exact(i.function).subs(numbers) for i in field.model.interfaces.values()]
+    rates = [exact(r).subs(numbers) for r in motion.rates]
+    parts = solved_along([functions[j] for j in motion.slides], rates, names)
+    if parts is None or (not parts[1] and len(motion.slides) == 1):
+        return None
+    solved, free = parts
+    weights = [sp.cancel(exact(s).subs(numbers).subs(solved)) for s in motion.weights]
+    others = [
+        sp.expand(sign * functions[j].subs(solved)) for j, sign in enumerate(motion.signs) if sign
+    ]
+    if any(h == 0 for h in others):
+        # the edge of a set within one more interface
+        return None
+    turned = sp.Integer(-1)
+    if len(motion.slides) == 1:
+        a, b = (exact(e).subs(numbers).subs(solved) for e in motion.bounds)
+        turned = sp.expand(a - b)
+    bounds = [e for s in weights for e in (1 - s, 1 + s)]
+    symbols = {real(n): real(n) for n in names} | solved
+    return Family(
+        field,
+        motion,
+        free,
+        tuple(sp.expand(symbols[real(n)]) for n in names),
+        (*bounds, *others),
+        turned,
+    )
+
+
+def solved_along(
+    heights: Sequence[sp.Expr], rates: Sequence[sp.Expr], names: Sequence[str]
+) -> tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Symbol, ...]] | None:
+    """Solve h = 0 and f = 0 for as many states as they determine.
+
+    Equations that are affine in a state, with a number for its coefficient, are
+    solved for it one after the other.
+
+    Returns
+    -------
+    solved : dict
+        States as functions of the free ones.
+    free : tuple of Symbol
+        None in place of both where an equation is left that is not solved so, or contradicts.
+
+    Examples
+    --------
+    >>> x, v, w = real("x"), real("v"), real("w")
+    >>> solved_along([v - w], [v - w, 0], ["x", "v"])
+    ({v: w}, (x,))
+    """
+    left = [sp.sympify(e) for e in (*heights, *rates)]
+    states = [real(n) for n in names]
+    solved: dict[sp.Symbol, sp.Expr] = {}
+    while True:
+        left = [e for e in map(_numerator, left) if e != 0]
+        if not left:
+            break
+        if any(not (e.free_symbols & set(states)) for e in left):
+            return None
+        # what the interfaces give comes first, then the last states: positions stay free
+        pick = next(
+            (
+                (e, s)
+                for e in left
+                for s in reversed(states)
+                if s not in solved and (c := e.diff(s)).is_number and c != 0
+            ),
+            None,
+        )
+        if pick is None:
+            return None
+        equation, symbol = pick
+        root = sp.expand(symbol - equation / equation.diff(symbol))
+        solved = {s: sp.expand(e.subs(symbol, root)) for s, e in solved.items()} | {symbol: root}
+        left = [e.subs(symbol, root) for e in left]
+    return solved, tuple(s for s in states if s not in solved)
+
+
+def _numerator(expression: sp.Expr) -> sp.Expr:
+    return sp.expand(sp.together(expression).as_numer_denom()[0])
+
+
+def sets_of(field: FrozenField, value: float) -> list[EquilibriumSet]:
+    """All sets of equilibria at a value of the field's parameter."""
+    return [one for family in families_of(field) for one in family.sets(value)]
+
+
+def covered(field: FrozenField, lower: float, upper: float) -> set[int]:
+    """Numbers of the modes of a field whose equilibria are all in exact sets.
+
+    Those of a region if it has one, in closed form, that is an edge of a set throughout.
+    """
+    names = {family.motion.name for family in families_of(field) if family.exact}
+    if not names:
+        return set()
+    found = set()
+    for equations in region_equations(field):
+        mode = field.modes[equations.region]
+        if mode.sides is not None:
+            if mode.name in names:
+                found |= {equations.region, equations.region + 1}
+        elif not equations.elimination.unknowns:
+            values = np.linspace(lower, upper, 7)
+            points = [(s, v) for v in values for s in equations.states(v)[:1]]
+            inside = [in_a_set(field, np.append(s, v), np.abs(s).max()) for s, v in points]
+            if all(inside) and len(points) == len(values):
+                found.add(equations.region)
+    return found
+
+
+def in_a_set(field: FrozenField, u: Array, unit: Array | float) -> bool:
+    """Whether a point (states, parameter) is in one of the sets of equilibria.
+
+    ``unit`` is the size of every state, by which rounding is judged.
+    """
+    return any(family.contains(u, unit) for family in families_of(field))
+
+
+def bands_of(field: FrozenField, lower: float, upper: float) -> tuple[EquilibriumBand, ...]:
+    """The bands that the sets of equilibria make over a range of the parameter."""
+    return tuple(b for family in families_of(field) for b in _bands(family, lower, upper))
+
+
+def _bands(family: Family, lower: float, upper: float) -> list[EquilibriumBand]:
+    count = ROWS if family.dimension < 2 else FEWER
+    grid = [float(value) for value in np.linspace(lower, upper, count)]
+    rows = [(value, family.sets(value)) for value in grid]
+    table = rows[:1]
+    for last, now in pairwise(rows):
+        if len(last[1]) != len(now[1]):
+            table += _change(family, last, now)
+        table.append(now)
+    done: list[Run] = []
+    growing: list[Run] = []
+    for value, sets in table:
+        following: list[Run] = []
+        for one in sets:
+            before = [run for run in growing if _meet(run[-1][1], one)]
+            alone = len(before) == 1 and sum(_meet(before[0][-1][1], s) for s in sets) == 1
+            following.append([*before[0], (value, one)] if alone else [(value, one)])
+        kept = {id(run[-2][1]) for run in following if len(run) > 1}
+        done += [run for run in growing if id(run[-1][1]) not in kept]
+        growing = following
+    return [_band(family, run) for run in (*done, *growing) if len(run) > 1]
+
+
+def _meet(one: EquilibriumSet, other: EquilibriumSet) -> bool:
+    """Whether the ranges of two sets at neighbouring values overlap, and their corners match."""
+    near = SMALL * (1.0 + np.abs(one.lower))
+    over = (one.lower <= other.upper + near) & (other.lower <= one.upper + near)
+    if one.dimension == 0:
+        over[:] = True
+    return bool(over.all()) and len(one.corners) == len(other.corners)
+
+
+def _change(
+    family: Family,
+    before: tuple[float, list[EquilibriumSet]],
+    after: tuple[float, list[EquilibriumSet]],
+) -> list[tuple[float, list[EquilibriumSet]]]:
+    """Neighbouring values between which the number of sets changes, to rounding."""
+    for _ in range(60):
+        middle = 0.5 * (before[0] + after[0])
+        if not before[0] < middle < after[0]:
+            break
+        now = middle, family.sets(middle)
+        if len(now[1]) == len(before[1]):
+            before = now
+        else:
+            after = now
+    return [before, after]
+
+
+def _band(family: Family, run: Run) -> EquilibriumBand:
+    def solver(value: float, near: Array) -> EquilibriumSet | None:
+        found = family.sets(value)
+        if not found:
+            return None
+        middles = [np.nan_to_num(0.5 * (s.lower + s.upper)) for s in found]
+        return found[int(np.argmin([np.abs(m - near).sum() for m in middles]))]
+
+    first = run[0][1]
+    return EquilibriumBand(
+        first.states,
+        family.field.parameter,
+        first.region,
+        first.interfaces,
+        first.dimension,
+        dict(family.field.model.parameters),
+        np.array([v for v, _ in run]),
+        np.array([one.lower for _, one in run]),
+        np.array([one.upper for _, one in run]),
+        np.array([one.corners for _, one in run]),
+        np.array([one.eigenvalues for _, one in run]),
+        first.attracting,
+        np.array([one.stable for _, one in run]),
+        first.exact,
+        solver,
+    )

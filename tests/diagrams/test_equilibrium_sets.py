@@ -1,0 +1,206 @@
+"""Sets of equilibria of Filippov fields: sticking bands of dry friction."""
+
+import math
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.optimize import linprog
+
+import fastslow as fs
+
+x, v, w, y, u, a, V, t = sp.symbols("x v w y u a V t")
+
+
+def block():
+    return fs.Model({x: v, v: -x - v / 10 - sp.sign(v) / 2 + w}, forcing={w: 2 * sp.sin(t / 100)})
+
+
+def two_blocks():
+    rates = {
+        x: v,
+        v: -x - (x - y) / 2 - a * sp.sign(v) + w,
+        y: u,
+        u: -2 * y + (x - y) / 2 - a * sp.sign(u),
+    }
+    return fs.Model(rates, parameters={a: 0.3, w: 0.1})
+
+
+def ends(points):
+    return sorted(e.state[0] for e in points)
+
+
+def test_the_sticking_band_of_a_block_is_listed_once():
+    found = fs.equilibria(block().frozen(), w=0.3)
+    assert found.coverage == "complete"
+    (band,) = found.sets
+    assert band["x"] == pytest.approx((-0.2, 0.8), abs=1e-14)
+    assert band["v"] == (0.0, 0.0)
+    assert (band.region, band.interfaces, band.dimension) == ("S1|S2", ("v",), 1)
+    assert band.attracting
+    assert band.stable
+    # its ends in the list, and none of the foci of the regions that meet there
+    assert ends(found) == pytest.approx([-0.2, 0.8], abs=1e-14)
+    assert all(e.continuum and e.pseudo and e.region == "S1|S2" for e in found)
+
+
+def test_the_band_of_a_block_is_in_its_diagram_with_its_edges():
+    diagram = fs.continue_equilibria(block().frozen(), "w", over=(-1, 1))
+    assert diagram.coverage == "complete"
+    assert len(diagram) == 0
+    (band,) = diagram.bands
+    assert band.range == (-1.0, 1.0)
+    assert np.abs(band.corners[:, :, 0] - band.values[:, None] - [-0.5, 0.5]).max() < 1e-14
+    assert ends(diagram.at(w=0.123)) == pytest.approx([-0.377, 0.623], abs=1e-14)
+    assert band.at(w=2.0) is None
+    assert "S1|S2 (sticking) on v = 0" in repr(diagram)
+    part = diagram.select(between=(0.25, 0.5))
+    assert part.bands[0].range == (0.25, 0.5)
+    assert diagram.select(region="S1").bands == ()
+    with pytest.raises(fs.UnknownNameError, match="unknown parameter 'x'"):
+        band.at(x=1.0)
+
+
+def test_bands_are_kept_in_files(tmp_path):
+    diagram = fs.continue_equilibria(block().frozen(), "w", over=(-1, 1))
+    diagram.save(tmp_path / "block.npz")
+    again = fs.load(tmp_path / "block.npz")
+    (band,) = again.bands
+    assert (band.corners == diagram.bands[0].corners).all()
+    assert repr(again) == repr(diagram)
+    assert ends(again.at(w=0.123)) == pytest.approx([-0.377, 0.623], abs=1e-14)
+
+
+@pytest.mark.parametrize("force", [-0.17, 0.0, 0.11])
+def test_a_softening_spring_has_up_to_three_bands(force):
+    # |w - x + x³| ≤ 1/5: cubic ends, from the roots of x - x³ = w ± 1/5
+    model = fs.Model({x: v, v: -x + x**3 - v / 10 - sp.sign(v) / 5 + w}, parameters={w: 0})
+    found = fs.equilibria(model, w=force)
+    roots = [np.roots([1, 0, -1, force + k / 5]) for k in (-1, 1)]
+    wanted = sorted(r.real for line in roots for r in line if abs(r.imag) < 1e-9)
+    assert len(found.sets) == 3
+    assert ends(found) == pytest.approx(wanted, abs=1e-12)
+    assert found.coverage == "complete"
+    # the middle one is a set of equilibria all the same: friction holds the block anywhere
+    diagram = fs.continue_equilibria(model, "w", over=(-0.8, 0.8))
+    edge = 2 / math.sqrt(27) + 0.2
+    assert max(b.range[1] for b in diagram.bands if b.range[0] > -0.5 and b.range[1] < 0.7) == (
+        pytest.approx(edge, abs=1e-9)
+    )
+    assert ends(diagram.at(w=force)) == pytest.approx(wanted, abs=1e-9)
+
+
+def test_a_softening_pendulum_says_that_its_bands_were_searched_for():
+    model = fs.Model({x: v, v: -sp.sin(x) - sp.sign(v) / 5}, parameters={})
+    found = fs.equilibria(model)
+    assert found.coverage == "found"
+    half = math.asin(0.2)
+    near = [one for one in found.sets if abs(one["x"][0]) < 1]
+    assert near[0]["x"] == pytest.approx((-half, half), abs=1e-12)
+    assert not near[0].exact
+    assert "found by search" in repr(near[0])
+
+
+def test_blocks_that_stick_together_have_a_polygon_with_exact_ranges():
+    (found,) = fs.equilibria(two_blocks()).sets
+    assert found.dimension == 2
+    assert found.interfaces == ("v", "u")
+    # |w - 3x/2 + y/2| ≤ a and |x/2 - 5y/2| ≤ a
+    matrix = np.array([[-1.5, 0.5], [0.5, -2.5]])
+    rows, right = np.vstack([matrix, -matrix]), [0.3 - 0.1, 0.3, 0.3 + 0.1, 0.3]
+    for k, name in enumerate(("x", "y")):
+        for sign, end in ((1, 0), (-1, 1)):
+            cost = sign * np.eye(2)[k]
+            best = linprog(cost, A_ub=rows, b_ub=right, bounds=[(None, None)] * 2)
+            assert found[name][end] == pytest.approx(sign * best.fun, abs=1e-12)
+    corners = [np.linalg.solve(matrix, [s * 0.3 - 0.1, r * 0.3]) for s in (1, -1) for r in (1, -1)]
+    key = {tuple(np.round(c, 9) + 0.0) for c in corners}
+    assert {tuple(np.round(c[[0, 2]], 9) + 0.0) for c in found.corners} == key
+
+
+def test_runs_of_two_blocks_end_in_the_polygon():
+    (found,) = fs.equilibria(two_blocks()).sets
+    many = fs.simulate_many(
+        two_blocks(), np.random.default_rng(4).normal(size=(60, 4)) * 2, t=(0, 80)
+    )
+    assert many.success.all()
+    assert (np.array(many.modes)[many.last_mode] == "S1|S4").all()
+    assert (many.final >= found.lower - 1e-12).all()
+    assert (many.final <= found.upper + 1e-12).all()
+
+
+def test_a_belt_that_moves_has_a_pseudo_equilibrium_and_one_at_rest_a_band():
+    stribeck = sp.Rational(1, 2) + 1 / (1 + 3 * sp.Abs(v - V))
+    model = fs.Model({x: v, v: -x - sp.sign(v - V) * stribeck}, parameters={V: 0.2})
+    moving = fs.equilibria(model)
+    assert moving.sets == ()
+    assert [e.region for e in moving] == ["S2"]
+    assert moving[0].state == pytest.approx([0.5 + 1 / 1.6, 0.0], abs=1e-12)
+    still = fs.equilibria(model, V=0)
+    (band,) = still.sets
+    assert band["x"] == pytest.approx((-1.5, 1.5), abs=1e-12)
+    assert ends(still) == pytest.approx([-1.5, 1.5], abs=1e-12)
+    assert all(e.continuum for e in still)
+    # as the belt slows down the equilibrium goes to the band's end
+    slow = fs.equilibria(model, V=1e-6)
+    assert slow[0].state[0] == pytest.approx(1.5, abs=1e-5)
+
+
+def test_a_block_without_a_spring_rests_anywhere():
+    model = fs.Model({x: v, v: w - sp.sign(v) / 2}, parameters={w: 0.2})
+    (band,) = fs.equilibria(model).sets
+    assert band["x"] == (-np.inf, np.inf)
+    diagram = fs.continue_equilibria(model, "w", over=(-1, 1))
+    assert diagram.bands[0].range == pytest.approx((-0.5, 0.5), abs=1e-12)
+
+
+def test_fields_that_point_away_make_a_set_that_is_no_sticking_band():
+    model = fs.Model({x: v, v: -x + sp.sign(v) / 2})
+    (band,) = fs.equilibria(model).sets
+    assert band.name == "S1|S2 (escaping)"
+    assert not band.stable
+
+
+def test_the_origin_of_a_relay_with_two_switches_is_an_equilibrium():
+    # sliding along both keeps the origin, which no region and no single sliding motion has
+    model = fs.Model({x: 0.3 - sp.sign(x) + sp.sign(y) / 4, y: w - sp.sign(y)}, parameters={w: 0.1})
+    found = fs.equilibria(model)
+    assert [e.region for e in found] == ["S1|S4"]
+    assert found[0].state.tolist() == [0.0, 0.0]
+    assert found[0].type == "pseudo-node"
+    assert found[0].stable
+    assert not found[0].continuum
+    diagram = fs.continue_equilibria(model, "w", over=(-2, 2))
+    assert diagram.bands[0].range == pytest.approx((-1, 1), abs=1e-9)
+
+
+def test_an_overlay_knows_when_the_block_sticks_and_when_it_slips_along_the_edge():
+    model = block()
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(-2.1, 2.1))
+    run = fs.simulate(model, [1, 0], t=(0, 600))
+    overlay = fs.overlay(diagram, run)
+    shares = overlay.shares()
+    sticking = sum(s.duration for s in run.segments if s.region == "S1|S2") / 600
+    assert shares["S1|S2 (sticking)"] == pytest.approx(sticking, abs=2e-3)
+    assert shares["edge of S1|S2"] > 0.5
+    assert shares[""] < 0.01
+    rests = [p for p in overlay.phases if p.kind == "sticking"]
+    assert len(rests) == 3
+    ends_at = [c.time for c in run.crossings if c.from_region == "S1|S2"]
+    assert [p.end for p in rests] == pytest.approx(ends_at, abs=1e-9)
+    # the block leaves where the spring, with the load, pulls as hard as friction can hold
+    for time in ends_at:
+        state = run(time)
+        assert abs(2 * math.sin(time / 100) - state[0]) == pytest.approx(0.5, abs=1e-8)
+    assert "in S1|S2 (sticking): 3 times" in overlay.summary()
+    assert overlay.at(t=200.0)[0].sheet == "S1|S2 (sticking)"
+    assert len(overlay.select(sheet="edge of S1|S2")) == 3
+
+
+def test_a_friction_oscillator_with_a_filter_has_a_band_that_is_stable_across():
+    # a state that follows: the set stays an interval, and the filter's eigenvalue decides
+    for rate, stable in ((-1, True), (1, False)):
+        rates = {x: v, v: -x - sp.sign(v) / 2, y: rate * (y - x)}
+        (band,) = fs.equilibria(fs.Model(rates)).sets
+        assert band["y"] == pytest.approx((-0.5, 0.5), abs=1e-14)
+        assert band.stable is stable
