@@ -8,7 +8,7 @@ units of states and time, nor with the rates of states that do not take part.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from fastslow.continuation.location import newton
 from fastslow.continuation.settings import Continuation
 from fastslow.continuation.zeros import ROUNDING, Bracket, Node, brackets
 from fastslow.diagrams.defining import Defining, OnInterface, Pair, row_sizes
+from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.normal_forms import (
     Vector,
     cusp_form,
@@ -57,6 +58,10 @@ class Criterion:
         The region that it belongs to.
     interface : int, optional
         The interface it is about.
+    beyond : int, optional
+        The region, or sliding motion, that meets the first one there.
+    note : str
+        What else a reader should know.
     """
 
     code: str
@@ -64,6 +69,8 @@ class Criterion:
     genuine: Callable[[Array], bool]
     region: int
     interface: int | None = None
+    beyond: int | None = None
+    note: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +115,9 @@ class Rows:
         return np.asarray(z)
 
 
-def criteria(system: Defining, others: list[int]) -> list[Criterion]:
+def criteria(
+    system: Defining, others: list[int], marks: Sequence[tuple[int, float]] = ()
+) -> list[Criterion]:
     """Give the tests for a curve of one kind.
 
     Parameters
@@ -116,18 +125,26 @@ def criteria(system: Defining, others: list[int]) -> list[Criterion]:
     system : Defining
     others : list of int
         For boundary equilibria the regions that meet there, else empty.
+    marks : sequence of (int, float)
+        Number of a parameter, 0 or 1, and a value of it that is a point UZ.
     """
+    at_marks = [_mark(system, k, value) for k, value in marks]
     if isinstance(system, OnInterface):
         found: list[Criterion] = []
         for region in others:
             found += _boundary_tests(system, region)
-        return found
+        return [*found, *at_marks]
     found = list(_interface_tests(system))
     if system.code == "LP":
         found += _fold_tests(system)
     if isinstance(system, Pair):
         found += _pair_tests(system)
-    return found
+    return [*found, *at_marks]
+
+
+def _mark(system: Defining, k: int, value: float) -> Criterion:
+    place, span = system.n + k, system.span[k]
+    return Criterion("UZ", lambda z: (float(z[place] - value) / span, 1.0), _always, system.region)
 
 
 def search(rows: Rows, watched: list[Criterion]) -> Iterator[Found]:
@@ -249,9 +266,13 @@ def _interface_tests(system: Defining) -> Iterator[Criterion]:
             imaginary = not isinstance(system, Pair) or z[system.width] > 0
             return bool(imaginary) and system.inside(z, but=k)
 
-        # of a sliding motion the last two rows are the drifts of both sides
-        interface = k if sides is None or k < len(field.interfaces) else sides.interface
-        yield Criterion(code, height, genuine, region, interface)
+        if sides is None or k < len(field.interfaces):
+            yield Criterion(code, height, genuine, region, k, field.neighbour(region, k))
+        else:
+            # the last two rows of a sliding motion are the drifts of both sides: where one
+            # vanishes the point is an equilibrium of that side, on the interface
+            side = sides.above if k == field.signs.shape[1] - 2 else sides.below
+            yield Criterion(code, height, genuine, region, sides.interface, side)
 
 
 def left_null(slopes: Array, v: Array) -> Array:
@@ -373,9 +394,27 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
     def eigenvalues(z: Array) -> Vector:
         return np.linalg.eigvals(matrix(z)[:, :n])
 
+    interface = system.interface
+    beyond = field.neighbour(region, interface)
     yield Criterion(
-        "BF", lambda z: (smallest_value(matrix(z)), 1.0), _always, region, system.interface
+        "BF", lambda z: (smallest_value(matrix(z)), 1.0), _always, region, interface, beyond
     )
+    sliding = None if beyond is None else _sliding(field, region, beyond)
+    if beyond is not None and sliding is not None:
+        other = beyond
+
+        def bordered(z: Array) -> tuple[float, float]:
+            """[[F_x, E], [h_x, 0]] with the jump E: singular where pseudo-equilibria fold."""
+            u = z[:width]
+            here, _, _, gradients = field.at(region, u)
+            inner, jump = matrix(z), (field.curve(other, u)[0] - here) / system.unit
+            size = float(np.abs(jump / row_sizes(inner)).max()) or 1.0
+            edge = gradients[interface] * system.scales
+            rows = np.column_stack([inner[:, :n], jump / size, inner[:, n:]])
+            last = np.concatenate([edge[:n], [0.0], edge[n:]])
+            return smallest_value(np.vstack([rows, last])), 1.0
+
+        yield Criterion("BF", bordered, _always, sliding, interface, region)
     if n < 2:
         return
     yield Criterion(
@@ -383,8 +422,18 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
         lambda z: (smallest_sum(eigenvalues(z)), 1.0),
         lambda z: _imaginary(eigenvalues(z)),
         region,
-        system.interface,
+        interface,
+        beyond,
     )
+
+
+def _sliding(field: FrozenField, region: int, beyond: int) -> int | None:
+    """The sliding motion between two regions, None where the field is continuous."""
+    pair = {region, beyond}
+    for number, mode in enumerate(field.modes):
+        if mode.sides is not None and {mode.sides.above, mode.sides.below} == pair:
+            return number
+    return None
 
 
 def _imaginary(values: Vector) -> bool:
@@ -401,6 +450,8 @@ def coefficients(system: Defining, found: Found) -> dict[str, float]:
     n, w = system.n, system.width
     u, region = found.z[:w], found.criterion.region
     raw = system.field.curve(region, u)[1][:, :n]
+    if found.criterion.code == "UZ":
+        return {}
     if found.criterion.code == "CP":
         return {"coefficient": cusp_form(forms_at(system.field, region, u), raw)}
     values = np.linalg.eigvals(raw)

@@ -9,11 +9,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, formula, instance, interval, items, mapping, takes, text
+from fastslow.arguments import (
+    finite,
+    flag,
+    formula,
+    instance,
+    interval,
+    items,
+    mapping,
+    takes,
+    text,
+)
 from fastslow.continuation import curves
 from fastslow.continuation.curves import Frame
 from fastslow.continuation.settings import Continuation
-from fastslow.diagrams.codimension_two import Found, Rows, along, coefficients, criteria, search
+from fastslow.diagrams.codimension_two import (
+    Criterion,
+    Found,
+    Rows,
+    along,
+    coefficients,
+    criteria,
+    search,
+)
 from fastslow.diagrams.curve_ends import outcome_of
 from fastslow.diagrams.defining import Crossing, Defining, Fold, OnInterface, Pair
 from fastslow.diagrams.fields import FrozenField
@@ -41,6 +59,7 @@ LEVEL = 1e-3
     continuation=instance(Continuation),
     virtual=flag,
     window=mapping,
+    marks=mapping,
 )
 def continue_points(
     point: SpecialPoint,
@@ -51,6 +70,7 @@ def continue_points(
     continuation: Continuation | None = None,
     virtual: bool = True,
     window: Mapping[Any, tuple[float | None, float | None]] | None = None,
+    marks: Mapping[Any, Sequence[float]] | None = None,
 ) -> PointBranch:
     """Trace a curve of special points in the plane of two parameters.
 
@@ -77,6 +97,8 @@ def continue_points(
     window : mapping, optional
         State to its range (low, high), as in `continue_equilibria`: a curve that leaves
         it ends exactly on the edge. The default is the window of the point's diagram.
+    marks : mapping, optional
+        Parameter, one of both, to the values at which points UZ are wanted exactly.
 
     Returns
     -------
@@ -107,13 +129,14 @@ def continue_points(
     model = _model(point, (first, second))
     field = FrozenField(model, first, second)
     continuation = continuation or Continuation()
-    region = _region_of(field, point)
+    region = _region_of(field, point, code)
     u = np.append(point.state, [point.parameters[n] for n in (first, second)])
     if np.any(u[-2:] < lower) or np.any(u[-2:] > upper):
         raise ArgumentError(
             f"the point {point.label} at {first} = {u[-2]:g}, {second} = {u[-1]:g} lies outside "
             f"over={dict(over)}"
         )
+    wanted = _marks(marks, (first, second), lower, upper)
     within = _window(point, window)
     if not within.contains(point.state, point.source.unit):
         raise ArgumentError(
@@ -127,7 +150,9 @@ def continue_points(
             f"the point {point.label} does not lie on a curve of {code} points of region "
             f"{field.regions[region]}: Newton's method did not converge from it"
         )
-    return _traced(system, landing, frame, continuation, point, (first, second), virtual, within)
+    return _traced(
+        system, landing, frame, continuation, point, (first, second), virtual, within, wanted
+    )
 
 
 def _names(parameters: Sequence[Any]) -> tuple[str, str]:
@@ -149,6 +174,25 @@ def _ranges(names: tuple[str, str], over: Mapping[Any, tuple[float, float]]) -> 
         bounds.append(interval(f"over['{name}']", given[name]))
     table = np.array(bounds)
     return table[:, 0], table[:, 1]
+
+
+def _marks(
+    given: Mapping[Any, Any] | None, names: tuple[str, str], lower: Array, upper: Array
+) -> list[tuple[int, float]]:
+    """Number of the parameter and value of every mark."""
+    found = []
+    for key, values in (given or {}).items():
+        name = str(key)
+        if name not in names:
+            raise unknown_name("parameter in marks", name, names)
+        k = names.index(name)
+        for value in items(finite)(f"marks['{name}']", values):
+            if not lower[k] <= value <= upper[k]:
+                raise ArgumentError(
+                    f"mark {name} = {value:g} is outside the range [{lower[k]:g}, {upper[k]:g}]"
+                )
+            found.append((k, float(value)))
+    return found
 
 
 def _window(point: SpecialPoint, given: Mapping[Any, Any] | None) -> StateWindow:
@@ -193,13 +237,11 @@ def _model(point: SpecialPoint, names: tuple[str, str]) -> Model:
     return whole.freed(names[0]).freed(names[1])
 
 
-def _region_of(field: FrozenField, point: SpecialPoint) -> int:
+def _region_of(field: FrozenField, point: SpecialPoint, code: str) -> int:
     """The region whose rates vanish; of a boundary equilibrium not the sliding motion."""
     numbers = [field.regions.index(r) for r in point.regions if r in field.regions]
     plain = [k for k in numbers if field.modes[k].sides is None]
-    if point.interface is not None and plain:
-        return plain[0]
-    return numbers[0]
+    return plain[0] if code == "BE" and plain else numbers[0]
 
 
 def _system(
@@ -241,6 +283,7 @@ def _traced(
     names: tuple[str, str],
     virtual: bool,
     window: StateWindow,
+    marks: Sequence[tuple[int, float]],
 ) -> PointBranch:
     field, region = system.field, system.region
     inside = _inside(system, start)
@@ -266,7 +309,7 @@ def _traced(
         )
         rows = np.concatenate([back[:0:-1], rows])
         tangents = np.concatenate([-turned[:0:-1], tangents])
-    watched = criteria(system, _meeting(system))
+    watched = criteria(system, _meeting(system), marks)
     coefficient = along(system, rows)
     found = sorted(
         search(Rows(system, rows, frame, continuation), watched),
@@ -284,6 +327,14 @@ def _traced(
         rows, tangents, coefficient = rows[kept], tangents[kept], coefficient[kept]
         found = [f for f, k in zip(found, spots, strict=True) if kept.start <= k < kept.stop]
         spots = [k - kept.start for k in spots if kept.start <= k < kept.stop]
+    ends = [
+        _two_interfaces(system, rows[k]) if s == curves.BOUND else None
+        for s, k in ((first, 0), (last, -1))
+    ]
+    if ends[0] is not None:
+        found, spots = [ends[0], *found], [0, *spots]
+    if ends[1] is not None:
+        found, spots = [*found, ends[1]], [*spots, len(rows) - 1]
     w, n = system.width, field.n
     admissible = np.array([_inside(system, z) for z in rows])
     codes = np.full(len(rows), system.code, dtype="<U3")
@@ -337,6 +388,26 @@ def _up_to_interfaces(
     return slice(start, stop)
 
 
+def _two_interfaces(system: Defining, z: Array) -> Found:
+    """The end of a curve of boundary equilibria at which another interface is met."""
+    assert isinstance(system, OnInterface)
+    field, region = system.field, system.region
+    apart = np.abs(system.heights(z))
+    apart[(field.signs[region] == 0) | (np.arange(len(apart)) == system.interface)] = np.inf
+    other = int(np.argmin(apart))
+    met = Criterion(
+        "BB",
+        lambda z: (float(system.heights(z)[other]), 1.0),
+        lambda _: True,
+        region,
+        system.interface,
+        field.neighbour(region, other),
+        f"on {field.interfaces[other]} as well",
+    )
+    residual = float(np.abs(np.append(system.residual(z, z), apart[other])).max())
+    return Found(0, met, z, residual, True, 0.0)
+
+
 def _inside(system: Defining, z: Array) -> bool:
     """Whether a point lies in the closure of its region; on its own interface it does."""
     return system.inside(z, system.interface if isinstance(system, OnInterface) else None)
@@ -384,11 +455,10 @@ def _special(
     counts[code] = counts.get(code, 0) + 1
     interface = found.criterion.interface
     region = found.criterion.region
+    beyond = found.criterion.beyond
     regions: tuple[str, ...] = (field.regions[region],)
-    if interface is not None:
-        other = field.neighbour(region, interface)
-        if other is not None:
-            regions = (*regions, field.regions[other])
+    if beyond is not None:
+        regions = (*regions, field.regions[beyond])
     data: dict[str, Any] = coefficients(system, found)
     return SpecialPoint(
         code=code,
@@ -406,6 +476,7 @@ def _special(
         converged=found.converged,
         interface=None if interface is None else field.interfaces[interface],
         accuracy=found.correction,
+        note=found.criterion.note,
         admissible=_inside(system, found.z),
         source=point.source,
         **data,

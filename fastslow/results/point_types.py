@@ -240,6 +240,16 @@ _ALL = (
         marker="X",
         colour="green",
     ),
+    PointType(
+        code="BB",
+        name="boundary equilibrium on two interfaces",
+        summary="A boundary equilibrium meets another interface.",
+        codimension=2,
+        unstable=None,
+        curves=("BE",),
+        marker="8",
+        colour="purple",
+    ),
 )
 
 #: The types by code, in the order of legends.
