@@ -114,6 +114,44 @@ class Rows:
             z = self.z[node.row] + node.part * (self.z[node.row + 1] - self.z[node.row])
         return np.asarray(z)
 
+    def solved(self, row: int, part: float, entry: int, value: float) -> Array | None:
+        """The point beside a part of the step behind a row at which an entry has a value."""
+        guess = self.z[row]
+        if part > 0:
+            guess = guess + part * (self.z[row + 1] - guess)
+        guide = self.system.renewed(guess)
+
+        def equations(z: Array) -> Array:
+            return np.append(self.system.residual(z, guide), z[entry] - value)
+
+        z, _, converged, _ = newton(equations, guess, self.frame.scale)
+        near = np.abs((z - guess) / self.frame.scale)[: self.frame.size].max()
+        if not converged or near > 2.0 * self.continuation.largest_step:
+            return None
+        z[entry] = value
+        return self.system.renewed(z)
+
+    def passes(self, u: Array) -> bool:
+        """Whether the curve goes through a point (states, parameters)."""
+        scale = self.frame.scale[: self.frame.size]
+        line, target = self.z[:, : self.frame.size] / scale, u / scale
+        if len(line) < 2:
+            return bool(np.abs(line - target).max() < SAME)
+        chords = np.diff(line, axis=0)
+        lengths = np.maximum((chords**2).sum(axis=1), 1e-300)
+        part = np.clip(((target - line[:-1]) * chords).sum(axis=1) / lengths, 0.0, 1.0)
+        apart = np.linalg.norm(line[:-1] + part[:, None] * chords - target, axis=1)
+        # a chord leaves the curve by less than its length times the turn within it
+        for row in np.flatnonzero(apart < 0.2 * np.sqrt(lengths) + SAME):
+            z = self.between(int(row), float(part[row]))
+            if z is not None and np.abs(z[: self.frame.size] / scale - target).max() < SAME:
+                return True
+        return False
+
+
+#: Points nearer to each other than this, in scaled units, are one.
+SAME = 1e-6
+
 
 def criteria(
     system: Defining, others: list[int], marks: Sequence[tuple[int, float]] = ()

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
-from typing import Any
+from dataclasses import asdict, dataclass, replace
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import (
+    either,
     finite,
     flag,
     formula,
@@ -37,7 +38,8 @@ from fastslow.diagrams.defining import Crossing, Defining, Fold, OnInterface, Pa
 from fastslow.diagrams.fields import FrozenField
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
-from fastslow.results.point_branches import PointBranch
+from fastslow.results.diagrams import Diagram
+from fastslow.results.point_branches import PointBranch, PointCorrector, PointCurves
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint, SpecialPoints
 from fastslow.results.windows import StateWindow, state_window
@@ -51,16 +53,7 @@ ISOLATED = 1e-7
 LEVEL = 1e-3
 
 
-@takes(
-    point=instance(SpecialPoint),
-    parameters=items(formula),
-    over=mapping,
-    code=text,
-    continuation=instance(Continuation),
-    virtual=flag,
-    window=mapping,
-    marks=mapping,
-)
+@overload
 def continue_points(
     point: SpecialPoint,
     parameters: Sequence[Any],
@@ -71,7 +64,40 @@ def continue_points(
     virtual: bool = True,
     window: Mapping[Any, tuple[float | None, float | None]] | None = None,
     marks: Mapping[Any, Sequence[float]] | None = None,
-) -> PointBranch:
+) -> PointBranch: ...
+@overload
+def continue_points(
+    point: Diagram,
+    parameters: Sequence[Any],
+    over: Mapping[Any, tuple[float, float]],
+    *,
+    code: str | None = None,
+    continuation: Continuation | None = None,
+    virtual: bool = True,
+    window: Mapping[Any, tuple[float | None, float | None]] | None = None,
+    marks: Mapping[Any, Sequence[float]] | None = None,
+) -> PointCurves: ...
+@takes(
+    point=either(instance(Diagram), instance(SpecialPoint)),
+    parameters=items(formula),
+    over=mapping,
+    code=text,
+    continuation=instance(Continuation),
+    virtual=flag,
+    window=mapping,
+    marks=mapping,
+)
+def continue_points(
+    point: SpecialPoint | Diagram,
+    parameters: Sequence[Any],
+    over: Mapping[Any, tuple[float, float]],
+    *,
+    code: str | None = None,
+    continuation: Continuation | None = None,
+    virtual: bool = True,
+    window: Mapping[Any, tuple[float | None, float | None]] | None = None,
+    marks: Mapping[Any, Sequence[float]] | None = None,
+) -> PointBranch | PointCurves:
     """Trace a curve of special points in the plane of two parameters.
 
     Folds, Hopf points, branch points (in models with a symmetry) and boundary
@@ -81,14 +107,16 @@ def continue_points(
 
     Parameters
     ----------
-    point : SpecialPoint
-        Of a diagram or of another such curve.
+    point : SpecialPoint or Diagram
+        A point of a diagram or of another such curve; of a diagram all its points, whose
+        curves are then traced, each once.
     parameters : sequence of two str or Symbol
     over : mapping
         The range of both, in their own units.
     code : str, optional
         Which curve to trace from a codimension-two point: ``"LP"`` or ``"HB"``
-        from BT and ZH, ``"BE"`` or ``"LP"`` from BF, ``"BE"`` or ``"HB"`` from BH.
+        from BT and ZH, ``"BE"`` or ``"LP"`` from BF, ``"BE"`` or ``"HB"`` from BH;
+        of a diagram, the only kind of curves to trace.
     continuation : Continuation, optional
         Lengths in units of the ranges.
     virtual : bool
@@ -102,13 +130,14 @@ def continue_points(
 
     Returns
     -------
-    PointBranch
+    PointBranch or PointCurves
+        The curve; of a diagram the tuple of its curves.
 
     Raises
     ------
     ArgumentError
         If the point has no model (it was read from a file), starts no curve, lies
-        outside the ranges, or a range is empty.
+        outside the ranges, a mark does, or a range is empty.
     UnknownNameError
         For a name that is no parameter.
 
@@ -123,36 +152,149 @@ def continue_points(
     >>> [abs(round(c["q"], 12)) for c in curve.special("CP")]
     [0.0]
     """
-    first, second = _names(parameters)
-    lower, upper = _ranges((first, second), over)
-    code = _curve_code(point, code)
-    model = _model(point, (first, second))
-    field = FrozenField(model, first, second)
-    continuation = continuation or Continuation()
-    region = _region_of(field, point, code)
-    u = np.append(point.state, [point.parameters[n] for n in (first, second)])
-    if np.any(u[-2:] < lower) or np.any(u[-2:] > upper):
+    names = _names(parameters)
+    lower, upper = _ranges(names, over)
+    plane = Plane(
+        names,
+        lower,
+        upper,
+        continuation or Continuation(),
+        virtual,
+        window,
+        _marks(marks, names, lower, upper),
+    )
+    if isinstance(point, Diagram):
+        return _all(point, plane, code)
+    return _curve(point, plane, _curve_code(point, code))[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """Where and how curves are traced.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Both parameters.
+    lower, upper : ndarray, shape (2,)
+        Their ranges.
+    continuation : Continuation
+    virtual : bool
+        Whether curves go on beyond interfaces.
+    window : mapping or None
+        Ranges of states that were asked for.
+    marks : list of (int, float)
+        Number of a parameter, and a value of it.
+    """
+
+    names: tuple[str, str]
+    lower: Array
+    upper: Array
+    continuation: Continuation
+    virtual: bool
+    window: Mapping[Any, Any] | None
+    marks: list[tuple[int, float]]
+
+    def holds(self, point: SpecialPoint) -> bool:
+        """Whether a point is in the ranges of both parameters."""
+        at = np.array([point.parameters.get(name, np.nan) for name in self.names])
+        return bool(np.all((at >= self.lower) & (at <= self.upper)))
+
+    @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        ends = zip(self.lower.tolist(), self.upper.tolist(), strict=True)
+        return dict(zip(self.names, ends, strict=True))
+
+
+def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
+    """The curves of all points of a diagram, each once."""
+    kinds = {kind for one in POINT_TYPES.values() for kind in one.curves}
+    if code is not None and code not in kinds:
+        raise unknown_name("curve", code, sorted(kinds))
+    if diagram.parameter not in plane.names:
         raise ArgumentError(
-            f"the point {point.label} at {first} = {u[-2]:g}, {second} = {u[-1]:g} lies outside "
-            f"over={dict(over)}"
+            f"parameters={plane.names!r}: expected the diagram's parameter "
+            f"{diagram.parameter} among them"
         )
-    wanted = _marks(marks, (first, second), lower, upper)
-    within = _window(point, window)
+    found: list[tuple[PointBranch, Rows]] = []
+    lost: list[SpecialPoint] = []
+    starts = [
+        (point, POINT_TYPES[point.code].curves[0])
+        for branch in diagram.branches
+        for point in branch.special
+        if point.code in POINT_TYPES and POINT_TYPES[point.code].curves
+    ]
+    for point, kind in starts:
+        if (code is not None and kind != code) or not plane.holds(point):
+            continue
+        if any(_passes(rows, point, kind, plane) for _, rows in found):
+            continue
+        try:
+            curve, rows = _curve(point, plane, kind)
+        except ArgumentError:
+            if point.source is None:
+                raise
+            lost.append(point)
+            continue
+        if curve.outcome.code != "no branch point":
+            found.append((curve, rows))
+        else:
+            lost.append(point)
+    return PointCurves((curve for curve, _ in found), plane.names, tuple(lost))
+
+
+def _passes(rows: Rows, point: SpecialPoint, code: str, plane: Plane) -> bool:
+    """Whether a curve that was traced goes through a point of the same kind."""
+    system = rows.system
+    field = system.field
+    if system.code != code:
+        return False
+    if isinstance(system, OnInterface) and point.interface != field.interfaces[system.interface]:
+        return False
+    number = _region_of(field, point, code)
+    if isinstance(system, OnInterface) and field.model.continuous[str(point.interface)]:
+        # the equilibria of both sides are the same on the interface
+        beyond = field.neighbour(system.region, system.interface)
+        if number not in (system.region, beyond):
+            return False
+    elif number not in (system.region, _twin(field, system.region)):
+        return False
+    u = np.append(point.state, [point.parameters[name] for name in plane.names])
+    return rows.passes(u)
+
+
+def _twin(field: FrozenField, region: int) -> int:
+    """The sliding motion with the same equations; of a region itself."""
+    sides = field.modes[region].sides
+    return region if sides is None else region - 1 if sides.escaping else region + 1
+
+
+def _curve(point: SpecialPoint, plane: Plane, code: str) -> tuple[PointBranch, Rows]:
+    """The curve of one kind through a point, with its rows."""
+    names = plane.names
+    model = _model(point, names)
+    field = FrozenField(model, *names)
+    region = _region_of(field, point, code)
+    u = np.append(point.state, [point.parameters[n] for n in names])
+    if not plane.holds(point):
+        raise ArgumentError(
+            f"the point {point.label} at {names[0]} = {u[-2]:g}, {names[1]} = {u[-1]:g} lies "
+            f"outside over={plane.ranges}"
+        )
+    within = _window(point, plane.window)
     if not within.contains(point.state, point.source.unit):
         raise ArgumentError(
             f"the point {point.label} lies outside the window {within}; window= sets other bounds"
         )
-    system, start = _system(field, region, code, point, u, upper - lower)
-    frame = _frame(system, start, (lower, upper), within)
+    system, start = _system(field, region, code, point, u, plane.upper - plane.lower)
+    frame = _frame(system, start, (plane.lower, plane.upper), within)
     landing = curves.landed(system, start, frame)
     if landing is None:
         raise ArgumentError(
             f"the point {point.label} does not lie on a curve of {code} points of region "
             f"{field.regions[region]}: Newton's method did not converge from it"
         )
-    return _traced(
-        system, landing, frame, continuation, point, (first, second), virtual, within, wanted
-    )
+    return _traced(system, landing, frame, point, plane, within)
 
 
 def _names(parameters: Sequence[Any]) -> tuple[str, str]:
@@ -278,14 +420,12 @@ def _traced(
     system: Defining,
     start: Array,
     frame: Frame,
-    continuation: Continuation,
     point: SpecialPoint,
-    names: tuple[str, str],
-    virtual: bool,
+    plane: Plane,
     window: StateWindow,
-    marks: Sequence[tuple[int, float]],
-) -> PointBranch:
-    field, region = system.field, system.region
+) -> tuple[PointBranch, Rows]:
+    field, region, names = system.field, system.region, plane.names
+    continuation, virtual = plane.continuation, plane.virtual
     inside = _inside(system, start)
 
     def stop(z: Array) -> bool:
@@ -309,7 +449,7 @@ def _traced(
         )
         rows = np.concatenate([back[:0:-1], rows])
         tangents = np.concatenate([-turned[:0:-1], tangents])
-    watched = criteria(system, _meeting(system), marks)
+    watched = criteria(system, _meeting(system), plane.marks)
     coefficient = along(system, rows)
     found = sorted(
         search(Rows(system, rows, frame, continuation), watched),
@@ -319,7 +459,8 @@ def _traced(
     places = [f.row + 1 for f in found]
     if found:
         rows = np.insert(rows, places, [f.z for f in found], axis=0)
-        tangents = np.insert(tangents, places, [tangents[f.row] for f in found], axis=0)
+        own = [_tangent_at(system, f.z, tangents[f.row], frame) for f in found]
+        tangents = np.insert(tangents, places, own, axis=0)
         coefficient = np.insert(coefficient, places, along(system, np.array([f.z for f in found])))
     spots = [place + k for k, place in enumerate(places)]
     if not virtual and inside:
@@ -345,7 +486,8 @@ def _traced(
         _special(system, f, point, names, tangents[k], counts)
         for f, k in zip(found, spots, strict=True)
     ]
-    return PointBranch(
+    whole = Rows(system, rows, frame, continuation)
+    curve = PointBranch(
         field.model.states,
         names,
         system.code,
@@ -367,7 +509,35 @@ def _traced(
         dict(field.model.parameters),
         field.model.equations,
         asdict(continuation),
+        _corrector(whole, point, names),
     )
+    return curve, whole
+
+
+def _corrector(rows: Rows, point: SpecialPoint, names: tuple[str, str]) -> PointCorrector:
+    system = rows.system
+    n = system.n
+
+    def correct(row: int, part: float, name: str, value: float) -> SpecialPoint | None:
+        entry = n + names.index(name)
+        z = rows.solved(row, part, entry, value)
+        if z is None:
+            return None
+        code = "NSD" if isinstance(system, Pair) and z[system.width] < 0 else system.code
+        residual = float(np.abs(system.residual(z, z)).max())
+        met = Criterion(code, lambda _: (0.0, 1.0), lambda _: True, system.region)
+        found = Found(row, met, z, residual, True, 0.0)
+        made = _special(system, found, point, names, np.zeros(len(z)), {})
+        lyapunov = along(system, z[None])[0] if code == "HB" else np.nan
+        return replace(
+            made,
+            label=code,
+            tangent=curves.tangent(system, z, rows.frame)[: system.width],
+            lyapunov=None if np.isnan(lyapunov) else float(lyapunov),
+            interface=point.interface if code == "BE" else None,
+        )
+
+    return correct
 
 
 def _oriented(direction: Array, frame: Frame) -> Array:
@@ -386,6 +556,12 @@ def _up_to_interfaces(
     start = on[0] if on and first == curves.STOPPED else 0
     stop = on[-1] + 1 if on and last == curves.STOPPED else count
     return slice(start, stop)
+
+
+def _tangent_at(system: Defining, z: Array, before: Array, frame: Frame) -> Array:
+    """The tangent at a point between rows, in the direction of the row before."""
+    tangent = curves.tangent(system, z, frame)
+    return tangent if (tangent * frame.weight) @ before >= 0 else -tangent
 
 
 def _two_interfaces(system: Defining, z: Array) -> Found:

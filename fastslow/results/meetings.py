@@ -12,7 +12,18 @@ from fastslow.errors import ArgumentError, unknown_name
 
 Array = NDArray[np.float64]
 
-#: Meetings closer than this part of the extent of both curves are one.
+#: A row nearer to the other curve than this part of the extent of both is on it, and
+#: meetings nearer to each other are one.
+ON = 1e-6
+
+#: Rows in turn on the other curve from which on both run along each other; curves that cross
+#: have one at most, and curves that touch few.
+ALONG = 5
+
+#: Sine of the angle from which straight lines meet where the curves do.
+WIDE = 0.2
+
+#: Cubics nearer to each other than this part of the extent of both curves meet.
 SAME = 1e-8
 
 
@@ -45,26 +56,80 @@ def intersections(one: Curve, other: Curve, names: tuple[str, str]) -> Array:
             if name not in curve.point_names:
                 raise unknown_name("column", name, curve.point_names)
         both = [curve.point_names.index(name) for name in names]
-        chord = np.linalg.norm(np.diff(curve.points, axis=0), axis=1, keepdims=True)
         lines.append(curve.points[:, both])
-        slopes.append((curve.tangent[:-1][:, both] * chord, curve.tangent[1:][:, both] * chord))
+        slopes.append(tuple(slope[:, both] for slope in step_slopes(curve)))
     scale = np.ptp(np.concatenate(lines), axis=0)
     scale[scale == 0] = 1.0
     lines = [line / scale for line in lines]
     i, j = _overlapping(lines[0], lines[1])
+    along = _along(lines, [tuple(s / scale for s in pair) for pair in slopes], i, j)
+    if along.size and along.all():
+        raise ArgumentError(
+            f"all rows of one curve lie on the other in the plane of {names[0]} and {names[1]}: "
+            "they are one curve, traced twice; expected another curve"
+        )
+    apart = ~along[i]
+    i, j = i[apart], j[apart]
     part, meet = _met(lines[0], lines[1], i, j)
     i, j, part = i[meet], j[meet], part[meet]
     cubics = [
         _cubic(line[:-1][k], line[1:][k], before[k] / scale, after[k] / scale)
         for line, (before, after), k in zip(lines, slopes, (i, j), strict=True)
     ]
-    part, points = _refined(cubics[0], cubics[1], part)
+    part, points, kept = _refined(cubics[0], cubics[1], part)
+    part, points, i = part[kept], points[kept], i[kept]
     order = np.argsort(i + part, kind="stable")
     distinct: list[Array] = []
     for point in points[order]:
-        if all(np.abs(point - known).max() > SAME for known in distinct):
+        if all(np.abs(point - known).max() > ON for known in distinct):
             distinct.append(point)
     return np.array(distinct).reshape(-1, 2) * scale
+
+
+def step_slopes(curve: Curve) -> tuple[Array, Array]:
+    """Derivatives of every step's cubic at its two ends by the part of the step, (N − 1, k).
+
+    The tangents, scaled to the length of the chord in units of the columns' extents.
+    """
+    points = curve.points
+    unit = np.ptp(points, axis=0) if len(points) else np.ones(points.shape[1])
+    unit[unit == 0] = 1.0
+    tangents = curve.tangent / unit
+    size = np.linalg.norm(tangents, axis=1, keepdims=True)
+    tangents = tangents / np.where(size > 0, size, 1.0)
+    length = np.linalg.norm(np.diff(points / unit, axis=0), axis=1, keepdims=True)
+    return tangents[:-1] * length * unit, tangents[1:] * length * unit
+
+
+def _along(
+    lines: list[Array],
+    slopes: list[tuple[Array, ...]],
+    i: NDArray[np.intp],
+    j: NDArray[np.intp],
+) -> NDArray[np.bool_]:
+    """Which steps of the first curve run along the second, from pairs of steps that overlap."""
+    first, second = lines
+    on = np.zeros(len(first), dtype=bool)
+    cubics = _cubic(second[:-1][j], second[1:][j], slopes[1][0][j], slopes[1][1][j])
+    chord = second[1:][j] - second[:-1][j]
+    length = np.maximum((chord**2).sum(axis=1), 1e-300)
+    for end in (0, 1):
+        rows = i + end
+        gap = first[rows] - second[:-1][j]
+        part = np.clip((gap * chord).sum(axis=1) / length, 0.0, 1.0)
+        for _ in range(4):
+            # Newton's method for the foot of the perpendicular
+            point, slope = _value(cubics, part)
+            steep = np.maximum((slope**2).sum(axis=1), 1e-300)
+            part = np.clip(part - ((point - first[rows]) * slope).sum(axis=1) / steep, 0.0, 1.0)
+        near = np.abs(_value(cubics, part)[0] - first[rows]).max(axis=1) <= ON
+        on[rows[near]] = True
+    both = on[:-1] & on[1:]
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], both.astype(int), [0]])))
+    for begin, end in edges.reshape(-1, 2):
+        if end - begin < min(ALONG, len(both)):
+            both[begin:end] = False
+    return both
 
 
 def _boxes(line: Array) -> list[tuple[Array, Array]]:
@@ -133,11 +198,11 @@ def _value(cubic: Array, part: Array) -> tuple[Array, Array]:
     return a + s * (b + s * (c + s * d)), b + s * (2 * c + s * 3 * d)
 
 
-def _refined(one: Array, other: Array, part: Array) -> tuple[Array, Array]:
+def _refined(one: Array, other: Array, part: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Meetings of cubics by Newton's method from those of the straight lines between their ends.
 
-    Returns the part of the first step and the points; where Newton's method
-    leaves the steps, those of the straight lines.
+    Returns the part of the first step, the points, and which of them are meetings:
+    where Newton's method leaves the steps, those of straight lines at a wide angle.
     """
     begin, end = one[:, 0], one.sum(axis=1)
     straight = begin + part[:, :1] * (end - begin)
@@ -150,4 +215,9 @@ def _refined(one: Array, other: Array, part: Array) -> tuple[Array, Array]:
         points = _value(one, now[:, 0])[0]
         apart = np.abs(points - _value(other, now[:, 1])[0]).max(axis=1)
     good = (np.abs(now - 0.5) <= 0.6).all(axis=1) & (apart <= SAME)
-    return np.where(good, now[:, 0], part[:, 0]), np.where(good[:, None], points, straight)
+    chords = end - begin, other.sum(axis=1) - other[:, 0]
+    size = np.linalg.norm(chords[0], axis=1) * np.linalg.norm(chords[1], axis=1)
+    # lines at a narrow angle may meet where the curves do not
+    wide = np.abs(_cross(*chords)) > WIDE * size
+    places = np.where(good, now[:, 0], part[:, 0])
+    return places, np.where(good[:, None], points, straight), good | wide

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, ClassVar
@@ -10,16 +10,22 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import formula, takes
+from fastslow.arguments import finite, formula, takes
+from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results import formulas
+from fastslow.results.curve_levels import points_at
 from fastslow.results.markup import points_html
 from fastslow.results.meetings import intersections
 from fastslow.results.outcome import Outcome
 from fastslow.results.point_columns import labels_at
-from fastslow.results.point_types import POINT_TYPES
-from fastslow.results.points import SpecialPoints
-from fastslow.results.result import Result
+from fastslow.results.point_types import POINT_TYPES, point_name
+from fastslow.results.points import SpecialPoint, SpecialPoints
+from fastslow.results.result import LIVE, Result
 from fastslow.results.tables import Table, numbered
+
+#: Solves for the point of a curve after a part of the step behind a row at which a
+#: parameter has a value: (row, part, name, value) -> SpecialPoint.
+PointCorrector = Callable[[int, float, str, float], SpecialPoint | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +68,8 @@ class PointBranch(Table, Result):
         The model as text.
     settings : mapping
         How the curve was traced.
+    corrector : callable, optional
+        Solves for a point read between rows; not kept in a file.
     """
 
     states: tuple[str, ...]
@@ -82,6 +90,7 @@ class PointBranch(Table, Result):
     parameters: Mapping[str, float] = field(default_factory=dict)
     equations: str = ""
     settings: Mapping[str, float] = field(default_factory=dict)
+    corrector: PointCorrector | None = field(default=None, repr=False, metadata=LIVE)
 
     @property
     def outcome(self) -> Outcome:
@@ -113,6 +122,48 @@ class PointBranch(Table, Result):
         """The columns of `points`."""
         return (*self.states, *self.parameter_names)
 
+    def at(self, **value: float) -> SpecialPoints:
+        """The points of the curve at one value of one of its parameters.
+
+        Each is solved for to rounding while the model is attached. Of a curve read
+        from a file it is interpolated by cubics, and its note says so.
+
+        Parameters
+        ----------
+        **value : float
+            One of both parameters by name, e.g. ``q=0.5``.
+
+        Returns
+        -------
+        SpecialPoints
+            In order along the curve; none where it does not reach the value.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is neither of both parameters.
+        ArgumentError
+            For a number that is not finite, or not one value.
+
+        Examples
+        --------
+        >>> import fastslow as fs
+        >>> cusp = fs.systems.cusp().frozen()
+        >>> fold = fs.continue_equilibria(cusp, "p", over=(-1, 1)).folds[0]
+        >>> curve = fs.continue_points(fold, ("p", "q"), over={"p": (-1, 1), "q": (-1, 2)})
+        >>> curve.at(q=0.75)["p"].round(12)
+        array([-0.25,  0.25])
+        """
+        if len(value) != 1:
+            raise ArgumentError(
+                f"at: expected one value of {' or '.join(self.parameter_names)}, received "
+                f"{', '.join(value) or 'none'}"
+            )
+        ((name, given),) = value.items()
+        if name not in self.parameter_names:
+            raise unknown_name("parameter of the curve", name, self.parameter_names)
+        return points_at(self, name, finite(name, given))
+
     @takes(x=formula, y=formula)
     def intersections(
         self, other: PointBranch, x: object = None, y: object = None
@@ -124,6 +175,11 @@ class PointBranch(Table, Result):
         other : PointBranch
         x, y : str, optional
             By default the two parameters.
+
+        Raises
+        ------
+        ArgumentError
+            For the same curve, also where it was traced twice.
         """
         first, second = self.parameter_names
         names = str(first if x is None else x), str(second if y is None else y)
@@ -154,4 +210,54 @@ class PointBranch(Table, Result):
             if point.code != "EP":
                 lines.append(f"   {point.label}: {at}, {point.description}")
         lines += [f"   ends: {outcome}" for outcome in dict.fromkeys(self.outcomes)]
+        return "\n".join(lines)
+
+
+class PointCurves(tuple[PointBranch, ...]):
+    """The curves of all special points of a diagram, each once.
+
+    Attributes
+    ----------
+    parameter_names : tuple of str
+        The two parameters.
+    isolated : SpecialPoints
+        Points of the diagram from which no curve could be traced, such as branch
+        points that no symmetry keeps.
+    """
+
+    parameter_names: tuple[str, str]
+    isolated: SpecialPoints
+
+    def __new__(
+        cls,
+        curves: Iterable[PointBranch],
+        parameter_names: tuple[str, str],
+        isolated: Iterable[SpecialPoint] = (),
+    ) -> PointCurves:
+        made = super().__new__(cls, curves)
+        made.parameter_names = parameter_names
+        made.isolated = SpecialPoints(isolated)
+        return made
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        return tuple(self), self.parameter_names, self.isolated
+
+    @property
+    def special(self) -> SpecialPoints:
+        """The special points of all curves; one that lies on two of them is there twice."""
+        return SpecialPoints(point for curve in self for point in curve.special)
+
+    def __repr__(self) -> str:
+        lines = [f"{len(self)} curves over {' and '.join(self.parameter_names)}"]
+        for curve in self:
+            codes = " ".join(p.label for p in curve.special)
+            cut = "" if curve.outcome.success else f"; {curve.outcome.code}"
+            lines.append(
+                f"   {curve.code} {point_name(curve.code)} in {curve.region}, {len(curve)} points"
+                + (f": {codes}" if codes else "")
+                + cut
+            )
+        if self.isolated:
+            names = ", ".join(point.label for point in self.isolated)
+            lines.append(f"   no curve from {names}")
         return "\n".join(lines)
