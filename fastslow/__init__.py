@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from fastslow.results.ensembles import Ensemble
     from fastslow.results.files import load
     from fastslow.results.overlays import Overlay
-    from fastslow.results.point_branches import PointBranch
+    from fastslow.results.point_branches import PointBranch, PointCurves
     from fastslow.results.points import Equilibrium, SpecialPoint
     from fastslow.results.refined_maps import RefinedMap
     from fastslow.results.sections import Section
@@ -81,6 +81,7 @@ _HOME = {
     "OutOfRangeError": "errors",
     "Overlay": "results.overlays",
     "PointBranch": "results.point_branches",
+    "PointCurves": "results.point_branches",
     "RefinedMap": "results.refined_maps",
     "Section": "results.sections",
     "SlowLoad": "results.slow_loads",
@@ -137,6 +138,7 @@ __all__ = [
     "OutOfRangeError",
     "Overlay",
     "PointBranch",
+    "PointCurves",
     "RefinedMap",
     "Section",
     "SlowLoad",

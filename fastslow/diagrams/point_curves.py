@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import (
-    either,
     finite,
     flag,
     formula,
@@ -78,7 +77,7 @@ def continue_points(
     marks: Mapping[Any, Sequence[float]] | None = None,
 ) -> PointCurves: ...
 @takes(
-    point=either(instance(Diagram), instance(SpecialPoint)),
+    point=instance(SpecialPoint, Diagram),
     parameters=items(formula),
     over=mapping,
     code=text,

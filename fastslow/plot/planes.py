@@ -26,7 +26,15 @@ from fastslow.plot.labels import place, tag
 from fastslow.plot.legends import explained
 from fastslow.plot.quantities import Quantity, at_points, quantity_of
 from fastslow.plot.spaces import HEIGHT, dress_space
-from fastslow.plot.style import VIRTUAL_CURVE, axes_for, curve_look, dot_look, spatial
+from fastslow.plot.style import (
+    HOPF_CURVES,
+    VIRTUAL_CURVE,
+    axes_for,
+    curve_look,
+    dot_look,
+    point_colour,
+    spatial,
+)
 from fastslow.results.point_branches import PointBranch
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
@@ -92,7 +100,9 @@ def parameter_plane(
     """Draw curves of folds, Hopf points, boundary equilibria, … over two parameters.
 
     Each kind has its colour and line style; virtual parts are dotted and faint,
-    neutral saddles, which are no bifurcation, thin.
+    neutral saddles, which are no bifurcation, thin. Supercritical Hopf points are solid
+    and subcritical ones dashed, with GH between them; the marker of a point that
+    was not solved for to rounding is hollow.
 
     Parameters
     ----------
@@ -163,10 +173,11 @@ def parameter_plane(
     lines: list[Line2D] = []
     for curve in curves:
         places = [q.of(_columns(curve), len(curve)) for q in quantities]
-        for code, real, rows in _runs(curve):
+        for code, real, kind, rows in _runs(curve):
             if not (real or virtual):
                 continue
-            look = {**curve_look(code), "zorder": 2.0, "label": POINT_TYPES[code].title}
+            title = ", ".join(filter(None, (POINT_TYPES[code].title, kind)))
+            look = {**curve_look(code), **HOPF_CURVES.get(kind, {}), "zorder": 2.0, "label": title}
             if not real:
                 look |= {**VIRTUAL_CURVE, "label": "virtual"}
             lines += ax.plot(*(place[rows] for place in places), **{**look, **style})
@@ -200,13 +211,22 @@ def _columns(curve: PointBranch) -> dict[str, Any]:
     return {**curve.parameters, **{name: curve[name] for name in curve.point_names}}
 
 
-def _runs(curve: PointBranch) -> list[tuple[str, bool, slice]]:
-    """Runs of one code, admissible or not; neighbours share their joint row."""
-    kinds = list(zip(curve.codes.tolist(), curve.admissible.tolist(), strict=True))
+def _runs(curve: PointBranch) -> list[tuple[str, bool, str, slice]]:
+    """Runs of one code and criticality, admissible or not; neighbours share their joint row."""
+    criticality = curve.criticality
+    known = np.flatnonzero((criticality != "") & (criticality != "degenerate"))
+    if known.size:
+        # a generalized Hopf point belongs to both sides
+        for row in np.flatnonzero(criticality == "degenerate"):
+            before = known[known < row]
+            criticality[row] = criticality[before[-1] if before.size else known[0]]
+    kinds = list(
+        zip(curve.codes.tolist(), curve.admissible.tolist(), criticality.tolist(), strict=True)
+    )
     found, start = [], 0
-    for (code, real), group in groupby(kinds):
+    for (code, real, kind), group in groupby(kinds):
         stop = start + len(list(group))
-        found.append((code, real, slice(max(start - 1, 0), stop)))
+        found.append((code, real, kind, slice(max(start - 1, 0), stop)))
         start = stop
     return found
 
@@ -236,8 +256,16 @@ def _special_points(
         if not met:
             continue
         places = np.column_stack(at_points(met, *shown))
-        look = {"zorder": 5, "label": POINT_TYPES[code].title}
-        markers += ax.plot(*places.T, **dot_look(code, 5.0), **look)
+        solved = np.array([point.converged for point in met])
+        look = {"zorder": 5, **dot_look(code, 5.0), "label": POINT_TYPES[code].title}
+        hollow = {
+            "markerfacecolor": "white",
+            "markeredgecolor": point_colour(code),
+            "label": f"{POINT_TYPES[code].title}, not converged",
+        }
+        for rows, own in ((solved, look), (~solved, {**look, **hollow})):
+            if rows.any():
+                markers += ax.plot(*places[rows].T, **own)
         if label:
             # numbered over all curves, which number their own points each
             labels += [tag(ax, f"{code}{k}", at) for k, at in enumerate(places, start=1)]

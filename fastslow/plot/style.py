@@ -45,6 +45,12 @@ STROKES = "x|"
 #: Line of the virtual parts of a curve of special points.
 VIRTUAL_CURVE: dict[str, Any] = {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.6}
 
+#: Line of a curve of Hopf points by their criticality.
+HOPF_CURVES: dict[str, dict[str, Any]] = {
+    "supercritical": {"linestyle": "-"},
+    "subcritical": {"linestyle": (0, (3, 1.5))},
+}
+
 #: Marker, colour and legend text of a transition by kind.
 TRANSITIONS: dict[str, tuple[str, str, str]] = {
     "jump": ("*", VERMILION, "jump at a fold"),

@@ -113,6 +113,14 @@ class PointBranch(Table, Result):
         return self.state[:, k] if k < n else self.parameter[:, k - n]
 
     @property
+    def criticality(self) -> NDArray[np.str_]:
+        """Of Hopf points supercritical, subcritical or degenerate, else empty, shape (N,)."""
+        kinds = np.array(["supercritical", "degenerate", "subcritical"])
+        hopf = (self.codes == "HB") & np.isfinite(self.coefficient)
+        signs = np.sign(np.where(hopf, self.coefficient, 0.0)).astype(int)
+        return np.where(hopf, kinds[signs + 1], "")
+
+    @property
     def points(self) -> NDArray[np.float64]:
         """States and parameters, shape (N, n + 2)."""
         return np.column_stack([self.state, self.parameter])

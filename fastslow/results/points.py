@@ -340,6 +340,8 @@ class SpecialPoint(_Point):
             kind += f", {self.subtype or self.criticality}"
         if self.clarke is not None and self.clarke.q_hopf is not None:
             kind += " with Clarke-Hopf"
+        if not self.converged:
+            kind += ", not converged"
         return kind if self.admissible else f"virtual {kind}"
 
     @property

@@ -256,6 +256,7 @@ def methods(r):
             r["curve"],
             {
                 "__getitem__": {"name": "x"},
+                "at": {"value": {"q": 1.0}},
                 "intersections": {"other": r["other curve"]},
                 "save": save,
             },

@@ -143,6 +143,12 @@ BY_FUNCTION = {
     "Trajectory.nearest.values": NEAR,
     "Trajectory.select.region": REGION,
     "Ensemble.__getitem__.name": [("y", Unknown, "unknown column 'y'")],
+    "PointBranch.at.value": [
+        ({}, Wrong, "at: expected one value of p or q, received none"),
+        ({"p": 0.0, "q": 0.0}, Wrong, "at: expected one value of p or q, received p, q"),
+        ({"omga": 0.0}, Unknown, "unknown parameter of the curve 'omga'"),
+        ({"q": "0"}, Wrong, "q = '0'; expected a finite number"),
+    ],
     "PointBranch.intersections.other": a("PointBranch"),
     "RefinedMap.at.named": [({"omga": 0.5}, Unknown, "unknown axis 'omga'")],
     "RefinedMap.at.values": [
@@ -196,6 +202,13 @@ BY_FUNCTION = {
         (("p", "p"), Wrong, "expected two different parameters"),
         ("p", Wrong, "parameters = 'p'; expected a sequence"),
         (("p", "omga"), fs.FastSlowError, "omga"),
+    ],
+    "continue_points.marks": [
+        *MAPPING,
+        ({"omga": [1.0]}, Unknown, "unknown parameter in marks 'omga'"),
+        ({"q": 1.0}, Wrong, "marks['q'] = 1.0; expected a sequence"),
+        ({"q": ["1"]}, Wrong, "marks['q'][0] = '1'; expected a finite number"),
+        ({"q": [9.0]}, Wrong, "mark q = 9 is outside the range [-1, 2]"),
     ],
     "continue_points.window": [
         *WINDOW,

@@ -1,10 +1,13 @@
 """Curves of special points in a parameter plane, as figures."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.results.points import SpecialPoints
 
 
 @pytest.fixture(scope="module")
@@ -58,3 +61,30 @@ def test_curves_over_different_planes_are_refused(curves):
     with pytest.raises(fs.FastSlowError, match="received none"):
         fs.plot.parameter_plane()
     assert np.isfinite(curve.parameter).all()
+
+
+def test_sub_and_supercritical_parts_of_a_hopf_curve_differ():
+    """l₁ = q along p = 0: GH at q = 0 divides them."""
+    x, y, p, q = sp.symbols("x y p q")
+    r2 = x**2 + y**2
+    growth = p + q * r2 - r2**2
+    model = fs.Model({x: growth * x - 2 * y, y: 2 * x + growth * y}, parameters={p: 0, q: 1})
+    (hopf,) = fs.continue_equilibria(model, "p", (-1, 1)).special("HB")
+    curve = fs.continue_points(hopf, ("p", "q"), over={"p": (-1, 1), "q": (-1, 1)})
+    drawn = fs.plot.parameter_plane(curve)
+    lines = {str(k.get_label()): k for k in drawn.lines}
+    assert set(lines) == {"HB Hopf, subcritical", "HB Hopf, supercritical"}
+    assert lines["HB Hopf, subcritical"].get_ydata().min() == pytest.approx(0, abs=1e-12)
+    assert lines["HB Hopf, supercritical"].get_ydata().max() < 0.05
+    assert len({k.get_linestyle() for k in drawn.lines}) == 2
+    texts = [t.get_text() for t in drawn.legend.get_texts()]
+    assert [t for t in texts if t.startswith("HB")] == list(lines)
+    assert not [m for m in drawn.markers if "not converged" in str(m.get_label())]
+
+
+def test_points_that_did_not_converge_are_hollow(curves):
+    special = SpecialPoints(replace(p, converged=p.code != "CP") for p in curves[0].special)
+    drawn = fs.plot.parameter_plane(replace(curves[0], special=special))
+    (hollow,) = [m for m in drawn.markers if m.get_label() == "CP cusp, not converged"]
+    assert hollow.get_markerfacecolor() == "white"
+    assert "not converged" in repr(special("CP")[0])
