@@ -19,6 +19,7 @@ RESULTS = (
     fs.Equilibrium,
     fs.Overlay,
     fs.PointBranch,
+    fs.PointCurves,
     fs.RefinedMap,
     fs.Section,
     fs.SlowLoad,
