@@ -84,6 +84,9 @@ def results():
     gear = fs.systems.harmonic_gear(omega=0.1, C=2.443)
     gap = fs.simulate(gear, [0.0, 0.0], periods=2)
     backlash = fs.continue_equilibria(gear.frozen(), "w", over=(-1, 1))
+    # its folds are the line p = q/4
+    slanted = fs.Model({x: p - q / 4 + x**2}, parameters={p: 0, q: 1})
+    other = fs.continue_equilibria(slanted, "p", over=(-1, 1)).folds[0]
     turning = fs.continue_equilibria(hopf(), "p", over=(-2, 2))
     many = fs.simulate_many(gear, [0.0, 0.0], parameters={"C": [2.0, 3.0]}, periods=1, samples=8)
     return {
@@ -94,7 +97,7 @@ def results():
         "fold": fold,
         "equilibrium": diagram.at(p=0.0)[0],
         "curve": fs.continue_points(fold, ("p", "q"), over=plane),
-        "other curve": fs.continue_points(diagram.folds[1], ("p", "q"), over=plane),
+        "other curve": fs.continue_points(other, ("p", "q"), over=plane),
         "run": run,
         "lay": fs.overlay(diagram, run),
         "gear": gear,
