@@ -166,7 +166,7 @@ def survey(  # type: ignore[no-untyped-def]
     Returns
     -------
     branching : ndarray, shape (N,)
-        Determinant of [F_x F_p; tangent] over the product of its row norms.
+        `signed_distance` of [F_x F_p; tangent], columns in units of the scale.
     jacobians : ndarray, shape (N, n, n)
     """
     count, columns = points.shape
@@ -180,42 +180,76 @@ def survey(  # type: ignore[no-untyped-def]
         for i in range(n):
             for j in range(n):
                 jacobians[k, i, j] = out[n + i * columns + j]
-        size = 1.0
         for i in range(columns):
-            squares = 0.0
             for j in range(columns):
                 if i < n:
                     matrix[i, j] = out[n + i * columns + j] * scale[j]
                 else:
                     matrix[i, j] = tangents[k, j] / scale[j]
-                squares += matrix[i, j] * matrix[i, j]
-            size *= math.sqrt(squares)
-        branching[k] = determinant(matrix) / (size if size > 0.0 else 1.0)
+        branching[k] = signed_distance(matrix)
     return branching, jacobians
 
 
 @njit(error_model="numpy")
-def determinant(matrix):  # type: ignore[no-untyped-def]
-    """Determinant by elimination in place."""
+def signed_distance(matrix):  # type: ignore[no-untyped-def]
+    """Size of a matrix's smallest singular value, with the sign of its determinant.
+
+    The rows are brought to length one, so that neither depends on units or on the
+    number of rows. The size is 1/|A⁻¹ b| for a fixed vector b of length one, at least
+    the smallest singular value and zero with it. The matrix is spoiled.
+    """
     size = matrix.shape[0]
-    result = 1.0
+    right = np.empty(size)
+    total = 0.0
+    for i in range(size):
+        squares = 0.0
+        largest = 0.0
+        for j in range(size):
+            largest = max(largest, abs(matrix[i, j]))
+        if not math.isfinite(largest):
+            return np.nan
+        if largest == 0.0:
+            return 0.0
+        for j in range(size):
+            matrix[i, j] /= largest
+            squares += matrix[i, j] * matrix[i, j]
+        for j in range(size):
+            matrix[i, j] /= math.sqrt(squares)
+        # in general position: no symmetry of a model makes it orthogonal to a null vector
+        right[i] = 0.5 + (0.6180339887498949 * (i + 1)) % 1.0
+        total += right[i] * right[i]
+    sign = 1.0
     for k in range(size):
         best = k
         for i in range(k + 1, size):
             if abs(matrix[i, k]) > abs(matrix[best, k]):
                 best = i
-        if matrix[best, k] == 0.0:
+        pivot = matrix[best, k]
+        if pivot == 0.0:
             return 0.0
         if best != k:
-            result = -result
+            sign = -sign
             for j in range(k, size):
                 matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
-        result *= matrix[k, k]
+            right[k], right[best] = right[best], right[k]
+        if pivot < 0.0:
+            sign = -sign
         for i in range(k + 1, size):
-            factor = matrix[i, k] / matrix[k, k]
-            for j in range(k + 1, size):
-                matrix[i, j] -= factor * matrix[k, j]
-    return result
+            factor = matrix[i, k] / pivot
+            if factor != 0.0:
+                for j in range(k + 1, size):
+                    matrix[i, j] -= factor * matrix[k, j]
+                right[i] -= factor * right[k]
+    solved = 0.0
+    for k in range(size - 1, -1, -1):
+        rest = right[k]
+        for j in range(k + 1, size):
+            rest -= matrix[k, j] * right[j]
+        right[k] = rest / matrix[k, k]
+        solved += right[k] * right[k]
+    if not math.isfinite(solved):
+        return 0.0
+    return sign * math.sqrt(total / solved)
 
 
 @njit(error_model="numpy")

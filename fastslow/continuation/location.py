@@ -20,6 +20,11 @@ Array = NDArray[np.float64]
 Curve = Callable[[Array], tuple[Array, Array]]
 
 
+#: Unknowns beyond which the singular values of a system are too dear: elimination is some
+#: thirty times as fast.
+LARGE = 60
+
+
 @dataclass(frozen=True)
 class Located:
     """A solved extended system.
@@ -105,9 +110,19 @@ def without_dust(u: Array, scale: Array) -> Array:
 
 
 def _solved(matrix: Array, right: Array) -> Array:
-    """Least-norm solution, with every equation brought to size one first."""
+    """Least-norm solution, with every equation brought to size one first.
+
+    Large systems are solved by elimination where they are not singular.
+    """
     size = np.abs(matrix).max(axis=1)
     size[size == 0] = 1.0
+    if len(matrix) > LARGE:
+        try:
+            found = np.linalg.solve(matrix / size[:, None], right / size)
+        except np.linalg.LinAlgError:
+            found = np.full(len(right), np.inf)
+        if np.abs(found).max() < np.inf:
+            return np.asarray(found)
     return np.asarray(np.linalg.lstsq(matrix / size[:, None], right / size, rcond=1e-14)[0])
 
 
@@ -195,9 +210,16 @@ def fold(curve: Curve, start: Array, scale: Array) -> Located:
 
 
 def turning_pair(curve: Curve, start: Array, scale: Array, squared: float) -> Located:
-    """Two eigenvalues of opposite sign: F = 0, (J² + κ) q = 0, |q| = 1, ⟨l, q⟩ = 0.
+    """Two eigenvalues of opposite sign: F = 0, J a = σb, J b = −(κ/σ) a, |a| = 1, ⟨l, a⟩ = 0.
 
-    κ = ω² > 0 is a Hopf point, κ < 0 a neutral saddle; ``extra`` is (κ,).
+    κ = ω² > 0 is a Hopf point, κ < 0 a neutral saddle; ``extra`` is (κ,). With the two
+    first-order equations, in place of (J² + κ) a = 0, slow pairs beside fast
+    eigenvalues are not lost in the squares of these. The constant σ is a size of κ^½.
+
+    Parameters
+    ----------
+    squared : float
+        About the product of the two eigenvalues: the pair is chosen by it.
     """
     n = len(start) - 1
     units = scale[:n]
@@ -207,36 +229,65 @@ def turning_pair(curve: Curve, start: Array, scale: Array, squared: float) -> Lo
         return value, slopes[:, :n] * units / units[:, None]
 
     _, matrix = jacobian(start)
-    _, _, right = np.linalg.svd(matrix @ matrix + squared * np.eye(n))
-    guide, across = right[-1], right[-2]
+    if not (np.all(np.isfinite(matrix)) and np.isfinite(squared)):
+        return Located(start, float("inf"), False, np.empty(0), float("inf"))
+    guide, across, squared = _pair_near(matrix, squared)
+    size = float(np.sqrt(abs(squared))) or float(np.abs(matrix).max()) or 1.0
 
     def equations(z: Array) -> Array:
         value, matrix = jacobian(z[: n + 1])
-        q, kappa = z[n + 1 : 2 * n + 1], z[-1]
-        double = matrix @ (matrix @ q) + kappa * q
-        return np.concatenate([value, double, [guide @ q - 1.0, across @ q]])
+        a, b, kappa = z[n + 1 : 2 * n + 1], z[2 * n + 1 : -1], z[-1]
+        first, second = matrix @ a / size - b, matrix @ b / size + kappa * a
+        return np.concatenate([value, first, second, [guide @ a - 1.0, across @ a]])
 
     def derivative(z: Array) -> Array:
-        u, q, kappa = z[: n + 1], z[n + 1 : 2 * n + 1], z[-1]
-        result = np.zeros((2 * n + 2, 2 * n + 2))
+        u, a, b, kappa = z[: n + 1], z[n + 1 : 2 * n + 1], z[2 * n + 1 : -1], z[-1]
+        result = np.zeros((3 * n + 2, 3 * n + 2))
         _, result[:n, : n + 1] = curve(u)
-        inner = result[:n, :n] * units / units[:, None]
-        first = _bending(curve, u, units * q, scale) / units[:, None]
-        second = _bending(curve, u, units * (inner @ q), scale) / units[:, None]
-        result[n : 2 * n, : n + 1] = inner @ first + second
-        result[n : 2 * n, n + 1 : 2 * n + 1] = inner @ inner + kappa * np.eye(n)
-        result[n : 2 * n, -1] = q
-        result[2 * n, n + 1 : 2 * n + 1] = guide
-        result[2 * n + 1, n + 1 : 2 * n + 1] = across
+        inner = result[:n, :n] * units / units[:, None] / size
+        in_a, in_b = slice(n + 1, 2 * n + 1), slice(2 * n + 1, 3 * n + 1)
+        first, second = slice(n, 2 * n), slice(2 * n, 3 * n)
+        result[first, : n + 1] = _bending(curve, u, units * a, scale) / units[:, None] / size
+        result[first, in_a], result[first, in_b] = inner, -np.eye(n)
+        result[second, : n + 1] = _bending(curve, u, units * b, scale) / units[:, None] / size
+        result[second, in_a], result[second, in_b] = kappa * np.eye(n), inner
+        result[second, -1] = a
+        result[3 * n, in_a] = guide
+        result[3 * n + 1, in_a] = across
         return result
 
-    z, residual, converged, size = newton(
+    z, residual, converged, correction = newton(
         equations,
-        np.concatenate([start, guide, [squared]]),
-        np.concatenate([scale, np.ones(n), [max(1.0, abs(squared))]]),
+        np.concatenate([start, guide, matrix @ guide / size, [squared / size**2]]),
+        np.concatenate([scale, np.ones(2 * n + 1)]),
         derivative,
     )
-    return Located(z[: n + 1], residual, converged, z[-1:], size)
+    return Located(z[: n + 1], residual, converged, z[-1:] * size**2, correction)
+
+
+def _pair_near(matrix: Array, squared: float) -> tuple[Array, Array, float]:
+    """Orthonormal vectors of the plane of two eigenvalues with sum near zero, and their product.
+
+    Of all pairs with a real sum the one whose sum is small and whose product is near
+    to a given one, both relative to its own size.
+    """
+    values, vectors = np.linalg.eig(matrix)
+    first, second = np.triu_indices(len(values), 1)
+    sums, products = values[first] + values[second], (values[first] * values[second]).real
+    size = np.abs(values[first]) + np.abs(values[second])
+    tiny = np.finfo(float).tiny
+    with np.errstate(divide="ignore"):
+        apart = np.abs(np.log(np.maximum(np.abs(products), tiny) / max(abs(squared), tiny)))
+    cost = np.abs(sums) / np.maximum(size, tiny) + apart + (products * squared < 0)
+    cost = np.where(np.abs(sums.imag) <= 1e-12 * size, cost, np.inf)
+    k = int(np.argmin(cost))
+    one, other = vectors[:, first[k]], vectors[:, second[k]]
+    if values[first[k]].imag == 0:
+        plane = np.column_stack([one.real, other.real])
+    else:
+        plane = np.column_stack([one.real, one.imag])
+    basis, _, _ = np.linalg.svd(plane, full_matrices=False)
+    return basis[:, 0], basis[:, 1], float(products[k])
 
 
 def branch_point(curve: Curve, start: Array, scale: Array) -> Located:

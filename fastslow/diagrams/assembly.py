@@ -80,9 +80,9 @@ def branch_of(
     at_row: list[int] = []
     tables: list[tuple[Array, Array, NDArray[np.complex128], int]] = []
     rows = 0
-    for number, piece in enumerate(curve.pieces):
+    for number, walked in enumerate(curve.pieces):
+        found, piece, finite = special_points(field, walked, window, marks)
         u, tangents = piece.u, piece.tangents
-        found, finite = special_points(field, piece, window, marks)
         eigenvalues = field.with_infinite(piece.region, finite)
         if found:
             largest = np.abs(finite).max(axis=-1, initial=0.0)

@@ -14,11 +14,21 @@ from fastslow.diagrams.walking import Piece, Window, beside
 
 Array = NDArray[np.float64]
 
-#: Halvings of a bracket before the solution outside of it is taken.
-HALVINGS = 50
+#: Steps by which a bracket is narrowed, beyond which it is at rounding.
+NARROWINGS = 80
 
-#: A dip is looked into where its parabola leaves less than this part of the smallest value.
-DIP = 0.3
+#: A minimum is computed where less than this fraction of the smallest value may be left.
+DIP = 0.5
+
+#: Evaluations spent on one minimum of a test function.
+EVALUATIONS = 40
+
+#: A minimum is known well enough at this fraction of the step: the test is above its minimum
+#: by the square of it.
+SETTLED = 1e-8
+
+#: The golden section, by which a minimum is bracketed where no parabola helps.
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,77 +70,91 @@ class Search:
     def brackets(self, test: Array) -> Iterator[Bracket]:
         """Changes of sign between rows next to each other but for one zero, and within dips."""
         u = self.piece.u
-        known = np.flatnonzero(test != 0)
-        signs = np.sign(test[known])
-        for k in np.flatnonzero(signs[:-1] * signs[1:] < 0):
-            before, after = int(known[k]), int(known[k + 1])
-            if after - before <= 2:
-                yield Bracket(before, (u[before], u[after]), (test[before], test[after]))
-        for row in _dips(test):
+        for before, after in sign_changes(test):
+            yield Bracket(before, (u[before], u[after]), (test[before], test[after]))
+        for row in _dips(test, self._arclength()):
             yield from self._dip(row, test)
 
+    def _arclength(self) -> Array:
+        chords = np.linalg.norm(np.diff(self.piece.u, axis=0) / self.window.scale, axis=1)
+        return np.append(0.0, np.cumsum(chords))
+
     def _dip(self, row: int, test: Array) -> Iterator[Bracket]:
-        """Two changes of sign beside a row at which the test is smallest, if there are."""
-        u, sign = self.piece.u, np.sign(test[row])
-        for a, b in ((row - 1, row), (row, row + 1)):
-            inner = self._lowest(u[a], u[b], float(test[a]), float(test[b]), sign)
-            if inner is not None:
-                yield Bracket(a, (u[a], inner[0]), (test[a], inner[1]))
-                yield Bracket(a, (inner[0], u[b]), (inner[1], test[b]))
-                return
+        """Two changes of sign around a minimum of the modulus after a row, if there are."""
+        a, b, sign = self.piece.u[row], self.piece.u[row + 1], float(np.sign(test[row]))
 
-    def _lowest(
-        self, a: Array, b: Array, at_a: float, at_b: float, sign: float
-    ) -> tuple[Array, float] | None:
-        """A point between two at which the test has the other sign, None if none is found."""
-        low, high, f_low, f_high = 0.0, 1.0, at_a * sign, at_b * sign
-        middle = self.between(a, b, 0.5)
-        for _ in range(12):
-            if middle is None:
-                return None
-            if middle[1] * sign < 0:
-                return middle
-            part = 0.5 * (low + high)
-            f = middle[1] * sign
-            if f >= max(f_low, f_high):
-                return None
-            # the parabola through both ends and the middle
-            bend = 2.0 * (f_low + f_high - 2.0 * f)
-            slope = f_high - f_low
-            least = f - slope**2 / (8.0 * bend) * 2.0 if bend > 0 else min(f_low, f_high)
-            if bend <= 0 or least > DIP * f:
-                return None
-            best = float(np.clip(0.5 - slope / (2.0 * bend), 0.02, 0.98))
-            place = low + best * (high - low)
-            found = self.between(a, b, place)
-            if found is None or found[1] * sign < 0:
-                return found
-            if place < part:
-                high, f_high = part, f
-            else:
-                low, f_low = part, f
-            middle = self.between(a, b, 0.5 * (low + high))
-        return None
+        def value(part: float) -> tuple[Array, float] | None:
+            found = self.between(a, b, part)
+            return None if found is None else (found[0], found[1] * sign)
 
-    def solve(self, bracket: Bracket, locate: Callable[[Array], Located]) -> Located:
-        """The special point within a bracket, which is halved until Newton's method stays in it."""
+        lowest = _negative(value, float(abs(test[row])), float(abs(test[row + 1])))
+        if lowest is not None:
+            point, at = lowest
+            yield Bracket(row, (a, point), (test[row], at * sign))
+            yield Bracket(row, (point, b), (at * sign, test[row + 1]))
+
+    def solve(
+        self, bracket: Bracket, locate: Callable[[Array], Located], *, narrowings: int = 0
+    ) -> Located | None:
+        """The special point within a bracket, which is narrowed until Newton's method stays in it.
+
+        Where Newton's method never does, the bracket itself is narrowed to rounding.
+
+        Parameters
+        ----------
+        bracket : Bracket
+        locate : callable
+            Newton's method for the point from a start u.
+        narrowings : int
+            How often the bracket is narrowed before the first attempt.
+
+        Returns
+        -------
+        Located or None
+            None where the test jumps from one sign to the other and does not vanish.
+        """
         (a, b), (f, g) = bracket.u, bracket.values
-        first: Located | None = None
-        for _ in range(HALVINGS):
-            located = locate(a + f / (f - g) * (b - a))
-            if first is None:
-                first = located
-            if located.converged and self._inside(located.u, a, b):
-                return located
-            middle = self.between(a, b, 0.5)
-            if middle is None or middle[1] == 0:
+        size = min(abs(f), abs(g))
+        # weights of the ends by the Illinois variant of regula falsi (Dowell & Jarratt 1971)
+        weight_a = weight_b = 1.0
+        side = 0
+        for count in range(NARROWINGS):
+            part = weight_a * f / (weight_a * f - weight_b * g)
+            if count >= narrowings:
+                located = locate(a + part * (b - a))
+                if located.converged and self._inside(located.u, a, b):
+                    return located
+                # regula falsi may hold on to one end
+                part = 0.5 if count % 2 else part
+            found = self.between(a, b, part)
+            if found is None:
                 break
-            if middle[1] * f > 0:
-                a, f = middle
+            if found[1] == 0:
+                located = locate(found[0])
+                good = located.converged and self._inside(located.u, a, b)
+                return located if good else self._at_rounding(found[0], 0.0)
+            if np.all(found[0] == a) or np.all(found[0] == b):
+                break
+            if found[1] * f > 0:
+                (a, f), weight_a = found, 1.0
+                weight_b = weight_b * 0.5 if side == 1 else 1.0
+                side = 1
             else:
-                b, g = middle
-        assert first is not None
-        return first
+                (b, g), weight_b = found, 1.0
+                weight_a = weight_a * 0.5 if side == -1 else 1.0
+                side = -1
+        return self._narrowed(a, b, f, g, size)
+
+    def _narrowed(self, a: Array, b: Array, f: float, g: float, size: float) -> Located | None:
+        """The middle of a bracket narrowed to rounding; None if the test jumps across it."""
+        length = float(np.abs((b - a) / self.window.scale).max())
+        if length > 1e-9 or min(abs(f), abs(g)) > 1e-3 * size:
+            return None
+        return self._at_rounding(a + f / (f - g) * (b - a), length)
+
+    def _at_rounding(self, u: Array, length: float) -> Located:
+        rates, _ = self.field.curve(self.piece.region, u)
+        return Located(u, float(np.abs(rates).max()), True, np.empty(0), length)
 
     def _inside(self, u: Array, a: Array, b: Array) -> bool:
         chord = (b - a) / self.window.scale
@@ -143,14 +167,104 @@ class Search:
         return -0.05 <= part <= 1.05 and aside <= 0.5 * np.sqrt(length) + 1e-9
 
 
-def _dips(test: Array) -> list[int]:
-    """Rows at which a test comes near to zero and turns: the parabola through three says so."""
-    if len(test) < 3:
-        return []
-    size = np.abs(test)
-    before, here, after = size[:-2], size[1:-1], size[2:]
-    alike = (test[:-2] * test[1:-1] > 0) & (test[1:-1] * test[2:] > 0)
-    bend, slope = before + after - 2.0 * here, 0.5 * (after - before)
-    low: NDArray[np.bool_] = alike & (here <= before) & (here <= after) & (bend > 0)
-    least = here - slope**2 / np.where(bend > 0, 2.0 * bend, 1.0)
-    return [int(k) + 1 for k in np.flatnonzero(low & (least < 0.5 * here))]
+def sign_changes(test: Array) -> list[tuple[int, int]]:
+    """Rows before and after every change of sign, at most one zero between them.
+
+    Examples
+    --------
+    >>> sign_changes(np.array([1.0, -2.0, -1.0, 0.0, 3.0]))
+    [(0, 1), (2, 4)]
+    """
+    known = np.flatnonzero(test != 0)
+    signs = np.sign(test[known])
+    changes = np.flatnonzero(signs[:-1] * signs[1:] < 0)
+    pairs = [(int(known[k]), int(known[k + 1])) for k in changes]
+    return [(before, after) for before, after in pairs if after - before <= 2]
+
+
+def _dips(test: Array, along: Array) -> list[int]:
+    """Rows after which a test that keeps its sign may reach zero and turn back.
+
+    The chords of both neighbouring steps are extended into the step: where the
+    modulus is convex they lie below it.
+    """
+    size, sign, length = np.abs(test), np.sign(test), np.diff(along)
+    found = []
+    for k in np.flatnonzero(sign[1:] * sign[:-1] > 0):
+        step, left, right = length[k], size[k], size[k + 1]
+        falls = rises = np.inf
+        if k > 0 and sign[k - 1] == sign[k] and length[k - 1] > 0:
+            falls = (size[k - 1] - left) / length[k - 1]
+        if k + 2 < len(test) and sign[k + 2] == sign[k] and length[k + 1] > 0:
+            rises = (size[k + 2] - right) / length[k + 1]
+        if falls <= 0 or rises <= 0 or np.isinf(min(falls, rises)):
+            continue
+        if np.isinf(falls):
+            least = right - rises * step
+        elif np.isinf(rises):
+            least = left - falls * step
+        else:
+            # where the two lines meet, within the step or at its nearer end
+            meet = float(np.clip((left - right + rises * step) / (falls + rises), 0.0, step))
+            least = max(left - falls * meet, right - rises * (step - meet))
+        if least < DIP * min(left, right):
+            found.append(int(k))
+    return found
+
+
+def _negative(
+    value: Callable[[float], tuple[Array, float] | None], left: float, right: float
+) -> tuple[Array, float] | None:
+    """A point between 0 and 1 at which a function with positive values there is negative.
+
+    Brent's minimization (1973, chapter 5), ended as soon as the function is
+    negative, or its minimum is known well enough and is not.
+    """
+    low, high = 0.0, 1.0
+    # best, second and third best place so far, with their values
+    second, third = ((low, left), (high, right))[:: 1 if left <= right else -1]
+    best = (float("nan"), np.inf)
+    step = earlier = np.inf
+    place = 0.5
+    for count in range(EVALUATIONS):
+        found = value(place)
+        if found is None or found[1] < 0:
+            return found
+        here = (place, found[1])
+        if count == 0:
+            best = here
+        elif here[1] <= best[1]:
+            low, high = (best[0], high) if place > best[0] else (low, best[0])
+            best, second, third = here, best, second
+        else:
+            low, high = (low, place) if place > best[0] else (place, high)
+            if here[1] <= second[1]:
+                second, third = here, second
+            elif here[1] <= third[1]:
+                third = here
+        x, f = best
+        vertex, least = _parabola(best, second, third)
+        if (count > 0 and abs(vertex - x) < SETTLED) or (count > 2 and least > DIP * f):
+            return None
+        aimed = vertex - x
+        if not low < vertex < high or abs(aimed) > 0.5 * earlier:
+            aimed = (1.0 - GOLDEN) * ((high if high - x > x - low else low) - x)
+            earlier = np.inf
+        else:
+            earlier = step
+        step = max(abs(aimed), SETTLED)
+        place = x + float(np.copysign(step, aimed))
+    return None
+
+
+def _parabola(*points: tuple[float, float]) -> tuple[float, float]:
+    """Vertex of the parabola through three points, with its value there; (∞, −∞) for none."""
+    (x, f), (y, g), (z, h) = points
+    if len({x, y, z}) < 3:
+        return np.inf, -np.inf
+    first, second = (g - f) / (y - x), (h - f) / (z - x)
+    bend = (second - first) / (z - y)
+    if not bend > 0:
+        return np.inf, -np.inf
+    slope = first - bend * (y - x)
+    return x - 0.5 * slope / bend, f - 0.25 * slope**2 / bend

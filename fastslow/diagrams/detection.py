@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation.location import (
-    Located,
-    branch_point,
-    fold,
-    turning_pair,
-)
+from fastslow.continuation.location import Located, branch_point, fold, turning_pair
 from fastslow.diagrams.brackets import Search
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.normal_forms import first_lyapunov, fold_form, forms_at
+from fastslow.diagrams.row_tests import RowTests, pair_sums, product_of_pair, resolved
 from fastslow.diagrams.walking import Piece, Window
 
 Array = NDArray[np.float64]
+
+#: How often a bracket of a Hopf point is narrowed before Newton's method for it is tried,
+#: which costs as much as dozens of evaluations where there are many states.
+NARROWED_FIRST = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,13 +37,22 @@ class Detected:
 @np.errstate(all="ignore")
 def special_points(
     field: FrozenField, piece: Piece, window: Window, marks: Sequence[float]
-) -> tuple[list[Detected], NDArray[np.complex128]]:
-    """All special points of a piece, in order along it, and the finite eigenvalues of its rows."""
-    branching, eigenvalues = field.survey(piece.region, piece.u, piece.tangents, window.scale)
+) -> tuple[list[Detected], Piece, NDArray[np.complex128]]:
+    """All special points of a piece, in order along it.
+
+    Returns
+    -------
+    found : list of Detected
+    piece : Piece
+        The piece, with rows added where one step hid several points.
+    eigenvalues : ndarray of complex
+        The finite ones of its rows.
+    """
+    piece, tests = resolved(field, piece, window)
     found = [
-        *_folds(field, piece, window),
-        *_branch_points(field, piece, window, branching),
-        *_turning_pairs(field, piece, window, eigenvalues),
+        *_folds(field, piece, window, tests),
+        *_branch_points(field, piece, window, tests),
+        *_turning_pairs(field, piece, window, tests),
         *_marks(field, piece, window, marks),
     ]
     found = [d for d in found if _between(d.located.u, piece, d.row, window)]
@@ -57,91 +65,69 @@ def special_points(
         or all(np.abs((d.located.u - c) / window.scale).max() > 1e-4 for c in crossings)
     ]
     found = sorted(found, key=lambda d: (d.row, _ahead(d.located.u, piece, d.row, window)))
-    return found, eigenvalues
+    return found, piece, tests.eigenvalues
 
 
-def _folds(field: FrozenField, piece: Piece, window: Window) -> Iterator[Detected]:
-    test = piece.tangents[:, -1] / window.scale[-1]
-    test = np.where(np.abs(test) < 1e-10, 0.0, test)
-
+def _folds(field: FrozenField, piece: Piece, window: Window, tests: RowTests) -> Iterator[Detected]:
     def curve(u: Array) -> tuple[Array, Array]:
         return field.curve(piece.region, u)
 
     def turning(u: Array, along: Array) -> float:
-        tangent, _ = field.tangent(piece.region, u, window.weight)
-        side = 1.0 if (tangent * window.weight) @ along >= 0 else -1.0
-        return float(side * tangent[-1] / window.scale[-1])
+        return float(_tangent(field, piece, u, along, window)[-1] / window.scale[-1])
 
     search = Search(field, piece, window, turning)
-    for bracket in search.brackets(test):
+    for bracket in search.brackets(tests.turning):
         located = search.solve(bracket, lambda u: fold(curve, u, window.scale))
-        jacobian = curve(located.u)[1][:, : field.n]
-        coefficient = fold_form(forms_at(field, piece.region, located.u), jacobian)
-        yield Detected(bracket.row, "LP", located, coefficient=coefficient)
+        if located is not None:
+            jacobian = curve(located.u)[1][:, : field.n]
+            coefficient = fold_form(forms_at(field, piece.region, located.u), jacobian)
+            yield Detected(bracket.row, "LP", located, coefficient=coefficient)
 
 
 def _branch_points(
-    field: FrozenField, piece: Piece, window: Window, test: Array
+    field: FrozenField, piece: Piece, window: Window, tests: RowTests
 ) -> Iterator[Detected]:
-    test = np.where(np.abs(test) < 1e-14, 0.0, test)
-
     def locate(u: Array) -> Located:
         return branch_point(lambda z: field.curve(piece.region, z), u, window.scale)
 
     def crossing(u: Array, along: Array) -> float:
-        _, slopes = field.curve(piece.region, u)
-        tangent, _ = field.tangent(piece.region, u, window.weight)
-        side = 1.0 if (tangent * window.weight) @ along >= 0 else -1.0
-        rows = np.vstack([slopes * window.scale, side * tangent / window.scale])
-        size = np.linalg.norm(rows, axis=1).prod()
-        return float(np.linalg.det(rows) / (size if size > 0 else 1.0))
+        tangent = _tangent(field, piece, u, along, window)
+        return float(field.branching(piece.region, u[None], tangent[None], window.scale)[0])
 
     search = Search(field, piece, window, crossing)
-    for bracket in search.brackets(test):
+    for bracket in search.brackets(tests.branching):
         located = search.solve(bracket, locate)
-        if located.converged:
+        if located is not None:
             yield Detected(bracket.row, "BP", located)
 
 
-@cache
-def _pairs(n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Numbers of the two members of every pair of n."""
-    first, second = np.triu_indices(n, 1)
-    return first, second
-
-
-def pair_sums(eigenvalues: NDArray[np.complex128]) -> Array:
-    """Product of the sums of all pairs, each in units of the largest eigenvalue."""
-    first, second = _pairs(eigenvalues.shape[-1])
-    sums = eigenvalues[..., first] + eigenvalues[..., second]
-    size = np.maximum(np.abs(eigenvalues).max(axis=-1, keepdims=True), np.finfo(float).tiny)
-    return np.asarray(np.prod(sums / size, axis=-1).real)
-
-
 def _turning_pairs(
-    field: FrozenField, piece: Piece, window: Window, eigenvalues: NDArray[np.complex128]
+    field: FrozenField, piece: Piece, window: Window, tests: RowTests
 ) -> Iterator[Detected]:
     n, region = field.n, piece.region
-    if eigenvalues.shape[1] < 2:
-        return
-    first, second = _pairs(eigenvalues.shape[1])
-    test = pair_sums(eigenvalues)
 
     def curve(u: Array) -> tuple[Array, Array]:
         return field.curve(region, u)
 
-    def locate(u: Array) -> Located:
-        values = field.finite_eigenvalues(region, u)
-        pair = int(np.argmin(np.abs(values[first] + values[second])))
-        squared = float((values[first[pair]] * values[second[pair]]).real)
-        return turning_pair(curve, u, window.scale, squared)
+    def sums(u: Array, along: Array) -> float:
+        return float(pair_sums(field.finite_eigenvalues(region, u)))
 
-    search = Search(
-        field, piece, window, lambda u, _: float(pair_sums(field.finite_eigenvalues(region, u)))
-    )
-    for bracket in search.brackets(np.where(np.abs(test) < 1e-14, 0.0, test)):
-        located = search.solve(bracket, locate)
-        kappa = float(located.extra[0])
+    search = Search(field, piece, window, sums)
+    product = np.nan
+
+    def locate(u: Array) -> Located:
+        nonlocal product
+        here = product_of_pair(field.finite_eigenvalues(region, u))
+        product = product if np.isnan(here) else here
+        return turning_pair(curve, u, window.scale, product)
+
+    for bracket in search.brackets(tests.pairs):
+        nearer = int(abs(bracket.values[1]) < abs(bracket.values[0]))
+        product = product_of_pair(field.finite_eigenvalues(region, bracket.u[nearer]))
+        located = search.solve(bracket, locate, narrowings=NARROWED_FIRST)
+        if located is None:
+            continue
+        kappa = float(located.extra[0]) if located.extra.size else product
         if kappa > 0:
             frequency = float(np.sqrt(kappa))
             jacobian = curve(located.u)[1][:, :n]
@@ -149,6 +135,12 @@ def _turning_pairs(
             yield Detected(bracket.row, "HB", located, frequency=frequency, lyapunov=lyapunov)
         else:
             yield Detected(bracket.row, "NSD", located)
+
+
+def _tangent(field: FrozenField, piece: Piece, u: Array, along: Array, window: Window) -> Array:
+    """The unit tangent at a point, in a direction along the piece."""
+    tangent, _ = field.tangent(piece.region, u, window.weight)
+    return tangent if (tangent * window.weight) @ along >= 0 else -tangent
 
 
 def _marks(
@@ -165,7 +157,8 @@ def _marks(
                     piece.region, u, window.scale, normal=along, point=mark * along
                 ),
             )
-            yield Detected(bracket.row, "UZ", located)
+            if located is not None:
+                yield Detected(bracket.row, "UZ", located)
 
 
 def _ahead(u: Array, piece: Piece, row: int, window: Window) -> float:

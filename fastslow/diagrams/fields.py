@@ -239,14 +239,24 @@ class FrozenField:
     def survey(
         self, region: int, points: Array, tangents: Array, scale: Array
     ) -> tuple[Array, NDArray[np.complex128]]:
-        """Normalized determinants of [F_x F_p; tangent], and finite eigenvalues, at rows."""
+        """Distances from a branch point with sign (see `branching`), and finite eigenvalues."""
+        branching, jacobians = self._surveyed(region, points, tangents, scale)
+        if self.modes[region].sides is not None:
+            return branching, self.finite_eigenvalues(region, points)
+        return branching, self.spectrum(jacobians)
+
+    def branching(self, region: int, points: Array, tangents: Array, scale: Array) -> Array:
+        """How far [F_x F_p; tangent] is from singular, with its determinant's sign, at rows."""
+        return self._surveyed(region, points, tangents, scale)[0]
+
+    def _surveyed(
+        self, region: int, points: Array, tangents: Array, scale: Array
+    ) -> tuple[Array, Array]:
         branching, jacobians = loop("survey")(
             self.compiled.address, region, self.values, np.ascontiguousarray(points),
             np.ascontiguousarray(tangents), scale, self.compiled.size,
         )  # fmt: skip
-        if self.modes[region].sides is not None:
-            return branching, self.finite_eigenvalues(region, points)
-        return branching, self.spectrum(jacobians)
+        return branching, jacobians
 
     def with_infinite(self, region: int, finite: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Eigenvalues with the infinite one of a sliding motion."""

@@ -6,7 +6,7 @@ SymPy derives them once for each set of rates; entries that vanish are left out.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -29,23 +29,38 @@ SINGULAR = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class Multilinear:
-    """Second and third derivatives of rates at one point, as multilinear forms.
+    """Derivatives of rates at one point, as multilinear forms, without those that vanish.
 
     Parameters
     ----------
-    second : ndarray, shape (n, n, n)
-        ∂²F_i/∂x_j∂x_k.
-    third : ndarray, shape (n, n, n, n)
+    n : int
+        Number of rates and states.
+    terms : mapping of int to (ndarray, ndarray)
+        For k = 2, 3 the indices (i, j₁, …, jₖ), shape (m, k + 1), in every order of the
+        j, and the values of ∂ᵏF_i/∂x_j₁…∂x_jₖ, shape (m,).
     """
 
-    second: Array
-    third: Array
+    n: int
+    terms: Mapping[int, tuple[NDArray[np.intp], Array]]
+
+    @classmethod
+    def dense(cls, *arrays: Array) -> Multilinear:
+        """Of whole arrays, shapes (n, n, n), (n, n, n, n) and so on."""
+        places = [np.argwhere(array) for array in arrays]
+        terms = {
+            array.ndim - 1: (at, array[tuple(at.T)])
+            for array, at in zip(arrays, places, strict=True)
+        }
+        return cls(len(arrays[0]), terms)
 
     def form(self, *vectors: Vector) -> Vector:
-        """B(q, r) or C(q, r, s), shape (n,)."""
-        result: Vector = self.second if len(vectors) == 2 else self.third
-        for vector in reversed(vectors):
-            result = result @ vector
+        """B(q, r), C(q, r, s), …, shape (n,)."""
+        indices, values = self.terms[len(vectors)]
+        products: Vector = values
+        for place, vector in enumerate(vectors, start=1):
+            products = products * vector[indices[:, place]]
+        result: Vector = np.zeros(self.n, dtype=products.dtype)
+        np.add.at(result, indices[:, 0], products)
         return result
 
 
@@ -80,17 +95,17 @@ def derivatives(
     ([(0, 0, 0), (0, 0, 1), (0, 0, 0, 1)], [10.0, 6.0, 2])
     """
     table: dict[tuple[int, ...], sp.Expr] = {}
+    number = {symbol: k for k, symbol in enumerate(states)}
     for i, rate in enumerate(rates):
         level: dict[tuple[int, ...], sp.Expr] = {(i,): rate}
         for _ in range(3):
             deeper = {}
             for index, expression in level.items():
                 first = index[-1] if len(index) > 1 else 0
-                for j in range(first, len(states)):
-                    if states[j] in expression.free_symbols:
-                        slope = expression.diff(states[j])
-                        if slope != 0:
-                            deeper[(*index, j)] = slope
+                present = sorted(number[s] for s in expression.free_symbols if s in number)
+                for j in present:
+                    if j >= first and (slope := expression.diff(states[j])) != 0:
+                        deeper[(*index, j)] = slope
             level = deeper
             table |= {k: e for k, e in level.items() if len(k) > 2}
     entries = sorted(table, key=lambda k: (len(k), k))
@@ -109,12 +124,17 @@ def forms_at(field: FrozenField, region: int, u: Array) -> Multilinear:
         tuple(rates), tuple(map(real, model.states)), tuple(map(real, names))
     )
     fixed = [model.parameters[p] for p in names[len(field.varying) :]]
-    second, third = np.zeros((n,) * 3), np.zeros((n,) * 4)
+    found: dict[int, tuple[Entries, list[float]]] = {2: ([], []), 3: ([], [])}
     for index, value in zip(entries, values(*u, *fixed), strict=True):
-        target = second if len(index) == 3 else third
-        for places in set(itertools.permutations(index[1:])):
-            target[(index[0], *places)] = value
-    return Multilinear(second, third)
+        places, numbers = found[len(index) - 1]
+        orders = set(itertools.permutations(index[1:]))
+        places += [(index[0], *order) for order in orders]
+        numbers += [float(value)] * len(orders)
+    terms = {
+        order: (np.array(places, dtype=np.intp).reshape(-1, order + 1), np.array(numbers))
+        for order, (places, numbers) in found.items()
+    }
+    return Multilinear(n, terms)
 
 
 def fold_form(forms: Multilinear, jacobian: Array) -> float:
@@ -184,7 +204,7 @@ def first_lyapunov(forms: Multilinear, jacobian: Array, frequency: float) -> flo
     --------
     >>> third = np.zeros((2, 2, 2, 2))  # of x' = −y − x³, y' = x
     >>> third[0, 0, 0, 0] = -6.0
-    >>> forms = Multilinear(np.zeros((2, 2, 2)), third)
+    >>> forms = Multilinear.dense(np.zeros((2, 2, 2)), third)
     >>> round(first_lyapunov(forms, np.array([[0.0, -1.0], [1.0, 0.0]]), 1.0), 14)
     -0.75
     """

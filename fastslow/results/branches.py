@@ -22,6 +22,7 @@ from fastslow.results.point_columns import labels_at
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoints, stability_of
 from fastslow.results.result import LIVE, Result
 from fastslow.results.tables import Table, numbered
+from fastslow.results.unexplained import UnexplainedChange, unexplained_changes
 
 
 @dataclass(frozen=True)
@@ -130,6 +131,11 @@ class Branch(Table, Result):
     def outcome(self) -> Outcome:
         """How the tracing ended: the first unsuccessful end, else the last one."""
         return next((o for o in self.outcomes if not o.success), self.outcomes[-1])
+
+    @cached_property
+    def unexplained(self) -> tuple[UnexplainedChange, ...]:
+        """Changes of the number of unstable eigenvalues that no special point explains."""
+        return unexplained_changes(self)
 
     def __len__(self) -> int:
         return len(self.parameter)

@@ -93,12 +93,12 @@ def test_the_sign_does_not_depend_on_coordinates(a, b, omega, unit, seed):
     third = np.zeros((2, 2, 2, 2))
     third[0, 0, 0, 0], third[1, 1, 1, 1] = a, b
     turn = np.array([[0.0, -omega], [omega, 0.0]])
-    plain = first_lyapunov(Multilinear(second, third), turn, omega)
-    scaled = first_lyapunov(Multilinear(second / unit, third / unit**2), turn, omega)
+    plain = first_lyapunov(Multilinear.dense(second, third), turn, omega)
+    scaled = first_lyapunov(Multilinear.dense(second / unit, third / unit**2), turn, omega)
     assert scaled == pytest.approx(plain / unit**2, rel=1e-9, abs=1e-12 / unit**2)
     c, s = np.cos(0.7), np.sin(0.7)
     r = np.array([[c, -s], [s, c]])
-    rotated = Multilinear(
+    rotated = Multilinear.dense(
         np.einsum("ia,abc,bj,ck->ijk", r, second, r.T, r.T),
         np.einsum("ia,abcd,bj,ck,dl->ijkl", r, third, r.T, r.T, r.T),
     )
@@ -128,4 +128,4 @@ def test_fold_coefficient_in_two_states():
     second = np.zeros((2, 2, 2))
     second[0, 0, 0] = -2.0
     second[0, 0, 1] = second[0, 1, 0] = 1.0
-    assert fold_form(Multilinear(second, np.zeros((2,) * 4)), np.diag([0.0, -1.0])) == -1.0
+    assert fold_form(Multilinear.dense(second, np.zeros((2,) * 4)), np.diag([0.0, -1.0])) == -1.0

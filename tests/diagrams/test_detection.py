@@ -1,0 +1,144 @@
+"""Hopf and branch points of models with many states and rates over many decades.
+
+The truth is known by construction: linear parts are similar to block-diagonal
+ones whose eigenvalues cross the imaginary axis at chosen parameter values.
+"""
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+import fastslow as fs
+from fastslow.diagrams.detection import special_points
+from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.row_tests import pair_sums
+from fastslow.diagrams.walking import Piece, Window
+from fastslow.results.points import stability_of
+from tests.diagrams.models import LENGTH, brusselator, chafee_infante, crossing_model
+
+p = sp.Symbol("p")
+
+
+def line(model, over, name="p"):
+    """The branch through the first start alone."""
+    settings = fs.Continuation(branches=1)
+    return fs.continue_equilibria(model, name, over, continuation=settings).branches[0]
+
+
+def trivial_line(model, low, high, state=0.0, name="p", rows=101):
+    """Special points of a branch whose state is constant: its rows need no tracing."""
+    field = FrozenField(model.freed(name), name)
+    u, tangents = np.zeros((rows, field.n + 1)), np.zeros((rows, field.n + 1))
+    u[:, :-1] = state
+    u[:, -1] = np.linspace(low, high, rows)
+    tangents[:, -1] = high - low
+    window = Window(low, high, np.append(np.ones(field.n), high - low))
+    found, piece, values = special_points(field, Piece(0, u, tangents), window, ())
+    return found, piece, values
+
+
+@pytest.mark.parametrize("size", [5, 8, 13, 20, 60])
+def test_points_of_random_models_with_rates_over_six_decades(size):
+    """Every crossing, no other, to ten digits; one seed for each size."""
+    model, hopf, zero = crossing_model(size, seed=size)
+    found, _, _ = trivial_line(model, -1.0, 1.03)
+    places = {code: [d.located.u[-1] for d in found if d.code == code] for code in ("HB", "BP")}
+    assert places["HB"] == pytest.approx(hopf, abs=1e-10)
+    assert places["BP"] == pytest.approx(zero, abs=1e-10)
+    assert {d.code for d in found} <= {"HB", "BP", "NSD"}
+    assert all(d.located.converged for d in found)
+
+
+@pytest.mark.parametrize("rates", [(1, 2, 1000), (1, 1e5), (1, 2, 3, 100), (1, 2, 3, 4, 5, 10, 20)])
+def test_a_hopf_point_beside_fast_passive_states(rates):
+    x, y, *passive = sp.symbols(f"x y z1:{len(rates) + 1}")
+    growth = p - x**2 - y**2
+    model = fs.Model(
+        {x: growth * x - y, y: x + growth * y}
+        | {z: -rate * z + x**2 for z, rate in zip(passive, rates, strict=True)},
+        parameters={p: 0},
+    )
+    (hopf,) = fs.continue_equilibria(model, "p", (-1, 0.7)).special("HB")
+    assert hopf["p"] == pytest.approx(0, abs=1e-14)
+    assert hopf.lyapunov == pytest.approx(-2, rel=1e-12)
+    assert hopf.frequency == pytest.approx(1, rel=1e-12)
+
+
+@pytest.mark.parametrize("cells", [5, 15])
+def test_hopf_points_of_the_discretized_brusselator(cells):
+    model, hopf = brusselator(cells)
+    branch = line(model, (0.2, 2), LENGTH)
+    expected = [value for value in hopf if 0.2 < value < 2]
+    assert [h[LENGTH] for h in branch.special("HB")] == pytest.approx(expected, rel=1e-10)
+    assert branch.unexplained == ()
+
+
+def test_hopf_points_of_the_brusselator_with_sixty_states():
+    model, hopf = brusselator(30)
+    found, _, _ = trivial_line(model, 0.2, 2, [2.0] * 30 + [5.45 / 2] * 30, LENGTH)
+    expected = [value for value in hopf if 0.2 < value < 2]
+    places = [d.located.u[-1] for d in found if d.code == "HB"]
+    assert places == pytest.approx(expected, rel=1e-10)
+
+
+def test_branch_points_of_the_discretized_chafee_infante_equation():
+    """u' = u_xx + p (u − u³), 60 interior points: the trivial branch crosses at the modes."""
+    model, modes = chafee_infante(60)
+    found, _, _ = trivial_line(model, 1, 60)
+    expected = [value for value in modes if 1 < value < 60]
+    assert len(expected) == 2
+    places = [d.located.u[-1] for d in found if d.code == "BP"]
+    assert places == pytest.approx(expected, rel=1e-10)
+    # all eigenvalues are real: no Hopf point
+    assert {d.code for d in found} == {"BP", "NSD"}
+
+
+def test_a_conservative_oscillator_hides_no_hopf_point():
+    """The sum of the oscillator's own pair is zero at every row."""
+    x, y, q, v, u, w = sp.symbols("x y q v u w")
+    growth = p - x**2 - y**2
+    rates = {x: growth * x - y, y: x + growth * y, q: v + x, v: -4 * sp.sin(q) - y}
+    slaved = {u: -3 * u + q + x, w: -100 * w + v + y}
+    (hopf,), _, values = trivial_line(fs.Model(rates | slaved, parameters={p: 0}), -1, 0.7)
+    assert (np.abs(values.real) < 1e-13).sum(axis=1).min() == 2
+    assert hopf.code == "HB"
+    assert hopf.located.u[-1] == pytest.approx(0, abs=1e-13)
+
+
+def product_sign(values):
+    """Sign of the product of all pair sums, term by term."""
+    n = len(values)
+    sums = [values[i] + values[j] for i in range(n) for j in range(i + 1, n)]
+    return np.sign(np.prod([s / abs(s) for s in sums]).real)
+
+
+@given(arrays(float, (6, 6), elements=st.floats(-10, 10, width=16)), st.integers(-150, 150))
+def test_the_sign_is_that_of_the_product_in_any_unit_of_time(matrix, exponent):
+    values = np.linalg.eigvals(matrix)
+    first, second = np.triu_indices(6, 1)
+    sums, size = np.abs(values[first] + values[second]), np.abs(values).max()
+    if sums.min() <= 1e-9 * size:
+        return
+    test = float(pair_sums(values))
+    assert np.sign(test) == product_sign(values)
+    assert 0 < abs(test) <= 1
+    assert float(pair_sums(values * 2.0**exponent)) == pytest.approx(test, rel=1e-12)
+
+
+def test_pair_sums_of_two_hundred_eigenvalues_do_not_underflow():
+    rng = np.random.default_rng(0)
+    values = -(10.0 ** rng.uniform(-6, 6, 200)).astype(complex)
+    values[:2] = 1e-3 + 1j, 1e-3 - 1j
+    assert float(pair_sums(values)) == pytest.approx(
+        1e-3 / abs(values[0]) * (-1) ** (198 * 197 // 2), rel=1e-12
+    )
+    assert str(stability_of(values)) == "unstable"
+
+
+def test_pair_sums_of_what_is_not_finite_or_alone():
+    assert pair_sums(np.array([[np.nan, 1.0], [-1.0, -2.0]])).tolist() == [0.0, -1.0]
+    assert float(pair_sums(np.array([2.0]))) == 0.0
+    assert float(pair_sums(np.array([1j, -1j]))) == 0.0
