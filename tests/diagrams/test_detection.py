@@ -17,6 +17,7 @@ from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.row_tests import pair_sums
 from fastslow.diagrams.walking import Piece, Window
 from fastslow.results.points import stability_of
+from fastslow.results.windows import state_window
 from tests.diagrams.models import LENGTH, brusselator, chafee_infante, crossing_model
 
 p = sp.Symbol("p")
@@ -35,7 +36,8 @@ def trivial_line(model, low, high, state=0.0, name="p", rows=101):
     u[:, :-1] = state
     u[:, -1] = np.linspace(low, high, rows)
     tangents[:, -1] = high - low
-    window = Window(low, high, np.append(np.ones(field.n), high - low))
+    scale = np.append(np.ones(field.n), high - low)
+    window = Window(low, high, scale, state_window(field.model.states))
     found, piece, values = special_points(field, Piece(0, u, tangents), window, ())
     return found, piece, values
 
