@@ -8,7 +8,7 @@ where everything is affine.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise, product
@@ -24,6 +24,7 @@ from fastslow.diagrams.fields import IDLE, FrozenField
 from fastslow.model.motions import Motion, motions_of
 from fastslow.model.structure import real
 from fastslow.results.equilibrium_sets import EquilibriumBand, EquilibriumSet
+from fastslow.symbolic.equilibrium_sets import solved_along
 
 Array = NDArray[np.float64]
 
@@ -349,59 +350,6 @@ def _family(field: FrozenField, motion: Motion) -> Family | None:
         (*bounds, *others),
         turned,
     )
-
-
-def solved_along(
-    heights: Sequence[sp.Expr], rates: Sequence[sp.Expr], names: Sequence[str]
-) -> tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Symbol, ...]] | None:
-    """Solve h = 0 and f = 0 for as many states as they determine.
-
-    Equations that are affine in a state, with a number for its coefficient, are
-    solved for it one after the other.
-
-    Returns
-    -------
-    solved : dict
-        States as functions of the free ones.
-    free : tuple of Symbol
-        None in place of both where an equation is left that is not solved so, or contradicts.
-
-    Examples
-    --------
-    >>> x, v, w = real("x"), real("v"), real("w")
-    >>> solved_along([v - w], [v - w, 0], ["x", "v"])
-    ({v: w}, (x,))
-    """
-    left = [sp.sympify(e) for e in (*heights, *rates)]
-    states = [real(n) for n in names]
-    solved: dict[sp.Symbol, sp.Expr] = {}
-    while True:
-        left = [e for e in map(_numerator, left) if e != 0]
-        if not left:
-            break
-        if any(not (e.free_symbols & set(states)) for e in left):
-            return None
-        # what the interfaces give comes first, then the last states: positions stay free
-        pick = next(
-            (
-                (e, s)
-                for e in left
-                for s in reversed(states)
-                if s not in solved and (c := e.diff(s)).is_number and c != 0
-            ),
-            None,
-        )
-        if pick is None:
-            return None
-        equation, symbol = pick
-        root = sp.expand(symbol - equation / equation.diff(symbol))
-        solved = {s: sp.expand(e.subs(symbol, root)) for s, e in solved.items()} | {symbol: root}
-        left = [e.subs(symbol, root) for e in left]
-    return solved, tuple(s for s in states if s not in solved)
-
-
-def _numerator(expression: sp.Expr) -> sp.Expr:
-    return sp.expand(sp.together(expression).as_numer_denom()[0])
 
 
 def sets_of(field: FrozenField, value: float) -> list[EquilibriumSet]:

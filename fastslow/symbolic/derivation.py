@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import sympy as sp
@@ -18,6 +18,11 @@ from fastslow.symbolic.assumptions import read_signs
 from fastslow.symbolic.boundaries import BoundaryForm, boundary_forms
 from fastslow.symbolic.candidates import Candidates
 from fastslow.symbolic.critical import Setting
+from fastslow.symbolic.equilibrium_sets import (
+    EDGE,
+    EquilibriumSetForm,
+    equilibrium_set_forms,
+)
 from fastslow.symbolic.forms import Continuum, CriticalPoint
 from fastslow.symbolic.inequalities import needed
 from fastslow.symbolic.regions import RegionForms, derive_region
@@ -40,6 +45,8 @@ class Derivation:
         Also reached as ``law["S1"]``.
     boundary_equilibria : tuple of BoundaryForm
         By interface.
+    equilibrium_sets : tuple of EquilibriumSetForm
+        Sets of equilibria within discontinuities, such as a sticking band.
     """
 
     states: tuple[str, ...]
@@ -47,6 +54,7 @@ class Derivation:
     assumptions: tuple[Relational, ...]
     regions: Named[RegionForms]
     boundary_equilibria: tuple[BoundaryForm, ...]
+    equilibrium_sets: tuple[EquilibriumSetForm, ...] = ()
 
     def __getitem__(self, region: object) -> RegionForms:
         return self.regions[region]
@@ -161,9 +169,41 @@ def derive(model: Model, assume: Any = None, *, parameter: Any = None) -> Deriva
         for above, below in _pairs(model, name):
             sides = (settings[above], settings[below])
             boundary += boundary_forms(name, function, sides, model.continuous[name])
-    found = tuple(dict.fromkeys(boundary))
-    regions = {name: derive_region(setting, found) for name, setting in settings.items()}
-    return Derivation(model.states, model.free, signs.conditions, Named("region", regions), found)
+    sets = equilibrium_set_forms(model, signs, _exact)
+    found = tuple(b for b in dict.fromkeys(boundary) if not _always(b, sets))
+    regions = {
+        name: _with_edges(derive_region(setting, found), sets) for name, setting in settings.items()
+    }
+    named = Named("region", regions)
+    return Derivation(model.states, model.free, signs.conditions, named, found, sets)
+
+
+def _edge(
+    sets: Sequence[EquilibriumSetForm], state: Named[sp.Expr], parameters: Named[sp.Expr]
+) -> EquilibriumSetForm | None:
+    """The set on whose edge a state is, if there is one."""
+    return next((one for one in sets if one.on_edge(state, parameters)), None)
+
+
+def _always(form: BoundaryForm, sets: Sequence[EquilibriumSetForm]) -> bool:
+    """Whether a boundary equilibrium is the edge of a set, and at no certain parameter value."""
+    if form.equations or _edge(sets, form.state, form.parameters) is None:
+        return False
+    # a parameter that stands for itself stays free
+    fixed = [e for n, e in form.parameters.items() if e != real(n)]
+    used = set().union(set(), *(e.free_symbols for e in fixed))
+    return not fixed or bool(used & {real(n) for n in form.state})
+
+
+def _with_edges(region: RegionForms, sets: Sequence[EquilibriumSetForm]) -> RegionForms:
+    """A region whose equilibria say of which sets they are edges."""
+    forms = []
+    for form in region.equilibria:
+        closed = form.kind != "implicit" and not form.conditions
+        one = _edge(sets, form.state, form.parameter) if closed else None
+        note = f"{EDGE} {one.region}" if one is not None else form.note
+        forms.append(replace(form, note=note))
+    return replace(region, equilibria=tuple(forms))
 
 
 def _candidates(model: Model, parameter: Any) -> Candidates:

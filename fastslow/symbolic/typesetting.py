@@ -9,6 +9,7 @@ import sympy as sp
 
 from fastslow.model.structure import real
 from fastslow.results.point_types import point_name
+from fastslow.symbolic.equilibrium_sets import EDGE
 from fastslow.symbolic.forms import Continuum, CriticalPoint, EquilibriumForm
 from fastslow.symbolic.naming import WIDTH, named, text
 from fastslow.symbolic.stability import Stability
@@ -51,6 +52,13 @@ def _blocks(law: Derivation) -> list[Block]:
         blocks.append(("Assumptions", [_comma(law.assumptions)]))
     for region in law.regions.values():
         blocks.append((f"Region {region.name}", _region(region, taken)))
+    for one in law.equilibrium_sets:
+        lines = [_tex(condition) for condition in one.conditions]
+        lines += [rf"{_tex(real(n))} = {_tex(e)}" for n, e in one.state.items() if e != real(n)]
+        for edge in one.edges:
+            values = (f"{_tex(real(n))} = {_tex(e)}" for n, e in edge.items())
+            lines.append(r"\text{edge: } " + r",\quad ".join(values))
+        blocks.append((f"Equilibrium set {one.region}".replace("|", r"\textbar "), lines))
     for form in law.boundary_equilibria:
         joined = " and ".join(form.regions)
         blocks.append((f"Boundary equilibrium between {joined}", _boundary(form, taken)))
@@ -77,7 +85,11 @@ def _equilibrium(form: EquilibriumForm, taken: set[str]) -> list[str]:
     given = () if form.kind == "implicit" else form.parameter.items()
     items = _values([*given, *form.state.items()])
     items += _zeros((*(form.equations if form.kind == "implicit" else ()), *form.conditions))
-    lines = _set(r"\text{equilibrium: } ", items, taken, form.exists, form.admissible)
+    edge = form.note.startswith(EDGE)
+    when = (sp.true, sp.true) if edge else (form.exists, form.admissible)
+    lines = _set(r"\text{equilibrium: } ", items, taken, *when)
+    if edge:
+        lines.append(rf"\text{{{form.note}}}".replace("|", r"\textbar "))
     if form.parameter_range is not None:
         lines.append(r"\text{admissible range: } " + _tex(form.parameter_range))
     if form.discriminant is not None:

@@ -11,11 +11,13 @@ import sympy as sp
 from fastslow.model.structure import real
 from fastslow.results.point_types import point_name
 from fastslow.symbolic.algebra import longer
+from fastslow.symbolic.equilibrium_sets import EDGE
 from fastslow.symbolic.naming import WIDTH, named, text
 
 if TYPE_CHECKING:
     from fastslow.symbolic.boundaries import BoundaryForm
     from fastslow.symbolic.derivation import Derivation
+    from fastslow.symbolic.equilibrium_sets import EquilibriumSetForm
     from fastslow.symbolic.forms import Continuum, CriticalPoint, EquilibriumForm
     from fastslow.symbolic.regions import RegionForms
 
@@ -63,6 +65,8 @@ def summary(law: Derivation) -> str:
     )
     for region in law.regions.values():
         lines += _region(region, taken)
+    for one in law.equilibrium_sets:
+        lines += entry(_equilibrium_set(one), taken, "  ")
     for form in law.boundary_equilibria:
         lines += entry(_boundary(form), taken, "  ")
     return "\n".join(lines)
@@ -192,7 +196,24 @@ def _equilibrium(form: EquilibriumForm) -> list[Piece]:
         pieces += [Piece("", condition) for condition in rest]
     else:
         pieces.append(Piece(verdict, separator="; "))
+    if form.note.startswith(EDGE):
+        return [*pieces, Piece(form.note, separator="; ")]
     return [*pieces, *_when(form.exists, form.admissible)]
+
+
+def _equilibrium_set(form: EquilibriumSetForm) -> list[Piece]:
+    kinds = {True: " (sticking)", False: " (escaping)", None: ""}
+    where = ", ".join(f"{name} = 0" for name in form.interfaces)
+    first, *others = form.conditions
+    head = f"equilibrium set{kinds[form.attracting]} {form.region} on {where}: "
+    pieces = [Piece(head, first), *(Piece("", condition) for condition in others)]
+    pieces += [Piece(f"{n} = ", e) for n, e in form.state.items() if e != real(n)]
+    for k, edge in enumerate(form.edges):
+        (free,) = form.free
+        name = "edges " if k == 0 else ""
+        separator = "; " if k == 0 else " and "
+        pieces.append(Piece(f"{name}{free} = ", edge[free.name], separator=separator))
+    return pieces
 
 
 def _when(exists: sp.Basic, admissible: sp.Basic) -> list[Piece]:
