@@ -13,6 +13,7 @@ from fastslow.diagrams.detection import Detected, special_points
 from fastslow.diagrams.fields import FrozenField, Source
 from fastslow.diagrams.two_folds import two_fold_residual
 from fastslow.diagrams.walking import Piece, Walk, Window
+from fastslow.results.angles import principal
 from fastslow.results.branches import Branch
 from fastslow.results.outcome import Outcome
 from fastslow.results.points import NEUTRAL, ClarkePath, SpecialPoint, SpecialPoints
@@ -98,7 +99,7 @@ def branch_of(
         if number < len(curve.joins):
             special.append(_corner(field, curve, number))
             at_row.append(rows - 1)
-    u = np.concatenate([t[0] for t in tables])
+    u = _centred(field, np.concatenate([t[0] for t in tables]), window)
     tangents = np.concatenate([t[1] for t in tables])
     eigenvalues = np.concatenate([t[2] for t in tables])
     names = np.array(field.regions)[[t[3] for t in tables]]
@@ -120,6 +121,7 @@ def branch_of(
         curve.closed,
         admissible,
         dict(field.model.parameters),
+        periods=dict(field.model.periodic),
     )
 
 
@@ -127,6 +129,15 @@ def _sizes(states: Array, scale: Array) -> Array:
     """Typical size of every state on a branch; its unit where it is zero on most of it."""
     typical = np.median(np.abs(states), axis=0)
     return np.where(typical > 1e-12 * scale, typical, scale)
+
+
+def _centred(field: FrozenField, u: Array, window: Window) -> Array:
+    """Rows shifted by whole periods, so that angles without a window are about zero."""
+    low, high = u[:, :-1].min(axis=0), u[:, :-1].max(axis=0)
+    middle = window.states.shifted(principal(0.5 * (low + high), field.periods))
+    turns = field.periods > 0
+    u[:, :-1][:, turns] += (middle - 0.5 * (low + high))[turns]
+    return u
 
 
 def _special(
@@ -144,7 +155,7 @@ def _special(
     return SpecialPoint(
         code=code,
         states=field.model.states,
-        state=u[:-1].copy(),
+        state=field.wrapped(u[:-1]),
         parameters={**field.model.parameters, field.parameter: float(u[-1])},
         tangent=tangent.copy(),
         **entries,  # type: ignore[arg-type]

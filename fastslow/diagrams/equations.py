@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fastslow.continuation.loops import loop
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.modes import Sides
 from fastslow.model.structure import real
+from fastslow.results.angles import apart
 from fastslow.symbolic.elimination import Elimination, eliminate
 
 Array = NDArray[np.float64]
@@ -189,7 +190,8 @@ class RegionEquations:
         kept: list[Array] = []
         for state in states:
             solved = self.corrected(state, value)
-            if solved is not None and not any(same(solved, other) for other in kept):
+            solved = None if solved is None else self.field.wrapped(solved)
+            if solved is not None and not any(same(solved, o, self.field.periods) for o in kept):
                 kept.append(solved)
         return kept
 
@@ -220,8 +222,11 @@ class RegionEquations:
             field.compiled.size, 100,
         )  # fmt: skip
         distinct: list[Array] = []
-        for state in states[converged]:
-            near = (np.abs(state - o).max() / max(1.0, np.abs(o).max()) for o in distinct)
+        for state in field.wrapped(states[converged]):
+            near = (
+                np.abs(apart(state, o, field.periods)).max() / max(1.0, np.abs(o).max())
+                for o in distinct
+            )
             if min(near, default=1.0) > 1e-5:
                 distinct.append(state)
         return sorted(self._polished(value, distinct), key=lambda s: tuple(s))
@@ -318,9 +323,10 @@ def real_roots(coefficients: Array) -> list[float]:
     return sorted(float(r) for r in roots.real[np.abs(roots.imag) < 1e-6 * scale])
 
 
-def same(one: Array, other: Array) -> bool:
-    """Whether two states are equal, but for what a double root may be off."""
-    return bool(np.all(np.abs(one - other) <= 1e-8 * np.maximum(1.0, np.abs(one))))
+def same(one: Array, other: Array, periods: ArrayLike = 0.0) -> bool:
+    """Whether two states are equal modulo periods, but for what a double root may be off."""
+    near = np.abs(apart(one, other, periods))
+    return bool(np.all(near <= 1e-8 * np.maximum(1.0, np.abs(one))))
 
 
 @lru_cache(maxsize=64)

@@ -19,6 +19,7 @@ from fastslow.errors import ModelError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.model.units import natural_units
+from fastslow.results.angles import periods_of, principal
 from fastslow.results.windows import StateWindow
 
 Array = NDArray[np.float64]
@@ -177,6 +178,15 @@ class FrozenField:
             return np.zeros(self.n)
         inverse = np.abs(np.linalg.pinv(slopes[:, : self.n]))
         return np.asarray(ROUNDINGS * inverse @ (np.abs(slopes) @ np.abs(u)))
+
+    @cached_property
+    def periods(self) -> Array:
+        """The period of every state, 0 where it has none, shape (n,)."""
+        return periods_of(self.model.states, self.model.periodic)
+
+    def wrapped(self, state: Array) -> Array:
+        """A state with angles in their principal range."""
+        return principal(state, self.periods)
 
     @cached_property
     def _layout(self) -> tuple[int, int, int, int, int, Callable[..., Array]]:

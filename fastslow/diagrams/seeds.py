@@ -18,6 +18,7 @@ from fastslow.diagrams.solving import point_at
 from fastslow.diagrams.walking import Window, walk
 from fastslow.diagrams.windows import NOISE, known
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.angles import apart
 from fastslow.results.branches import Branch
 from fastslow.results.points import Equilibrium, SpecialPoint
 from fastslow.results.windows import ROUNDING, StateWindow, typical
@@ -112,7 +113,7 @@ class Seeds:
         states = np.array([e.state for e in self._points])
         size = np.where(known(self._field, self._points), np.abs(states), 0.0).max(axis=0)
         length = self._over[1] - self._over[0]
-        first = Window(*self._over, np.append(np.where(size > 0, size, 1.0), length), self._around)
+        first = Window(*self._over, np.append(self._unit(size), length), self._around)
         rows = np.concatenate([self._rows(e, first) for e in self._points])
         wide = typical(rows, ROUNDING * np.abs(rows).max(axis=0))
         middle = np.median(rows, axis=0)
@@ -123,13 +124,19 @@ class Seeds:
         core = tuple(
             (float(a), float(b)) if b > a else None for a, b in zip(low, high, strict=True)
         )
-        return replace(self._around, core=core), np.append(np.where(unit > 0, unit, 1.0), length)
+        return replace(self._around, core=core), np.append(self._unit(unit), length)
+
+    def _unit(self, size: Array) -> Array:
+        """The size of each state, one where it is not known, a radian of angles."""
+        periods = self._field.periods
+        return np.where(periods > 0, periods / (2.0 * np.pi), np.where(size > 0, size, 1.0))
 
     def _rows(self, point: Equilibrium, window: Window) -> Array:
         """States of the branch through a point, evenly over the parameter; 0 for rounding."""
         field = self._field
         region = field.regions.index(point.region)
-        u = np.append(point.state, point.parameters[field.parameter])
+        state = self._around.shifted(point.state)
+        u = np.append(state, point.parameters[field.parameter])
         tangent, _ = field.tangent(region, u, window.weight)
         samples = []
         for side in (1, -1):
@@ -182,7 +189,7 @@ class Seeds:
                 f"{name}: no equilibrium of the model was found from {where} at "
                 f"{self._field.parameter} = {value:g}"
             )
-        inside = [e for e in found if window.contains(e.state, np.abs(state))]
+        inside = [e for e in found if window.contains(window.shifted(e.state), np.abs(state))]
         if not inside:
             raise ArgumentError(f"{name}: {where} lies outside the window {window}")
         return inside
@@ -211,7 +218,7 @@ class Seeds:
             if solved is None:
                 continue
             size = max(float(np.abs(state).max()), float(np.abs(solved).max()), 1e-300)
-            moved = float(np.abs(solved - state).max()) / size
+            moved = float(np.abs(apart(solved, state, self._field.periods)).max()) / size
             if moved > NEAR and not far:
                 continue
             u = np.append(solved, value)

@@ -86,7 +86,7 @@ def equilibria(
     given = model.with_parameters(values, **named)
     name = next(iter(given.parameters), IDLE)
     value = given.parameters[name] if given.parameters else 0.0
-    asked = state_window(model.states, window)
+    asked = state_window(model.states, window, model.periodic)
     field = FrozenField(given, name)
     # sets may exist at this value of every parameter alone
     found = solve_at(field, value, virtual, FrozenField(given, IDLE))
@@ -125,7 +125,7 @@ def solve_at(
     sets = sets_of(along, value)
     found += [corner for one in sets for corner in one.equilibria]
     complete &= all(one.exact for one in sets)
-    return Equilibria(_distinct(found), "complete" if complete else "found", sets)
+    return Equilibria(_distinct(found, field.periods), "complete" if complete else "found", sets)
 
 
 def point_at(
@@ -135,7 +135,7 @@ def point_at(
     rates, _ = field.curve(region, u)
     return Equilibrium(
         field.model.states,
-        u[:-1].copy(),
+        field.wrapped(u[:-1]),
         {**field.model.parameters, field.parameter: float(u[-1])},
         field.regions[region],
         admissible,
@@ -145,7 +145,7 @@ def point_at(
     )
 
 
-def _distinct(points: list[Equilibrium]) -> list[Equilibrium]:
+def _distinct(points: list[Equilibrium], periods: Array) -> list[Equilibrium]:
     """Each admissible state once: on an interface two regions share it; a continuum wins.
 
     Ends of a continuum of pseudo-equilibria that is no `EquilibriumSet` stand beside the
@@ -154,7 +154,7 @@ def _distinct(points: list[Equilibrium]) -> list[Equilibrium]:
     kept: list[Equilibrium] = []
     for point in sorted(points, key=lambda p: not p.continuum):
         shared = point.admissible and any(
-            k.admissible and same(k.state, point.state) and not (k.continuum and k.pseudo)
+            k.admissible and same(k.state, point.state, periods) and not (k.continuum and k.pseudo)
             for k in kept
         )
         if not shared:

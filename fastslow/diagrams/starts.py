@@ -66,7 +66,7 @@ class Starts:
         """Equilibria in the window."""
         points = self._asked_at(value, admissible)
         unit = self.scale[:-1]
-        return [e for e in points if self.window.contains(e.state, unit)]
+        return [e for e in points if self.window.contains(self.window.shifted(e.state), unit)]
 
     def _asked_at(self, value: float, admissible: bool) -> list[Equilibrium]:
         """Equilibria within the bounds that were asked for."""
@@ -153,7 +153,7 @@ class Starts:
         n, name = self._field.n, self._field.parameter
         both = [e for v in self._first for k in (True, False) for e in self._asked_at(v, k)]
         table = np.reshape([e.state for e in both], (-1, n))
-        inside = self.window.contains(table)
+        inside = self.window.contains(self.window.shifted(table))
         states = table[inside]
         points = [
             (self._field.regions.index(e.region), np.append(e.state, e.parameters[name]))
@@ -169,6 +169,9 @@ class Starts:
         # far from zero it is the differences that count
         moved = np.where(spread > ROUNDING * size, np.maximum(spread, 1e-3 * size), size)
         size = np.where(size > FAINT * largest, moved, largest)
+        # an angle is measured in radians
+        periods = self._field.periods
+        size = np.where(periods > 0, periods / (2.0 * np.pi), size)
         return np.append(size, self._over[1] - self._over[0])
 
 

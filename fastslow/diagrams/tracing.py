@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import lru_cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ from fastslow.diagrams.walking import Piece, Window, beside, on_interface, walk
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
+from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import SEARCHED, Diagram
 from fastslow.results.outcome import Outcome
@@ -143,7 +145,7 @@ def continue_equilibria(
         )
     field = _field(model, name)
     continuation = continuation or Continuation()
-    asked = state_window(model.states, window)
+    asked = state_window(model.states, window, model.periodic)
     starts = (
         starts_of(field, lower, upper, continuation.starts, asked)
         if from_points is None
@@ -184,6 +186,7 @@ def continue_equilibria(
         asdict(continuation),
         starts.window,
         bands_of(field, lower, upper) if from_points is None else (),
+        dict(model.periodic),
     )
 
 
@@ -250,7 +253,7 @@ def _traced(
 ) -> Curve:
     """The whole branch through a start."""
     region = field.regions.index(start.region)
-    u = np.append(start.state, value)
+    u = np.append(window.states.shifted(start.state), value)
     tangent, _ = field.tangent(region, u, window.weight)
     if bounded and _along_interface(field, region, np.array([u]), window).any():
         # rounding would end it everywhere: no side of the interface is left or entered
@@ -361,8 +364,14 @@ def _passes(
     """Whether a branch goes through an equilibrium."""
     if branch.admissible != start.admissible:
         return False
-    u = np.append(start.state, value)
     rows = np.column_stack([branch.state, branch.parameter])
+    low, high = branch.state.min(axis=0), branch.state.max(axis=0)
+    ways = [copies(*entry) for entry in zip(start.state, low, high, field.periods, strict=True)]
+    return any(_holds(field, branch, rows, np.array([*s, value]), window) for s in product(*ways))
+
+
+def _holds(field: FrozenField, branch: Branch, rows: Array, u: Array, window: Window) -> bool:
+    """Whether a branch goes through a point."""
     if len(rows) < 2:
         # where the equations are singular all along a line, one point of it is enough
         apart = np.abs((rows[0] - u) / window.scale)
@@ -385,7 +394,9 @@ def _labelled(branches: list[Branch], name: str, window: Window) -> tuple[Branch
 
     def near(one: SpecialPoint, other: SpecialPoint) -> bool:
         here, there = (np.append(p.state, p.parameters[name]) for p in (one, other))
-        return bool(np.all(np.abs(here - there) <= 1e-7 * np.maximum(window.scale, np.abs(here))))
+        periods = np.append(periods_of(one.states, branches[0].periods), 0.0)
+        away = np.abs(apart(here, there, periods))
+        return bool(np.all(away <= 1e-7 * np.maximum(window.scale, np.abs(here))))
 
     counts: dict[str, int] = {}
     shared: list[SpecialPoint] = []

@@ -12,6 +12,7 @@ from fastslow.continuation.location import Located
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.two_folds import cut_at_two_fold, two_fold_ahead
+from fastslow.results.angles import apart, nearest_copy
 from fastslow.results.outcome import Outcome
 from fastslow.results.windows import ON_EDGE, StateWindow, left_window
 
@@ -114,7 +115,7 @@ def walk(
     joins: list[int] = []
     first = Piece(region, start[None], tangent[None])
     low, high = np.array(window.states.lower), np.array(window.states.upper)
-    middle, periods = window.states.middle(), np.zeros(field.n)
+    middle, periods = window.states.middle(), field.periods
     step = continuation.step
     while len(pieces) < PIECES:
         signs = field.signs[region] if bounded else np.zeros(field.compiled.m)
@@ -125,7 +126,7 @@ def walk(
             continuation.largest_step, continuation.largest_turn, continuation.tolerance,
             continuation.iterations, continuation.points, not joins,
         )  # fmt: skip
-        back = _returned(region, u, tangents, first, window) if joins else None
+        back = _returned(region, u, tangents, first, window, periods) if joins else None
         if back is not None:
             pieces.append(back)
             return Walk(tuple(pieces), tuple(joins), _closed(), closed=True)
@@ -151,7 +152,8 @@ def walk(
             pieces.append(Piece(region, u, tangents))
             closed = status == loops.CLOSED
             if closed:
-                u[-1], tangents[-1] = first.u[0], first.tangents[0]
+                u[-1] = nearest_copy(first.u[0], u[-1], np.append(periods, 0.0))
+                tangents[-1] = first.tangents[0]
             outcome = _outcome(status, field, u[-1], window, continuation)
             return Walk(tuple(pieces), tuple(joins), outcome, closed=closed)
         row, corner = met
@@ -170,20 +172,23 @@ def walk(
         joins.append(interface)
         region, tangent = beyond
         start = corner
-        apart = np.abs((start - first.u[0]) / window.scale).max()
-        home = region == first.region and apart < 1e-9
+        moved = apart(start, first.u[0], np.append(periods, 0.0))
+        away = np.abs(moved / window.scale).max()
+        home = region == first.region and away < 1e-9
         if home:
             return Walk(tuple(pieces), tuple(joins), _closed(), closed=True)
     return Walk(tuple(pieces), tuple(joins), _full(field, start, continuation))
 
 
-def _returned(region: int, u: Array, tangents: Array, first: Piece, window: Window) -> Piece | None:
+def _returned(
+    region: int, u: Array, tangents: Array, first: Piece, window: Window, periods: Array
+) -> Piece | None:
     """The rows before a curve that left the first region passes its start again."""
     if region != first.region:
         return None
     start, direction = first.u[0], first.tangents[0]
     chords = np.linalg.norm(np.diff(u, axis=0) / window.scale, axis=1)
-    gaps = (start - u[:-1]) / window.scale
+    gaps = apart(start, u[:-1], np.append(periods, 0.0)) / window.scale
     along = tangents[:-1] / window.scale
     ahead = (gaps * along).sum(axis=1)
     aside = np.linalg.norm(gaps - ahead[:, None] * along, axis=1)
@@ -192,6 +197,7 @@ def _returned(region: int, u: Array, tangents: Array, first: Piece, window: Wind
     if not passed.size:
         return None
     stop = int(passed[0]) + 1
+    start = nearest_copy(start, u[stop - 1], np.append(periods, 0.0))
     return Piece(region, np.vstack([u[:stop], start]), np.vstack([tangents[:stop], direction]))
 
 

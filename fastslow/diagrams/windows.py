@@ -63,7 +63,7 @@ def within(
         return list(points)
     states = np.reshape([e.state for e in points], (-1, field.n))
     size = np.where(known(field, points), np.abs(states), 0.0).max(axis=0, initial=0.0)
-    inside = window.contains(states, np.where(size > 0, size, 1.0))
+    inside = window.contains(window.shifted(states), np.where(size > 0, size, 1.0))
     return [e for e, kept in zip(points, inside, strict=True) if kept]
 
 

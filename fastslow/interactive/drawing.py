@@ -15,7 +15,7 @@ from fastslow.interactive.views import View
 from fastslow.plot.branches import draw_branches
 from fastslow.plot.motions import draw_motion, phase_portrait, time_series
 from fastslow.plot.passages import draw_passage
-from fastslow.plot.quantities import Quantity
+from fastslow.plot.quantities import Quantity, along_run
 from fastslow.plot.style import GREY, MOTION, SMALL, TEXT, VERMILION, dressed, typeset
 
 #: Size of a figure of our own, in inches, and places of its axes in it.
@@ -59,7 +59,8 @@ def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:
         curves += curves_of(below, view.diagram)
         slow = view.diagram.parameter
         if run is not None and slow in run.columns:
-            handles += draw_motion(main, run.t, (run[slow], run[name]), run.period, MOTION, {})
+            axes = Quantity(slow), Quantity(name)
+            handles += draw_motion(main, run.t, along_run(run, *axes), axes, run, MOTION, {})
             curves.append(run_curve(main, run, Quantity(slow), Quantity(name)))
         handles += _mark_value(main, view)
     else:

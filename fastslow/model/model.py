@@ -12,6 +12,7 @@ import sympy as sp
 
 from fastslow.arguments import formula, mapping, real_number, shown, takes
 from fastslow.errors import ModelError, unknown_name
+from fastslow.model.angles import read_periods
 from fastslow.model.interfaces import Interface, Region, vanishes_on
 from fastslow.model.periods import common_period
 from fastslow.model.structure import TIME, Structure, read_expression, read_structure, real
@@ -43,6 +44,11 @@ class Model:
     regions : mapping, optional
         Name to a condition; other regions are named S1, S2, … in lexicographic
         order of their sign patterns, + before −.
+    periodic : mapping, optional
+        State to its period, a number or an expression of numbers such as ``2*sp.pi``:
+        an angle. States that differ by a period are one; equilibria are given in
+        the principal range (−period/2, period/2]. Rates and interfaces must
+        repeat with the period, which is checked.
 
     Attributes
     ----------
@@ -53,11 +59,13 @@ class Model:
         Parameters without a value: the slow quantities of a frozen model.
     interfaces : Named of Interface
     regions : Named of Region
+    periodic : Named of float
 
     Raises
     ------
     ModelError
-        For an unknown symbol, a missing or non-finite value, or regions that contradict.
+        For an unknown symbol, a missing or non-finite value, regions that contradict,
+        or a rate or interface that does not repeat with a period.
 
     Examples
     --------
@@ -78,6 +86,7 @@ class Model:
     free: tuple[str, ...]
     interfaces: Named[Interface]
     regions: Named[Region]
+    periodic: Named[float]
     structure: Structure = field(repr=False)
 
     @takes(
@@ -87,6 +96,7 @@ class Model:
         slow=mapping,
         interfaces=mapping,
         regions=mapping,
+        periodic=mapping,
     )
     def __init__(
         self,
@@ -97,12 +107,14 @@ class Model:
         slow: Written | None = None,
         interfaces: Written | None = None,
         regions: Written | None = None,
+        periodic: Written | None = None,
     ) -> None:
         values = {str(k): number(f"parameter {k}", v) for k, v in (parameters or {}).items()}
         structure = read_structure(
             rates, forcing or {}, slow or {}, tuple(values), interfaces or {}, (), regions or {}
         )
-        self._fill(structure, values)
+        periods = read_periods(structure, values, periodic or {})
+        self._fill(replace(structure, periodic=periods), values)
 
     def _fill(self, structure: Structure, values: Mapping[str, float]) -> None:
         numbers = {real(name): value for name, value in values.items()}
@@ -116,6 +128,9 @@ class Model:
             "free": structure.free,
             "interfaces": Named("interface", {i.name: i for i in interfaces}),
             "regions": Named("region", {r.name: r for r in regions}),
+            "periodic": Named(
+                "periodic state", {n: float(p) for n, p in structure.periodic.items()}
+            ),
             "structure": structure,
         }
         for name, value in fields.items():
@@ -354,7 +369,11 @@ class Model:
         """
         from fastslow.model.typesetting import equations_text
 
-        return equations_text(tuple(self.rates.items()), tuple(self.forcing.items()))
+        return equations_text(
+            tuple(self.rates.items()),
+            tuple(self.forcing.items()),
+            tuple(self.structure.periodic.items()),
+        )
 
     def to_latex(self) -> str:
         """The equations of every region as LaTeX, for a document with amsmath."""
@@ -376,6 +395,7 @@ class Model:
         if self.vanished:
             lines.append(f"  empty at these parameter values: {', '.join(self.vanished)}")
         lines += [f"  {name} = {law}" for name, law in self.forcing.items()]
+        lines += [f"  {name} modulo {p}" for name, p in self.structure.periodic.items()]
         if self.parameters:
             lines.append("  " + ", ".join(f"{k} = {v:g}" for k, v in self.parameters.items()))
         return "\n".join(lines)

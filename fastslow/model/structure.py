@@ -42,6 +42,7 @@ class Structure:
     conditions: dict[str, Boolean]
     names: dict[Cell, str] = field(default_factory=dict)
     path: dict[str, sp.Expr] = field(default_factory=dict)
+    periodic: dict[str, sp.Expr] = field(default_factory=dict)
 
     @property
     def moving(self) -> tuple[sp.Symbol, ...]:

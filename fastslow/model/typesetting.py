@@ -16,10 +16,13 @@ Law = tuple[str, sp.Expr]
 
 
 @lru_cache(maxsize=64)
-def equations_text(rates: tuple[Law, ...], forcing: tuple[Law, ...]) -> str:
-    """Rates and laws of slow quantities, one a line; written once."""
+def equations_text(
+    rates: tuple[Law, ...], forcing: tuple[Law, ...], periodic: tuple[Law, ...] = ()
+) -> str:
+    """Rates, laws of slow quantities and periods of states, one a line; written once."""
     lines = [f"{name}' = {rate}" for name, rate in rates]
-    return "\n".join([*lines, *(f"{name} = {law}" for name, law in forcing)])
+    lines += [f"{name} = {law}" for name, law in forcing]
+    return "\n".join([*lines, *(f"{name} modulo {period}" for name, period in periodic)])
 
 
 def model_latex(model: Model) -> str:
@@ -44,5 +47,7 @@ def model_latex(model: Model) -> str:
         rows.append(rates + rf"&&\text{{{region.name}}}:\ {where}" if where else rates)
     for name, law in model.forcing.items():
         rows.append(rf"{sp.latex(real(name))}({sp.latex(TIME)}) = {sp.latex(law)}")
+    for name, period in model.structure.periodic.items():
+        rows.append(rf"{sp.latex(real(name))} \bmod {sp.latex(period)}")
     body = " \\\\\n".join(f"  & {row}" for row in rows)
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"

@@ -10,6 +10,7 @@ import numpy as np
 from fastslow.passage.excursions import Excursion
 from fastslow.passage.sheets import ends_of
 from fastslow.passage.transitions import Passage
+from fastslow.results.angles import apart
 from fastslow.results.crossings import Crossing
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
@@ -113,8 +114,9 @@ def _saddle(p: Passage, e: Excursion, value: float) -> float | None:
     since = e.turns[-2] if len(e.turns) > 1 else e.turns[-1]
     _, stop = e.rows(p.m)
     rows = slice(int(np.searchsorted(p.m.time, since)), stop)
-    apart = [np.linalg.norm(p.m.scaled[rows] - s / p.m.extent, axis=1).min() for s in saddles]
-    return float(min(apart))
+    states, periods = p.m.scaled[rows], p.m.periods
+    away = [np.linalg.norm(apart(states, s / p.m.extent, periods), axis=1).min() for s in saddles]
+    return float(min(away))
 
 
 def ending(p: Passage, e: Excursion, end: CycleEnd) -> Transition:

@@ -72,8 +72,10 @@ class Oscillation:
 
 
 def oscillation_of(m: Measured, observed: int) -> Oscillation:
-    """Turns of the observed state over the whole run."""
+    """Turns of the observed state over the whole run; of an angle those of its sine."""
     values = m.scaled[:, observed] * m.extent[observed]
+    if m.periods[observed] > 0:
+        values = np.sin(2.0 * np.pi * m.scaled[:, observed] / m.periods[observed])
     reach = float(np.ptp(values))
     # what moves by rounding only has no spikes
     least = PROMINENT * reach if reach > 1e-9 * float(np.abs(values).max(initial=0.0)) else 0.0

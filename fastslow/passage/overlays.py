@@ -67,7 +67,8 @@ def overlay(
     radius : float
         What counts as near, with each state in units of its extent.
     observed : str or Symbol, optional
-        The state whose maxima count as spikes, by default the first.
+        The state whose maxima count as spikes, by default the first that is not
+        periodic; of a periodic one those of its sine.
 
     Returns
     -------
@@ -164,7 +165,8 @@ def _checked(diagram: Diagram, run: Trajectory, radius: float, observed: object)
         raise ArgumentError(f"radius = {radius:g}; expected a number between 0 and 1")
     if not len(run.t):
         raise ArgumentError("the trajectory has no samples; simulate with dense=True or samples=")
-    name = diagram.states[0] if observed is None else str(observed)
+    plain = [n for n in diagram.states if n not in run.periods]
+    name = [*plain, *diagram.states][0] if observed is None else str(observed)
     if name not in diagram.states:
         raise unknown_name("state", name, diagram.states)
     return diagram.states.index(name)
@@ -250,7 +252,7 @@ def _distances(p: Passage, followed: NDArray[np.intp]) -> tuple[Array, Array, Ar
         steep = (slope**2).sum(axis=1)
         rate = -course.relaxation(slow)
         with np.errstate(divide="ignore", invalid="ignore"):
-            ahead = ((m.scaled[on] - m.places[on, number]) * slope).sum(axis=1) / steep
+            ahead = (m.deviation(number, on) * slope).sum(axis=1) / steep
             behind = -ahead / p.drift[on]
             relaxation[on] = np.where(rate > 0, 1.0 / rate, np.nan)
         moving = np.abs(p.drift[on]) > STILL * mean

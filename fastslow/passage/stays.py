@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fastslow.passage.sheets import Course
 from fastslow.passage.slow_quantities import SlowQuantity
+from fastslow.results.angles import apart, nearest_copy, periods_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -49,6 +50,8 @@ class Measured:
         The slow quantity's range in the run.
     radius : float
         What counts as near.
+    periods : ndarray, shape (n,)
+        Scaled period of each state, 0 where it has none.
     """
 
     time: Array
@@ -62,10 +65,15 @@ class Measured:
     curves: tuple[Array, ...]
     span: float
     radius: float
+    periods: Array
 
     def apart(self, course: int) -> Array:
         """Distance from a course at the same value of the slow quantity, shape (N,)."""
-        return np.asarray(np.linalg.norm(self.scaled - self.places[:, course], axis=1))
+        return np.asarray(np.linalg.norm(self.deviation(course), axis=1))
+
+    def deviation(self, course: int, rows: slice | Mask | int = slice(None)) -> Array:
+        """Scaled states less those of a course at the same value of the slow quantity."""
+        return apart(self.scaled[rows], self.places[rows, course], self.periods)
 
     def beside(self, course: int, slow: Array, scaled: Array) -> Mask:
         """Whether states are nearer than the radius to a course as a curve, shape (N,).
@@ -74,6 +82,9 @@ class Measured:
         be found is one of a moment ago.
         """
         curve = self.curves[course]
+        if self.periods.any():
+            place = self.courses[course].state(slow) / self.extent
+            scaled = nearest_copy(scaled, place, self.periods)
         points = np.column_stack([scaled, slow / self.span])
         low, high = curve.min(axis=0) - self.radius, curve.max(axis=0) + self.radius
         inside = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
@@ -84,7 +95,7 @@ class Measured:
 
     def way(self, old: int, new: int) -> Array:
         """Which part of the way from one course to another the state has done, shape (N,)."""
-        return way_done(self.scaled, self.places[:, old], self.places[:, new])
+        return way_done(self.scaled, self.places[:, old], self.places[:, new], self.periods)
 
 
 @dataclass(frozen=True)
@@ -119,6 +130,8 @@ def measured(
     # what moves by rounding only has no extent
     extent = np.where(extent > 1e-9 * size, extent, np.where(size > 0, size, 1.0))
     extent = _bounded(extent, courses)
+    periods = periods_of(slow.states, run.periods)
+    extent = np.where(periods > 0, np.minimum(extent, periods), extent)
     for rate, of in _velocities(slow):
         extent[rate] = max(extent[rate], extent[of] * fastest)
     span = max(float(np.ptp(slow.table)), 1e-3 * (over[1] - over[0]))
@@ -135,6 +148,7 @@ def measured(
         curves,
         span,
         radius,
+        periods / extent,
     )
 
 
@@ -191,11 +205,11 @@ def _distance(points: Array, curve: Array) -> Array:
     return least
 
 
-def way_done(scaled: Array, old: Array, new: Array) -> Array:
+def way_done(scaled: Array, old: Array, new: Array, periods: Array) -> Array:
     """Which part of the way from an old place to a new one states have done."""
-    chord = new - old
+    chord = apart(new, old, periods)
     length = (chord**2).sum(axis=-1)
-    done = ((scaled - old) * chord).sum(axis=-1)
+    done = (apart(scaled, old, periods) * chord).sum(axis=-1)
     return np.asarray(done / np.where(length > 0, length, np.inf))
 
 

@@ -92,8 +92,9 @@ class Passage:
             scaled = state / self.m.extent
             far = ~self.m.beside(stay.course, slow, scaled)
             if other is not None:
-                places = (c.state(slow) / self.m.extent for c in (course, other))
-                far |= other.present(slow) & (way_done(scaled, *places) > WAY)
+                old, new = (c.state(slow) / self.m.extent for c in (course, other))
+                way = way_done(scaled, old, new, self.m.periods)
+                far |= other.present(slow) & (way > WAY)
             return np.asarray(far)
 
         return self.moment(self.first(float(time[stay.stop - 1]), float(time[stay.stop]), away))
@@ -123,7 +124,8 @@ class Passage:
 
         def done(slow: Array, state: Array) -> Array:
             unit = self.m.extent
-            way = way_done(state / unit, one.state(slow) / unit, other.state(slow) / unit)
+            places = one.state(slow) / unit, other.state(slow) / unit
+            way = way_done(state / unit, *places, self.m.periods)
             return np.asarray(other.present(slow) & (way > WAY))
 
         return self.moment(self.first(float(self.m.time[row - 1]), float(self.m.time[row]), done))
@@ -238,7 +240,7 @@ def _behind(p: Passage, number: int, row: int) -> bool:
     """Whether the deviation of a sample points back along the course that drifts away."""
     slope = p.m.courses[number].slope(p.m.slow[row : row + 1])[0] / p.m.extent
     back = -slope * p.drift[row]
-    deviation = p.m.scaled[row] - p.m.places[row, number]
+    deviation = p.m.deviation(number, row)
     sizes = np.linalg.norm(back) * np.linalg.norm(deviation)
     return bool(back @ deviation > 0.7 * sizes)
 

@@ -88,7 +88,8 @@ def _turn(ax: Axes, heads: Sequence[Annotation], ends: Values) -> None:
 def length_along(line: Line2D) -> Values:
     """Length of a curve in pixels up to each of its points, shape (N,)."""
     pixels = pixels_of(axes_of(line), points(line))
-    return np.r_[0.0, np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))]
+    # where a line is in parts, the way between them is none
+    return np.r_[0.0, np.nancumsum(np.hypot(*np.diff(pixels, axis=0).T))]
 
 
 def points(line: Line2D) -> Values:

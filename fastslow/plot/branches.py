@@ -20,7 +20,7 @@ from fastslow.plot.drawings import Drawing
 from fastslow.plot.equilibrium_sets import draw_sets
 from fastslow.plot.labels import place
 from fastslow.plot.legends import explained
-from fastslow.plot.quantities import Quantity, along_branch, of_diagram
+from fastslow.plot.quantities import Quantity, along_branch, joined, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
 from fastslow.plot.stretches import draw_points, runs, worth_a_marker
 from fastslow.plot.style import BRANCH, LINES, axes_for, spatial
@@ -210,7 +210,7 @@ def draw_branches(
         x, y = along_branch(diagram, branch, *shown)
         for kind, rows in runs(branch):
             look = {"color": color, "zorder": 2.0, "label": kind, **LINES[kind], **style}
-            lines += ax.plot(x[rows], y[rows], **look)
+            lines += ax.plot(*joined([x[rows], y[rows]], shown, branch.periods), **look)
     sets = draw_sets(ax, diagram, shown, color)
     markers, labels = draw_points(ax, worth_a_marker(branches), shown, label)
     across, up = shown

@@ -31,7 +31,7 @@ from fastslow.plot.labels import place
 from fastslow.plot.legends import explained
 from fastslow.plot.marks import draw_dots
 from fastslow.plot.phases import draw_phases, fit_words, strip_height
-from fastslow.plot.quantities import Array, Quantity, along_run, at_crossings, of_run
+from fastslow.plot.quantities import Array, Quantity, along_run, at_crossings, joined, of_run
 from fastslow.plot.spaces import HEIGHT, dress_space
 from fastslow.plot.style import MOTION, axes_for, spatial
 from fastslow.results.trajectories import Trajectory
@@ -167,7 +167,7 @@ def time_series(
     own, ax = ax is None, axes_for(ax, width, height=50.0)
     time, values = along_run(run, *shown)
     look = {"color": color, "label": "trajectory", **LINE, **_alone(len(time)), **style}
-    lines = tuple(ax.plot(time, values, **look))
+    lines = tuple(ax.plot(*joined([time, values], shown, run.periods), **look))
     dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
     ax.set_xlabel(shown[0].label)
     ax.set_ylabel(shown[1].label)
@@ -277,7 +277,7 @@ def phase_portrait(
         third = next((n for n in names if n not in (shown[0].text, shown[1].text)), "t")
         shown.append(of_run(run, z, third))
     own, ax = ax is None, axes_for(ax, width, HEIGHT if space else 64.0, space)
-    lines = draw_motion(ax, run.t, along_run(run, *shown), run.period, color, style)
+    lines = draw_motion(ax, run.t, along_run(run, *shown), shown, run, color, style)
     dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
     bands: tuple[Bands, ...] = ()
     if space:
@@ -312,18 +312,23 @@ def draw_motion(
     ax: Axes,
     t: Array,
     places: Sequence[Array],
-    period: float | None,
+    shown: Sequence[Quantity],
+    run: Trajectory,
     color: str,
     style: dict[str, Any],
 ) -> tuple[Line2D, ...]:
     """Draw a curve in time, what comes before its last period faintly."""
     look = {"color": color, **LINE, **_alone(len(t)), **style}
     last = 0
-    if period is not None:
-        last = max(int(np.searchsorted(t, t[-1] - period, side="right")) - 1, 0)
+    if run.period is not None:
+        last = max(int(np.searchsorted(t, t[-1] - run.period, side="right")) - 1, 0)
     earlier = {"label": "earlier periods", **look, "alpha": 0.35, "zorder": 2.9}
-    lines = ax.plot(*(p[: last + 1] for p in places), **earlier) if last > 0 else []
-    return (*lines, *ax.plot(*(p[last:] for p in places), **{"label": "trajectory", **look}))
+    before, after = (
+        joined([p[rows] for p in places], shown, run.periods)
+        for rows in (slice(last + 1), slice(last, None))
+    )
+    lines = ax.plot(*before, **earlier) if last > 0 else []
+    return (*lines, *ax.plot(*after, **{"label": "trajectory", **look}))
 
 
 def _alone(count: int) -> dict[str, Any]:

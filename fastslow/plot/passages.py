@@ -229,7 +229,7 @@ def draw_passage(
 ) -> OverlayDrawing:
     """Draw an overlay without a legend, its labels not placed yet; arguments as for `overlay`."""
     across, up = along_overlay(lay, *shown)
-    lines = draw_motion(ax, lay.time, (across, up), lay.run.period, color, style)
+    lines = draw_motion(ax, lay.time, (across, up), shown, lay.run, color, style)
     dots = draw_crossings(ax, lay, shown) if crossings else None
     changes = draw_transitions(ax, lay, shown)
     turns = draw_turning(ax, lay, shown) if turning else None
@@ -245,7 +245,9 @@ def draw_passage(
             # spikes would cover it
             line.set_zorder(3.5)
     drawn = len(points(lines[-1]))
-    heads = draw_heads(lines[-1], _heads(lay, up, lay.slow[len(lay) - drawn :]))
+    # a line in parts has other points than the samples
+    round_ = any(q.column in lay.run.periods for q in shown)
+    heads = () if round_ else draw_heads(lines[-1], _heads(lay, up, lay.slow[len(lay) - drawn :]))
     text = shown[1].text
     return OverlayDrawing(
         ax, text, below, lines, dots, changes, turns, heads, None, shown[0].text, shown

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.plot.style import typeset
+from fastslow.results.angles import principal
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import Diagram
 from fastslow.results.formulas import evaluated, names_in
@@ -124,10 +126,54 @@ def of_run(run: Trajectory, given: object, default: str) -> Quantity:
     return quantity_of(given, default, names, run.parameters, "state or slow quantity")
 
 
+def joined(
+    columns: Sequence[Array], shown: Sequence[Quantity], periods: Mapping[str, float]
+) -> list[Array]:
+    """Columns of a line, in parts where a periodic state goes round.
+
+    Where the line leaves the principal range by one end it is led up to it and goes
+    on from the other; between both stands a row of NaN.
+
+    Examples
+    --------
+    >>> theta, p = Quantity("theta"), Quantity("p")
+    >>> line = [np.array([1.5, -1.5]), np.array([0.0, 1.0])]
+    >>> [c.tolist() for c in joined(line, [theta, p], {"theta": 4.0})]
+    [[1.5, 2.0, nan, -2.0, -1.5], [0.0, 0.5, nan, 0.5, 1.0]]
+    """
+    table = np.column_stack(columns)
+    for k, quantity in enumerate(shown):
+        period = float(periods.get(quantity.column, 0.0))
+        if period == 0.0:
+            continue
+        rows = np.flatnonzero(np.abs(np.diff(table[:, k])) > 0.5 * period)
+        pieces = np.split(table, rows + 1)
+        whole = pieces[:1]
+        for before, after in pairwise(pieces):
+            up = np.sign(before[-1, k] - after[0, k])
+            ahead = after[0].copy()
+            ahead[k] += up * period
+            edge = 0.5 * up * period
+            part = (edge - before[-1, k]) / (ahead[k] - before[-1, k])
+            there = before[-1] + part * (ahead - before[-1])
+            here = there.copy()
+            there[k], here[k] = edge, -edge
+            whole += [there[None], np.full((1, len(there)), np.nan), here[None], after]
+        table = np.concatenate(whole)
+    return list(table.T)
+
+
+def _wrapped(values: Array, quantity: Quantity, periods: Mapping[str, float]) -> Array:
+    """Values of a periodic state in its principal range (−period/2, period/2]."""
+    period = periods.get(quantity.column, 0.0)
+    return principal(values, period) if period else values
+
+
 def along_branch(diagram: Diagram, branch: Branch, *shown: Quantity) -> list[Array]:
     """Quantities at the rows of a branch, each of shape (N,)."""
     columns = {name: branch[name] for name in (*branch.states, diagram.parameter)}
-    return [q.of({**diagram.parameters, **columns}, len(branch)) for q in shown]
+    known = {**diagram.parameters, **columns}
+    return [_wrapped(q.of(known, len(branch)), q, branch.periods) for q in shown]
 
 
 def at_points(points: Sequence[SpecialPoint], *shown: Quantity) -> list[Array]:
@@ -142,7 +188,8 @@ def at_points(points: Sequence[SpecialPoint], *shown: Quantity) -> list[Array]:
 def along_run(run: Trajectory, *shown: Quantity) -> list[Array]:
     """Quantities at the samples of a trajectory, each of shape (N,)."""
     columns = {name: run[name] for name in ("t", *run.columns)}
-    return [q.of({**run.parameters, **columns}, len(run.t)) for q in shown]
+    known = {**run.parameters, **columns}
+    return [_wrapped(q.of(known, len(run.t)), q, run.periods) for q in shown]
 
 
 def at_crossings(run: Trajectory, *shown: Quantity) -> list[Array]:
@@ -152,13 +199,15 @@ def at_crossings(run: Trajectory, *shown: Quantity) -> list[Array]:
     columns = {name: np.interp(times, run.t, run[name]) for name in run.columns}
     state = np.reshape([c.state for c in met], (-1, len(run.states)))
     columns |= dict(zip(run.states, state.T, strict=True))
-    return [q.of({**run.parameters, **columns, "t": times}, len(met)) for q in shown]
+    known = {**run.parameters, **columns, "t": times}
+    return [_wrapped(q.of(known, len(met)), q, run.periods) for q in shown]
 
 
 def along_overlay(lay: Overlay, *shown: Quantity) -> list[Array]:
     """Quantities at the times of an overlay, each of shape (N,)."""
     columns = {name: lay.run[name] for name in lay.run.columns}
-    return [q.of({**_fixed(lay), **columns, lay.parameter: lay.slow}, len(lay)) for q in shown]
+    known = {**_fixed(lay), **columns, lay.parameter: lay.slow}
+    return [_wrapped(q.of(known, len(lay)), q, lay.run.periods) for q in shown]
 
 
 def at_times(
@@ -168,7 +217,8 @@ def at_times(
     columns = {n: np.interp(times, lay.time, lay.run[n]) for n in lay.run.columns}
     columns[lay.parameter] = np.interp(times, lay.time, lay.slow)
     columns |= dict(zip(names, state.reshape(len(times), -1).T, strict=True))
-    return [q.of({**_fixed(lay), **columns}, len(times)) for q in shown]
+    known = {**_fixed(lay), **columns}
+    return [_wrapped(q.of(known, len(times)), q, lay.run.periods) for q in shown]
 
 
 def _fixed(lay: Overlay) -> dict[str, Any]:

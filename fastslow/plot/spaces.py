@@ -18,7 +18,7 @@ from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place
 from fastslow.plot.legends import explained
 from fastslow.plot.marks import draw_crossings, draw_transitions, draw_turning
-from fastslow.plot.quantities import Quantity, along_branch, along_overlay
+from fastslow.plot.quantities import Quantity, along_branch, along_overlay, joined
 from fastslow.plot.stretches import draw_points, runs, worth_a_marker
 from fastslow.plot.style import BRANCH, LINES, SMALL, TEXT, axes_for
 from fastslow.results.diagrams import Diagram
@@ -116,7 +116,8 @@ def draw_space(
             if lay is not None and kind == "stable":
                 # wide enough to be seen beneath a trajectory that follows it
                 look["linewidth"] = 2.0
-            branches += space.plot(*(p[rows] for p in places), **look)
+            line_places = joined([p[rows] for p in places], shown, branch.periods)
+            branches += space.plot(*line_places, **look)
     line: Line2D | None = None
     dots: Line2D | None = None
     turns: Line2D | None = None
@@ -124,7 +125,7 @@ def draw_space(
     heads: tuple[Annotation, ...] = ()
     if lay is not None:
         look = {"linewidth": 0.7, "color": color, "label": "trajectory", **style}
-        (line,) = space.plot(*along_overlay(lay, *shown), **look)
+        (line,) = space.plot(*joined(along_overlay(lay, *shown), shown, lay.run.periods), **look)
         dots = draw_crossings(space, lay, shown) if crossings else None
         changes = draw_transitions(space, lay, shown)
         turns = draw_turning(space, lay, shown) if turning else None

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import flag, formula, position, takes, text
 from fastslow.errors import unknown_name
 from fastslow.results import formulas, selecting, stretches
+from fastslow.results.angles import periods_of, principal
 from fastslow.results.levels import Pieces, asked, chosen, passages, pieces_of, stored
 from fastslow.results.markup import branch_html
 from fastslow.results.meetings import intersections
@@ -86,6 +87,11 @@ class Branch(Table, Result):
         Stability where the eigenvalues are not known, as in files of AUTO-07p.
     corrector : callable, optional
         Solves for an equilibrium read between rows; not kept in a file.
+    periods : mapping
+        The period of every state that has one. The columns go on beyond the
+        principal range (−period/2, period/2] without a jump, and the last row of a
+        closed branch may be whole periods from the first; equilibria and special
+        points are given in the principal range.
 
     Examples
     --------
@@ -114,6 +120,11 @@ class Branch(Table, Result):
     parameters: Mapping[str, float] = field(default_factory=dict)
     known_stability: NDArray[np.str_] | None = None
     corrector: Corrector | None = field(default=None, repr=False, metadata=LIVE)
+    periods: Mapping[str, float] = field(default_factory=dict)
+
+    def wrapped(self, state: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A state with angles in their principal range (−period/2, period/2]."""
+        return principal(state, periods_of(self.states, self.periods))
 
     @property
     def stability(self) -> NDArray[np.str_]:

@@ -70,6 +70,8 @@ class Diagram(Table, Result):
     window : StateWindow, optional
         The ranges of the states within which they were: what lies beyond was
         neither looked for nor traced, and "complete" says nothing of it.
+    periods : mapping
+        The period of every state that has one.
 
     Examples
     --------
@@ -98,6 +100,7 @@ class Diagram(Table, Result):
     settings: Mapping[str, float] = field(default_factory=dict)
     window: StateWindow | None = None
     bands: tuple[EquilibriumBand, ...] = ()
+    periods: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.branches)

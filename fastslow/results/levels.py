@@ -121,7 +121,7 @@ def stored(
     """The equilibrium of one row."""
     return Equilibrium(
         branch.states,
-        branch.state[row].copy(),
+        branch.wrapped(branch.state[row]),
         {**constants, branch.parameter_name: float(branch.parameter[row])},
         str(branch.region[row]),
         branch.admissible,
@@ -163,7 +163,7 @@ def read_off(
     real, imaginary = (np.array([1 - part, part]) @ p for p in (pair.real, pair.imag))
     return Equilibrium(
         branch.states,
-        state,
+        branch.wrapped(state),
         parameters,
         str(branch.region[row]),
         branch.admissible,

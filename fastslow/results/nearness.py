@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.angles import copies, periods_of
 from fastslow.results.levels import between, read_off, stored
 from fastslow.results.points import Corrector, Equilibrium
 
@@ -40,10 +42,16 @@ def nearest_of(
     low = np.min([t.min(axis=0) for t in tables], axis=0)
     high = np.max([t.max(axis=0) for t in tables], axis=0)
     scale = np.where(high > low, high - low, 1.0)
-    target = np.array([float(v) for v in values.values()]) / scale
-    found = [_closest(t / scale, target) for t in tables]
-    best = int(np.argmin([distance for distance, _, _ in found]))
-    _, row, part = found[best]
+    periods = periods_of(tuple(values), branches[0].periods)
+    scale = np.where(periods > 0, periods, scale)
+    ways = [
+        copies(float(v), *entry)
+        for v, *entry in zip(values.values(), low, high, periods, strict=True)
+    ]
+    targets = [np.array(way) / scale for way in product(*ways)]
+    _, row, part, best = min(
+        (*_closest(t / scale, target), k) for k, t in enumerate(tables) for target in targets
+    )
     return _point(branches[best], row, part, constants, corrector)
 
 

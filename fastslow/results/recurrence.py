@@ -80,7 +80,8 @@ class Recurrence:
         """Poincaré section: where an expression passes a level, or an interface is crossed.
 
         Every root of every step's polynomial is found, to rounding; where the
-        run begins on the section there is no point.
+        run begins on the section there is no point. A periodic state passes a level
+        wherever it does so modulo its period.
 
         Parameters
         ----------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.angles import copies, periods_of
 from fastslow.results.dense import refined_table
 from fastslow.results.expressions import StepPolynomials, along_steps
 from fastslow.results.moments import Moment, check_readable, is_dense, moments_at
@@ -59,6 +61,19 @@ def units_of(table: Array) -> Array:
     return np.where(reach > 0, reach, 1.0)
 
 
+def nearest_target(table: Array, target: Array, scale: Array, periods: Array) -> Array:
+    """Of the copies of a target by whole periods the one that a table comes nearest to."""
+    if not periods.any() or not len(table):
+        return target
+    low, high = table.min(axis=0), table.max(axis=0)
+    ways = [copies(*entry) for entry in zip(target.tolist(), low, high, periods, strict=True)]
+    found = [np.array(way) for way in product(*ways)]
+    distances = [
+        nearest_time(np.arange(len(table), dtype=float), table / scale, t / scale)[1] for t in found
+    ]
+    return found[int(np.argmin([d.min(initial=np.inf) for d in distances]))]
+
+
 def nearest_moment(run: Trajectory, values: Mapping[str, float]) -> Moment:
     """The nearest moment of a trajectory; see `Trajectory.nearest`."""
     checked_values(values, (*run.columns, "t"))
@@ -70,8 +85,9 @@ def nearest_moment(run: Trajectory, values: Mapping[str, float]) -> Moment:
         table = np.column_stack([known[name] for name in values])
     else:
         times, table = run.t, np.column_stack([run[name] for name in values])
-    scale = units_of(table)
-    target = np.array([float(value) for value in values.values()])
+    periods = periods_of(tuple(values), run.periods)
+    scale = np.where(periods > 0, periods, units_of(table))
+    target = nearest_target(table, np.array([float(v) for v in values.values()]), scale, periods)
     time, distance = nearest_time(times, table / scale, target / scale)
     if is_dense(run) and len(distance):
         close = np.argpartition(distance, min(4 * STEPS, len(distance)) - 1)[: 4 * STEPS]

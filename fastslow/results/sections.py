@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results import formulas
 from fastslow.results.dense import evaluate
-from fastslow.results.expressions import along_steps
+from fastslow.results.expressions import StepPolynomials, along_steps
 from fastslow.results.result import Result
-from fastslow.results.step_roots import find_roots
+from fastslow.results.step_roots import StepRoots, find_roots
 from fastslow.results.tables import Table
 
 if TYPE_CHECKING:
@@ -151,11 +151,52 @@ def poincare_section(
 
 
 def _on_level(run: Trajectory, expression: object, level: float) -> Section:
-    roots = find_roots(along_steps(run, expression).minus(level))
+    line = along_steps(run, expression)
+    period = run.periods.get(str(expression))
+    roots = find_roots(line.minus(level)) if period is None else _modulo(line, level, period)
     offset = roots.part * run.steps[roots.step, 1]
     table = evaluate(run, roots.step, offset)
     times = run.steps[roots.step, 0] + offset
     return Section("", run.columns, times, table, roots.direction)
+
+
+def _modulo(line: StepPolynomials, level: float, period: float) -> StepRoots:
+    """Zeros of a quantity less every copy of a level, shifted by whole periods.
+
+    The steps near each copy are put after those near the copy before it, with a
+    straight step between them, whose zeros are none.
+    """
+    c = line.coefficients
+    count = len(c)
+    moved = np.abs(c[:, 1:]).sum(axis=1) + 1e-9 * period
+    low = np.ceil((c[:, 0] - moved - level) / period)
+    high = np.floor((c[:, 0] + moved - level) / period)
+    # with their neighbours, so that a zero between two steps is seen from both
+    first, last = low.copy(), high.copy()
+    for shifted, source in ((slice(1, None), slice(-1)), (slice(-1), slice(1, None))):
+        first[shifted] = np.minimum(first[shifted], low[source])
+        last[shifted] = np.maximum(last[shifted], high[source])
+    copies = np.maximum(last - first + 1, 0).astype(np.intp)
+    step = np.repeat(np.arange(count), copies)
+    turn = first[step] + np.arange(len(step)) - np.repeat(np.cumsum(copies) - copies, copies)
+    order = np.lexsort((step, turn))
+    step, turn = step[order], turn[order]
+    if not len(step):
+        return StepRoots(step, np.empty(0), np.empty(0, dtype=np.int64))
+    rows = c[step].copy()
+    rows[:, 0] -= level + period * turn
+    size = line.size[step] + np.abs(level + period * turn)
+    gaps = np.flatnonzero((np.diff(step) != 1) | (np.diff(turn) != 0)) + 1
+    between = np.zeros((len(gaps), c.shape[1]))
+    between[:, 0] = rows[gaps - 1].sum(axis=1)
+    between[:, 1] = rows[gaps, 0] - between[:, 0]
+    rows, size = np.insert(rows, gaps, between, axis=0), np.insert(size, gaps, size[gaps])
+    number = np.insert(step, gaps, -1)
+    roots = find_roots(StepPolynomials(rows, size))
+    found = number[roots.step]
+    kept = (found >= 0) & ~((found == 0) & (roots.part == 0.0))
+    order = np.lexsort((roots.part[kept], found[kept]))
+    return StepRoots(found[kept][order], roots.part[kept][order], roots.direction[kept][order])
 
 
 def _on_interface(run: Trajectory, interface: object) -> Section:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
+from fastslow.results.angles import apart, periods_of
 from fastslow.results.outcome import Outcome
 from fastslow.results.result import Result
 from fastslow.results.sections import Section, poincare_section, stroboscopic_section
@@ -77,7 +78,11 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
     # the ends of steps are close enough to each other to tell how far a state ranges
     everywhere = np.vstack([run.series[:, : len(run.states), 0], run.end[1:]])
     settled = everywhere[np.append(run.steps[:, 0] >= late, True)]
-    ranges, whole = np.ptp(settled, axis=0), np.ptp(everywhere, axis=0)
+    periods = periods_of(run.states, run.periods)
+    most_apart = np.where(periods > 0, periods, np.inf)
+    ranges, whole = (
+        np.minimum(np.ptp(table, axis=0), most_apart) for table in (settled, everywhere)
+    )
     # a state that does not move is compared with its own size
     least = 1e-9 * (1.0 + np.abs(settled).max(axis=0))
     scale = np.maximum(ranges, least)
@@ -99,7 +104,8 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
     for multiple in range(1, most + 1):
         if multiple >= len(section):
             break
-        change = np.abs(states[:, multiple:] - states[:, :-multiple]).max(axis=0)
+        later, former = states[:, multiple:], states[:, :-multiple]
+        change = np.abs(apart(later, former, (periods / scale)[:, None])).max(axis=0)
         wrong = np.flatnonzero(change > tol)
         first = int(wrong[-1]) + 1 if len(wrong) else 0
         agreeing = change[first:]

@@ -78,6 +78,9 @@ class Trajectory(Queries, Recurrence, Table, Result):
         The model as text.
     settings : mapping
         How it was simulated.
+    periods : mapping
+        The period of every state that has one. Columns go on beyond it without a
+        jump; distances are taken modulo the period.
 
     Examples
     --------
@@ -110,6 +113,7 @@ class Trajectory(Queries, Recurrence, Table, Result):
     sampled: tuple[NDArray[np.float64], NDArray[np.float64]] | None
     equations: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict)
+    periods: Mapping[str, float] = field(default_factory=dict)
 
     _row = "t"
     _places = ("t",)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import real_number, shown
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.angles import nearest_copy
 from fastslow.results.outcome import Outcome
 
 Array = NDArray[np.float64]
@@ -51,6 +52,8 @@ class StateWindow:
     core : tuple of (float, float) or None
         For each state the range of the equilibria from which the tracing
         started without the few that are far from the others, near a pole.
+    periods : tuple of float
+        The period of each state, 0 where it has none; empty where none has one.
 
     Examples
     --------
@@ -66,6 +69,7 @@ class StateWindow:
     upper: tuple[float, ...]
     given: tuple[tuple[bool, bool], ...]
     core: tuple[tuple[float, float] | None, ...]
+    periods: tuple[float, ...] = ()
 
     def __getitem__(self, state: object) -> tuple[float, float]:
         name = str(state)
@@ -95,6 +99,8 @@ class StateWindow:
     def around(self, points: Array, known: NDArray[np.bool_] | None = None) -> StateWindow:
         """The window with defaults in place of the bounds that were not asked for.
 
+        A periodic state has none.
+
         They are `MARGIN` times the size of the equilibria away from these, where
         the size of a state is the larger of its spread and its largest modulus:
         measured in other units, it is the same window.
@@ -111,7 +117,7 @@ class StateWindow:
         core: list[tuple[float, float] | None] = []
         for k in range(len(self.states)):
             column = points[kept[:, k], k]
-            if not column.size:
+            if not column.size or (self.periods and self.periods[k]):
                 core.append(None)
                 continue
             low, high = float(column.min()), float(column.max())
@@ -126,8 +132,20 @@ class StateWindow:
         return replace(self, lower=tuple(lower), upper=tuple(upper), core=tuple(core))
 
     def middle(self) -> Array:
-        """The middle of the core, 0 where there is none, shape (n,)."""
-        return np.array([0.0 if c is None else 0.5 * (c[0] + c[1]) for c in self.core])
+        """The middle of the core, 0 where there is none, NaN of periodic states, shape (n,)."""
+        middle = [0.0 if c is None else 0.5 * (c[0] + c[1]) for c in self.core]
+        return np.where(self._periods > 0, np.nan, middle)
+
+    @property
+    def _periods(self) -> Array:
+        return np.array(self.periods or (0.0,) * len(self.states))
+
+    def shifted(self, states: Array) -> Array:
+        """States, shape (…, n), shifted by whole periods into the window's ranges."""
+        low, high = np.array(self.lower), np.array(self.upper)
+        bounded = (self._periods > 0) & np.isfinite(low)
+        middle = np.where(bounded, low, 0.0) / 2.0 + np.where(bounded, high, 0.0) / 2.0
+        return np.where(bounded, nearest_copy(states, middle, self._periods), states)
 
     def __str__(self) -> str:
         return ", ".join(
@@ -160,7 +178,11 @@ def typical(points: Array, least: Array | float) -> Array:
     return np.array([TYPICAL * float(np.median(a)) if a.size else np.inf for a in found])
 
 
-def state_window(states: tuple[str, ...], given: Mapping[Any, Any] | None = None) -> StateWindow:
+def state_window(
+    states: tuple[str, ...],
+    given: Mapping[Any, Any] | None = None,
+    periodic: Mapping[str, float] | None = None,
+) -> StateWindow:
     """The window that a user asks for, without defaults.
 
     Parameters
@@ -169,6 +191,8 @@ def state_window(states: tuple[str, ...], given: Mapping[Any, Any] | None = None
     given : mapping, optional
         State (symbol or name) to its range (low, high); None in place of an end
         leaves the default there, an infinite end is no bound at all.
+    periodic : mapping, optional
+        State to its period.
 
     Raises
     ------
@@ -196,8 +220,17 @@ first, or None for an end without bound; did you mean (-5, 5)?
         k = states.index(name)
         lower[k], upper[k] = _range(name, ends)
         asked[k] = (ends[0] is not None, ends[1] is not None)
+        period = (periodic or {}).get(name)
+        if period is not None and not upper[k] - lower[k] <= period * (1 + ON_EDGE):
+            raise ArgumentError(
+                f"window of {name} = {shown(ends)}; expected a range no longer than the period "
+                f"{period:g} of {name}"
+            )
     none = (None,) * len(states)
-    return StateWindow(states, tuple(lower), tuple(upper), tuple(asked), none)
+    periods = tuple(float((periodic or {}).get(name, 0.0)) for name in states)
+    return StateWindow(
+        states, tuple(lower), tuple(upper), tuple(asked), none, periods if any(periods) else ()
+    )
 
 
 def _range(name: str, ends: Any) -> tuple[float, float]:

@@ -244,6 +244,7 @@ def simulate(
         (times[:reached], sampled[:, :reached]) if samples is not None else None,
         equations=model.equations,
         settings=resolved.recorded(),
+        periods=dict(model.periodic),
     )
 
 

@@ -93,6 +93,13 @@ BY_FUNCTION = {
         ((1, 0), Wrong, "between = (1, 0); expected two numbers, the lower one first"),
         ((5, 6), Wrong, "between=(5, 6) is outside this diagram's range [-1, 1]"),
     ],
+    "Model.periodic": [
+        *MAPPING,
+        ({"x": 1}, BadModel, "x modulo 1: the rate of x, -k*x, does not repeat when x grows by 1"),
+        ({"x": NAN}, BadModel, "period of x: expected a positive number"),
+        ({"x": "k"}, BadModel, "period of x: expected a positive number"),
+        ({"omga": 1}, Unknown, "unknown state in periodic 'omga'"),
+    ],
     "Model.interfaces": [
         *MAPPING,
         ({"edge": "omga"}, BadModel, "interface edge: unknown symbol 'omga'"),

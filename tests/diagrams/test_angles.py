@@ -1,0 +1,265 @@
+"""States modulo a period: the pendulum in closed form, and what knows of the period."""
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+from fastslow.plot.quantities import along_branch, of_diagram
+
+mpl.use("Agg")
+
+theta, omega, p, a, t = sp.symbols("theta omega p a t")
+TURN = {theta: 2 * sp.pi}
+
+
+def pendulum(**values):
+    """θ'' + a θ' + sin θ = p: equilibria arcsin p and π − arcsin p."""
+    rates = {theta: omega, omega: p - sp.sin(theta) - a * omega}
+    return fs.Model(rates, parameters={"p": 0.5, "a": 0.5, **values}, periodic=TURN)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return fs.continue_equilibria(pendulum(), p, (-2, 2))
+
+
+# ---------------------------------------------------------------- the model
+
+
+def test_the_period_is_part_of_the_model():
+    model = pendulum()
+    assert model.periodic == {"theta": pytest.approx(2 * np.pi, rel=1e-15)}
+    assert "theta modulo 2*pi" in repr(model)
+    assert model.equations.endswith("theta modulo 2*pi")
+    assert r"\theta \bmod 2 \pi" in model.to_latex()
+    for other in (
+        model.with_parameters(a=1),
+        model.freed("p"),
+        model.ramped("p", 0.1),
+        model.ramped("p", 0.1).frozen(),
+    ):
+        assert other.periodic == model.periodic
+
+
+@pytest.mark.parametrize("period", [2 * sp.pi, 4 * np.pi, "2*pi", 6.283185307179586])
+def test_periods_as_they_are_written(period):
+    rates = {theta: omega, omega: sp.Abs(sp.sin(theta)) - omega}
+    assert fs.Model(rates, periodic={"theta": period}).periodic["theta"] > 6
+
+
+@pytest.mark.parametrize(
+    ("rate", "period", "words"),
+    [
+        (1 - theta, 2 * sp.pi, "the rate of theta, 1 - theta, does not repeat when theta grows"),
+        (sp.sin(theta), 3, "theta modulo 3: the rate of theta, sin\\(theta\\), does not repeat"),
+        (sp.sin(theta / 2), 2 * sp.pi, "does not repeat"),
+        (sp.sign(theta - 1), 2 * sp.pi, "does not repeat"),
+        (sp.sin(theta), -1, "period of theta: expected a positive number"),
+        (sp.sin(theta), theta, "period of theta: expected a positive number"),
+        (sp.sin(theta), True, "period of theta: expected a positive number"),
+        (sp.sin(theta), sp.oo, "period of theta: expected a positive number"),
+    ],
+)
+def test_what_does_not_repeat(rate, period, words):
+    with pytest.raises(fs.ModelError, match=words):
+        fs.Model({theta: rate}, periodic={theta: period})
+
+
+def test_an_interface_that_does_not_repeat():
+    with pytest.raises(fs.ModelError, match="the interface edge, theta - 1, does not repeat"):
+        fs.Model({theta: sp.sin(theta)}, interfaces={"edge": theta - 1}, periodic=TURN)
+
+
+def test_a_name_that_is_no_state():
+    with pytest.raises(fs.UnknownNameError, match="unknown state in periodic 'thet'"):
+        fs.Model({theta: sp.sin(theta)}, periodic={"thet": 2 * sp.pi})
+
+
+# ---------------------------------------------------------------- equilibria and branches
+
+
+@pytest.mark.parametrize("value", [-0.9, -1e-3, 0.0, 0.5, 0.999])
+def test_two_equilibria_in_the_principal_range(value):
+    found = sorted(e["theta"] for e in fs.equilibria(pendulum(p=value)))
+    other = np.pi - np.arcsin(value)
+    expected = sorted([np.arcsin(value), other if other <= np.pi else other - 2 * np.pi])
+    np.testing.assert_allclose(found, expected, atol=1e-13)
+
+
+def test_one_closed_branch(whole):
+    (branch,) = whole
+    assert branch.closed
+    np.testing.assert_allclose(np.sin(branch["theta"]), branch["p"], atol=1e-14)
+    assert abs(np.ptp(branch["theta"]) - 2 * np.pi) < 1e-12
+    assert len(branch) < 400
+    assert sorted(round(q["p"], 12) for q in whole.folds) == [-1, 1]
+    np.testing.assert_allclose(sorted(q["theta"] for q in whole.folds), [-np.pi / 2, np.pi / 2])
+
+
+@pytest.mark.parametrize("over", [(-0.5, 2), (-2, 0.3), (-0.5, 0.5), (0, 0.5), (0.2, 0.9)])
+def test_a_part_of_it_once(over):
+    diagram = fs.continue_equilibria(pendulum(), p, over)
+    assert len(diagram) == (1 if over[1] > 1 or over[0] < -1 else 2)
+    middle = 0.5 * (max(over[0], -1) + min(over[1], 1))
+    found = sorted(e["theta"] for e in diagram.at(p=middle))
+    assert len(found) == 2
+    np.testing.assert_allclose(np.sin(found), middle, atol=1e-14)
+    assert np.abs(found).max() <= np.pi
+
+
+def test_nearest_modulo_the_period(whole):
+    for turns in (-3, 0, 20):
+        point = whole.nearest(theta=0.3 + 2 * np.pi * turns, p=np.sin(0.3))
+        assert point["theta"] == pytest.approx(0.3, abs=1e-5)
+        assert whole[0].nearest(theta=3.1 + 2 * np.pi * turns, p=0.0)["theta"] > 3
+
+
+def test_seeds_and_windows_modulo_the_period(whole):
+    far = {theta: 0.5 + 20 * np.pi, omega: 0, p: np.sin(0.5)}
+    diagram = fs.continue_equilibria(pendulum(), p, (-2, 2), from_points=[far])
+    assert len(diagram) == 1
+    assert diagram[0].closed
+    upper = fs.continue_equilibria(pendulum(), p, (-2, 2), window={theta: (2, 5)})
+    (branch,) = upper
+    assert sorted(branch["theta"][[0, -1]].tolist()) == [2, 5]
+    assert len(fs.equilibria(pendulum(), window={theta: (2, 5)})) == 1
+    assert len(fs.equilibria(pendulum(), window={theta: (2 + 2 * np.pi, 5 + 2 * np.pi)})) == 1
+
+
+@pytest.mark.parametrize("ends", [(2, 50), (2, None), (-np.inf, np.inf)])
+def test_a_window_longer_than_the_period(ends):
+    with pytest.raises(fs.ArgumentError, match=r"no longer than the period 6\.28319 of theta"):
+        fs.continue_equilibria(pendulum(), p, (-2, 2), window={theta: ends})
+
+
+def test_through_an_interface_at_every_turn():
+    """θ' = p − |sin θ|: four equilibria in a turn, folds and corners in each half of it."""
+    model = fs.Model({theta: p - sp.Abs(sp.sin(theta))}, parameters={p: 0.5}, periodic=TURN)
+    assert len(fs.equilibria(model)) == 4
+    diagram = fs.continue_equilibria(model, p, (-1, 2))
+    (branch,) = diagram
+    assert branch.closed
+    np.testing.assert_allclose(np.abs(np.sin(branch["theta"])), branch["p"], atol=1e-14)
+    assert len(diagram.folds) == 2
+    assert len(diagram.boundary_equilibria) == 2
+
+
+def test_two_angles():
+    """Two uncoupled rotors: 4 equilibria of the torus, no copies."""
+    phi = sp.symbols("phi")
+    rates = {theta: p - sp.sin(theta), phi: p / 2 - sp.sin(phi)}
+    model = fs.Model(rates, parameters={p: 0.5}, periodic={theta: 2 * sp.pi, phi: 2 * sp.pi})
+    assert len(fs.equilibria(model)) == 4
+    diagram = fs.continue_equilibria(model, p, (-3, 3))
+    assert sum(b.closed for b in diagram) == len(diagram) == 2
+
+
+def test_a_file_keeps_the_period(whole, tmp_path):
+    whole.save(tmp_path / "pendulum.npz")
+    again = fs.load(tmp_path / "pendulum.npz")
+    assert again.periods == whole.periods
+    assert again.nearest(theta=0.3 - 6 * np.pi, p=0.29)["theta"] == pytest.approx(0.294, abs=1e-2)
+
+
+def test_collapse_of_a_grid():
+    """A generator over a lossless line to a load at constant angle δ: P = sin(δ)/X.
+
+    The power limit is the fold δ = π/2 (Dobson and Chiang 1989, section 2, for X = 1/2).
+    """
+    delta, P, v = sp.symbols("delta P v")
+    rates = {delta: v, v: P - 2 * sp.sin(delta) - v / 10}
+    grid = fs.Model(rates, parameters={P: 1}, periodic={delta: 2 * sp.pi})
+    diagram = fs.continue_equilibria(grid, P, (0, 3))
+    assert len(diagram) == 1
+    (fold,) = diagram.folds
+    assert fold["P"] == pytest.approx(2, rel=1e-14)
+    assert fold["delta"] == pytest.approx(np.pi / 2, rel=1e-7)
+
+
+# ---------------------------------------------------------------- runs
+
+
+@pytest.fixture(scope="module")
+def rotating():
+    return fs.simulate(pendulum(p=1.2), [0.0, 0.0], t=(0, 60))
+
+
+def test_a_run_keeps_the_unwrapped_angle(rotating):
+    assert rotating["theta"][-1] > 20 * np.pi
+    assert rotating.periods == {"theta": pytest.approx(2 * np.pi)}
+
+
+def test_a_section_at_an_angle(rotating):
+    """Every turn passes θ = 0.3 once, on its way up."""
+    section = rotating.section("theta", level=0.3)
+    turns = int((rotating["theta"][-1] - 0.3) // (2 * np.pi)) + 1
+    assert len(section) == turns
+    np.testing.assert_allclose(np.mod(section["theta"], 2 * np.pi), 0.3, atol=1e-9)
+    assert (section.directions == 1).all()
+    assert (np.diff(section.times) > 0).all()
+
+
+def test_a_rotation_repeats(rotating):
+    """After one turn: the period solves the energy balance; here against the section."""
+    steady = rotating.steady()
+    assert steady.outcome.code == "periodic"
+    assert steady.multiple == 1
+    times = rotating.section("theta", level=0.0).times
+    assert steady.period == pytest.approx(times[-1] - times[-2], rel=1e-6)
+
+
+def test_the_nearest_moment_modulo_the_period(rotating):
+    found = rotating.nearest(theta=1000.3, omega=3.0)
+    away = (found["theta"] - 1000.3 + np.pi) % (2 * np.pi) - np.pi
+    assert abs(away) < 1.0
+
+
+def test_an_overlay_modulo_the_period():
+    """A run ten turns off follows the same branch, and leaves it at the fold p = 1."""
+    model = fs.Model(
+        {theta: omega, omega: p - sp.sin(theta) - omega / 2},
+        forcing={p: sp.Rational(1, 2) + t / 200},
+        periodic=TURN,
+    )
+    diagram = fs.continue_equilibria(model.frozen(), p, (0, 1.4))
+    runs = [fs.simulate(model, [np.arcsin(0.5) + 2 * np.pi * k, 0.0], t=(0, 150)) for k in (0, 10)]
+    first, second = (fs.overlay(diagram, run) for run in runs)
+    for lay in (first, second):
+        assert lay.transitions[0].special.code == "LP"
+        assert lay.phases[0].kind == "quiescent"
+        assert lay.phases[-1].kind == "spiking"
+    assert second.transitions[0].time == pytest.approx(first.transitions[0].time, rel=1e-6)
+    inside = first.time < 90
+    assert first.distance[inside].max() < 0.05
+
+
+# ---------------------------------------------------------------- figures
+
+
+def test_a_diagram_is_drawn_in_the_principal_range(whole):
+    drawn = fs.plot.diagram(whole)
+    for line in drawn.lines:
+        heights = line.get_ydata()
+        assert np.nanmax(np.abs(heights)) <= np.pi
+        # no line across the jump
+        assert np.nanmax(np.abs(np.diff(heights))) < 1.0
+    ends = np.concatenate([line.get_ydata() for line in drawn.lines])
+    assert np.nanmax(ends) == pytest.approx(np.pi)
+    assert np.nanmin(ends) == pytest.approx(-np.pi)
+    (heights,) = along_branch(whole, whole[0], of_diagram(whole, "theta", ""))
+    assert np.abs(heights).max() <= np.pi
+    # an expression in the angle is drawn as it is
+    assert np.ptp(fs.plot.diagram(whole, "sin(theta)").lines[0].get_ydata()) > 0.5
+
+
+def test_a_rotation_is_drawn_in_parts(rotating):
+    for drawn in (
+        fs.plot.phase_portrait(rotating),
+        fs.plot.time_series(rotating, "theta"),
+        fs.plot.phase_portrait(rotating, "theta", "omega", "t"),
+    ):
+        assert drawn.lines
+    turns = fs.plot.time_series(rotating, "theta").lines[-1].get_ydata()
+    assert np.isnan(turns).sum() == int((rotating["theta"][-1] + np.pi) // (2 * np.pi))
