@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from fastslow.arguments import flag, formula, position, takes, text
 from fastslow.errors import unknown_name
 from fastslow.results import formulas, selecting, stretches
-from fastslow.results.angles import periods_of, principal
 from fastslow.results.levels import Pieces, asked, chosen, passages, pieces_of, stored
 from fastslow.results.markup import branch_html
 from fastslow.results.meetings import intersections
@@ -121,10 +120,6 @@ class Branch(Table, Result):
     known_stability: NDArray[np.str_] | None = None
     corrector: Corrector | None = field(default=None, repr=False, metadata=LIVE)
     periods: Mapping[str, float] = field(default_factory=dict)
-
-    def wrapped(self, state: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A state with angles in their principal range (−period/2, period/2]."""
-        return principal(state, periods_of(self.states, self.periods))
 
     @property
     def stability(self) -> NDArray[np.str_]:

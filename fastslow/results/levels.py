@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.angles import periods_of, principal
 from fastslow.results.interpolation import hermite
 from fastslow.results.points import Corrector, Equilibrium
 
@@ -115,13 +116,18 @@ def passages(
     return [point for _, point in sorted(found, key=lambda entry: entry[0])]
 
 
+def wrapped(branch: Branch, state: Array) -> Array:
+    """A state of a branch with angles in their principal range."""
+    return principal(state, periods_of(branch.states, branch.periods))
+
+
 def stored(
     branch: Branch, row: int, constants: Mapping[str, float], continuum: bool = False
 ) -> Equilibrium:
     """The equilibrium of one row."""
     return Equilibrium(
         branch.states,
-        branch.wrapped(branch.state[row]),
+        wrapped(branch, branch.state[row]),
         {**constants, branch.parameter_name: float(branch.parameter[row])},
         str(branch.region[row]),
         branch.admissible,
@@ -163,7 +169,7 @@ def read_off(
     real, imaginary = (np.array([1 - part, part]) @ p for p in (pair.real, pair.imag))
     return Equilibrium(
         branch.states,
-        branch.wrapped(state),
+        wrapped(branch, state),
         parameters,
         str(branch.region[row]),
         branch.admissible,
