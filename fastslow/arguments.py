@@ -225,6 +225,10 @@ def word(kind: str, valid: Iterable[str]) -> Check:
     return check
 
 
+#: Ends of a range may be this large: products of some lengths must not overflow.
+LARGEST = 1e100
+
+
 def interval(name: str, value: Any) -> tuple[float, float]:
     """Two finite numbers, the lower one first."""
     expected = "two finite numbers, the lower one first"
@@ -239,6 +243,8 @@ def interval(name: str, value: Any) -> tuple[float, float]:
     if low >= high:
         hint = f"; did you mean ({high:g}, {low:g})?" if low > high else ""
         raise refusal(name, value, expected + hint)
+    if max(abs(low), abs(high)) > LARGEST:
+        raise refusal(name, value, f"two numbers of at most {LARGEST:g} in size")
     return low, high
 
 
@@ -261,9 +267,9 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
     """An array of real numbers, of any shape; they need not be finite."""
     try:
         raw = np.asarray(value)
-        if raw.dtype.kind not in _REAL or any(
-            isinstance(item, bool | str | bytes) for item in raw.flat if raw.dtype.kind == "O"
-        ):
+        objects = raw.flat if raw.dtype.kind == "O" else ()
+        mixed = any(isinstance(item, bool | str | bytes) for item in objects)
+        if raw.dtype.kind not in _REAL or mixed:
             raise TypeError
         return np.array(raw, dtype=float)
     except (TypeError, ValueError, OverflowError):

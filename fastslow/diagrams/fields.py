@@ -40,6 +40,12 @@ DOUBTFUL = 1e-8
 ROUNDINGS = 16 * float(np.finfo(float).eps)
 
 
+def require_frozen(model: Model, instead: str) -> None:
+    """Raise unless a model is frozen; ``instead`` begins what to do with the frozen one."""
+    for quantity in (*model.forcing, *model.slow_states):
+        raise ModelError(f"'{quantity}' still varies in time; {instead} model.frozen() instead")
+
+
 @dataclass(frozen=True, eq=False)
 class Source:
     """Where a special point comes from: the frozen model, and the units of its states.

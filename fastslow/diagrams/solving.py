@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import flag, instance, mapping, takes
 from fastslow.diagrams.equations import region_equations, same
 from fastslow.diagrams.equilibrium_sets import in_a_set, sets_of
-from fastslow.diagrams.fields import IDLE, FrozenField
+from fastslow.diagrams.fields import IDLE, FrozenField, require_frozen
 from fastslow.diagrams.windows import within
 from fastslow.model.model import Model
 from fastslow.results.points import Equilibria, Equilibrium
@@ -83,6 +83,7 @@ def equilibria(
     >>> equilibria(Model({x: v, v: 1 - x - sp.sign(v) / 2})).sets
     (EquilibriumSet(0.5 ≤ x ≤ 1.5, v = 0; S1|S2 (sticking) on v = 0, dimension 1),)
     """
+    require_frozen(model, "solve for the equilibria of")
     given = model.with_parameters(values, **named)
     name = next(iter(given.parameters), IDLE)
     value = given.parameters[name] if given.parameters else 0.0

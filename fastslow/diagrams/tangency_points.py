@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import instance, mapping, takes
 from fastslow.continuation.location import newton
 from fastslow.diagrams.equations import DEGREE, STARTS, real_roots
+from fastslow.diagrams.fields import require_frozen
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.interfaces import vanishes_on
@@ -82,6 +83,7 @@ def tangencies(
     """
     changes = {str(k): v for k, v in {**(values or {}), **named}.items()}
     held = {n: number(f"state {n}", changes.pop(n)) for n in model.states if n in changes}
+    require_frozen(model, "look for the tangencies of")
     given = model.with_parameters(changes)
     _check(given, held)
     modes = [mode for mode in modes_of(given) if mode.sides is None]

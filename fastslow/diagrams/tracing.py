@@ -27,12 +27,12 @@ from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.assembly import Curve, branch_of, joined, rising
 from fastslow.diagrams.equations import region_equations
 from fastslow.diagrams.equilibrium_sets import bands_of
-from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.fields import FrozenField, require_frozen
 from fastslow.diagrams.seeds import Seeds
 from fastslow.diagrams.solving import point_at
 from fastslow.diagrams.starts import starts_of
 from fastslow.diagrams.walking import Piece, Window, beside, on_interface, walk
-from fastslow.errors import ArgumentError, ModelError
+from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.angles import apart, copies, periods_of
@@ -138,11 +138,7 @@ def continue_equilibria(
             raise ArgumentError(
                 f"mark {name} = {mark:g} is outside the range [{lower:g}, {upper:g}]"
             )
-    if model.forcing or model.slow_states:
-        quantity = next(iter((*model.forcing, *model.slow_states)))
-        raise ModelError(
-            f"'{quantity}' still varies in time; trace the branches of model.frozen() instead"
-        )
+    require_frozen(model, "trace the branches of")
     field = _field(model, name)
     continuation = continuation or Continuation()
     asked = state_window(model.states, window, model.periodic)

@@ -19,6 +19,9 @@ from fastslow.results.named import Named
 
 TIME = sp.Symbol("t", real=True)
 
+#: Functions with infinitely many jumps.
+STAIRS = (sp.floor, sp.ceiling, sp.frac, sp.Mod)
+
 Cell = frozenset[tuple[sp.Expr, int]]
 Values = Mapping[sp.Symbol, float]
 
@@ -220,6 +223,9 @@ def read_structure(
     equations = {str(n): _checked(f"rate of {n}", e, known) for n, e in {**rates, **slow}.items()}
     moving = (*(real(n) for kind, names in groups.items() if kind != "parameter" for n in names),)
     moving = (*moving, TIME)
+    for what, written in (("rate of", equations), ("law of", laws)):
+        for name, expression in written.items():
+            _refuse_stairs(f"{what} {name}", expression, moving)
     listed = {str(n): _checked(f"interface {n}", h, known) for n, h in interfaces.items()}
     found = [Interface(n, _irreducible(n, h, moving)) for n, h in listed.items()]
     shapes = {_shape(i.function, moving) for i in found}
@@ -295,6 +301,16 @@ def _checked(what: str, expression: Any, known: set[str]) -> sp.Expr:
                 "a parameter with a value, or t"
             )
     return with_piecewise(written)
+
+
+def _refuse_stairs(what: str, expression: sp.Expr, moving: Sequence[sp.Symbol]) -> None:
+    """Refuse what jumps without end along a solution."""
+    for part in sorted(expression.atoms(*STAIRS), key=str):
+        if part.free_symbols & set(moving):
+            raise ModelError(
+                f"{what}: {part} jumps at infinitely many values, each of which would be an "
+                "interface; expected a Piecewise with the few jumps that are reached"
+            )
 
 
 def _irreducible(name: str, function: sp.Expr, moving: Sequence[sp.Symbol]) -> sp.Expr:

@@ -33,7 +33,8 @@ from fastslow.plot.marks import draw_dots
 from fastslow.plot.phases import draw_phases, fit_words, strip_height
 from fastslow.plot.quantities import Array, Quantity, along_run, at_crossings, joined, of_run
 from fastslow.plot.spaces import HEIGHT, dress_space
-from fastslow.plot.style import MOTION, axes_for, spatial
+from fastslow.plot.style import MOTION, axes_for, note_early_end, spatial
+from fastslow.results.outcome import early_end
 from fastslow.results.trajectories import Trajectory
 from fastslow.results.transitions import Phase
 
@@ -178,6 +179,7 @@ def time_series(
     drawn = MotionDrawing(ax, "t", shown[1].text, lines, dots, (), bands, *strip, shown=shown)
     if phases:
         at_draw(ax, lambda: fit_words(*strip))
+    note_early_end(ax, early_end(run))
     # a legend stays below the strip
     top = 1.0 - strip_height(ax) if phases else 1.0
     return _explained(drawn, own, label, legend, top)
@@ -289,6 +291,7 @@ def phase_portrait(
         bands = _bands(ax, run, (shown[0], shown[1]), interfaces, label)
     fractions = (np.arange(arrows) + 0.5) / max(arrows, 1)
     heads = draw_arrows(lines[-1], length_along(lines[-1]), fractions.tolist())
+    note_early_end(ax, early_end(run))
     across, up, *more = (q.text for q in shown)
     drawn = MotionDrawing(
         ax, across, up, lines, dots, heads, bands, z="".join(more), shown=tuple(shown)

@@ -24,7 +24,8 @@ from fastslow.plot.marks import draw_crossings, draw_transitions, draw_turning
 from fastslow.plot.motions import draw_motion
 from fastslow.plot.quantities import Array, Quantity, along_overlay, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
-from fastslow.plot.style import MOTION, axes_for, spatial
+from fastslow.plot.style import MOTION, axes_for, note_early_end, spatial
+from fastslow.results.outcome import early_end
 from fastslow.results.overlays import Overlay
 
 #: Shares of the slow quantity's travel over a period at which an arrow head sits: uneven, so that
@@ -232,6 +233,7 @@ def draw_passage(
     lines = draw_motion(ax, lay.time, (across, up), shown, lay.run, color, style)
     dots = draw_crossings(ax, lay, shown) if crossings else None
     changes = draw_transitions(ax, lay, shown)
+    note_early_end(ax, early_end(lay.run))
     turns = draw_turning(ax, lay, shown) if turning else None
     # after the trajectory, so that the bands take its limits in
     below = draw_branches(

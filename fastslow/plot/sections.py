@@ -15,7 +15,7 @@ from fastslow.plot.arguments import axis_quantity, figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.legends import explained
 from fastslow.plot.quantities import quantity_of
-from fastslow.plot.style import BLACK, BLUE, VERMILION, axes_for, widen
+from fastslow.plot.style import BLACK, BLUE, VERMILION, axes_for, note_early_end, widen
 from fastslow.results.sections import Section
 
 #: Marker, colour and words by direction.
@@ -136,6 +136,7 @@ def section(
         look |= {"linestyle": "none", "label": words, **style}
         points += ax.plot(horizontal[mine], vertical[mine], **look)
     widen(ax)
+    note_early_end(ax, section.ended)
     ax.set_xlabel(across.label)
     ax.set_ylabel(up.label)
     key = explained(ax, points, own, label, legend) if len(points) > 1 else None

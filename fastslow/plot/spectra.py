@@ -18,7 +18,7 @@ from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place, tag
 from fastslow.plot.legends import explained
-from fastslow.plot.style import MOTION, VERMILION, axes_for, typeset
+from fastslow.plot.style import MOTION, VERMILION, axes_for, note_early_end, typeset
 from fastslow.results.spectra import Spectrum
 
 #: Amplitudes below this part of the largest are not looked for when the axes are chosen.
@@ -135,6 +135,7 @@ def spectrum(
     ax.set_ylim(LOWEST * largest, largest * LOWEST ** (-ABOVE / (1.0 - ABOVE)))
     ax.set_xlabel("angular frequency" if angular else "frequency")
     ax.set_ylabel(f"amplitude of {typeset(spectrum.name)}")
+    note_early_end(ax, spectrum.ended)
     found = [p for p in spectrum.peaks(peaks) if over[0] <= unit * p.frequency <= over[1]]
     if not found:
         return SpectrumDrawing(ax, line, None, (), explained(ax, [line], own, label, legend))

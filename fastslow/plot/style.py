@@ -245,6 +245,28 @@ def widen(ax: Axes) -> None:
             set_limits(middle - 0.1 * size, middle + 0.1 * size)
 
 
+def note_early_end(ax: Axes, why: str) -> None:
+    """Write why a run ended early below the upper edge of axes, where there is a reason.
+
+    Examples
+    --------
+    >>> ax = axes_for(None, None)
+    >>> note_early_end(ax, "too many steps")
+    >>> ax.texts[0].get_text()
+    'run ended early: too many steps'
+    """
+    if why:
+        ax.annotate(
+            f"run ended early: {why}",
+            (0.02, 0.98),
+            xycoords="axes fraction",
+            ha="left",
+            va="top",
+            fontsize="small",
+            color=VERMILION,
+        )
+
+
 def root(ax: Axes) -> Figure:
     """The outermost figure of axes."""
     figure = ax.get_figure(root=True)

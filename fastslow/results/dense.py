@@ -45,10 +45,24 @@ def evaluate(
 ) -> NDArray[np.float64]:
     """All columns at offsets into given steps, shape (n + n_forcing, N)."""
     assert run.series is not None
-    value = run.series[row, :, -1].T
-    for k in range(run.series.shape[2] - 2, -1, -1):
-        value = value * offset + run.series[row, :, k].T
-    return np.ascontiguousarray(value)
+    if len(row) < len(run.series):
+        value = run.series[row, :, -1].T
+        for k in range(run.series.shape[2] - 2, -1, -1):
+            value = value * offset + run.series[row, :, k].T
+        return np.ascontiguousarray(value)
+    # many times: coefficients of one power side by side, each step's as often as it is needed
+    powers = run.series.transpose(2, 1, 0)
+    ordered = bool((row[1:] >= row[:-1]).all())
+    counts = np.bincount(row, minlength=len(run.series)) if ordered else np.empty(0, dtype=int)
+
+    def spread(power: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.repeat(power, counts, axis=1) if ordered else np.take(power, row, axis=1)
+
+    value = spread(powers[-1])
+    for power in powers[-2::-1]:
+        value *= offset
+        value += spread(power)
+    return value
 
 
 def refined_table(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

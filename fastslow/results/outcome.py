@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fastslow.results.trajectories import Trajectory
 
 
 @dataclass(frozen=True)
@@ -33,3 +37,13 @@ class Outcome:
 
     def __bool__(self) -> bool:
         return self.success
+
+
+def stopped_early(run: Trajectory) -> str:
+    """What a result read off a run adds when the run stopped before its end, else nothing."""
+    return "" if run.outcome.success else f" The run ended early: {run.outcome}"
+
+
+def early_end(run: Trajectory) -> str:
+    """The code of the outcome of a run that ended early, else empty."""
+    return "" if run.outcome.success else run.outcome.code

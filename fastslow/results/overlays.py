@@ -323,6 +323,8 @@ class Overlay(Table, Result):
         )
         if not self.outcome:
             yield f"  {self.outcome}"
+        if not self.run.outcome:
+            yield f"  the run ended early: {self.run.outcome}"
         if not self.sheets and not self.diagram.bands:
             yield "  the diagram has no stable sheet"
         elif not self.diagram.folds:

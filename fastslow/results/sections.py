@@ -14,6 +14,7 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results import formulas
 from fastslow.results.dense import evaluate
 from fastslow.results.expressions import StepPolynomials, along_steps
+from fastslow.results.outcome import early_end
 from fastslow.results.result import Result
 from fastslow.results.step_roots import StepRoots, find_roots
 from fastslow.results.tables import Table
@@ -37,6 +38,8 @@ class Section(Table, Result):
         Every column at those times.
     directions : ndarray of int, shape (K,)
         +1 upwards, −1 downwards, 0 for a touch; 0 throughout for a stroboscopic section.
+    ended : str
+        Why the run ended early, as the code of its outcome; empty where it did not.
     """
 
     rule: str
@@ -44,6 +47,7 @@ class Section(Table, Result):
     times: NDArray[np.float64]
     table: NDArray[np.float64]
     directions: NDArray[np.int64]
+    ended: str = ""
 
     _row = "t"
     _places = ("t",)
@@ -66,7 +70,8 @@ class Section(Table, Result):
 
     def __repr__(self) -> str:
         when = f", t from {self.times[0]:.6g} to {self.times[-1]:.6g}" if len(self) else ""
-        return f"Section {self.rule}: {len(self)} points of {', '.join(self.names)}{when}"
+        early = f"; the run ended early: {self.ended}" if self.ended else ""
+        return f"Section {self.rule}: {len(self)} points of {', '.join(self.names)}{when}{early}"
 
 
 def window_of(
@@ -118,7 +123,8 @@ def stroboscopic_section(
     times = np.clip(begin + length * np.arange(lowest, highest + 1), *run.span)
     rule = f"every {length:.6g}" + (f" at phase {phase:.6g}" if phase else "")
     table = run.dense_columns(times)
-    return Section(rule, run.columns, times, table, np.zeros(len(times), dtype=np.int64))
+    none = np.zeros(len(times), dtype=np.int64)
+    return Section(rule, run.columns, times, table, none, early_end(run))
 
 
 def poincare_section(
@@ -146,7 +152,12 @@ def poincare_section(
     if direction is not None:
         kept &= found.directions == direction
     return Section(
-        rule, found.names, found.times[kept], found.table[:, kept], found.directions[kept]
+        rule,
+        found.names,
+        found.times[kept],
+        found.table[:, kept],
+        found.directions[kept],
+        early_end(run),
     )
 
 

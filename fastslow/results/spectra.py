@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import takes, whole, within
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.outcome import early_end
 from fastslow.results.result import Result
 from fastslow.results.sections import window_of
 from fastslow.results.tables import Table
@@ -67,6 +68,8 @@ class Spectrum(Table, Result):
     amplitude : ndarray, shape (N,)
         A sine of amplitude a at the centre of a bin has amplitude a there; at
         zero, the modulus of the mean.
+    ended : str
+        Why the run ended early, as the code of its outcome; empty where it did not.
 
     Examples
     --------
@@ -83,6 +86,7 @@ class Spectrum(Table, Result):
     span: tuple[float, float]
     frequency: NDArray[np.float64]
     amplitude: NDArray[np.float64]
+    ended: str = ""
 
     _row = "frequency"
     _places = ("frequency",)
@@ -156,6 +160,7 @@ class Spectrum(Table, Result):
         return (
             f"Spectrum of {self.name} for t from {self.span[0]:.6g} to {self.span[1]:.6g}, "
             f"{self.window} window: {lines or 'no line'}"
+            + (f"; the run ended early: {self.ended}" if self.ended else "")
         )
 
 
@@ -204,4 +209,5 @@ def spectrum_of(
     if samples % 2 == 0:
         amplitude[-1] /= 2.0
     frequency = np.arange(len(amplitude)) / (last - first)
-    return Spectrum(str(name), window, (first, last), frequency, amplitude)
+    ended = early_end(run)
+    return Spectrum(str(name), window, (first, last), frequency, amplitude, ended)

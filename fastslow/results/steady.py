@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.results.angles import apart, periods_of
-from fastslow.results.outcome import Outcome
+from fastslow.results.outcome import Outcome, stopped_early
 from fastslow.results.result import Result
 from fastslow.results.sections import Section, poincare_section, stroboscopic_section
 
@@ -21,6 +21,16 @@ Array = NDArray[np.float64]
 
 #: Only the last half of a run says what it settles on.
 LATE = 0.5
+
+#: A state whose range is below this part of its size does not move.
+STILL = 1e-9
+
+#: Changes below this many relative tolerances of the integration are its errors: on an
+#: attracting orbit those of one period add up to some tens of them.
+ERRORS = 1e3
+
+#: A run has settled when no more than this many tolerances are left to its limit.
+NEARLY = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +53,12 @@ class SteadyState(Result):
     section : Section
         The states compared.
     outcome : Outcome
-        ``"periodic"``, ``"equilibrium"``, ``"too short"`` or ``"not periodic"``.
+        ``"periodic"``, ``"equilibrium"``, ``"too short"``, ``"not periodic"``, or
+        ``"drifting"`` where changes below the tolerance do not shrink, as near a
+        fold of periodic solutions.
+    left : float
+        How far the states still are from those they settle on, in the same units, by
+        the rate at which the changes shrink; infinite where they do not.
 
     Examples
     --------
@@ -60,6 +75,7 @@ class SteadyState(Result):
     distance: float
     section: Section
     outcome: Outcome
+    left: float = float("nan")
 
     def __repr__(self) -> str:
         return f"SteadyState: {self.outcome}"
@@ -83,8 +99,9 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
     ranges, whole = (
         np.minimum(np.ptp(table, axis=0), most_apart) for table in (settled, everywhere)
     )
-    # a state that does not move is compared with its own size
-    least = 1e-9 * (1.0 + np.abs(settled).max(axis=0))
+    # a state that does not move is compared with its own size, or that of where it came from
+    size = np.abs(everywhere).max(axis=0)
+    least = STILL * np.where(size > 0, size, 1.0)
     scale = np.maximum(ranges, least)
     if period is not None or run.period is not None:
         section = stroboscopic_section(run, period, 0.0, None)
@@ -92,7 +109,8 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
     else:
         if (ranges <= tol * np.maximum(whole, least)).all():
             section = Section("", run.states, np.empty(0), np.empty((len(run.states), 0)), _NONE)
-            still = Outcome("equilibrium", "the run settles on an equilibrium.", True)
+            text = "the run settles on an equilibrium." + stopped_early(run)
+            still = Outcome("equilibrium", text, True)
             return SteadyState(None, None, late, float(ranges.max()), section, still)
         widest = int(np.argmax(ranges))
         mean = _mean(run, widest, late)
@@ -100,6 +118,7 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
         section = poincare_section(run, name, mean, 1, None, run.span)
         unit = f"returns to {name} = {mean:.6g}"
     states = section.table[: len(run.states)] / scale[:, None]
+    noise = ERRORS * float(run.settings.get("rtol", 0.0))
     smallest = np.inf
     for multiple in range(1, most + 1):
         if multiple >= len(section):
@@ -113,8 +132,22 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
         # as many repeats as there are points, or the next point might still differ
         if len(agreeing) >= max(multiple, 2):
             length = float(section.times[-1] - section.times[-1 - multiple])
-            text = f"repeats after {multiple} {unit if multiple > 1 else _single(unit)}"
+            left, moved = _left(states[:, first:], periods / scale, multiple, noise)
+            if left > NEARLY * tol:
+                text = (
+                    f"the changes over {_some(multiple, unit)}, up to {agreeing.max():.2g} of the "
+                    f"range, hardly shrink: they add up to {moved:.2g} since "
+                    f"t = {section.times[first]:.6g}; a slow passage, as near a fold of periodic "
+                    "solutions, or not yet settled: simulate for longer."
+                )
+                drifting = Outcome("drifting", text, False)
+                worst = float(agreeing.max())
+                return SteadyState(None, None, None, worst, section, drifting, left)
+            text = f"repeats after {_some(multiple, unit)}"
             text += f", {length:.9g}, from t = {section.times[first]:.6g} on."
+            if left > tol:
+                text = f"{text[:-1]}; the changes shrink, {left:.2g} of the range is left."
+            text += stopped_early(run)
             return SteadyState(
                 multiple,
                 length,
@@ -122,19 +155,40 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
                 float(agreeing.max()),
                 section,
                 Outcome("periodic", text, True),
+                left,
             )
     if len(section) < 3:
-        count = f"{len(section)} {unit if len(section) != 1 else _single(unit)}"
-        text = f"only {count} within the run; simulate for longer."
+        text = f"only {_some(len(section), unit)} within the run; simulate for longer."
+        text += stopped_early(run)
         return SteadyState(None, None, None, smallest, section, Outcome("too short", text, False))
     text = (
         f"no repeat within {tol:g} after up to {most} {unit}: quasi-periodic, chaotic, or not "
         "yet settled; simulate for longer, or raise most= or tol=."
     )
+    text += stopped_early(run)
     return SteadyState(None, None, None, smallest, section, Outcome("not periodic", text, False))
 
 
 _NONE = np.empty(0, dtype=np.int64)
+
+
+def _left(states: Array, periods: Array, multiple: int, noise: float) -> tuple[float, float]:
+    """How far states are from their limit, and how far they moved, from both halves of a run.
+
+    Geometric convergence moves them by a ratio less in the second half.
+    """
+    same = states[:, (states.shape[1] - 1) % multiple :: multiple]
+    middle = (same.shape[1] - 1) // 2
+    before = float(np.abs(same[:, middle] - same[:, 0]).max())
+    after = float(np.abs(same[:, -1] - same[:, middle]).max())
+    moved = float(np.abs(same[:, -1] - same[:, 0]).max())
+    if after <= noise:
+        return after, moved
+    return (after**2 / (before - after) if after < before else float("inf")), moved
+
+
+def _some(count: int, unit: str) -> str:
+    return f"{count} {unit if count != 1 else _single(unit)}"
 
 
 def _single(unit: str) -> str:

@@ -59,6 +59,10 @@ def initial_state(model: Model, start: Any) -> NDArray[np.float64]:
     return values
 
 
+#: Instants that a span must hold, so that steps and crossings within it have some digits.
+INSTANTS = 1e5
+
+
 def time_span(
     t: Any, periods: Any, start: float, period: float | None, own_period: Callable[[], float | None]
 ) -> tuple[tuple[float, float], float | None]:
@@ -82,6 +86,7 @@ def time_span(
         first, last = map(float, values)
         if not (math.isfinite(first) and math.isfinite(last) and first < last):
             raise ArgumentError(f"t = ({first:g}, {last:g}); expected finite times, start < end")
+        _check_resolution(first, last)
         return (first, last), period if period is not None else own_period()
     count = positive("periods", periods)
     if period is None:
@@ -91,7 +96,18 @@ def time_span(
             f"periods={periods!r}, but nothing in this model has a common period; give "
             "t=(start, end), or the period as period="
         )
+    _check_resolution(start, start + count * period)
     return (start, start + count * period), period
+
+
+def _check_resolution(first: float, last: float) -> None:
+    """Refuse a span within which too few times can be told apart."""
+    spacing = math.ulp(max(abs(first), abs(last)))
+    if last - first < INSTANTS * spacing:
+        raise ArgumentError(
+            f"t = ({first:.17g}, {last:.17g}): in double precision times here are {spacing:.3g} "
+            f"apart, too far for a span of {last - first:.3g}; measure time from a later origin"
+        )
 
 
 def sample_times(

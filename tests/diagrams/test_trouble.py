@@ -128,3 +128,14 @@ def test_too_many_branches_are_said():
     assert diagram.coverage == "found"
     assert diagram.outcome.code == "too many branches"
     assert "Continuation(branches" in repr(diagram)
+
+
+@pytest.mark.parametrize("function", [fs.equilibria, fs.tangencies])
+def test_points_of_a_model_that_is_not_frozen(gear, function):
+    with pytest.raises(fs.FastSlowError, match=r"'w' still varies in time; .*model\.frozen\(\)"):
+        function(gear)
+
+
+def test_a_range_whose_squares_overflow(gear):
+    with pytest.raises(fs.FastSlowError, match=r"over = .*of at most 1e\+100 in size"):
+        fs.continue_equilibria(gear.frozen(), "w", over=(-1e300, 1e300))

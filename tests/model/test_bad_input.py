@@ -136,3 +136,12 @@ def test_values_of_the_frozen_parameter(fast):
         fs.equilibria(fast)
     with pytest.raises(FastSlowError, match="finite"):
         fs.equilibria(fast, w=math.nan)
+
+
+@pytest.mark.parametrize("function", [sp.floor, sp.ceiling, sp.frac, lambda z: sp.Mod(z, 1)])
+def test_functions_with_infinitely_many_jumps(function):
+    state, rate = sp.symbols("x k")
+    with pytest.raises(ModelError, match=r"rate of x: .* jumps at infinitely many values"):
+        fs.Model({state: -function(state)})
+    # of a parameter it is a number
+    assert fs.Model({state: -function(rate) * state}, parameters={rate: 2.5}).states == ("x",)

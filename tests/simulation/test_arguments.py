@@ -110,3 +110,11 @@ def test_symbols_and_arrays_are_welcome(gear):
     one = simulate(gear, {x: 0.1, v: 0}, t=(0, sp.pi))
     other = simulate(gear, np.array([0.1, 0]), t=np.array([0, math.pi]))
     assert np.array_equal(one.end, other.end)
+
+
+@pytest.mark.parametrize("span", [{"t": (1e17, 1e17 + 100)}, {"periods": 1, "start": 1e16}])
+def test_a_span_in_which_times_cannot_be_told_apart(span):
+    x, v, t = sp.symbols("x v t")
+    model = Model({x: v, v: sp.sin(t) - x})
+    with pytest.raises(ArgumentError, match=r"in double precision times here are .* apart"):
+        simulate(model, [1, 0], **span)
