@@ -178,13 +178,13 @@ def _left(states: Array, periods: Array, multiple: int, noise: float) -> tuple[f
     Geometric convergence moves them by a ratio less in the second half.
     """
     same = states[:, (states.shape[1] - 1) % multiple :: multiple]
-    middle = (same.shape[1] - 1) // 2
-    before = float(np.abs(same[:, middle] - same[:, 0]).max())
+    middle, extra = divmod(same.shape[1] - 1, 2)
+    middle += extra
+    before = float(np.abs(same[:, middle] - same[:, extra]).max())
     after = float(np.abs(same[:, -1] - same[:, middle]).max())
     moved = float(np.abs(same[:, -1] - same[:, 0]).max())
-    if after <= noise:
-        return after, moved
-    return (after**2 / (before - after) if after < before else float("inf")), moved
+    left = after**2 / (before - after) if after < before else float("inf")
+    return (min(left, after) if after <= noise else left), moved
 
 
 def _some(count: int, unit: str) -> str:

@@ -64,14 +64,17 @@ def test_a_passage_near_a_fold_of_periodic_solutions_is_no_period():
 
 @pytest.mark.parametrize("damping", [0.02, 0.05, 0.3])
 def test_what_is_left_to_the_periodic_solution(damping):
-    """A damped linear oscillator approaches its response by exp(−damping t/2)."""
+    """A damped linear oscillator approaches its response by exp(−damping t/2).
+
+    The estimate is one of size: the distance turns while it decays.
+    """
     model = fs.Model({x: v, v: sp.sin(t) - x - damping * v})
     run = fs.simulate(model, [0, 0], periods=int(5 / damping))
     steady = run.steady()
     assert steady.multiple == 1
     exact = np.array([-1 / damping, 0.0])
     apart = np.abs(steady.section.table[:2, -1] - exact).max() * damping / 2
-    assert steady.left == pytest.approx(apart, rel=0.5, abs=2e-8)
+    assert apart / 3 < steady.left < 3 * apart
 
 
 @pytest.mark.parametrize("order", ["rising", "shuffled", "few"])
