@@ -180,9 +180,11 @@ def _left(states: Array, periods: Array, multiple: int, noise: float) -> tuple[f
     same = states[:, (states.shape[1] - 1) % multiple :: multiple]
     middle, extra = divmod(same.shape[1] - 1, 2)
     middle += extra
-    before = float(np.abs(same[:, middle] - same[:, extra]).max())
-    after = float(np.abs(same[:, -1] - same[:, middle]).max())
-    moved = float(np.abs(same[:, -1] - same[:, 0]).max())
+
+    def distance(first: int, last: int) -> float:
+        return float(np.abs(apart(same[:, last], same[:, first], periods)).max())
+
+    before, after, moved = distance(extra, middle), distance(middle, -1), distance(0, -1)
     left = after**2 / (before - after) if after < before else float("inf")
     return (min(left, after) if after <= noise else left), moved
 
