@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import pairwise, product
 from typing import Any
 
@@ -37,12 +37,15 @@ ROWS = 129
 #: The same for sets of more dimensions than one, each of whose ranges is a linear programme.
 FEWER = 33
 
-#: Where ends are searched for in the free state if no polynomial gives them and the model's
-#: states have no window: from minus to plus this.
+#: Where ends are searched for in the free state if no polynomial gives them: from minus to
+#: plus this, in the natural unit of the state.
 REACH = 10.0
 
 #: Places in between at which functions that are no polynomials are looked at.
 PLACES = 1001
+
+#: Rows of a band between its end and the next of the other rows.
+ROUND = 8
 
 #: How far a weight may exceed 1 on an edge that was solved for.
 EDGE = 1e-6
@@ -132,6 +135,10 @@ class Family:
         with np.errstate(all="ignore"):
             found = self._bounds(value, *free)
         return np.array(np.broadcast_arrays(*found, *free)[: len(found)], dtype=float)
+
+    def _bound(self, value: float, number: int, free: float) -> float:
+        """One of the bounds at a value of the only free state."""
+        return float(self.values(value, free)[number])
 
     def sets(self, value: float) -> list[EquilibriumSet]:
         """The sets at a value of the parameter, those of dimension 1 from below to above."""
@@ -252,12 +259,13 @@ class Family:
                 ends += real_roots(np.atleast_1d(np.array(coefficients(value), dtype=float)))
             ends = [-np.inf, *sorted(set(ends)), np.inf]
         else:
-            grid = np.linspace(-REACH, REACH, PLACES)
-            for k, row in enumerate(self.values(value, grid)):
+            k = self.field.model.states.index(self.free[0].name)
+            reach = REACH * float(self.field.units_at(value)[k])
+            grid = np.linspace(-reach, reach, PLACES)
+            for number, row in enumerate(self.values(value, grid)):
                 for i in np.flatnonzero(row[1:] * row[:-1] < 0):
-                    ends.append(
-                        brentq(lambda c, k=k: self.values(value, c)[k], grid[i], grid[i + 1])
-                    )
+                    bound = partial(self._bound, value, number)
+                    ends.append(float(brentq(bound, grid[i], grid[i + 1])))
             ends = sorted(set(ends))
         inside = []
         for low, high in pairwise(ends):
@@ -418,7 +426,7 @@ def _bands(family: Family, lower: float, upper: float) -> list[EquilibriumBand]:
 
 def _meet(one: EquilibriumSet, other: EquilibriumSet) -> bool:
     """Whether the ranges of two sets at neighbouring values overlap, and their corners match."""
-    near = SMALL * (1.0 + np.abs(one.lower))
+    near = SMALL * np.nan_to_num(np.abs(one.lower) + np.abs(one.upper), posinf=0.0)
     over = (one.lower <= other.upper + near) & (other.lower <= one.upper + near)
     if one.dimension == 0:
         over[:] = True
@@ -430,7 +438,8 @@ def _change(
     before: tuple[float, list[EquilibriumSet]],
     after: tuple[float, list[EquilibriumSet]],
 ) -> list[tuple[float, list[EquilibriumSet]]]:
-    """Neighbouring values between which the number of sets changes, to rounding."""
+    """Values to rounding between which the number of sets changes, and some beside them."""
+    first, last = before[0], after[0]
     for _ in range(60):
         middle = 0.5 * (before[0] + after[0])
         if not before[0] < middle < after[0]:
@@ -440,7 +449,13 @@ def _change(
             before = now
         else:
             after = now
-    return [before, after]
+    # closer and closer to the change, where an edge may turn round
+    parts = [(k / ROUND) ** 2 for k in range(ROUND - 1, 0, -1)]
+    left = [before[0] - part * (before[0] - first) for part in parts]
+    right = [after[0] + part * (last - after[0]) for part in reversed(parts)]
+    rows = [(value, family.sets(value)) for value in (*left, *right)]
+    count = len(left)
+    return [*rows[:count], before, after, *rows[count:]]
 
 
 def _band(family: Family, run: Run) -> EquilibriumBand:

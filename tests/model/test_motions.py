@@ -6,6 +6,7 @@ import sympy as sp
 import fastslow as fs
 from fastslow.compiled.series import compile_series
 from fastslow.diagrams.modes import modes_of
+from fastslow.model.interfaces import vanishes_on
 from fastslow.model.motions import motions_of
 
 x, y, z, v, p = sp.symbols("x y z v p", real=True)
@@ -85,3 +86,23 @@ def test_sliding_that_the_first_derivatives_do_not_determine_is_left_undecided()
     ((where, why),) = motions_of(model).undecided
     assert "= 0 and " in where
     assert "singular" in why
+
+
+def test_continuity_with_decimal_numbers_and_interfaces_of_high_degree():
+    # a growth rate is zero where a temperature, a rational function, leaves its range
+    heat = 100 * p * (1 - (x + y) / 4) / (1 + (x + y) / 4)
+    for share in (0.75, 0.25):
+        growth = sp.Max(0, 1 - 0.003265 * (22.5 - heat + 20 * (x / 2 - share)) ** 2)
+        model = fs.Model({x: x * (growth - 0.3), y: -y}, parameters={p: 0.8})
+        assert all(model.continuous.values())
+        assert motions_of(model).sliding == ()
+
+
+def test_vanishing_on_a_surface_is_decided_at_its_points():
+    h = 3.7 * x**2 * y + 0.1 * y**2 * x - 1.3
+    multiple = sp.expand(h * (x + 2 * y)) / (1 + x**2)
+    assert vanishes_on(multiple, h)
+    assert not vanishes_on(multiple + sp.Rational(1, 10**12), h)
+    assert vanishes_on(sp.exp(x) - sp.exp(y + 1), x - y - 1)
+    assert not vanishes_on(sp.exp(x) - sp.exp(y), x - y - 1)
+    assert vanishes_on(sp.sqrt(x) - y, x - y**2)
