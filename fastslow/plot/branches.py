@@ -24,7 +24,9 @@ from fastslow.plot.quantities import Quantity, along_branch, joined, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
 from fastslow.plot.stretches import draw_points, runs, worth_a_marker
 from fastslow.plot.style import BRANCH, LINES, axes_for, spatial
+from fastslow.results.branches import Branch
 from fastslow.results.diagrams import Diagram
+from fastslow.results.windows import LEFT
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -210,7 +212,16 @@ def draw_branches(
         x, y = along_branch(diagram, branch, *shown)
         for kind, rows in runs(branch):
             look = {"color": color, "zorder": 2.0, "label": kind, **LINES[kind], **style}
-            lines += ax.plot(*joined([x[rows], y[rows]], shown, branch.periods), **look)
+            line = joined([x[rows], y[rows]], shown, branch.periods)
+            if diagram.window is None or not _goes_to_infinity(branch):
+                lines += ax.plot(*line, **look)
+                continue
+            # drawn whole, but the axes are scaled to what is not far away
+            near = diagram.window.near(branch.state[rows])
+            lines.append(Line2D(*line, **look))
+            ax.add_artist(lines[-1])
+            ax.update_datalim(np.column_stack([x[rows], y[rows]])[near])
+            ax.autoscale_view()
     sets = draw_sets(ax, diagram, shown, color)
     markers, labels = draw_points(ax, worth_a_marker(branches), shown, label)
     across, up = shown
@@ -234,3 +245,8 @@ def draw_branches(
     return DiagramDrawing(
         ax, up.text, tuple(lines), markers, labels, bands, None, across.text, shown, sets
     )
+
+
+def _goes_to_infinity(branch: Branch) -> bool:
+    """Whether an end of a branch is on a default bound of the window."""
+    return any(o.code == LEFT and not o.success for o in branch.outcomes)

@@ -15,6 +15,7 @@ from fastslow.plot.style import dot_look
 from fastslow.results.branches import Branch
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
+from fastslow.results.windows import LEFT
 
 #: What is written beside an end point is no longer than this; a sentence is for the hover.
 WORDY = 24
@@ -65,7 +66,9 @@ def worth_a_marker(branches: Sequence[Branch]) -> list[SpecialPoint]:
 
 
 def _shown(branch: Branch) -> list[SpecialPoint]:
-    ends = {0: branch.outcomes[0].success, len(branch) - 1: branch.outcomes[1].success}
+    # an end at infinity is outside the figure
+    usual = [o.success or o.code == LEFT for o in branch.outcomes]
+    ends = {0: usual[0], len(branch) - 1: usual[1]}
     return [
         p
         for p, row in zip(branch.special, branch.special_rows, strict=True)

@@ -131,6 +131,18 @@ class StateWindow:
                 upper[k] = high + MARGIN * size
         return replace(self, lower=tuple(lower), upper=tuple(upper), core=tuple(core))
 
+    def near(self, states: Array) -> NDArray[np.bool_]:
+        """Whether states, shape (N, n), are not farther from the core than it is wide, shape (N,).
+
+        Figures are scaled to these where a branch goes to infinity.
+        """
+        found = np.ones(len(states), dtype=bool)
+        for k, core in enumerate(self.core):
+            if core is not None:
+                wide = core[1] - core[0] or abs(core[0])
+                found &= (states[:, k] >= core[0] - wide) & (states[:, k] <= core[1] + wide)
+        return found
+
     def middle(self) -> Array:
         """The middle of the core, 0 where there is none, NaN of periodic states, shape (n,)."""
         middle = [0.0 if c is None else 0.5 * (c[0] + c[1]) for c in self.core]

@@ -164,10 +164,7 @@ def test_a_file_keeps_the_period(whole, tmp_path):
 
 
 def test_collapse_of_a_grid():
-    """A generator over a lossless line to a load at constant angle δ: P = sin(δ)/X.
-
-    The power limit is the fold δ = π/2 (Dobson and Chiang 1989, section 2, for X = 1/2).
-    """
+    """A generator over a lossless line, P = 2 sin δ: the power limit is the fold δ = π/2."""
     delta, P, v = sp.symbols("delta P v")
     rates = {delta: v, v: P - 2 * sp.sin(delta) - v / 10}
     grid = fs.Model(rates, parameters={P: 1}, periodic={delta: 2 * sp.pi})

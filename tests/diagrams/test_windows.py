@@ -1,5 +1,6 @@
 """Windows in the states: branches that leave them, by closed forms and NumPy's roots."""
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 import sympy as sp
@@ -213,6 +214,21 @@ def test_equilibria_without_negative_concentrations():
     assert sorted(e.state.tolist() for e in kept) == [[0, 0], [0, 1], [1, 0]]
     diagram = fs.continue_equilibria(model, p, (-3, 3), window={x: (0, None), y: (0, None)})
     assert min(b.state.min() for b in diagram) >= -1e-14
+
+
+def test_a_figure_is_scaled_to_the_finite_part():
+    """The fold of x = p² − 1 is not squashed by the hyperbola x = 1/p; the lines are whole."""
+    mpl.use("Agg")
+    diagram = traced({x: (1 - p * x) * (x - p**2 + 1)})
+    drawn = fs.plot.diagram(diagram)
+    low, high = drawn.ax.get_ylim()
+    assert -60 < low < -1
+    assert 1 < high < 60
+    assert max(np.nanmax(np.abs(line.get_ydata())) for line in drawn.lines) > 1e3
+    assert "EP end point" not in drawn.data
+    # a bound that was asked for is drawn to its edge
+    low, high = fs.plot.diagram(traced({x: 1 - p * x}, window={x: (-500, 500)})).ax.get_ylim()
+    assert low < -500 < 500 < high
 
 
 def test_the_window_is_kept_in_a_file(tmp_path):
