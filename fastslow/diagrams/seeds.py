@@ -16,7 +16,7 @@ from fastslow.diagrams.equations import region_equations
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.solving import point_at
 from fastslow.diagrams.walking import Window, walk
-from fastslow.diagrams.windows import NOISE, known
+from fastslow.diagrams.windows import NOISE, known, size_of
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.angles import apart
 from fastslow.results.branches import Branch
@@ -110,10 +110,9 @@ class Seeds:
     @cached_property
     def _measured(self) -> tuple[StateWindow, Array]:
         """The window and the units, from the branches themselves, traced once to measure them."""
-        states = np.array([e.state for e in self._points])
-        size = np.where(known(self._field, self._points), np.abs(states), 0.0).max(axis=0)
+        least = size_of(self._field, self._points)
         length = self._over[1] - self._over[0]
-        first = Window(*self._over, np.append(self._unit(size), length), self._around)
+        first = Window(*self._over, np.append(self._unit(least), length), self._around)
         rows = np.concatenate([self._rows(e, first) for e in self._points])
         wide = typical(rows, ROUNDING * np.abs(rows).max(axis=0))
         middle = np.median(rows, axis=0)
@@ -124,12 +123,14 @@ class Seeds:
         core = tuple(
             (float(a), float(b)) if b > a else None for a, b in zip(low, high, strict=True)
         )
-        return replace(self._around, core=core), np.append(self._unit(unit), length)
+        return replace(self._around, core=core), np.append(
+            self._unit(np.where(unit > 0, unit, least)), length
+        )
 
     def _unit(self, size: Array) -> Array:
-        """The size of each state, one where it is not known, a radian of angles."""
+        """The size of each state, a radian of angles."""
         periods = self._field.periods
-        return np.where(periods > 0, periods / (2.0 * np.pi), np.where(size > 0, size, 1.0))
+        return np.where(periods > 0, periods / (2.0 * np.pi), size)
 
     def _rows(self, point: Equilibrium, window: Window) -> Array:
         """States of the branch through a point, evenly over the parameter; 0 for rounding."""

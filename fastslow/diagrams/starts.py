@@ -14,7 +14,7 @@ from fastslow.diagrams.equations import region_equations
 from fastslow.diagrams.equilibrium_sets import covered
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.solving import solve_at
-from fastslow.diagrams.windows import Sides, edges_left, edges_of, known, within
+from fastslow.diagrams.windows import Sides, edges_left, edges_of, known, size_of, within
 from fastslow.results.branches import Branch
 from fastslow.results.points import Equilibrium
 from fastslow.results.windows import ROUNDING, StateWindow, typical
@@ -150,17 +150,12 @@ class Starts:
     @cached_property
     def scale(self) -> Array:
         """Unit of each state, the size of its equilibria, and the length of the range."""
-        n, name = self._field.n, self._field.parameter
+        n = self._field.n
         both = [e for v in self._first for k in (True, False) for e in self._asked_at(v, k)]
         table = np.reshape([e.state for e in both], (-1, n))
         inside = self.window.contains(self.window.shifted(table))
         states = table[inside]
-        points = [
-            (self._field.regions.index(e.region), np.append(e.state, e.parameters[name]))
-            for e, kept in zip(both, inside, strict=True)
-            if kept
-        ]
-        largest = size = self._field.sizes(points)
+        largest = size = size_of(self._field, [both[k] for k in np.flatnonzero(inside)])
         # a few equilibria near a pole are far away and must not set the unit
         wide = typical(states, ROUNDING * size)
         middle = np.median(states, axis=0) if len(states) else np.zeros(n)

@@ -7,12 +7,15 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from fastslow.diagrams.fields import FrozenField
 from fastslow.model.structure import real
 from fastslow.results.branches import Branch
 from fastslow.results.points import Equilibrium
 from fastslow.results.windows import LEFT, StateWindow
+
+Array = NDArray[np.float64]
 
 #: For each state, whether its lower and its upper bound are meant.
 Sides = tuple[tuple[bool, bool], ...]
@@ -51,19 +54,26 @@ def known(field: FrozenField, points: Sequence[Equilibrium]) -> np.ndarray:
     return np.reshape(found, (-1, field.n)).astype(bool)
 
 
+def size_of(field: FrozenField, points: Sequence[Equilibrium]) -> Array:
+    """Unit of each state by some equilibria, shape (n,)."""
+    name = field.parameter
+    return field.sizes(
+        [(field.regions.index(e.region), np.append(e.state, e.parameters[name])) for e in points]
+    )
+
+
 def within(
     field: FrozenField, window: StateWindow, points: Sequence[Equilibrium]
 ) -> list[Equilibrium]:
     """Those equilibria that lie in a window.
 
     What is off an edge by rounding lies on it; it is judged by the size of the
-    state among these equilibria, by one where all are zero.
+    state among these equilibria, by its natural unit where all are zero.
     """
     if not window.chosen:
         return list(points)
     states = np.reshape([e.state for e in points], (-1, field.n))
-    size = np.where(known(field, points), np.abs(states), 0.0).max(axis=0, initial=0.0)
-    inside = window.contains(window.shifted(states), np.where(size > 0, size, 1.0))
+    inside = window.contains(window.shifted(states), size_of(field, points))
     return [e for e, kept in zip(points, inside, strict=True) if kept]
 
 
