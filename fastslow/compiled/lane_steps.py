@@ -61,8 +61,8 @@ NOT_TAKEN, TAKEN, REPORTED = 0.0, 1.0, 2.0
 #: instructions are that many, and take half a minute per 100,000 to compile.
 _LARGEST = 50_000
 
-#: Smallest coefficient that limits a step.
-_SMALLEST = 1e-250
+#: Smallest coefficient that limits a step, in units of its row's size, and the largest.
+_SMALLEST, _LARGEST_TERM = 1e-250, 1e250
 
 
 @dataclass(frozen=True)
@@ -75,10 +75,11 @@ class CompiledSteps:
         Of ``void(int64 region, double* lanes, double* parameters, double* W)``. It
         takes steps until one of them is not `TAKEN` in every lane. The arrays
         hold `WIDTH` numbers for each row: ``lanes`` time, states, the rows
-        that are named above and the smallest and largest values of every
-        state; ``parameters`` those of the series and the binary logarithm of
-        the tolerance; ``W`` is filled with the coefficients of states and slow
-        quantities where a step is `REPORTED`.
+        that are named above, the smallest and largest values of every
+        state, and the sizes that the run has reached; ``parameters`` those of the
+        series, the binary logarithm of the tolerance and the rules of sizes; ``W`` is
+        filled with the coefficients of states and slow quantities where a step is
+        `REPORTED`.
     regions : int
         How many, the first modes of the series; none for a model that is too large.
     """
@@ -193,16 +194,21 @@ def _step(
         return trace.load(lanes, 1 + n + row)
 
     inputs = [trace.load(lanes, i) for i in range(1 + n)]
-    given = [trace.load(parameters, i, steady=True) for i in range(n_parameters + 1)]
-    rows = _series(trace, region, inputs, given, kept + len(signs), order)
+    count = kept + len(signs)
+    given = [trace.load(parameters, i, steady=True) for i in range(n_parameters + 1 + 2 * count)]
+    tolerance, rules = given[n_parameters], given[n_parameters + 1 :]
+    rows = _series(trace, region, inputs, given, count, order)
+    reached = [number(ROWS + 2 * n + i) for i in range(count)]
+    scales = [_larger(abs(row[0]), size) for row, size in zip(rows, reached, strict=True)]
     t, late, usual, allowed = inputs[0], number(LATE), number(USUAL), number(ALLOWED)
     calm = number(CALM) - 1.0
-    longest = _length(rows, given[-1], order)
+    longest, known = _length(rows, scales, tolerance, order)
     # as in the loop of one trajectory, a step between two times that are exact
     h = added(added(t + longest) - t)
     after = added(t + h)
     taken = (longest < added(number(LIMIT) - t) - late) & (h > 0.0) & (h <= 2.0 * usual)
-    taken &= (allowed >= 1.0) & ~((calm <= 0.0) & _settled(rows, longest, given[-1], order))
+    taken &= (allowed >= 1.0) & known
+    taken &= ~((calm <= 0.0) & _settled(rows, scales, longest, tolerance, order))
     state = [polynomial(row, h) for row in rows[:n]]
     for value in (*state, *(row[k] for row in rows[n:kept] for k in (0, order))):
         taken &= value - value <= 0.0
@@ -229,6 +235,9 @@ def _step(
     }
     for place, result in results.items():
         trace.store(result, lanes, 1 + n + place)
+    for i, size in enumerate(scales):
+        left = _larger(rules[i], added(rules[count + i] * size))
+        trace.store(taken.choose(left, reached[i]), lanes, 1 + n + ROWS + 2 * n + i)
     _branch(trace, taken, plain, blocks, lambda: _report(trace, rows[:kept], W))
 
 
@@ -247,10 +256,21 @@ def _series(
     return [[trace.lanes(W[i * columns + k]) for k in range(columns)] for i in range(count)]
 
 
-def _length(rows: Sequence[Sequence[Lanes]], tolerance: Lanes, order: int) -> Lanes:
-    """The step whose last three terms are within the tolerance, as `step_length` has it."""
-    scales = [1.0 / (1.0 + abs(row[0])) for row in rows]
+def _larger(a: Lanes, b: Lanes) -> Lanes:
+    return (a > b).choose(a, b)
+
+
+def _length(
+    rows: Sequence[Sequence[Lanes]], sizes: Sequence[Lanes], tolerance: Lanes, order: int
+) -> tuple[Lanes, Mask]:
+    """The step whose last three terms are within the tolerance, as `step_length` has it.
+
+    And whether every row that moves has a size. One that is and stays zero has
+    none, and counts for nothing: 0/0 is no number, which no comparison lets through.
+    """
+    scales = [1.0 / size for size in sizes]
     shortest: Lanes | None = None
+    known: Mask | None = None
     for k in (order, order - 1, order - 2):
         largest = tolerance.trace.lanes(_SMALLEST)
         for row, scale in zip(rows, scales, strict=True):
@@ -258,11 +278,19 @@ def _length(rows: Sequence[Sequence[Lanes]], tolerance: Lanes, order: int) -> La
             largest = (size > largest).choose(size, largest)
         length = added((tolerance - log2(largest)) * (1.0 / k))
         shortest = length if shortest is None else (length < shortest).choose(length, shortest)
+        known = largest < _LARGEST_TERM if known is None else known & (largest < _LARGEST_TERM)
     assert shortest is not None
-    return exp2(shortest)
+    assert known is not None
+    return exp2(shortest), known
 
 
-def _settled(rows: Sequence[Sequence[Lanes]], h: Lanes, tolerance: Lanes, order: int) -> Mask:
+def _settled(
+    rows: Sequence[Sequence[Lanes]],
+    sizes: Sequence[Lanes],
+    h: Lanes,
+    tolerance: Lanes,
+    order: int,
+) -> Mask:
     """Whether stability and not accuracy limits a step, as `settled` has it."""
     k = order // 2
     before = h
@@ -270,8 +298,8 @@ def _settled(rows: Sequence[Sequence[Lanes]], h: Lanes, tolerance: Lanes, order:
         before = added(before * h)
     most = exp2(added(tolerance + 0.5 * order / math.log(2.0)))
     calm = h > 0.0
-    for row in rows:
-        allowed = added(most * added(1.0 + abs(row[0])))
+    for row, size in zip(rows, sizes, strict=True):
+        allowed = added(most * size)
         calm &= added(abs(row[k - 1]) * before) <= allowed
         calm &= added(abs(row[k]) * added(before * h)) <= allowed
     return calm

@@ -5,12 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fastslow.arguments import finite, formula, instance, mapping, takes
+from fastslow.arguments import finite, formula, instance, mapping, positive, takes
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.passage.boundary_delays import boundary_delay, gap_transit
+from fastslow.passage.branch_exits import branch_exit
 from fastslow.passage.fold_delays import fold_delay
-from fastslow.results.delays import BoundaryDelay, FoldDelay, GapTransit
+from fastslow.passage.hopf_delays import hopf_exit
+from fastslow.results.delays import (
+    BoundaryDelay,
+    BranchPointExit,
+    FoldDelay,
+    GapTransit,
+    HopfExit,
+)
+from fastslow.results.diagrams import Diagram
 from fastslow.results.point_types import POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint
 
@@ -21,6 +30,9 @@ from fastslow.results.points import SpecialPoint
     level=mapping,
     parameter=formula,
     model=instance(Model),
+    diagram=instance(Diagram),
+    entry=finite,
+    gain=positive,
 )
 def predict_delay(
     point: SpecialPoint,
@@ -29,18 +41,24 @@ def predict_delay(
     level: Mapping[Any, float] | None = None,
     parameter: object = None,
     model: Model | None = None,
-) -> FoldDelay | BoundaryDelay | GapTransit:
+    diagram: Diagram | None = None,
+    entry: float | None = None,
+    gain: float = 1.0,
+) -> FoldDelay | BoundaryDelay | GapTransit | HopfExit | BranchPointExit:
     """How far past a special point a drifting parameter is when the trajectory changes sheet.
 
     At a fold see `fold_delay`, at a boundary equilibrium with persistence or a
     non-smooth fold `boundary_delay`, at the end of a continuum `gap_transit`. At a
-    Hopf point the delay depends on where the trajectory came to the sheet: see
-    `hopf_exit`.
+    Hopf point, and at a branch point where an invariant branch is left, the delay
+    depends on where the trajectory came to the branch: ``diagram`` and ``entry`` are
+    needed, and the integral of the eigenvalue from the entry to the exit is zero
+    (see `hopf_exit`). At other branch points, where the branch moves with the
+    parameter, the passage is algebraic and no such law is offered.
 
     Parameters
     ----------
     point : SpecialPoint
-        Code LP or BE.
+        Code LP, BE, HB or BP.
     rate : float
         Of the parameter, with its sign.
     level : mapping, optional
@@ -49,10 +67,16 @@ def predict_delay(
         What drifts, by default the parameter of the point's diagram.
     model : Model, optional
         For a point that was read from a file: its model.
+    diagram : Diagram, optional
+        At HB and BP: with the branch on both sides of the point.
+    entry : float, optional
+        At HB and BP: the parameter where the trajectory comes to the branch.
+    gain : float
+        At HB and BP: distance from the branch at the exit by that at the entry.
 
     Returns
     -------
-    FoldDelay, BoundaryDelay or GapTransit
+    FoldDelay, BoundaryDelay, GapTransit, HopfExit or BranchPointExit
 
     Raises
     ------
@@ -69,14 +93,32 @@ def predict_delay(
     """
     known = POINT_TYPES.get(point.code)
     law = known.law if known else ""
+    if law in ("fold", "boundary") and not (diagram is None and entry is None):
+        raise ArgumentError(
+            "diagram= and entry= go with a Hopf (HB) or branch point (BP); the delay past "
+            f"{point.label} does not depend on the entry"
+        )
     if law == "fold":
         return fold_delay(point, rate, level=level, parameter=parameter, model=model)
     if law == "boundary" and point.subtype == "degenerate":
         return gap_transit(point, rate, parameter=parameter, model=model)
     if law == "boundary":
         return boundary_delay(point, rate, level=level, parameter=parameter, model=model)
-    hint = "; at a Hopf point see hopf_exit" if law == "entry-exit" else ""
+    if law == "entry-exit":
+        if diagram is None or entry is None:
+            raise ArgumentError(
+                f"the exit past {point.label}, a {point_name(point.code)}, depends on where the "
+                "trajectory came to the branch; give diagram= and entry="
+            )
+        if level is not None:
+            raise ArgumentError(
+                f"level= goes with a fold (LP) or boundary equilibrium (BE), not {point.label}; "
+                "the distance at the exit is gain="
+            )
+        if point.code == "HB":
+            return hopf_exit(diagram, point, entry, rate, gain=gain)
+        return branch_exit(diagram, point, entry, rate, gain=gain, model=model)
     raise ArgumentError(
-        f"expected a fold (LP) or a boundary equilibrium (BE), received {point.label}, a "
-        f"{point_name(point.code)}{hint}"
+        "expected a fold (LP), a boundary equilibrium (BE), a Hopf (HB) or branch point (BP), "
+        f"received {point.label}, a {point_name(point.code)}"
     )

@@ -97,22 +97,19 @@ def hopf_exit(
     require_code(point, "HB", "the exit after a Hopf point")
     speed = drift(rate)
     name = diagram.parameter
-    branch, row = _place(diagram, point)
+    branch, row = next(places(diagram, point))
     here, way = point[name], 1 if speed > 0 else -1
-    before = _Sheet(diagram, branch, row, -way)
-    behind = _Sheet(diagram, branch, row, way)
+    values = branch.eigenvalues[row]
+    turning = values[values.imag > 0]
+    pair = complex(turning[np.argmin(np.abs(turning.real))])
+    before = Sheet(diagram, branch, row, -way, pair)
+    behind = Sheet(diagram, branch, row, way, pair)
     if before.first_growth() > 0:
         raise WrongWay(
             f"rate = {speed:g}: the sheet before {point.label} is not stable in this direction; "
             f"expected rate {'<' if speed > 0 else '>'} 0"
         )
-    reached = before.ends[-1] if len(before.ends) else here
-    low, high = sorted((reached, here))
-    if not low <= entry <= high or entry == here:
-        raise ArgumentError(
-            f"entry = {entry:g}; expected a value of {name} on the sheet before {point.label}, "
-            f"from {reached:g} to {here:g}"
-        )
+    require_entry(before, point, entry)
     decay = -before.integral(entry) / abs(speed)
     exit_at = behind.where(abs(speed) * (decay + math.log(gain)))
     words = "the exit at the amplitude of the entry, the buffer point left aside"
@@ -134,32 +131,53 @@ def hopf_exit(
         entry=float(entry),
         decay=decay,
         gain=float(gain),
+        forgotten=decay > MEMORY,
     )
 
 
-def _place(diagram: Diagram, point: SpecialPoint) -> tuple[Branch, int]:
-    """The branch and row of a special point of a diagram."""
+def require_entry(before: Sheet, point: SpecialPoint, entry: float) -> None:
+    """Raise unless an entry is on the sheet before a point."""
+    name = before.diagram.parameter
+    here = point[name]
+    reached = before.ends[-1] if len(before.ends) else here
+    low, high = sorted((reached, here))
+    if not low <= entry <= high or entry == here:
+        raise ArgumentError(
+            f"entry = {entry:g}; expected a value of {name} on the sheet before {point.label}, "
+            f"from {reached:g} to {here:g}"
+        )
+
+
+def places(diagram: Diagram, point: SpecialPoint) -> Iterator[tuple[Branch, int]]:
+    """The branches of a diagram through a special point, each with its row."""
+    found = False
     for branch in diagram.branches:
         for other, row in zip(branch.special, branch.special_rows, strict=True):
             alike = (other.code, other.states) == (point.code, point.states)
             if alike and diagram.parameters.items() <= point.parameters.items():
                 apart = [other[n] - point[n] for n in (*other.states, diagram.parameter)]
                 if np.abs(apart).max() <= 1e-9 * (1.0 + np.abs(point.state).max()):
-                    return branch, row
-    raise ArgumentError(f"{point.label} is not a point of this diagram over {diagram.parameter}")
+                    found = True
+                    yield branch, row
+    if not found:
+        raise ArgumentError(
+            f"{point.label} is not a point of this diagram over {diagram.parameter}"
+        )
 
 
 @dataclass(eq=False)
-class _Sheet:
-    """One side of a Hopf point, as far as the parameter goes on in one direction.
+class Sheet:
+    """One side of a special point, as far as the parameter goes on in one direction.
 
-    ``way`` is +1 where the parameter rises along it.
+    ``way`` is +1 where the parameter rises along it, ``critical`` the eigenvalue at the
+    point that is followed along the branch.
     """
 
     diagram: Diagram
     branch: Branch
     row: int
     way: int
+    critical: complex
     rows: list[int] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -197,7 +215,7 @@ class _Sheet:
 
     def integral(self, end: float) -> float:
         """∫ Re λ |dp| from the point to a value on the sheet."""
-        total, pair = 0.0, self._pair()
+        total, pair = 0.0, self.critical
         for row, start, stop in self._steps():
             last = self.way * (end - stop) <= 0
             part, pair = self._over(row, start, end if last else stop, pair)
@@ -210,7 +228,7 @@ class _Sheet:
         """The value at which the integral from the point reaches a target, nan if none does."""
         from scipy.optimize import brentq
 
-        total, pair = 0.0, self._pair()
+        total, pair = 0.0, self.critical
         if target <= 0:
             return math.nan
         for row, start, stop in self._steps():
@@ -223,11 +241,6 @@ class _Sheet:
 
     def _missing(self, row: int, start: float, pair: complex, target: float, end: float) -> float:
         return self._over(row, start, end, pair)[0] - target
-
-    def _pair(self) -> complex:
-        values = self.branch.eigenvalues[self.row]
-        turning = values[values.imag > 0]
-        return complex(turning[np.argmin(np.abs(turning.real))])
 
     def _over(self, row: int, start: float, end: float, pair: complex) -> tuple[float, complex]:
         """∫ Re λ |dp| within one step of the branch, and the eigenvalue at its last node."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from fastslow.errors import ArgumentError
 from fastslow.passage.delay_laws import predict_delay
 from fastslow.passage.hopf_delays import hopf_exit
 from fastslow.passage.transitions import Passage
-from fastslow.results.delays import Delay
+from fastslow.results.delays import Delay, HopfExit
 from fastslow.results.points import SpecialPoint
 from fastslow.results.transitions import Transition
 
@@ -47,11 +48,23 @@ def _law(
 ) -> Delay | None:
     try:
         if isinstance(where, float):
-            return hopf_exit(p.diagram, point, where, rate)
+            return _as_integrated(p, hopf_exit(p.diagram, point, where, rate))
         return predict_delay(point, rate, level=where)
     except ArgumentError:
         # a law that does not hold there, or a diagram without its model
         return None
+
+
+def _as_integrated(p: Passage, law: HopfExit) -> HopfExit:
+    """The law, which says so where the tolerance of the run forgets the entry."""
+    rtol = float(p.slow.run.settings.get("rtol", 0.0))
+    if law.forgotten or not rtol > 0.0 or law.decay <= -math.log(rtol):
+        return law
+    words = (
+        f"the tolerance decides: the amplitude falls by exp(−{law.decay:.0f}), below rtol = "
+        f"{rtol:g} of the run, and the exit comes at another place than this"
+    )
+    return replace(law, validity=words, forgotten=True)
 
 
 def _rounded(where: float | dict[str, float] | None) -> str:

@@ -31,7 +31,7 @@ from fastslow.results.delay_scalings import DelayScaling
 from fastslow.results.delays import BoundaryDelay, FoldDelay, GapTransit
 from fastslow.results.diagrams import Diagram
 from fastslow.results.outcome import Outcome
-from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.point_types import POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint
 from fastslow.results.sections import Section
 from fastslow.results.trajectories import Trajectory
@@ -153,9 +153,16 @@ def _speeds(rates: ArrayLike) -> Array:
 
 
 def _law(site: Site, rate: float, level: Mapping[Any, float] | None) -> Law:
-    return predict_delay(
+    if POINT_TYPES[site.point.code].law == "entry-exit":
+        raise ArgumentError(
+            f"expected a fold (LP) or a boundary equilibrium (BE), received {site.point.label}, a "
+            f"{point_name(site.point.code)}, whose exit depends on the entry: see predict_delay"
+        )
+    law = predict_delay(
         site.point, rate, level=level, parameter=site.field.parameter, model=site.field.model
     )
+    assert isinstance(law, FoldDelay | BoundaryDelay | GapTransit)
+    return law
 
 
 def _direction(site: Site, eps: float, level: Mapping[Any, float] | None) -> tuple[int, Law]:

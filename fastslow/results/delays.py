@@ -184,12 +184,44 @@ class HopfExit(Delay):
         falls to exp(−decay).
     gain : float
         Amplitude at the exit by amplitude at the entry.
+    forgotten : bool
+        Whether the decay is below what is remembered, so that rounding, noise or the
+        tolerance decides the exit.
     """
 
     entry: float
     decay: float
     gain: float = 1.0
+    forgotten: bool = False
 
     @property
     def law(self) -> str:
         return f"entry at {self.entry:.6g} and exit of a Hopf point, ∫ Re λ = 0"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class BranchPointExit(Delay):
+    """Delayed loss of stability of an invariant branch: where growth has made up for the decay.
+
+    Parameters
+    ----------
+    entry : float
+        The parameter where the trajectory comes to the branch.
+    decay : float
+        ∫ |λ| dp / |rate| from the entry to the branch point: the distance from the
+        branch falls to exp(−decay).
+    gain : float
+        Distance at the exit by distance at the entry.
+    forgotten : bool
+        Whether the decay is below what is remembered, so that rounding, noise or the
+        tolerance decides the exit.
+    """
+
+    entry: float
+    decay: float
+    gain: float = 1.0
+    forgotten: bool = False
+
+    @property
+    def law(self) -> str:
+        return f"entry at {self.entry:.6g} and exit of an invariant branch, ∫ λ = 0"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import among, position, takes, text
 from fastslow.results import overlay_queries
 from fastslow.results.crossings import regions_at
+from fastslow.results.delays import BranchPointExit, HopfExit
 from fastslow.results.diagrams import Diagram
 from fastslow.results.formulas import evaluated
 from fastslow.results.moments import Moment, in_blocks, sample
@@ -339,6 +340,12 @@ class Overlay(Table, Result):
         yield from (f"  {t.describe(name)}" for t in self.transitions[:SHOWN])
         if count > SHOWN:
             yield f"  and {count - SHOWN} more, in transitions"
+        lost = {
+            f"  {t.law.point.label}: {t.law.validity}": None
+            for t in self.transitions
+            if isinstance(t.law, HopfExit | BranchPointExit) and t.law.forgotten
+        }
+        yield from lost
 
     def _behind(self, label: str) -> str:
         """How far the motion is behind a sheet, in words."""

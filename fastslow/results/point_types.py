@@ -130,6 +130,7 @@ _ALL = (
         codimension=1,
         event="zero",
         unstable=1,
+        law="entry-exit",
         curves=("BP",),
         auto=(1,),
         marker="D",

@@ -29,6 +29,7 @@ from fastslow.simulation.lobatto import (
     F,
 )
 from fastslow.simulation.polynomials import EPSILON
+from fastslow.simulation.scales import NOW
 
 #: Most iterations of one attempt, and most attempts for one step.
 ITERATIONS, ATTEMPTS = 40, 100
@@ -44,7 +45,7 @@ def memory_size(n_states: int, order: int) -> int:
 
 
 @part
-def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
+def collocate(address, layout, mode, inputs, parameters, tol, scales, room, W, memory):
     """Replace the values and rates in ``W`` by collocation polynomials; see `modes.expand`."""
     n_states, n_forcing, n_interfaces, _, order = layout
     columns = order + 1
@@ -63,7 +64,8 @@ def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
     for i in range(n_rates):
         row = columns * (i if i < n_states else i + n_forcing)
         start[i], rates[i, 0] = W[row], W[row + 1]
-        scale[i] = 1.0 / (1.0 + abs(W[row]))
+        size = scales[NOW, i if i < n_states else i + n_forcing]
+        scale[i] = 1.0 / size if size > 0.0 else 0.0
         finite += 0.0 * (W[row] + W[row + 1])
     for k in range(n_forcing):
         finite += 0.0 * W[(n_states + k) * columns]
@@ -73,7 +75,12 @@ def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
     if memory.shape[0] > 0 and memory[1] > 0.0:
         h = min(room, memory[1])
     else:
-        h = min(room, first_length(address, layout, mode, inputs, parameters, tol, W, point, out))
+        h = min(
+            room,
+            first_length(
+                address, layout, mode, inputs, parameters, tol, scale, room, W, point, out
+            ),
+        )
     done = False
     for _ in range(ATTEMPTS):
         if inputs[0] + h == inputs[0]:
@@ -85,6 +92,16 @@ def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
         if taken == 0:
             h *= 0.4
             continue
+        # a state that begins at zero, and has reached nothing yet, is measured by its change
+        for i in range(n_rates):
+            if scales[NOW, i if i < n_states else i + n_forcing] == 0.0:
+                change = 0.0
+                for j in range(1, n):
+                    total = 0.0
+                    for k in range(n):
+                        total += TO_C[table, j, k] * rates[i, k]
+                    change = max(change, abs(h * total))
+                scale[i] = 1.0 / change if change > 0.0 else 0.0
         error = check(
             address,
             layout,
@@ -97,6 +114,7 @@ def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
             rates,
             defect,
             values,
+            scales,
             point,
             out,
         )
@@ -141,14 +159,14 @@ def collocate(address, layout, mode, inputs, parameters, tol, room, W, memory):
 
 
 @part
-def first_length(address, layout, mode, inputs, parameters, tol, W, point, out):
+def first_length(address, layout, mode, inputs, parameters, tol, scale, room, W, point, out):
     """A length to try first, from the rates and how they change (Hairer et al. 1993, II.4)."""
     n_states, order = layout[0], layout[4]
     columns = order + 1
     rate = 0.0
     for i in range(n_states):
-        rate = max(rate, abs(W[i * columns + 1]) / (1.0 + abs(W[i * columns])))
-    short = 1e-3 / rate if rate > 0.0 else 1e-3
+        rate = max(rate, abs(W[i * columns + 1]) * scale[i])
+    short = min(1e-3 / rate, room) if rate > 0.0 else 1e-3 * room
     point[0] = inputs[0] + short
     for i in range(n_states):
         point[1 + i] = inputs[1 + i] + short * W[i * columns + 1]
@@ -156,11 +174,11 @@ def first_length(address, layout, mode, inputs, parameters, tol, W, point, out):
     change = 0.0
     for i in range(n_states):
         difference = abs(out[i * columns + 1] - W[i * columns + 1]) / short
-        change = max(change, difference / (1.0 + abs(W[i * columns])))
+        change = max(change, (difference * scale[i]) ** 0.5)
     most = max(rate, change)
     length = 100.0 * short
     if most > 0.0:
-        length = min(length, (tol / most) ** (1.0 / (min(order, HIGHEST) + 1)))
+        length = min(length, tol ** (1.0 / (min(order, HIGHEST) + 1)) / most)
     return length if length > 0.0 else short
 
 
@@ -243,6 +261,7 @@ def check(
     rates,
     defect,
     values,
+    scales,
     point,
     out,
 ):
@@ -252,7 +271,7 @@ def check(
     -------
     float
         The largest integral of the difference between the rates and the derivatives of
-        the polynomials, relative to 1 + |y|, not finite where the rates are not.
+        the polynomials, relative to the sizes of the rows, not finite where the rates are not.
     """
     n_states, n_forcing, n_interfaces, _, order = layout
     columns, n = order + 1, rates.shape[1]
@@ -294,7 +313,9 @@ def check(
         # slow quantities depend on time alone: the states at that place play no part
         between = newton(values[k], F[table], n + 1, WORST[table])
         difference = abs(between - values[k, n + 1])
-        error = max(error, difference / (1.0 + abs(values[k, 0])))
+        size = max(scales[NOW, n_states + k], abs(values[k, n // 2]))
+        if size > 0.0:
+            error = max(error, difference / size)
     return error if finite == 0.0 else np.nan
 
 
@@ -342,6 +363,7 @@ def step_by_collocation(
     inputs,
     parameters,
     tol,
+    scales,
     room,
     W,
     size,
@@ -356,6 +378,7 @@ def step_by_collocation(
         carray(inputs, 1 + n_states + n_forcing),
         carray(parameters, 1),
         tol,
+        carray(scales, (2, n_states + n_forcing + n_interfaces)),
         room,
         carray(W, size),
         carray(memory, carried),
@@ -366,7 +389,9 @@ def step_by_collocation(
 SIGNATURE = types.float64(
     *[types.int64] * 7,
     *[DOUBLES] * 2,
-    *[types.float64] * 2,
+    types.float64,
+    DOUBLES,
+    types.float64,
     *[DOUBLES, types.int64] * 2,
 )
 
@@ -379,6 +404,7 @@ late_collocation = late_function(
     (
         "fastslow.simulation.lobatto",
         "fastslow.simulation.polynomials",
+        "fastslow.simulation.scales",
         "fastslow.compiled.parts",
         "fastslow.compiled.pointers",
         "fastslow.compiled.series",

@@ -36,9 +36,18 @@ from fastslow.simulation.rooms import (
     MODE,
     PAUSE,
     SAMPLES,
+    SIZES,
     STEPS,
     USUAL,
     grown,
+)
+from fastslow.simulation.scales import (
+    REACHED,
+    SUDDEN,
+    flush,
+    raise_sizes,
+    remember_sizes,
+    step_length,
 )
 
 #: How the loop ended.
@@ -71,6 +80,7 @@ def drive(
     parameters,
     span,
     tol,
+    rules,
     times,
     samples,
     since,
@@ -105,6 +115,8 @@ def drive(
     span : tuple of float
         Start and end of time.
     tol : float
+    rules : float64 array, shape (2, n_states + n_forcing + n_interfaces)
+        From `rules_of`: in what sizes errors are measured.
     times : float64 array
         Increasing times of the samples, within the span.
     samples : float64 array, shape (n_rows, n_times)
@@ -127,8 +139,8 @@ def drive(
         From `room_for`.
     inputs : float64 array, shape (1 + n_states + n_forcing,)
         Time and state, changed here.
-    carried : float64 array, shape (3,)
-    counted : int64 array, shape (5,)
+    carried : float64 array, shape (3 + n_states + n_forcing + n_interfaces,)
+    counted : int64 array, shape (7,)
         What is carried from step to step, at first that of `beginnings`; changed here.
     handed : int
         After a plain step in one of so many first modes the run is handed over.
@@ -151,8 +163,11 @@ def drive(
     t, late, stop = inputs[0], carried[LATE], span[1]
     whole = stop - span[0]
     work, W, b, d, stack, gradient, noise, on, hit, rests, side, offsets = room[:12]
-    right, poly, matrices, vectors, memory = room[12:]
+    right, poly, matrices, vectors, memory, scales = room[12:]
     memory[:] = 0.0
+    n_rows = kept + n_interfaces
+    for i in range(n_rows):
+        scales[REACHED, i] = carried[SIZES + i]
     n_fast = sizes[2]
     for j in range(n_interfaces):
         on[j] = hit[j] = rests[j] = False
@@ -167,7 +182,7 @@ def drive(
     calm, pause, in_a_row = counted[CALM], counted[PAUSE], ZERO
     wanted = longest = 0.0
     code = REACHED_END
-    choosing, touched, ahead = mode < 0, False, False
+    choosing, touched, ahead, fresh = mode < 0, False, False, mode < 0
     while True:
         if choosing:
             # most often one interface is crossed where the rates are continuous
@@ -188,7 +203,7 @@ def drive(
                 mode != before
                 and others == 0
                 and continuous[interface]
-                and leaves(W, layout, interface, signs[mode, interface], tol, whole, noise)
+                and leaves(W, layout, interface, signs[mode, interface], tol, scales, whole, noise)
             )
             if not ahead:
                 mode = choose_mode(
@@ -199,6 +214,7 @@ def drive(
                     inputs,
                     parameters,
                     tol,
+                    scales,
                     whole,
                     on,
                     side,
@@ -237,6 +253,7 @@ def drive(
                 code = TOO_MANY_CROSSINGS
                 break
             choosing = touched = False
+            fresh = True
             calm = pause = ZERO + WAIT
             in_a_row = ZERO
         remaining = (stop - t) - late
@@ -250,9 +267,14 @@ def drive(
             W, right = right, W
         else:
             longest = expand(
-                address, layout, mode, inputs, parameters, tol, remaining, W, memory, ahead
+                address, layout, mode, inputs, parameters, tol, scales, remaining, W, memory, ahead
             )
             ahead = False
+            if fresh and longest < SUDDEN * (usual if usual > 0.0 else remaining):
+                raise_sizes(W, n_rows, order, tol, remaining, rules, scales)
+                if memory[0] == 0.0:
+                    longest = step_length(W, n_rows, order, tol, scales)
+            fresh = False
             if not longest > 0.0:
                 code = NOT_FINITE
                 break
@@ -260,7 +282,7 @@ def drive(
         for i in range(n_states, kept):
             inputs[1 + i] = W[i * columns]
         calm -= 1
-        if n_fast > 0 and calm <= 0 and (in_a_row > 0 or settled(W, layout, longest, tol)):
+        if n_fast > 0 and calm <= 0 and (in_a_row > 0 or settled(W, layout, longest, tol, scales)):
             if in_a_row == 0:
                 wanted = 1.25 * longest
             taken, growth = long_step(
@@ -272,6 +294,7 @@ def drive(
                 inputs,
                 parameters,
                 tol,
+                scales,
                 wanted,
                 (1.1 if in_a_row < DAMPING else PAYS) * longest,
                 longest,
@@ -297,7 +320,17 @@ def drive(
             else:
                 if in_a_row > 0:
                     longest = expand(
-                        address, layout, mode, inputs, parameters, tol, remaining, W, memory, False
+                        address,
+                        layout,
+                        mode,
+                        inputs,
+                        parameters,
+                        tol,
+                        scales,
+                        remaining,
+                        W,
+                        memory,
+                        False,
                     )
                 pause = min(2 * pause, LONGEST_WAIT)
                 calm, in_a_row = pause, ZERO
@@ -331,7 +364,7 @@ def drive(
                 if (
                     h == 0.0
                     or not doubtful
-                    or holds(address, layout, mode, inputs, parameters, W, taken, tol, work)
+                    or holds(address, layout, mode, inputs, parameters, W, taken, tol, scales, work)
                 ):
                     break
                 h, final = (t + 0.25 * taken) - t, False
@@ -350,6 +383,7 @@ def drive(
         else:
             t = begin + h
         if taken > 0.0:
+            remember_sizes(rules, scales)
             if listing:
                 if n_steps == steps.shape[0]:
                     steps = grown(steps)
@@ -377,6 +411,7 @@ def drive(
                 sample(W, columns, samples.shape[0], offsets[first:n_samples], samples, first)
             for i in range(kept):
                 inputs[1 + i] = horner(W, i * columns, i * columns + order, taken)
+            flush(rules, inputs, n_states)
         inputs[0] = t
         for j in range(n_interfaces):
             hit[j] = signs[mode, j] == 0
@@ -396,6 +431,8 @@ def drive(
             code = HANDED_OVER
             break
     carried[LATE], carried[USUAL], carried[LAST_EVENT] = late, usual, last_event
+    for i in range(n_rows):
+        carried[SIZES + i] = scales[REACHED, i]
     counted[STEPS], counted[CROSSINGS] = n_steps, n_crossings
     counted[SAMPLES], counted[CROWDED], counted[MODE] = n_samples, crowd, mode
     counted[CALM], counted[PAUSE] = calm, pause

@@ -35,6 +35,7 @@ from fastslow.simulation.settings import (
 )
 from fastslow.simulation.trajectories import (
     SOURCES,
+    error_rules,
     gap_of,
     layout_of,
     once_a_model,
@@ -55,6 +56,7 @@ _ARGUMENTS = (
     "signs",
     "continuous",
     "tol",
+    "rules",
     "limits",
     "parameters",
     "spans",
@@ -171,7 +173,7 @@ def simulate_many(
     """
     starts, swept = starts_and_parameters(model, states, parameters)
     count = len(starts)
-    resolved = resolve(integration, implicit=False)
+    resolved = resolve(integration, model, implicit=False)
     threads = threads_of(threads)
     own = periods_of(model, period, count, swept)
     spans, since = spans_of(t, periods, start, settle, own)
@@ -198,6 +200,7 @@ def simulate_many(
                 compiled,
                 lanes,
                 resolved,
+                error_rules(one, resolved, compiled),
                 threads,
                 sizes_of(model, compiled, resolved.implicit),
                 (values, starts[chosen], spans[chosen], since[chosen]),
@@ -257,6 +260,7 @@ def _run(
     compiled: CompiledSeries,
     lanes: CompiledSteps,
     resolved: Resolved,
+    rules: Floats,
     threads: int,
     sizes: tuple[int, int, int],
     rows: tuple[Floats, Floats, Floats, Floats],
@@ -273,7 +277,7 @@ def _run(
     )
     hits = np.zeros((count, compiled.n_interfaces, 2), dtype=np.int64)
     seen = np.full((count, len(compiled.modes)), -np.inf)
-    places, carried, whole = beginnings(spans[:, 0], starts, compiled.n_forcing)
+    places, carried, whole = beginnings(spans[:, 0], starts, compiled.n_forcing, rules)
     codes = np.empty(count, dtype=np.int64)
     samples = np.full((count, n_columns, times.shape[1]), np.nan)
     layout = layout_of(compiled)
@@ -289,6 +293,7 @@ def _run(
             compiled.signs,
             compiled.continuous,
             resolved.rtol,
+            rules,
             resolved.limits,
             values,
             spans,

@@ -23,7 +23,9 @@ from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
 from fastslow.compiled.series import SHORT
 from fastslow.simulation.events import find_event
-from fastslow.simulation.matrices import contracts, factorise_in_place, solve_in_place
+from fastslow.simulation.matrices import factorise_in_place, forgotten_in, solve_in_place
+from fastslow.simulation.polynomials import EPSILON
+from fastslow.simulation.scales import NOW, REACHED
 
 #: Taylor coefficients that are matched at the beginning and at the end of a step.
 P, Q = 2, SHORT
@@ -43,8 +45,19 @@ WAIT, LONGEST_WAIT = 4, 64
 #: What marks such a step in the table of a run's steps.
 IMPLICIT = 2
 
-#: How much at least all motions of the fast states decay within a step of the series.
+#: How much at least a motion of the fast states decays within a step of the series for an
+#: implicit one to forget it.
 CONTRACTION = 0.01
+
+#: How far at most a motion that does not decay so fast goes within an implicit step, |lambda| h:
+#: those are followed, and not damped.
+RESOLVED = 0.5
+
+#: Corrections this much smaller than what is allowed may be rounding, and are the last.
+ROUNDED = 1e-2
+
+#: Relative step of the differences that give the derivatives of the equation, and the least.
+DIFFERENCE, TINY = 1e-7, 1e-150
 
 
 def weights(q: int, p: int) -> tuple[float, ...]:
@@ -96,6 +109,7 @@ def long_step(
     inputs,
     parameters,
     tol,
+    scales,
     wanted,
     least,
     longest,
@@ -128,8 +142,10 @@ def long_step(
         filled: the short series at the end, and the polynomials of the step.
     work : float64 array
         As large; work space.
-    matrices : float64 array, shape (2, n_states, n_states + 1)
-    vectors : float64 array, shape (5, 1 + n_states + n_forcing or 1 + order, the larger)
+    scales : float64 array, shape (2, rows)
+        In which errors are measured, those now at the beginning.
+    matrices : float64 array, shape (2 + Q, n_states, n_states + 1)
+    vectors : float64 array, shape (6, 1 + n_states + n_forcing or 1 + order, the larger)
         Work space.
 
     Returns
@@ -156,6 +172,7 @@ def long_step(
             inputs,
             parameters,
             tol,
+            scales,
             CONTRACTION / longest,
             h,
             W,
@@ -170,7 +187,7 @@ def long_step(
                 stack, gradient,
             )  # fmt: skip
             if j < 0:
-                keep_forcing(address, layout, mode, inputs, parameters, tol, h, poly, work)
+                keep_forcing(address, layout, mode, inputs, parameters, tol, scales, h, poly, work)
                 return h, min(4.0, 0.8 * max(error, 1e-9) ** (-1.0 / (P + Q)))
             # the series goes through events; end a little before this one
             h *= 0.9 * s
@@ -180,7 +197,7 @@ def long_step(
 
 
 @part
-def settled(W, layout, h, tol):
+def settled(W, layout, h, tol, scales):
     """Whether a step is limited by stability: its middle terms are small beside what is allowed.
 
     A motion exp(lambda t) of size a has the terms a z**k / k!, z = lambda h. Where
@@ -191,10 +208,10 @@ def settled(W, layout, h, tol):
     most = tol * math.exp(0.5 * order)
     for i in range(layout[0] + layout[1] + layout[2]):
         row = i * (order + 1)
-        scale = 1.0 / (1.0 + abs(W[row]))
+        allowed = most * scales[NOW, i]
         k = order // 2
         for m in range(k - 1, k + 1):
-            if not abs(W[row + m]) * h**m * scale <= most:
+            if not abs(W[row + m]) * h**m <= allowed:
                 return False
     return True
 
@@ -208,6 +225,7 @@ def implicit_step(
     inputs,
     parameters,
     tol,
+    scales,
     rate,
     h,
     W,
@@ -225,7 +243,8 @@ def implicit_step(
     columns = order + 1
     short = n_modes + n_interfaces + mode
     slopes, jacobian = matrices[0], matrices[1]
-    ahead, start, residual, moved, rest = vectors
+    derivatives = matrices[2:]
+    ahead, start, residual, moved, rest, least = vectors
     ahead[0] = inputs[0] + h
     for i in range(n):
         row = i * columns
@@ -236,54 +255,95 @@ def implicit_step(
         residual[i] = matched(right, i * columns, -h, _RIGHT) - start[i]
     for k in range(n):
         kept = ahead[1 + k]
-        ahead[1 + k] = kept + 1e-7 * (1.0 + abs(kept))
+        ahead[1 + k] = kept + max(DIFFERENCE * max(scales[NOW, k], abs(kept)), TINY)
         step = ahead[1 + k] - kept
         call_address(address, short, ahead, parameters, poly)
         for i in range(n):
             row = i * columns
             slopes[i, k] = (matched(poly, row, -h, _RIGHT) - start[i] - residual[i]) / step
             jacobian[i, k] = (poly[row + 1] - right[row + 1]) / step
+            for j in range(Q):
+                derivatives[j, i, k] = (poly[row + 1 + j] - right[row + 1 + j]) / step
         ahead[1 + k] = kept
     # also says no where something is not finite
-    if not contracts(jacobian, n_fast, rate) or not factorise_in_place(slopes, n):
+    unresolved = forgotten_in(jacobian, n_fast, rate) * h
+    if unresolved > RESOLVED:
+        # as an error of this order, so that the next attempt is as short as it must be
+        return (unresolved / RESOLVED) ** (P + Q)
+    if not unresolved >= 0.0 or not factorise_in_place(slopes, n):
         return np.inf
+    # a state is known no better than rounding of the others lets it be
+    for i in range(n):
+        noise = 0.0
+        for k in range(n):
+            if k != i:
+                noise += abs(jacobian[i, k] * ahead[1 + k])
+        least[i] = 8.0 * EPSILON * (noise / max(abs(jacobian[i, i]), 1.0 / h) + abs(ahead[1 + i]))
     before = np.inf
     for turn in range(8):
         solve_in_place(slopes, residual, moved, n)
         size = 0.0
         for i in range(n):
             ahead[1 + i] -= moved[i]
-            size = max(size, abs(moved[i]) / (1.0 + abs(ahead[1 + i])))
+            allowed = allowed_of(tol, W[i * columns], ahead[1 + i], scales[REACHED, i], least[i])
+            size = max(size, ratio_of(moved[i], allowed))
         call_address(address, short, ahead, parameters, right)
-        if not size <= 0.5 * before or turn == 7:
-            return np.inf
-        # nothing is known of the rate of convergence before the second turn
-        ratio, before = size / before if turn > 0 else 0.1, size
-        if size * ratio <= max(1e-6 * tol, 1e-15) * (1.0 - ratio):
-            break
+        # rounding, magnified by the condition of the equation, is where it cannot go on
+        done = size <= ROUNDED
+        if not done:
+            if not size <= 0.5 * before or turn == 7:
+                return np.inf
+            # nothing is known of the rate of convergence before the second turn
+            ratio, before = size / before if turn > 0 else 0.1, size
+            done = size * ratio <= 1e-6 * (1.0 - ratio)
         for i in range(n):
             residual[i] = matched(right, i * columns, -h, _RIGHT) - start[i]
+        if done:
+            break
+    # what is left is mostly rounding of the states, which stiff rates magnify: the
+    # coefficients at the end are those of the state that solves the equation exactly
+    solve_in_place(slopes, residual, moved, n)
+    for i in range(n):
+        row = i * columns
+        for j in range(Q):
+            for k in range(n):
+                right[row + 1 + j] -= derivatives[j, i, k] * moved[k]
     for i in range(n):
         row = i * columns
         residual[i] = matched(right, row, -h, _LESS_RIGHT) - matched(W, row, h, _LESS_LEFT)
     solve_in_place(slopes, residual, moved, n)
     error = 0.0
     for i in range(n):
-        error = max(error, abs(moved[i]) / (1.0 + abs(ahead[1 + i])))
+        least[i] = allowed_of(tol, W[i * columns], ahead[1 + i], scales[REACHED, i], least[i])
+        error = max(error, ratio_of(moved[i], least[i]))
     for i in range(n + n_forcing + n_interfaces):
         row = i * columns
         join(W, right, row, h, poly, rest)
         # the first coefficient that is not matched tells how far the motion within leaves it
         power = h ** (P + 1)
         error_within = abs(W[row + P + 1] - poly[row + P + 1]) * power * _HUMP
-        error = max(error, error_within / (1.0 + abs(W[row])))
+        error = max(error, ratio_of(error_within, least[i] if i < n else tol * scales[NOW, i]))
         for k in range(P + Q + 2, columns):
             poly[row + k] = 0.0
-    return error / tol if error < np.inf else np.inf
+    return error if error < np.inf else np.inf
 
 
 @part
-def keep_forcing(address, layout, mode, inputs, parameters, tol, h, poly, work):
+def allowed_of(tol, before, after, reached, least):
+    """The error that is allowed in a state, by its smaller value at both ends of a step."""
+    return max(tol * max(reached, min(abs(after), abs(before))), least)
+
+
+@part
+def ratio_of(error, allowed):
+    """An error in units of what is allowed; nothing is allowed in what is and stays zero."""
+    if error == 0.0:
+        return 0.0
+    return abs(error) / allowed if allowed > 0.0 else np.inf
+
+
+@part
+def keep_forcing(address, layout, mode, inputs, parameters, tol, scales, h, poly, work):
     """Let the slow quantities keep their own series where it holds throughout a step.
 
     They do not depend on the states, so that only the states need be implicit.
@@ -292,9 +352,10 @@ def keep_forcing(address, layout, mode, inputs, parameters, tol, h, poly, work):
     if n_forcing == 0:
         return
     call_address(address, mode, inputs, parameters, work)
-    for row in range(n * (order + 1), (n + n_forcing) * (order + 1), order + 1):
+    for i in range(n, n + n_forcing):
+        row = i * (order + 1)
         left = max(abs(work[row + order]) * h, abs(work[row + order - 1])) * h ** (order - 1)
-        if left <= 1e-6 * tol * (1.0 + abs(work[row])):
+        if left <= 1e-6 * tol * scales[NOW, i]:
             for k in range(order + 1):
                 poly[row + k] = work[row + k]
 

@@ -19,7 +19,8 @@ from fastslow.compiled.pointers import call_address
 from fastslow.simulation.driver import HANDED_OVER, drive
 from fastslow.simulation.extremes import widen_extremes
 from fastslow.simulation.polynomials import ZERO, sample
-from fastslow.simulation.rooms import CALM, LATE, MODE, SAMPLES, STEPS, USUAL, room_for
+from fastslow.simulation.rooms import CALM, LATE, MODE, SAMPLES, SIZES, STEPS, USUAL, room_for
+from fastslow.simulation.scales import FIXED, LASTING
 
 # made where it is used: arguments on the stack are slow to hand on
 own_room = part(room_for)
@@ -32,11 +33,12 @@ def pool_for(
     layout: tuple[int, int, int, int, int], regions: int, n_values: int, count: int
 ) -> tuple[NDArray[Any], ...]:
     """Work space of `drive_many`: what is in the lanes, and who waits for what."""
-    n, n_forcing, _, _, order = layout
+    n, n_forcing, n_interfaces, _, order = layout
+    rows = n + n_forcing + n_interfaces
     under_way = min(UNDER_WAY, count)
     return (
-        np.zeros((1 + n + step.ROWS + 2 * n, WIDTH)),
-        np.zeros((n_values + 1, WIDTH)),
+        np.zeros((1 + n + step.ROWS + 2 * n + rows, WIDTH)),
+        np.zeros((n_values + 1 + 2 * rows, WIDTH)),
         np.empty(((n + n_forcing) * (order + 1), WIDTH)),
         np.empty(WIDTH, dtype=np.int64),
         np.empty((max(1, regions), under_way), dtype=np.int64),
@@ -55,6 +57,7 @@ def drive_many(
     signs,
     continuous,
     tol,
+    rules,
     limits,
     parameters,
     spans,
@@ -88,6 +91,9 @@ def drive_many(
     for lane in range(WIDTH):
         held[lane] = -1
         given[parameters.shape[1], lane] = math.log2(tol)
+        for k in range(rules.shape[1]):
+            given[parameters.shape[1] + 1 + k, lane] = rules[FIXED, k]
+            given[parameters.shape[1] + 1 + rules.shape[1] + k, lane] = rules[LASTING, k]
     while n_alone < min(alone.shape[0], bounds[1] - bounds[0]):
         alone[n_alone] = following
         n_alone += 1
@@ -104,6 +110,7 @@ def drive_many(
                 parameters[i],
                 (spans[i, 0], spans[i, 1]),
                 tol,
+                rules,
                 times[min(i, times.shape[0] - 1)],
                 samples[i],
                 since[i],
@@ -183,6 +190,9 @@ def take_up(rows, lane, i, limits, since, spans, times, places, carried, counted
         rows[k, lane] = places[i, k]
     rows[1 + n + step.LATE, lane] = carried[i, LATE]
     rows[1 + n + step.USUAL, lane] = carried[i, USUAL]
+    first = 1 + n + step.ROWS + 2 * n
+    for k in range(rows.shape[0] - first):
+        rows[first + k, lane] = carried[i, SIZES + k]
     rows[1 + n + step.ALLOWED, lane] = limits[0] - counted[i, STEPS]
     rows[1 + n + step.CALM, lane] = counted[i, CALM]
     rows[1 + n + step.NEXT, lane] = next_time(times, i, counted[i, SAMPLES])
@@ -211,6 +221,9 @@ def put_down(rows, lane, i, limits, since, places, carried, counted, extremes, s
     for k in range(1 + n):
         places[i, k] = rows[k, lane]
     carried[i, USUAL] = rows[1 + n + step.USUAL, lane]
+    first = 1 + n + step.ROWS + 2 * n
+    for k in range(rows.shape[0] - first):
+        carried[i, SIZES + k] = rows[first + k, lane]
 
 
 @part

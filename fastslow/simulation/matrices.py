@@ -59,6 +59,30 @@ def contracts(jacobian, n, rate):
 
 
 @part
+def forgotten_in(jacobian, n, rate):
+    """The largest modulus of the eigenvalues whose real parts are not below -rate.
+
+    Of the first rows and columns. 0 where there is none, NaN where something is
+    not finite.
+    """
+    if contracts(jacobian, n, rate):
+        return 0.0
+    if n == 1:
+        return abs(jacobian[0, 0])
+    matrix = np.empty((n, n), dtype=np.complex128)
+    for i in range(n):
+        for j in range(n):
+            if not abs(jacobian[i, j]) < np.inf:
+                return np.nan
+            matrix[i, j] = jacobian[i, j]
+    largest = 0.0
+    for value in np.linalg.eigvals(matrix):
+        if not value.real < -rate:
+            largest = max(largest, abs(value))
+    return largest
+
+
+@part
 def factorise_in_place(matrix, n):
     """LU factors with the largest pivots; the last column keeps the exchanges of rows."""
     for k in range(n):

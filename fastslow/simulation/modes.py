@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
 from fastslow.simulation.collocation import late_collocation
 from fastslow.simulation.polynomials import EPSILON, ONE, ZERO, first_nonzero, first_strong
+from fastslow.simulation.scales import step_length
 
 #: The part of a step over which the beginning of a motion is judged: over a whole one that
 #: stability limits, the last terms of the series are much larger than the motion itself.
@@ -23,41 +22,7 @@ NO_MODE, MANY_MODES, NOT_DEFINED = -1, -2, -3
 
 
 @part
-def step_length(W, n_rows, order, tol):
-    """The step whose last terms are as large as the tolerance (Jorba and Zou 2005).
-
-    An error of ``tol * (1 + |y|)`` is allowed in every row. Three terms are
-    looked at, because series of even or odd functions lack every other one.
-
-    Returns
-    -------
-    float
-        Infinite where the series ends, NaN where it is not finite.
-    """
-    columns = order + 1
-    last = before = third = finite = 0.0
-    for i in range(n_rows):
-        row = i * columns
-        scale = 1.0 / (1.0 + abs(W[row]))
-        last = max(last, abs(W[row + order]) * scale)
-        before = max(before, abs(W[row + order - 1]) * scale)
-        third = max(third, abs(W[row + order - 2]) * scale)
-        finite += 0.0 * (W[row + order] + W[row + order - 1])
-    if finite != 0.0:
-        return np.nan
-    # logarithms of the lengths: powers with whole exponents take longer
-    allowed, length = math.log(tol), np.inf
-    if last > 0.0:
-        length = (allowed - math.log(last)) / order
-    if before > 0.0:
-        length = min(length, (allowed - math.log(before)) / (order - 1))
-    if third > 0.0:
-        length = min(length, (allowed - math.log(third)) / (order - 2))
-    return math.exp(length)
-
-
-@part
-def expand(address, layout, mode, inputs, parameters, tol, room, W, memory, known):
+def expand(address, layout, mode, inputs, parameters, tol, scales, room, W, memory, known):
     """Fill ``W`` with polynomials of time from a point on.
 
     The Taylor series where there is one; else, where its coefficients are not
@@ -68,6 +33,8 @@ def expand(address, layout, mode, inputs, parameters, tol, room, W, memory, know
     address, layout, mode, inputs, parameters
         As for `drive`: the compiled function, and where.
     tol : float
+    scales : float64 array, shape (2, rows)
+        In which errors are measured, see `step_length`.
     room : float
         Longest step that is of use.
     W : float64 array
@@ -85,16 +52,16 @@ def expand(address, layout, mode, inputs, parameters, tol, room, W, memory, know
     """
     if not known:
         call_address(address, mode, inputs, parameters, W)
-    length = step_length(W, layout[0] + layout[1] + layout[2], layout[4], tol)
+    length = step_length(W, layout[0] + layout[1] + layout[2], layout[4], tol, scales)
     if memory.shape[0] > 0:
         memory[0] = 0.0
     if length > 0.0:
         return length
-    return instead(address, layout, mode, inputs, parameters, tol, room, W, memory)
+    return instead(address, layout, mode, inputs, parameters, tol, scales, room, W, memory)
 
 
 @part
-def instead(address, layout, mode, inputs, parameters, tol, room, W, memory):
+def instead(address, layout, mode, inputs, parameters, tol, scales, room, W, memory):
     """Call `late_collocation`: apart, so that the common case stays short."""
     n_states, n_forcing, n_interfaces, n_modes, order = layout
     return late_collocation(
@@ -108,6 +75,7 @@ def instead(address, layout, mode, inputs, parameters, tol, room, W, memory):
         inputs.ctypes,
         parameters.ctypes,
         tol,
+        scales.ctypes,
         room,
         W.ctypes,
         W.shape[0],
@@ -149,7 +117,7 @@ def across(signs, mode, j):
 
 
 @part
-def leaves(W, layout, j, side, tol, longest, noise):
+def leaves(W, layout, j, side, tol, scales, longest, noise):
     """Whether a motion from an interface goes to one side at once, by its drift.
 
     Where the rates are continuous it does so in no other mode, as `choose_mode`
@@ -157,7 +125,7 @@ def leaves(W, layout, j, side, tol, longest, noise):
     """
     n_states, n_forcing, n_interfaces, _, order = layout
     first_h = n_states + n_forcing
-    length = min(longest, step_length(W, first_h + n_interfaces, order, tol))
+    length = min(longest, step_length(W, first_h + n_interfaces, order, tol, scales))
     if not length > 0.0:
         return False
     drift = W[(first_h + j) * (order + 1) + 1]
@@ -190,6 +158,7 @@ def choose_mode(
     inputs,
     parameters,
     tol,
+    scales,
     longest,
     on,
     side,
@@ -211,8 +180,9 @@ def choose_mode(
         Where the rates are continuous there is one way on, and doubt is rounding.
     inputs, parameters : float64 arrays
         Where.
-    tol, longest : float
-        The step over which rounding is judged: its tolerance and longest length.
+    tol, scales, longest
+        The step over which rounding is judged: its tolerance, in which scales, and longest
+        length.
     on : bool array, shape (n_interfaces,)
         Interfaces on which the point lies.
     side : int64 array, shape (n_interfaces,)
@@ -249,7 +219,7 @@ def choose_mode(
             if not possible:
                 continue
             length = expand(
-                address, layout, mode, inputs, parameters, tol, longest, W, memory, False
+                address, layout, mode, inputs, parameters, tol, scales, longest, W, memory, False
             )
             if not length > 0.0:
                 broken = True

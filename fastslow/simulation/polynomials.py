@@ -224,14 +224,22 @@ def refine(b, first, last, low, high):
         else:
             high = s
         new = s - value / rate if rate != 0.0 else low - 1.0
-        if not (low < new < high):
-            new = 0.5 * (low + high)
-        # the next correction is about K moved**2, as this one was K times the last squared
         move = abs(new - s)
-        near = move <= 1e-16 * abs(new) or move * move * move <= 1e-17 * abs(new) * moved * moved
-        s, moved = new, move
-        if near:
+        if low < new < high:
+            # the next correction is about K moved**2, as this one was K times the last squared
+            near = move * move * move <= 1e-17 * abs(new) * moved * moved
+            s, moved = new, move
+            if near or move <= 1e-16 * abs(new):
+                break
+        elif move <= 1e-16 * abs(s):
+            # at the root, which is an end of the bracket: the correction is rounding
             break
+        else:
+            # a halved bracket tells nothing of how fast Newton's method converges
+            new, moved = 0.5 * (low + high), 0.0
+            if new == s:
+                break
+            s = new
     return s
 
 

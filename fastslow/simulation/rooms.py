@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from fastslow.compiled.parts import part
 from fastslow.simulation.collocation import memory_size
-from fastslow.simulation.implicit_steps import WAIT
+from fastslow.simulation.implicit_steps import WAIT, Q
+from fastslow.simulation.scales import FIXED
 
 #: Numbers carried from step to step: by how much the time is late, the usual length of a
-#: step, the time of the last event.
-LATE, USUAL, LAST_EVENT = 0, 1, 2
+#: step, the time of the last event, and from then on the sizes that the run has reached.
+LATE, USUAL, LAST_EVENT, SIZES = 0, 1, 2, 3
 
 #: Whole numbers carried: steps, crossings and samples so far, crossings crowded
 #: together, the mode, -1 before the first was chosen, steps until an implicit one is
@@ -22,7 +23,10 @@ STEPS, CROSSINGS, SAMPLES, CROWDED, MODE, CALM, PAUSE = 0, 1, 2, 3, 4, 5, 6
 
 
 def beginnings(
-    times: NDArray[np.float64], states: NDArray[np.float64], n_forcing: int
+    times: NDArray[np.float64],
+    states: NDArray[np.float64],
+    n_forcing: int,
+    rules: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """What `drive` carries from step to step, of several runs at their beginnings.
 
@@ -31,17 +35,19 @@ def beginnings(
     times : ndarray, shape (m,)
     states : ndarray, shape (m, n)
     n_forcing : int
+    rules : ndarray, shape (2, rows)
 
     Returns
     -------
     places : ndarray, shape (m, 1 + n + n_forcing)
         Times, states, and room for the slow quantities.
-    carried : ndarray, shape (m, 3)
+    carried : ndarray, shape (m, 3 + rows)
     counted : ndarray of int64, shape (m, 7)
     """
     m = len(times)
     places = np.column_stack([times, states, np.zeros((m, n_forcing))])
-    carried = np.zeros((m, 3))
+    carried = np.zeros((m, SIZES + rules.shape[1]))
+    carried[:, SIZES:] = rules[FIXED]
     carried[:, LAST_EVENT] = -np.inf
     counted = np.zeros((m, 7), dtype=np.int64)
     counted[:, MODE] = -1
@@ -71,9 +77,10 @@ def room_for(
         np.empty(n_times),
         np.empty(settling),
         np.empty(settling),
-        np.empty((2, n_states, n_states + 1)),
-        np.empty((5, max(1 + n_states + n_forcing, columns))),
+        np.empty((2 + Q, n_states, n_states + 1)),
+        np.empty((6, max(1 + n_states + n_forcing, columns))),
         np.zeros(memory_size(n_states, order)),
+        np.zeros((2, n_states + n_forcing + n_interfaces)),
     )
 
 

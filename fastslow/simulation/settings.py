@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from fastslow.arguments import Check, flag, instance, tolerance, whole
+from fastslow.arguments import Check, flag, instance, items, real_number, refusal, tolerance, whole
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.model import Model
+from fastslow.results.named import Named
 
 #: Where a run ends that nothing else ends.
 MOST = 1_000_000
@@ -16,19 +19,27 @@ MOST = 1_000_000
 class Integration:
     """How a trajectory is integrated: error control, method and limits.
 
+    In a step an error of rtol |y| is allowed in every state y, or of atol where that
+    is larger.
+
     Parameters
     ----------
     rtol : float
-        Error allowed in a step, relative to 1 + |y| for every state y.
+        Relative error allowed in a step, 1e-16 (rounding) to 0.1.
+    atol : float, sequence or mapping, optional
+        Absolute error allowed in a step, in the unit of the state: one number for all
+        states, one for each in order, or by name; 0 is allowed. A state that is not
+        named, as all are by default, gets rtol times the size that it has had of late
+        in the run, so that no unit plays a part; one whose rate has it as a factor
+        (x' = x g, as of an extinct species or a laser that is off) gets 0, so that a
+        passage along x = 0 keeps its memory down to 1e-300, below which it is zero.
     order : int, optional
         Order of the series, 4 to 40, by default chosen by the tolerance; of
         collocation polynomials 12 at most.
     implicit : bool, optional
         Whether an implicit method may take long steps through settled phases, in
         which stability and not accuracy limits the series; by default in a single
-        run, but not in an ensemble. They forget what is smaller than ``rtol``: where
-        a slow passage through a Hopf point decays below it, its exit depends on
-        ``rtol``, with them or without. Plain steps of an ensemble, taken together,
+        run, but not in an ensemble. Plain steps of an ensemble, taken together,
         are so cheap that implicit ones pay only where the fast motion is some thirty
         times faster than the slow one lets the steps be, as in stiff contacts.
     max_steps, max_crossings : int
@@ -43,9 +54,14 @@ class Integration:
     --------
     >>> Integration(rtol=1e-12).default_order
     24
+    >>> Integration(atol={"x": -1})
+    Traceback (most recent call last):
+    ...
+    fastslow.errors.ArgumentError: atol of x = -1; expected a finite number from 0
     """
 
     rtol: float = 1e-9
+    atol: float | Sequence[float] | Mapping[Any, float] | None = None
     order: int | None = None
     implicit: bool | None = None
     max_steps: int = MOST
@@ -62,36 +78,60 @@ class Integration:
         """Order of the series for the tolerance, one of two so that little is compiled."""
         return 16 if self.rtol >= 1e-11 else 24
 
+
+@dataclass(frozen=True, kw_only=True)
+class Resolved:
+    """An `Integration` of which nothing is left open but what the run decides.
+
+    ``atol`` names every state; None is the size read off the run.
+    """
+
+    rtol: float
+    atol: Mapping[str, float | None]
+    order: int
+    implicit: bool
+    max_steps: int
+    max_crossings: int
+
     @property
     def limits(self) -> tuple[int, int]:
         """Largest numbers of steps and of crossings."""
         return self.max_steps, self.max_crossings
 
-
-@dataclass(frozen=True, kw_only=True)
-class Resolved(Integration):
-    """An `Integration` of which nothing is left open."""
-
-    order: int
-    implicit: bool
-
-    def recorded(self) -> Mapping[str, Any]:
+    def recorded(self) -> dict[str, Any]:
         """What a result keeps as its ``settings``."""
-        return asdict(self)
+        given = {name: value for name, value in self.atol.items() if value is not None}
+        return {
+            "rtol": self.rtol,
+            "atol": given or None,
+            "order": self.order,
+            "implicit": self.implicit,
+            "max_steps": self.max_steps,
+            "max_crossings": self.max_crossings,
+        }
 
 
-def resolve(integration: Integration, *, implicit: bool) -> Resolved:
+def resolve(integration: Integration, model: Model, *, implicit: bool) -> Resolved:
     """The settings with nothing left open.
 
     Parameters
     ----------
     integration : Integration
+    model : Model
     implicit : bool
         Whether implicit steps are taken by default.
+
+    Raises
+    ------
+    UnknownNameError
+        For an absolute tolerance of what is no state.
+    ArgumentError
+        For a number of absolute tolerances that is not that of the states.
     """
     order = integration.order
     return Resolved(
         rtol=integration.rtol,
+        atol=_by_state(integration.atol, (*model.states, *model.slow_states)),
         order=integration.default_order if order is None else order,
         implicit=implicit if integration.implicit is None else integration.implicit,
         max_steps=integration.max_steps,
@@ -99,14 +139,48 @@ def resolve(integration: Integration, *, implicit: bool) -> Resolved:
     )
 
 
+def _by_state(atol: Any, names: tuple[str, ...]) -> dict[str, float | None]:
+    """An absolute tolerance for every state, None where the run decides."""
+    if isinstance(atol, Mapping):
+        for name in atol:
+            if name not in names:
+                raise unknown_name("state", name, names)
+        return {name: atol.get(name) for name in names}
+    if isinstance(atol, tuple):
+        if len(atol) != len(names):
+            raise ArgumentError(
+                f"atol: received {len(atol)} values; expected {len(names)}, for {', '.join(names)}"
+            )
+        return dict(zip(names, atol, strict=True))
+    return dict.fromkeys(names, atol)
+
+
+def _absolute(name: str, value: Any) -> Any:
+    """One absolute tolerance, or one for each of several states."""
+    if isinstance(value, Mapping):
+        checked = {str(k): _nonnegative(f"{name} of {k}", v) for k, v in value.items()}
+        return Named("state", checked)
+    if real_number(value) is not None or isinstance(value, str | bool):
+        return _nonnegative(name, value)
+    return items(_nonnegative)(name, value)
+
+
+def _nonnegative(name: str, value: Any) -> float:
+    number = real_number(value)
+    if number is None or not 0.0 <= number < float("inf"):
+        raise refusal(name, value, "a finite number from 0")
+    return number
+
+
 _CHECKS: dict[str, Check] = {
     "rtol": tolerance,
+    "atol": _absolute,
     "order": whole(4, 40),
     "implicit": flag,
     "max_steps": whole(1, 2**40),
     "max_crossings": whole(1, 2**40),
 }
-_OPTIONAL = ("order", "implicit")
+_OPTIONAL = ("atol", "order", "implicit")
 
 #: What is used where nothing is given.
 DEFAULT = Integration()

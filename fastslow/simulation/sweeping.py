@@ -166,7 +166,7 @@ def bifurcation_sweep(
             finished = passes[-1].ends[np.isfinite(passes[-1].ends).all(axis=1)]
             begin = finished[-1] if len(finished) else begin
     others = {n: v for n, v in model.parameters.items() if n != settings.parameter}
-    runs = resolve(integration, implicit=True).recorded()
+    runs = resolve(integration, model, implicit=True).recorded()
     kept = {"settle": settings.settle, "keep": settings.keep, **runs}
     return Sweep(settings.parameter, name, what, rule, tuple(passes), others, model.equations, kept)
 

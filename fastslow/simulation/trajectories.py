@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import finite, flag, instance, positive, takes, text
 from fastslow.compiled.generic import load_loop
 from fastslow.compiled.series import CompiledSeries, compile_series
+from fastslow.model.invariance import factor_states
 from fastslow.model.model import Model
 from fastslow.results.endings import outcome_of
 from fastslow.results.trajectories import Trajectory
@@ -26,8 +27,16 @@ from fastslow.simulation.arguments import (
     time_span,
 )
 from fastslow.simulation.implicit_steps import DEGREE, IMPLICIT, SETTLED_ORDER
+from fastslow.simulation.remembering import with_noise
 from fastslow.simulation.rooms import MODE, SAMPLES, STEPS, beginnings, room_for
-from fastslow.simulation.settings import DEFAULT, Integration, integration_settings, resolve
+from fastslow.simulation.scales import FORGETTING, rules_of
+from fastslow.simulation.settings import (
+    DEFAULT,
+    Integration,
+    Resolved,
+    integration_settings,
+    resolve,
+)
 
 _ARGUMENTS = (
     "address",
@@ -38,6 +47,7 @@ _ARGUMENTS = (
     "parameters",
     "span",
     "tol",
+    "rules",
     "times",
     "samples",
     "since",
@@ -62,6 +72,7 @@ SOURCES = (
     "fastslow.simulation.modes",
     "fastslow.simulation.polynomials",
     "fastslow.simulation.rooms",
+    "fastslow.simulation.scales",
     "fastslow.simulation.implicit_steps",
     "fastslow.compiled.parts",
     "fastslow.compiled.pointers",
@@ -96,6 +107,7 @@ def once_a_model(
 
 
 gap_of = once_a_model(gap_regions)
+vanishing_of = once_a_model(factor_states)
 series_of = once_a_model(compile_series)
 period_of = once_a_model(Model.period)
 
@@ -183,15 +195,16 @@ def simulate(
     begin = initial_state(model, state)
     span, period = time_span(t, periods, start, period, lambda: period_of(model))
     times = sample_times(samples, span)
-    resolved = resolve(integration, implicit=True)
+    resolved = resolve(integration, model, implicit=True)
     between = gap_of(model, gap)
     compiled = series_of(model, resolved.order)
     kept = compiled.n_states + compiled.n_forcing
     rows = compiled.n_states if dense else kept
     sampled = np.empty((rows, len(times)))
+    rules = error_rules(model, resolved, compiled)
     layout, sizes = layout_of(compiled), sizes_of(model, compiled, resolved.implicit)
     (place,), (carried,), (counted,) = beginnings(
-        np.array([span[0]]), begin[None], compiled.n_forcing
+        np.array([span[0]]), begin[None], compiled.n_forcing, rules
     )
     code, (steps, store, crossings) = drive_loop()(
         compiled.address,
@@ -202,6 +215,7 @@ def simulate(
         compiled.parameter_array(model),
         span,
         resolved.rtol,
+        rules,
         times,
         sampled,
         span[0],
@@ -216,31 +230,40 @@ def simulate(
     )
     end, reached = place[: 1 + compiled.n_states].copy(), counted[SAMPLES]
     n_steps, mode = int(counted[STEPS]), int(counted[MODE])
+    names = (*model.states, *model.slow_states)
+    outcome = outcome_of(
+        code,
+        mode,
+        end,
+        n_steps,
+        float(np.abs(begin).max()),
+        compiled.modes,
+        resolved.limits,
+        compiled.undecided,
+    )
+    series = _kept(store, len(steps), kept, compiled.order + 1) if dense else None
+    vanishing = vanishing_of(model)
+    if vanishing and series is not None and len(steps):
+        ends = np.vstack([series[:, :, 0], place[1 : 1 + kept]])
+        columns = dict(zip((*names, *model.forcing), ends.T, strict=True))
+        whole = np.vstack([steps, [end[0], 0.0, steps[-1, 2], 0.0]])
+        outcome = with_noise(outcome, model, resolved, vanishing, whole, columns, compiled.modes)
     return Trajectory(
-        (*model.states, *model.slow_states),
+        names,
         tuple(model.forcing),
         tuple(model.interfaces),
         tuple(model.regions),
         dict(model.parameters),
         period,
         between,
-        outcome_of(
-            code,
-            mode,
-            end,
-            n_steps,
-            float(np.abs(begin).max()),
-            compiled.modes,
-            resolved.limits,
-            compiled.undecided,
-        ),
+        outcome,
         (span[0], float(end[0])),
         end,
         _method(compiled, steps),
         steps,
         compiled.modes,
         crossings,
-        _kept(store, len(steps), kept, compiled.order + 1) if dense else None,
+        series,
         (times[:reached], sampled[:, :reached]) if samples is not None else None,
         equations=model.equations,
         settings=resolved.recorded(),
@@ -296,6 +319,20 @@ def sizes_of(model: Model, compiled: CompiledSeries, implicit: bool) -> tuple[in
     """Rows of the series, of the event search, and fast states if implicit steps are wanted."""
     settling = implicit and compiled.order >= DEGREE and not compiled.values_only
     return compiled.n_rows, STACK_ROWS, len(model.states) if settling else 0
+
+
+def error_rules(model: Model, resolved: Resolved, compiled: CompiledSeries) -> NDArray[np.float64]:
+    """In what sizes the errors of a run are measured, from its tolerances."""
+    names = (*model.states, *model.slow_states)
+    fixed, lasting = np.zeros(len(names)), np.zeros(len(names))
+    vanishing = vanishing_of(model)
+    for i, name in enumerate(names):
+        given = resolved.atol[name]
+        if given is not None:
+            fixed[i] = given / resolved.rtol
+        elif name not in vanishing:
+            lasting[i] = FORGETTING
+    return rules_of(fixed, lasting, compiled.n_forcing, compiled.n_interfaces)
 
 
 def drive_loop() -> Callable[..., Any]:

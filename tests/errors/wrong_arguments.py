@@ -84,6 +84,15 @@ BY_FUNCTION = {
         ({"p": NAN}, Wrong, "p = nan; expected a finite number"),
     ],
     "Continuation.starts": COUNT,
+    "Integration.atol": [
+        (-1, Wrong, "atol = -1; expected a finite number from 0"),
+        (NAN, Wrong, "atol = nan; expected a finite number from 0"),
+        ("1e-9", Wrong, "atol = '1e-9'; expected a finite number from 0"),
+        (True, Wrong, "atol = True; expected a finite number from 0"),
+        ([1e-9, -1], Wrong, "atol[1] = -1; expected a finite number from 0"),
+        ({"x": INF}, Wrong, "atol of x = inf; expected a finite number from 0"),
+        ({"x": "0"}, Wrong, "atol of x = '0'; expected a finite number from 0"),
+    ],
     "Derivation.__getitem__.region": [("S9", Unknown, "unknown region 'S9'; did you mean 'S1'?")],
     "Diagram.nearest.values": [
         ({"omga": 1.0}, Unknown, "unknown state or parameter 'omga'"),
@@ -108,6 +117,8 @@ BY_FUNCTION = {
         ({"omga": 1}, Unknown, "unknown parameter 'omga'; did you mean 'omega'?"),
         ({"C": True}, BadModel, "parameter C: expected a finite number, received True"),
     ],
+    "predict_delay.diagram": [("omga", Wrong, "diagram: expected a Diagram, received a str")],
+    "predict_delay.entry": [*NUMBER, (0.5, Wrong, "diagram= and entry= go with a Hopf")],
     "predict_delay.model": [("omga", Wrong, "model: expected a Model, received a str")],
     "Model.parameters": [
         *MAPPING,

@@ -169,7 +169,7 @@ def test_wrong_arguments(cusp, cusp_fold, turning):
     with pytest.raises(fs.ArgumentError, match="give level="):
         fs.delay_scaling(cusp, cusp_fold, [1e-3, 1e-4])
     hopf = fs.continue_equilibria(turning, "p", over=(-2, 2)).special("HB")[0]
-    with pytest.raises(fs.ArgumentError, match="see hopf_exit"):
+    with pytest.raises(fs.ArgumentError, match="depends on the entry: see predict_delay"):
         fs.delay_scaling(turning, hopf, [1e-3, 1e-4], parameter="p")
 
 

@@ -77,12 +77,38 @@ def test_settings(keywords, message):
         Integration(**keywords)
 
 
+@pytest.mark.parametrize(
+    ("atol", "error", "message"),
+    [
+        ({"y": 1e-9}, UnknownNameError, "unknown state 'y'"),
+        ({"w": 1e-9}, UnknownNameError, "unknown state 'w'"),
+        ([1e-9], ArgumentError, "atol: received 1 values; expected 2, for x, v"),
+    ],
+)
+def test_absolute_tolerances_are_of_the_states(gear, atol, error, message):
+    settings = Integration(atol=atol)
+    for call in (simulate, simulate_many):
+        with pytest.raises(error, match=message):
+            call(gear, [0, 0], t=(0, 1), integration=settings)
+
+
+def test_absolute_tolerances_by_name_and_in_order(gear):
+    by_name = simulate(gear, [0, 0], t=(0, 9), integration=Integration(atol={"v": 1e-3, "x": 0}))
+    in_order = simulate(gear, [0, 0], t=(0, 9), integration=Integration(atol=[0, 1e-3]))
+    assert np.array_equal(by_name.steps, in_order.steps)
+    assert by_name.settings["atol"] == {"x": 0.0, "v": 1e-3}
+    some = simulate(gear, [0, 0], t=(0, 9), integration=Integration(atol={sp.Symbol("v"): 1e-3}))
+    assert some.settings["atol"] == {"v": 1e-3}
+    coarse = simulate(gear, [0, 0], t=(0, 9), integration=Integration(atol=1e-3))
+    assert len(coarse.steps) < len(simulate(gear, [0, 0], t=(0, 9)).steps)
+
+
 def test_a_run_keeps_its_settings(gear):
     run = simulate(gear, [0, 0], t=(0, 1), integration=Integration(rtol=1e-12, max_steps=9))
-    expected = {"rtol": 1e-12, "order": 24, "implicit": True, "max_steps": 9}
+    expected = {"rtol": 1e-12, "atol": None, "order": 24, "implicit": True, "max_steps": 9}
     assert run.settings == {**expected, "max_crossings": 1_000_000}
     many = simulate_many(gear, [0, 0], t=(0, 1))
-    expected = {"rtol": 1e-9, "order": 16, "implicit": False, "max_steps": 1_000_000}
+    expected = {"rtol": 1e-9, "atol": None, "order": 16, "implicit": False, "max_steps": 1_000_000}
     assert many.settings == {**expected, "max_crossings": 1_000_000}
 
 

@@ -1,6 +1,7 @@
 """What the tolerance promises: against quadruple precision, matrix exponentials and mpmath."""
 
 import json
+import math
 from pathlib import Path
 
 import mpmath
@@ -9,6 +10,7 @@ import pytest
 import sympy as sp
 
 from fastslow.model.model import Model
+from fastslow.simulation.ensembles import simulate_many
 from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
@@ -148,3 +150,99 @@ def test_every_step(model, start, end, rates, tol):
             reference = np.array([[float(q) for q in exact(mpmath.mpf(s))] for s in inside]).T
         error = np.abs(run(inside) - reference) / (1 + np.abs(reference))
         assert error.max() < PROMISED * tol
+
+
+W = sp.Symbol("w")
+
+
+def bernoulli(time, start="1e-3"):
+    """x' = w x − x³, w = −1 + t/100: u = x⁻² obeys u' = −2 w u + 2."""
+    with mpmath.workdps(50):
+        end = mpmath.mpf(time)
+
+        def exponent(s):
+            return -s + s * s / 200
+
+        grown = mpmath.quad(lambda s: mpmath.exp(2 * exponent(s)), mpmath.linspace(0, end, 21))
+        u = mpmath.exp(-2 * exponent(end)) * (mpmath.mpf(start) ** -2 + 2 * grown)
+        return float(1 / mpmath.sqrt(u))
+
+
+@pytest.mark.parametrize("implicit", [True, False])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+def test_a_passage_along_an_invariant_zero(rtol, implicit):
+    model = Model({x: W * x - x**3}, forcing={W: -1 + t / 100})
+    settings = Integration(rtol=rtol, implicit=implicit)
+    run = simulate(model, [1e-3], t=(0, 200), integration=settings)
+    times = [100, 166, 180, 200]
+    expected = [bernoulli(s) for s in times]
+    assert expected[2] == pytest.approx(1.5e-11, rel=0.02)
+    assert expected[3] == pytest.approx(1.0e-3, rel=1e-3)
+    assert run(times)[0] == pytest.approx(expected, rel=5 * rtol)
+    many = simulate_many(model, [1e-3], t=(0, 200), samples=times, integration=settings)
+    assert many["x"][0] == pytest.approx(expected, rel=5 * rtol)
+
+
+def test_a_linear_growth_returns_from_1e_58():
+    model = Model({x: W * x}, forcing={W: -sp.Rational(1, 2) + t / 1000})
+    run = simulate(model, [1e-3], t=(0, 1000))
+    assert run(500.0)[0] == pytest.approx(1e-3 * math.exp(-125), rel=1e-8)
+    assert run.end[1] == pytest.approx(1e-3, rel=1e-8)
+    assert str(run.outcome) == "reached t = 1000, the end of the time asked for."
+    # 1e-3 exp(−800) is no number any more
+    deep = simulate(model, [1e-3], t=(-1100, 2100))
+    assert deep.end[1] == 0
+    assert "x fell below 1e-300, the smallest number kept, at t = " in str(deep.outcome)
+    assert "its logarithm" in str(deep.outcome)
+
+
+def test_an_absolute_tolerance_that_decides_says_so():
+    model = Model({x: W * x - x**3}, forcing={W: -1 + t / 100})
+    run = simulate(model, [1e-3], t=(0, 230), integration=Integration(atol=1e-12))
+    assert "x fell below its atol = 1e-12" in str(run.outcome)
+    assert run.outcome
+
+
+UNITS = [
+    (VAN_DER_POL, [2.0, 0.0], 12.0),
+    (LORENZ, [1.0, 1.0, 20.0], 3.0),
+    (RELAY, [1.0, 0.0], 8.0),
+    (Model({x: W * x - x**3 + y, y: -x}, forcing={W: sp.sin(t)}), [0.0, 0.5], 20.0),
+    (Model({x: v, v: W - v - 40 * sp.Max(x - 1, 0)}, forcing={W: 1 + sp.cos(t)}), [0, 0], 20.0),
+]
+
+
+def in_units(model, factors, unit):
+    """The same model with every state, and time, measured in other units."""
+    symbols = [sp.Symbol(name) for name in model.states]
+    powers = {s: s / f for s, f in zip(symbols, factors, strict=True)}
+    powers[t] = t / unit
+    plain = {sp.Symbol(s.name, real=True): s for s in (*symbols, t, W)}
+    rates = {
+        s: (f * model.rates[s].xreplace(plain)).xreplace(powers) / unit
+        for s, f in zip(symbols, factors, strict=True)
+    }
+    forcing = {w: law.xreplace(plain).xreplace({t: t / unit}) for w, law in model.forcing.items()}
+    return Model(rates, forcing=forcing, parameters=dict(model.parameters))
+
+
+@pytest.mark.parametrize("case", range(len(UNITS)))
+def test_a_run_is_the_same_in_other_units(case):
+    model, start, end = UNITS[case]
+    settings = Integration(implicit=False)
+    run = simulate(model, start, t=(0, end), integration=settings)
+    rng = np.random.default_rng(case)
+    for _ in range(2):
+        # powers of two: what differs is not rounding
+        factors = [sp.Integer(2) ** int(k) for k in rng.integers(-20, 21, len(start))]
+        unit = sp.Integer(2) ** int(rng.integers(-20, 21))
+        numbers = np.array([float(f) for f in factors])
+        other = simulate(
+            in_units(model, factors, unit),
+            numbers * start,
+            t=(0, end * float(unit)),
+            integration=settings,
+        )
+        assert len(other.steps) == len(run.steps)
+        assert other.end[1:] / numbers == pytest.approx(run.end[1:], rel=1e-7)
+        assert other.word == run.word

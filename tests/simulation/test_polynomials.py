@@ -57,3 +57,22 @@ def test_a_known_root_at_the_start_is_left_out():
 def test_roots_at_the_end_and_at_a_division():
     assert root(P.polyfromroots([1.0, 3.0]))[0] == 1.0
     assert root(P.polyfromroots([0.5, 3.0]))[0] == 0.5
+
+
+#: An interface function along a step of a piecewise-linear system, up to its root.
+STEP = [
+    -16.032518176094182, 12.213726115908715, 5.440449917779179, -1.3673842256388868,
+    -0.3068741081122470, 4.6532974016430188e-2, 6.9019709485304611e-3, -7.5875977020397754e-4,
+    -8.3024023720064470e-5, 7.2373880408558787e-6, 6.2083553485648413e-7, -4.5238763459206378e-8,
+    -3.1634629819869550e-9, 1.9947372307283201e-10, 1.1686005285617954e-11,
+    -6.5341316926236988e-13, -3.2724738645825274e-14,
+]  # fmt: skip
+
+
+def test_every_root_is_located_to_rounding():
+    """At an end of its bracket, too: there a halved bracket once passed for convergence."""
+    for longer in np.linspace(1.0001, 3, 5001):
+        series = STEP * longer ** np.arange(len(STEP))
+        s, touch = root(series, noise=1e-14)
+        assert not touch
+        assert abs(P.polyval(s, series)) < 1e-14 * np.abs(series).sum()

@@ -133,7 +133,7 @@ def test_a_double_pendulum_with_dry_joints_against_smooth_friction():
     run = fs.simulate(pendulum, state, t=(0, 30), integration=integration)
     assert run.outcome
     assert run.word[-1] == "S1|S4"
-    assert run(30.0)[2:].tolist() == [0.0, 0.0]
+    assert np.abs(run(30.0)[2:]).max() < 1e-15
     # while one joint sticks it turns with nothing between
     stuck = next(s for s in run.segments if s.region in ("S1|S2", "S3|S4", "S1|S3", "S2|S4"))
     middle = run(0.5 * (stuck.start + stuck.end))

@@ -1,0 +1,90 @@
+"""Whether a run was left by noise: what fell below its tolerance, or the smallest number."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.model.model import Model
+from fastslow.model.structure import TIME, real
+from fastslow.results.outcome import Outcome
+from fastslow.simulation.scales import SMALLEST
+from fastslow.simulation.settings import Resolved
+
+Floats = NDArray[np.float64]
+
+#: A state has left zero when it is this much larger than the noise in it.
+LEFT = 1e3
+
+
+def with_noise(
+    outcome: Outcome,
+    model: Model,
+    resolved: Resolved,
+    vanishing: tuple[str, ...],
+    steps: Floats,
+    columns: dict[str, Floats],
+    modes: tuple[str, ...],
+) -> Outcome:
+    """The outcome, with a sentence for every state whose noise decided when it left zero.
+
+    Parameters
+    ----------
+    outcome : Outcome
+    model : Model
+    resolved : Resolved
+    vanishing : tuple of str
+        States that their rates have as a factor: only of those it is known what they leave.
+    steps : ndarray, shape (N, 4)
+        Time, length and mode of every step, and at last of the end.
+    columns : dict
+        Values of states and slow quantities there, each of shape (N,).
+    modes : tuple of str
+    """
+    found = []
+    for name in vanishing:
+        absolute = resolved.atol[name] or 0.0
+        size = np.abs(columns[name])
+        below = np.flatnonzero(size < max(absolute, SMALLEST))
+        if not len(below):
+            continue
+        first, rest = below[0], size[below[0] :]
+        time = f"t = {steps[first, 0]:.6g}"
+        if absolute > SMALLEST and rest.max() > LEFT * absolute:
+            found.append(
+                f"{name} fell below its atol = {absolute:g} at {time} and was left from there: the "
+                "tolerance decides when; give atol=0."
+            )
+        elif size[0] >= SMALLEST and any(_grows(model, name, columns, steps, modes, below)):
+            found.append(
+                f"{name} fell below {SMALLEST:g}, the smallest number kept, at {time}: what it "
+                "would grow to afterwards is lost; take its logarithm for a state."
+            )
+    if not found:
+        return outcome
+    return Outcome(outcome.code, " ".join([outcome.message, *found]), outcome.success)
+
+
+def _grows(
+    model: Model,
+    name: str,
+    columns: dict[str, Floats],
+    steps: Floats,
+    modes: tuple[str, ...],
+    below: NDArray[np.intp],
+) -> Iterator[bool]:
+    """Whether the growth rate at zero is positive after a state was lost, region by region."""
+    state = real(name)
+    symbols = [TIME, *(real(n) for n in columns)]
+    for region in model.regions.values():
+        rows = below[np.array([modes[int(k)] for k in steps[below, 2]]) == region.name]
+        if len(rows):
+            rate = region.rates[name].diff(state).subs(state, 0).subs(model.values)
+            rate = rate.subs({real(n): law for n, law in region.forcing.items()})
+            rate = rate.subs(model.values)
+            growth = sp.lambdify(symbols, rate, "numpy")
+            given = [steps[rows, 0], *(values[rows] for values in columns.values())]
+            yield bool(np.any(np.asarray(growth(*given)) > 0))

@@ -1,0 +1,1 @@
+"""Long random campaigns against independent references, a sample of each in the tests."""

@@ -1,0 +1,24 @@
+"""Run a campaign: ``python -m tests.campaigns NAME [count] [seed]``."""
+
+import sys
+from importlib import import_module
+
+#: Name of each campaign, and what one of its counts is. A module of the name has
+#: ``campaign(count, seed)``, which returns a report with ``failures``, and prints as text.
+CAMPAIGNS = {"crossings": "crossings of random piecewise-linear systems"}
+
+
+def main(arguments):
+    """Print the report of a campaign; 1 where something failed."""
+    if not arguments or arguments[0] not in CAMPAIGNS:
+        names = "\n".join(f"  {name}: {what}" for name, what in CAMPAIGNS.items())
+        print(f"{__doc__}\n\n{names}")
+        return 2
+    module = import_module(f"tests.campaigns.{arguments[0]}")
+    report = module.campaign(*map(int, arguments[1:]))
+    print(report)
+    return 1 if report.failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,11 @@
+"""A sample of the campaign of crossings, and the case that began it."""
+
+from tests.campaigns.crossings import campaign
+
+
+def test_crossings_of_random_piecewise_linear_systems():
+    report = campaign(1000, seed=14)
+    assert report.failures == []
+    assert report.crossings >= 1000
+    assert report.segments > 500
+    assert report.worst_h < 1e-13
