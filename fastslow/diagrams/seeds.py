@@ -96,6 +96,11 @@ class Seeds:
         """Nothing is said of branches through other points."""
         return False
 
+    @property
+    def outside(self) -> tuple[StateWindow, list[tuple[Equilibrium, float]]]:
+        """Nothing is looked for elsewhere."""
+        return self._around, []
+
     def missed(self, branches: Sequence[Branch]) -> list[tuple[str, float]]:
         return []
 

@@ -17,7 +17,7 @@ from fastslow.diagrams.solving import solve_at
 from fastslow.diagrams.windows import Sides, edges_left, edges_of, known, size_of, within
 from fastslow.results.branches import Branch
 from fastslow.results.points import Equilibrium
-from fastslow.results.windows import ROUNDING, StateWindow, typical
+from fastslow.results.windows import ROUNDING, StateWindow, state_window, typical
 
 Array = NDArray[np.float64]
 
@@ -76,6 +76,24 @@ class Starts:
             single = [e for e in solved if not e.continuum and e.region in self._field.regions]
             self._found[value] = within(self._field, self._asked, single)
         return [e for e in self._found[value] if e.admissible == admissible]
+
+    @cached_property
+    def outside(self) -> tuple[StateWindow, list[tuple[Equilibrium, float]]]:
+        """Admissible equilibria that the window asked for excludes, and a window about them.
+
+        Their branches may enter it between the values at which equilibria are looked
+        for. Where critical values are known there is a start in every such interval, and
+        nothing is listed.
+        """
+        if self.complete or not self._asked.chosen:
+            return self._asked, []
+        found = [(e, v) for v in self._first for e in solve_at(self._field, v) if not e.continuum]
+        points = [e for e, _ in found]
+        open_window = state_window(self._asked.states, None, self._field.model.periodic)
+        states = np.reshape([e.state for e in points], (-1, self._field.n))
+        kept = {id(e) for e in within(self._field, self._asked, points)}
+        wide = open_window.around(states, known(self._field, points))
+        return wide, [(e, v) for e, v in found if id(e) not in kept]
 
     @cached_property
     def window(self) -> StateWindow:

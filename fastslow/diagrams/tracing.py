@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import lru_cache
 from itertools import product
@@ -30,7 +30,7 @@ from fastslow.diagrams.equilibrium_sets import bands_of
 from fastslow.diagrams.fields import FrozenField, require_frozen
 from fastslow.diagrams.seeds import Seeds
 from fastslow.diagrams.solving import point_at
-from fastslow.diagrams.starts import starts_of
+from fastslow.diagrams.starts import Starts, starts_of
 from fastslow.diagrams.walking import Piece, Window, beside, on_interface, walk
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
@@ -46,6 +46,9 @@ Array = NDArray[np.float64]
 
 #: Largest distance from an interface, in units of the window, of what lies in it.
 INSIDE = 1e-9
+
+#: Rows of a branch outside the window along which is looked for where it enters.
+COARSE = 2000
 
 #: First step along the branch that crosses at a branch point, in units of the window.
 SWITCH = 1e-3
@@ -157,6 +160,12 @@ def continue_equilibria(
                 if not any(_passes(field, b, start, value, within) for b in branches):
                     curve = _traced(field, start, value, within, continuation, admissible)
                     branches += _branches(field, curve, within, marks, admissible)
+        for start, value in _entering(field, starts, within) if admissible else ():
+            if len(branches) >= continuation.branches:
+                break
+            if not any(_passes(field, b, start, value, within) for b in branches):
+                curve = _traced(field, start, value, within, continuation, admissible)
+                branches += _branches(field, curve, within, marks, admissible)
         if from_points is None:
             branches += _switched(field, branches, within, continuation, marks, admissible)
     full = len(branches) >= continuation.branches
@@ -262,6 +271,28 @@ def _traced(
         return joined(None, forward)
     backward = walk(field, region, u, -tangent, window, continuation, bounded=bounded)
     return rising(joined(backward, forward))
+
+
+def _entering(
+    field: FrozenField, starts: Starts | Seeds, window: Window
+) -> Iterator[tuple[Equilibrium, float]]:
+    """Points in the window on branches that a start outside of it is on."""
+    wide, outside = starts.outside
+    around = replace(window, states=wide)
+    coarse = Continuation(points=COARSE)
+    for start, value in outside:
+        region = field.regions.index(start.region)
+        u = np.append(start.state, value)
+        tangent, _ = field.tangent(region, u, window.weight)
+        for side in (1, -1):
+            for piece in walk(field, region, u, side * tangent, around, coarse).pieces:
+                states = window.states.shifted(piece.u[:, :-1])
+                inside = window.states.contains(states, window.scale[:-1])
+                # the middle of every part inside
+                edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
+                for first, last in zip(edges[::2], edges[1::2], strict=True):
+                    row = piece.u[(first + last - 1) // 2]
+                    yield point_at(field, piece.region, row), float(row[-1])
 
 
 def _along_interface(field: FrozenField, region: int, rows: Array, window: Window) -> Array:

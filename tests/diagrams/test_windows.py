@@ -165,6 +165,16 @@ def test_a_window_between_all_starts():
     np.testing.assert_allclose(np.sort(diagram[0]["p"][[0, -1]]), [-0.36, -0.25], atol=1e-15)
 
 
+def test_a_window_between_all_starts_of_a_transcendental_model():
+    """Of sinh² x = −p the part 0.52 ≤ x ≤ 0.55 lies between any values tried."""
+    diagram = traced({x: p + sp.sinh(x) ** 2, y: x - y}, window={x: (0.52, 0.55)})
+    (branch,) = diagram
+    assert diagram.coverage == "found"
+    np.testing.assert_allclose(
+        np.sort(branch["p"][[0, -1]]), [-(np.sinh(0.55) ** 2), -(np.sinh(0.52) ** 2)], rtol=1e-12
+    )
+
+
 def test_a_window_that_excludes_all():
     diagram = traced({x: p + x**2}, window={x: (5, 6)})
     assert len(diagram) == 0
