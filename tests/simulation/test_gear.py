@@ -22,7 +22,7 @@ INTERFACES = {"+D": "x - D", "-D": "x + D"}
 @pytest.mark.parametrize("tol", [1e-6, 1e-9, 1e-12])
 def test_states_reach_the_tolerance(gear, tol):
     run = simulate(gear, [0, 0], periods=3, integration=Integration(rtol=tol))
-    assert np.abs(run(TIMES) - STATES).max() < 10 * tol
+    assert np.abs(run(TIMES) - STATES).max() < tol
     assert len(run.crossings) == 41
 
 

@@ -186,3 +186,32 @@ def test_an_unstable_equilibrium_is_left():
     model = Model({x: x, y: -800 * y})
     run = simulate(model, [1e-12, 0.5], t=(0, 12 * np.log(10)), integration=Integration(rtol=1e-14))
     assert run([run.span[1]])[0] == pytest.approx(1, rel=1e-8)
+
+
+@pytest.mark.parametrize("stiffness", [1e2, 1e4, 1e6, 1e8])
+def test_a_stiff_linear_system_beside_a_slow_one(stiffness):
+    """x' = −p (x − v), v' = −v: v does not decay within a step of the series, but is followed."""
+    p = sp.Symbol("p")
+    model = Model({x: -p * (x - v), v: -v}, parameters={p: stiffness})
+    run = simulate(model, [1, 1], t=(0, 10))
+    assert run.outcome
+    assert len(run.steps) < 200
+    assert "implicit steps" in run.method
+    times = np.linspace(0, 10, 1001)
+    ratio = stiffness / (stiffness - 1)
+    slow, fast = np.exp(-times), np.exp(-stiffness * times)
+    exact = np.array([ratio * slow + (1 - ratio) * fast, slow])
+    assert np.abs(run(times) - exact).max() < 2e-9
+
+
+def test_a_stiff_van_der_pol_oscillator():
+    """mu = 1e4, whose slow motion expands: two jumps, at the times of a tighter run."""
+    model = Model({x: v, v: k * (1 - x**2) * v - x}, parameters={k: 10_000})
+    run = simulate(model, [2, 0], t=(0, 9000), integration=Integration(rtol=1e-7))
+    finer = simulate(model, [2, 0], t=(0, 9000), integration=Integration(rtol=1e-9))
+    assert run.outcome
+    assert finer.outcome
+    (jump,), (exact,) = (r.section("x", 0.0, direction=-1).times for r in (run, finer))
+    # (3/2 − ln 2) mu from the first fold to the other one, and half of it more from x = 2
+    assert exact == pytest.approx(8070, rel=2e-3)
+    assert jump == pytest.approx(exact, rel=1e-6)
