@@ -342,7 +342,10 @@ class Model:
         >>> Model({x: -sp.Abs(x)}).continuous, Model({x: -sp.sign(x)}).continuous
         ({x: True}, {x: False})
         """
-        return Named("interface", {name: self._continuous(name) for name in self.interfaces})
+        whole = self.structure.continuous
+        return Named(
+            "interface", {name: whole or self._continuous(name) for name in self.interfaces}
+        )
 
     def _continuous(self, name: str) -> bool:
         function = self.interfaces[name].function

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import sympy as sp
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import And, BooleanFunction, Not, Or
 
 from fastslow.errors import ModelError
+from fastslow.model.interfaces import vanishes_on
+from fastslow.model.polynomials import PastBudgetError
+from fastslow.model.rational import quotient
+
+#: Factorised expressions that are kept for the next question about them.
+MEMORY = 4096
+
+#: A function that prints no longer than this, in characters, is given by its one factor.
+LONG = 40
 
 SWITCHING = (sp.Abs, sp.Max, sp.Min, sp.sign, sp.Heaviside)
 
@@ -68,29 +78,69 @@ def factorise(expression: sp.Expr, moving: Sequence[sp.Symbol]) -> Factorised:
     moving : sequence of Symbol
         States, slow quantities and time, in order.
     """
-    numerator, denominator = sp.together(sp.nsimplify(expression, rational=True)).as_numer_denom()
+    return _factorised(expression, tuple(moving))
+
+
+@lru_cache(maxsize=MEMORY)
+def _factorised(expression: sp.Expr, moving: tuple[sp.Symbol, ...]) -> Factorised:
     sign, factors, scales = 1, [], []
-    for part in (numerator, denominator):
-        constant, pieces = sp.factor_list(part)
-        sign *= -1 if constant.is_negative else 1
-        for factor, power in pieces:
-            if factor.is_positive:
-                continue
-            if factor.is_negative:
-                sign *= (-1) ** power
-                continue
-            if not factor.free_symbols & set(moving):
-                scales.append((factor, power))
-                continue
-            flip = -1 if _decreases(factor, moving) else 1
-            factors.append((sp.expand(flip * factor), power))
-            sign *= flip**power
+    constant, pieces = _pieces(sp.nsimplify(expression, rational=True))
+    sign *= -1 if constant.is_negative else 1
+    for factor, power in pieces:
+        if factor.is_positive:
+            continue
+        if factor.is_negative:
+            sign *= (-1) ** power
+            continue
+        if not factor.free_symbols & set(moving):
+            scales.append((factor, power))
+            continue
+        flip = -1 if _decreases(factor, moving) else 1
+        factors.append((sp.expand(flip * factor), power))
+        sign *= flip**power
     if not factors and len(scales) == 1:
         (factor, power), scales = scales[0], []
         first = sorted(factor.free_symbols, key=lambda s: s.name)
         flip = -1 if _decreases(factor, first) else 1
         factors, sign = [(sp.expand(flip * factor), power)], sign * flip**power
     return Factorised(sign, tuple(factors), tuple(scales))
+
+
+def _pieces(expression: sp.Expr) -> tuple[sp.Expr, list[tuple[sp.Expr, int]]]:
+    """Constant and irreducible factors of numerator and denominator, all powers positive."""
+    found = quotient(expression)
+    if found is not None:
+        try:
+            constant, pieces = found.factors()
+        except PastBudgetError:
+            return sp.S.One, [(expression, 1)]
+        return constant, [(f, abs(p)) for f, p in pieces]
+    sign, factors = sp.S.One, []
+    for part in sp.together(expression).as_numer_denom():
+        constant, pieces = sp.factor_list(part)
+        sign *= -1 if constant.is_negative else 1
+        factors += pieces
+    return sign, factors
+
+
+def as_written(expression: sp.Expr, moving: Sequence[sp.Symbol]) -> sp.Expr | None:
+    """A switching expression itself, oriented, where its one factor is longer than it.
+
+    Examples
+    --------
+    >>> x, y, k = sp.symbols("x y k", real=True)
+    >>> as_written(1 - k * (22 - (x + 2 * y) ** 2 / 295) ** 2, [x, y])
+    k*(22 - (x + 2*y)**2/295)**2 - 1
+    >>> as_written((3 - x) / 2, [x]) is None
+    True
+    """
+    parts = factorise(expression, moving)
+    if len(parts.factors) != 1 or parts.factors[0][1] % 2 == 0:
+        return None
+    ((factor, _),) = parts.factors
+    if len(str(factor)) <= max(LONG, len(str(expression))):
+        return None
+    return expression if parts.sign > 0 else -expression
 
 
 def _decreases(factor: sp.Expr, order: Sequence[sp.Symbol]) -> bool:
@@ -221,6 +271,10 @@ def sign_of(
     values: Mapping[sp.Symbol, float],
 ) -> int:
     """Sign of a smooth switching expression where the interface functions have given signs."""
+    if expression in signs:
+        return signs[expression]
+    if -expression in signs:
+        return -signs[-expression]
     parts = factorise(expression, moving)
     side = parts.sign
     for factor, power in parts.factors:
@@ -237,3 +291,66 @@ def sign_of(
         value = float(number)
         side *= (1 if value > 0 else -1) ** power
     return side
+
+
+def both_ways(
+    signs: Iterable[tuple[sp.Expr, int]],
+    moving: Sequence[sp.Symbol],
+    values: Mapping[sp.Symbol, float],
+) -> dict[sp.Expr, int]:
+    """Signs of interface functions, of their negatives, and of the factors that they hold.
+
+    Examples
+    --------
+    >>> x, y = sp.symbols("x y", real=True)
+    >>> both_ways([(x - (y + 1) ** 2, 1)], [x, y], {})[x - y**2 - 2 * y - 1]
+    1
+    """
+    known: dict[sp.Expr, int] = {}
+    for function, sign in signs:
+        known[function] = sign
+        known[sp.expand(-function)] = -sign
+        parts = factorise(function, moving)
+        if len(parts.factors) != 1:
+            continue
+        ((factor, _),) = parts.factors
+        side = sign * parts.sign
+        for scale, power in parts.scales:
+            number = scale.subs(values)
+            side = 0 if not number.is_number else side * int(sp.sign(number)) ** power
+        if side:
+            known.setdefault(factor, side)
+            known.setdefault(sp.expand(-factor), -side)
+    return known
+
+
+def continuous(expression: sp.Expr) -> bool:
+    """Whether an expression as it is written is seen to be continuous.
+
+    Max, Min and Abs are; a Piecewise of two branches is where their difference vanishes
+    with what its condition compares. sign, Heaviside and any other Piecewise leave the
+    question open.
+
+    Examples
+    --------
+    >>> x, y = sp.symbols("x y", real=True)
+    >>> continuous(sp.Max(0, 1 - sp.Max(x, y) ** 2)), continuous(x * sp.sign(x))
+    (True, False)
+    """
+    if expression.has(sp.sign, sp.Heaviside):
+        return False
+    return all(map(_continuous_piece, set(_piecewise_in_order(expression))))
+
+
+def _continuous_piece(piece: sp.Piecewise) -> bool:
+    if len(piece.args) != 2:
+        return False
+    (first, condition), (second, otherwise) = piece.args
+    if otherwise is not sp.true or not isinstance(condition, (sp.Gt, sp.Ge, sp.Lt, sp.Le)):
+        return False
+    jump, level = first - second, condition.lhs - condition.rhs
+    if sp.expand(jump) == 0 or sp.expand(jump - level) == 0 or sp.expand(jump + level) == 0:
+        return True
+    if jump.has(sp.Piecewise, *SWITCHING) or level.has(sp.Piecewise, *SWITCHING):
+        return False
+    return vanishes_on(*(sp.nsimplify(e, rational=True) for e in (jump, level)))

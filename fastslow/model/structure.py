@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import count
 from typing import Any
 
 import sympy as sp
@@ -14,7 +15,16 @@ from fastslow.arguments import shown
 from fastslow.errors import ModelError, unknown_name
 from fastslow.model.geometry import Pattern, affine_rows, possible_patterns
 from fastslow.model.interfaces import Interface, Region
-from fastslow.model.reading import factorise, smooth, switching_expressions, with_piecewise
+from fastslow.model.reading import (
+    LONG,
+    as_written,
+    both_ways,
+    continuous,
+    factorise,
+    smooth,
+    switching_expressions,
+    with_piecewise,
+)
 from fastslow.results.named import Named
 
 TIME = sp.Symbol("t", real=True)
@@ -33,7 +43,11 @@ def real(name: str) -> sp.Symbol:
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """The equations with their interfaces, and the names given to regions so far."""
+    """The equations with their interfaces, and the names given to regions so far.
+
+    ``continuous`` is whether the rates as they were written are seen to be continuous;
+    where they are not, the regions on both sides of an interface decide.
+    """
 
     states: tuple[str, ...]
     slow_states: tuple[str, ...]
@@ -46,6 +60,7 @@ class Structure:
     names: dict[Cell, str] = field(default_factory=dict)
     path: dict[str, sp.Expr] = field(default_factory=dict)
     periodic: dict[str, sp.Expr] = field(default_factory=dict)
+    continuous: bool = False
 
     @property
     def moving(self) -> tuple[sp.Symbol, ...]:
@@ -93,7 +108,7 @@ class Structure:
     def _contents(
         self, functions: Sequence[sp.Expr], pattern: Pattern, values: Values
     ) -> dict[str, sp.Expr]:
-        signs = _both_ways(zip(functions, pattern, strict=True))
+        signs = both_ways(zip(functions, pattern, strict=True), self.moving, values)
         written = {**self.rates, **self.forcing}
         return {n: smooth(e, signs, self.moving, values) for n, e in written.items()}
 
@@ -106,7 +121,7 @@ class Structure:
         """A name for each pattern: asked for, kept from before, or the next free number."""
         named: dict[Pattern, str] = {}
         for pattern, whole in patterns.items():
-            signs = _both_ways(_cell(interfaces, pattern))
+            signs = both_ways(_cell(interfaces, pattern), self.moving, values)
             asked = []
             for region, condition in self.conditions.items():
                 try:
@@ -231,10 +246,13 @@ def read_structure(
     shapes = {_shape(i.function, moving) for i in found}
     for expression in (*equations.values(), *laws.values()):
         for switching in switching_expressions(expression):
-            for function, _ in factorise(switching, moving).factors:
-                if _shape(function, moving) not in shapes:
-                    shapes.add(_shape(function, moving))
-                    found.append(Interface(_written(function, moving), function))
+            for factor, _ in factorise(switching, moving).factors:
+                if _shape(factor, moving) not in shapes:
+                    shapes.add(_shape(factor, moving))
+                    written = as_written(switching, moving)
+                    function = factor if written is None else written
+                    taken = {*known, *(i.name for i in found)}
+                    found.append(Interface(_name(function, moving, taken), function))
     conditions = {str(n): _checked_condition(f"region {n}", c, known) for n, c in regions.items()}
     return Structure(
         tuple(groups["state"]),
@@ -245,6 +263,9 @@ def read_structure(
         tuple(found),
         frozenset(listed),
         conditions,
+        continuous=all(
+            continuous(read_expression(f"rate of {n}", e)) for n, e in {**rates, **slow}.items()
+        ),
     )
 
 
@@ -322,6 +343,9 @@ def _irreducible(name: str, function: sp.Expr, moving: Sequence[sp.Symbol]) -> s
             f"interface {name}: expected one irreducible switching function, received "
             f"{function}, which vanishes where one of these does: {names}"
         )
+    written = as_written(function, moving)
+    if written is not None:
+        return function
     return sp.expand(parts.sign * parts.factors[0][0])
 
 
@@ -357,6 +381,14 @@ def _written(function: sp.Expr, moving: Sequence[sp.Symbol]) -> str:
     return text
 
 
+def _name(function: sp.Expr, moving: Sequence[sp.Symbol], taken: set[str]) -> str:
+    """What a function prints, where that is short, else a letter with the next free number."""
+    text = _written(function, moving)
+    if len(text) <= LONG:
+        return text
+    return next(n for n in (f"h{k}" for k in count(1)) if n not in taken)
+
+
 def _cell(interfaces: Sequence[Interface], pattern: Pattern) -> Cell:
     return frozenset((i.function, s) for i, s in zip(interfaces, pattern, strict=True))
 
@@ -380,15 +412,6 @@ def _inequality(interface: Interface, sign: int) -> sp.Rel:
             level = sp.expand(symbol - h)
             return sp.Gt(symbol, level) if sign > 0 else sp.Lt(symbol, level)
     return sp.Gt(h, 0) if sign > 0 else sp.Lt(h, 0)
-
-
-def _both_ways(signs: Iterable[tuple[sp.Expr, int]]) -> dict[sp.Expr, int]:
-    """Signs of the functions and of their negatives, whichever way a factor is oriented."""
-    known: dict[sp.Expr, int] = {}
-    for function, sign in signs:
-        known[function] = sign
-        known[sp.expand(-function)] = -sign
-    return known
 
 
 def _indicator(condition: Boolean) -> sp.Expr:

@@ -13,8 +13,8 @@ import math
 
 import sympy as sp
 
-from fastslow.symbolic.polynomials import PastBudgetError
-from fastslow.symbolic.rational import quotient
+from fastslow.model.polynomials import PastBudgetError
+from fastslow.model.rational import quotient
 
 #: Longest sum, in terms, that is factored or cancelled.
 TERMS = 200

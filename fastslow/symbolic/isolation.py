@@ -7,7 +7,7 @@ from collections.abc import Callable
 import sympy as sp
 
 from fastslow.symbolic.algebra import longer, numerator, shortest, spread, tidy
-from fastslow.symbolic.rational import quotient
+from fastslow.model.rational import quotient
 from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.univariate import Root, roots
 

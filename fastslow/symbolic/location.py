@@ -19,7 +19,7 @@ from fastslow.symbolic.algebra import (
     undefined,
 )
 from fastslow.symbolic.candidates import Candidates, chosen
-from fastslow.symbolic.rational import quotient
+from fastslow.model.rational import quotient
 from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.solution_families import Family
 from fastslow.symbolic.univariate import Root, factors_in, roots, solved_for

@@ -8,7 +8,7 @@ import sympy as sp
 from sympy.printing.str import StrPrinter
 
 from fastslow.symbolic.algebra import irrational, longer, shortest, whole
-from fastslow.symbolic.rational import quotient
+from fastslow.model.rational import quotient
 
 #: Longest line of text, and the longest formula that is printed at all.
 WIDTH = 180

@@ -9,7 +9,7 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from fastslow.symbolic.algebra import factors, light, longer, spread, tidy, undefined
-from fastslow.symbolic.rational import quotient
+from fastslow.model.rational import quotient
 
 #: Parts of an expression up to which more than the signs of its terms is tried.
 PARTS = 300

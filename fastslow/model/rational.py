@@ -13,7 +13,7 @@ import sympy as sp
 from sympy.polys.domains import ZZ
 from sympy.polys.rings import PolyElement, PolyRing
 
-from fastslow.symbolic.polynomials import (
+from fastslow.model.polynomials import (
     PastBudgetError,
     coefficients,
     degree,
