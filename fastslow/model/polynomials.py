@@ -18,10 +18,10 @@ from sympy.polys.polyerrors import HeuristicGCDFailed
 from sympy.polys.rings import PolyElement
 
 #: Most terms of a polynomial that is formed.
-TERMS = 3000
+TERMS = 600
 
 #: Most products of terms in one multiplication.
-PRODUCTS = 60_000
+PRODUCTS = 12_000
 
 #: Bits of the integers that a heuristic common divisor may reach.
 BITS = 200_000

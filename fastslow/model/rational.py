@@ -34,7 +34,7 @@ POWER = 24
 INDEX = 4
 
 #: Parts of an expression that is read.
-PARTS = 4000
+PARTS = 1500
 
 
 @dataclass(frozen=True)

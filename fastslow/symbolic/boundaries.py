@@ -11,7 +11,7 @@ from sympy.logic.boolalg import Boolean
 
 from fastslow.model.structure import real
 from fastslow.results.named import Named
-from fastslow.symbolic.algebra import adjugate, determinant, spread, tidy, undefined
+from fastslow.symbolic.algebra import adjugate, determinant, longer, spread, tidy, undefined
 from fastslow.symbolic.candidates import Candidates, settled
 from fastslow.symbolic.critical import Setting
 from fastslow.symbolic.inequalities import conjunction, implied
@@ -21,6 +21,9 @@ from fastslow.symbolic.solution_families import Family, families
 from fastslow.symbolic.stability import jacobian
 from fastslow.symbolic.univariate import Root, roots, solved_for
 from fastslow.symbolic.verification import OPEN, checked
+
+#: Equations longer than this, in parts of their tree, are solved for the first parameter only.
+LONG = 120
 
 #: Kinds of boundary equilibria by the sign of their test.
 TYPES = {1: "persistence", -1: "non-smooth fold", 0: "degenerate"}
@@ -163,9 +166,10 @@ def _places(function: sp.Expr, own: Setting) -> list[_Place]:
     """
     used = set().union(function.free_symbols, *(r.free_symbols for r in own.rates.values()))
     best: list[_Place] = []
-    for parameter in own.candidates:
-        if parameter not in used:
-            continue
+    tried = [c for c in own.candidates if c in used]
+    if longer(function, LONG) or any(longer(r, LONG) for r in own.rates.values()):
+        tried = tried[:1]
+    for parameter in tried:
         names = (*own.states, parameter.name)
         signs = own.signs.without(parameter)
         others = own.candidates.without(parameter)

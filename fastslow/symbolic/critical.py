@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 from sympy.logic.boolalg import Boolean
+from sympy.polys.rootoftools import ComplexRootOf
 
 from fastslow.model.structure import real
 from fastslow.results.named import Named
@@ -155,7 +156,8 @@ def _defined(point: CriticalPoint) -> bool:
 
 def _passes(other: Family, point: CriticalPoint, setting: Setting) -> bool:
     """Whether another family holds a point."""
-    if point.equations:
+    if point.equations or any(e.has(ComplexRootOf) for e in point.state.values()):
+        # roots of numbers alone are told apart by their polynomials
         return False
     place = {real(n): e for n, e in {**point.parameters, **point.state}.items()}
     gaps = [e.xreplace(place) for e in other.equations]

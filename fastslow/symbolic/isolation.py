@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import sympy as sp
 
-from fastslow.symbolic.algebra import longer, numerator, shortest, spread, tidy
 from fastslow.model.rational import quotient
+from fastslow.symbolic.algebra import longer, numerator, shortest, spread, tidy
 from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.univariate import Root, roots
 
 #: A longer equation, in parts of its tree, is not solved.
-PARTS = 400
+PARTS = 150
 
 #: Functions that take each value once, with their inverse.
 INVERSES: dict[type, Callable[[sp.Expr], sp.Expr]] = {

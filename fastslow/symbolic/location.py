@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from fastslow.model.rational import quotient
 from fastslow.symbolic.algebra import (
     generators,
     irrational,
@@ -19,7 +20,6 @@ from fastslow.symbolic.algebra import (
     undefined,
 )
 from fastslow.symbolic.candidates import Candidates, chosen
-from fastslow.model.rational import quotient
 from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.solution_families import Family
 from fastslow.symbolic.univariate import Root, factors_in, roots, solved_for
@@ -27,6 +27,9 @@ from fastslow.symbolic.verification import vanishes
 
 #: A longer condition, in parts of its tree, is left as an equation.
 PARTS = 500
+
+#: A root longer than this, in parts of its tree, is not put into a condition.
+BENT = 150
 
 #: Resultants are formed up to this degree of the eliminated unknown.
 RESULTANT = 6
@@ -161,9 +164,10 @@ def _on_bent_curve(
     assert curve is not None
     (equation,) = family.equations
     free = numerator(replace(family, parameter=None, curve=None).reduced(condition))
-    whole = equation.is_polynomial(parameter) and free.is_polynomial(parameter)
+    short = not longer(free, BENT) and not longer(curve, BENT)
+    whole = short and equation.is_polynomial(parameter) and free.is_polynomial(parameter)
     if not whole or max(sp.degree(e, parameter) for e in (equation, free)) > RESULTANT:
-        return [Located({parameter: curve}, family.radicands, (free.subs(parameter, curve),))]
+        return [Located({}, family.radicands, (equation, free))]
     both = sp.resultant(equation, free, parameter) if parameter in free.free_symbols else free
     found = []
     for factor in _open(both, [unknown, *candidates], signs):

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 import sympy as sp
 from sympy.printing.str import StrPrinter
 
-from fastslow.symbolic.algebra import irrational, longer, shortest, whole
 from fastslow.model.rational import quotient
+from fastslow.symbolic.algebra import irrational, longer, shortest, whole
 
 #: Longest line of text, and the longest formula that is printed at all.
 WIDTH = 180

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import sympy as sp
 from sympy.core.relational import Relational
 
-from fastslow.symbolic.algebra import factors, light, longer, spread, tidy, undefined
 from fastslow.model.rational import quotient
+from fastslow.symbolic.algebra import factors, light, longer, spread, tidy, undefined
 
 #: Parts of an expression up to which more than the signs of its terms is tried.
 PARTS = 300

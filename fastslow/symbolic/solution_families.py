@@ -10,6 +10,7 @@ import sympy as sp
 from fastslow.model.structure import real
 from fastslow.results.named import Named
 from fastslow.symbolic.algebra import (
+    generators,
     growth,
     light,
     longer,
@@ -31,6 +32,12 @@ COEFFICIENTS = 12
 
 #: Longer divisors, in parts of their tree, are not written out in a note.
 PARTS = 100
+
+#: Rates that may have more terms than this once expanded are left as they are.
+EXPANDED = 300
+
+#: What is then said.
+PAST = "rates past the budget of expansion; given as they are"
 
 #: More branches of one set of equations than this are not split any further.
 BRANCHES = 24
@@ -120,13 +127,16 @@ def families(
     [x**3]
     """
     candidates = Candidates.of(candidates)
+    unknowns = tuple(real(n) for n in states)
+    if any(growth(rates[n]) > EXPANDED for n in states if not generators(rates[n])):
+        whole = Elimination(tuple(rates.values()), unknowns, Named("solved state", {}))
+        return [Family(whole, note=PAST)]
     direct = cramer(rates, states)
     if isinstance(direct, tuple):
         values, below = direct
         solved = Elimination((), (), Named("solved state", values), (below,))
         return _solved(solved, signs, candidates)
     if direct is not None:
-        unknowns = tuple(real(n) for n in states)
         whole = Elimination(tuple(rates.values()), unknowns, Named("solved state", {}))
         return [Family(whole, note=direct)]
     poles = _poles(rates, states)

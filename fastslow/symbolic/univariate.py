@@ -76,7 +76,7 @@ def roots(factor: sp.Expr, unknown: sp.Symbol, signs: Signs) -> list[Root] | Non
     D/3 + sqrt(-3*A + D**2)/3 -3*A + D**2
     D/3 - sqrt(-3*A + D**2)/3 -3*A + D**2
     """
-    if not factor.is_polynomial(unknown):
+    if longer(factor, PARTS) or not factor.is_polynomial(unknown):
         return None
     poly = sp.Poly(factor, unknown)
     degree = poly.degree()
