@@ -13,9 +13,11 @@ from fastslow.diagrams.equations import region_equations, same
 from fastslow.diagrams.equilibrium_sets import in_a_set, sets_of
 from fastslow.diagrams.fields import IDLE, FrozenField, require_frozen
 from fastslow.diagrams.windows import within
+from fastslow.errors import ModelError
 from fastslow.model.model import Model
 from fastslow.results.points import Equilibria, Equilibrium
 from fastslow.results.windows import state_window
+from fastslow.symbolic.symmetries import free_directions
 
 Array = NDArray[np.float64]
 
@@ -66,7 +68,8 @@ def equilibria(
     UnknownNameError
         For a name that is no parameter, or in the window no state.
     ModelError
-        For a slow quantity without value.
+        For a slow quantity without value, or where a shift of the states leaves every
+        rate as it is, so that no equilibrium is isolated.
     ArgumentError
         For a range in the window that is none.
 
@@ -85,6 +88,8 @@ def equilibria(
     """
     require_frozen(model, "solve for the equilibria of")
     given = model.with_parameters(values, **named)
+    if free := free_directions(model):
+        raise ModelError(f"the equilibria are not isolated; {free[0]}")
     name = next(iter(given.parameters), IDLE)
     value = given.parameters[name] if given.parameters else 0.0
     asked = state_window(model.states, window, model.periodic)

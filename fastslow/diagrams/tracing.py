@@ -41,6 +41,7 @@ from fastslow.results.diagrams import SEARCHED, Diagram
 from fastslow.results.outcome import Outcome
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.windows import LEFT, state_window
+from fastslow.symbolic.symmetries import FreeDirection, free_directions
 
 Array = NDArray[np.float64]
 
@@ -145,6 +146,8 @@ def continue_equilibria(
     field = _field(model, name)
     continuation = continuation or Continuation()
     asked = state_window(model.states, window, model.periodic)
+    if from_points is None and (free := free_directions(model)):
+        return _without_branches(field, name, (lower, upper), continuation, free[0])
     starts = (
         starts_of(field, lower, upper, continuation.starts, asked)
         if from_points is None
@@ -215,6 +218,33 @@ def _ending(
         f"only branches through the {count} given point{'s' if count > 1 else ''} were traced; "
         "no others were looked for.",
         True,
+    )
+
+
+def _without_branches(
+    field: FrozenField,
+    name: str,
+    over: tuple[float, float],
+    continuation: Continuation,
+    direction: FreeDirection,
+) -> Diagram:
+    """The diagram of a model in which no equilibrium is isolated, and its outcome."""
+    corrector = _corrector(field)
+    return Diagram(
+        field.model.states,
+        name,
+        over,
+        dict(field.model.parameters),
+        (),
+        "found",
+        field.interfaces,
+        field.regions,
+        _interface_values(field),
+        _text(field.model),
+        corrector,
+        Outcome("free direction", f"no branch of equilibria is traced; {direction}.", False),
+        {quantity: str(law) for quantity, law in field.model.path.items()},
+        asdict(continuation),
     )
 
 

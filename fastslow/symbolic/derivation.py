@@ -27,6 +27,7 @@ from fastslow.symbolic.forms import Continuum, CriticalPoint
 from fastslow.symbolic.inequalities import needed
 from fastslow.symbolic.regions import RegionForms, derive_region
 from fastslow.symbolic.signs import Signs
+from fastslow.symbolic.symmetries import FreeDirection, free_directions
 from fastslow.symbolic.verification import weakest
 
 
@@ -47,6 +48,8 @@ class Derivation:
         By interface.
     equilibrium_sets : tuple of EquilibriumSetForm
         Sets of equilibria within discontinuities, such as a sticking band.
+    free_directions : tuple of FreeDirection
+        Shifts of the states that leave every rate as it is, with the reduction without them.
     """
 
     states: tuple[str, ...]
@@ -55,6 +58,7 @@ class Derivation:
     regions: Named[RegionForms]
     boundary_equilibria: tuple[BoundaryForm, ...]
     equilibrium_sets: tuple[EquilibriumSetForm, ...] = ()
+    free_directions: tuple[FreeDirection, ...] = ()
 
     def __getitem__(self, region: object) -> RegionForms:
         return self.regions[region]
@@ -175,7 +179,15 @@ def derive(model: Model, assume: Any = None, *, parameter: Any = None) -> Deriva
         name: _with_edges(derive_region(setting, found), sets) for name, setting in settings.items()
     }
     named = Named("region", regions)
-    return Derivation(model.states, model.free, signs.conditions, named, found, sets)
+    return Derivation(
+        model.states,
+        model.free,
+        signs.conditions,
+        named,
+        found,
+        sets,
+        free_directions(model),
+    )
 
 
 def _edge(

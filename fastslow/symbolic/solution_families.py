@@ -274,7 +274,8 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
     if closed is not None and sp.degree(equation, unknown) == 1:
         return [_linear(slim, closed[0].value, free, note, signs)]
     choice = chosen(equation, candidates.without(unknown), signs)
-    if choice is not None and choice.slope is None and (closed is not None or not choice.values):
+    bent = choice is not None and choice.slope is None
+    if choice is not None and (not choice.values or (bent and closed is not None)):
         # the unknown has a closed form; a root of the parameter would only be longer
         choice = None
     parameter = choice.symbol if choice is not None else None

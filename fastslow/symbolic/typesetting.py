@@ -50,6 +50,10 @@ def _blocks(law: Derivation) -> list[Block]:
     taken = names_of(law)
     if law.assumptions:
         blocks.append(("Assumptions", [_comma(law.assumptions)]))
+    for free in law.free_directions:
+        moved = [rf"{_tex(real(n))} + c \, {_tex(e)}" for n, e in free.shift.items()]
+        kept = [rf"{_tex(real(n))} = {_tex(e)}" for n, e in free.combinations.items()]
+        blocks.append(("Free direction", [r",\quad ".join(moved), r",\quad ".join(kept)]))
     for region in law.regions.values():
         blocks.append((f"Region {region.name}", _region(region, taken)))
     for one in law.equilibrium_sets:

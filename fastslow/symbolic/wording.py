@@ -63,6 +63,8 @@ def summary(law: Derivation) -> str:
     lines = _wrapped(
         f"Derivation of {', '.join(law.states)}{frozen}; assumed:", assumed.split(", "), "  "
     )
+    for free in law.free_directions:
+        lines += _sentence("", str(free), "  ")
     for region in law.regions.values():
         lines += _region(region, taken)
     for one in law.equilibrium_sets:
@@ -165,10 +167,10 @@ def _region(region: RegionForms, taken: set[str]) -> list[str]:
     return lines
 
 
-def _sentence(head: str, sentence: str) -> list[str]:
+def _sentence(head: str, sentence: str, indent: str = "    ") -> list[str]:
     words = sentence.split(" ")
     pieces = [Piece(head + words[0]), *(Piece(w, separator=" ") for w in words[1:])]
-    return _lines(pieces, [p.before for p in pieces], "    ")
+    return _lines(pieces, [p.before for p in pieces], indent)
 
 
 def _values(head: str, values: Sequence[tuple[str, sp.Expr]]) -> list[Piece]:
