@@ -249,8 +249,8 @@ def read_structure(
             for factor, _ in factorise(switching, moving).factors:
                 if _shape(factor, moving) not in shapes:
                     shapes.add(_shape(factor, moving))
-                    written = as_written(switching, moving)
-                    function = factor if written is None else written
+                    whole = as_written(switching, moving)
+                    function = factor if whole is None else whole
                     taken = {*known, *(i.name for i in found)}
                     found.append(Interface(_name(function, moving, taken), function))
     conditions = {str(n): _checked_condition(f"region {n}", c, known) for n, c in regions.items()}
