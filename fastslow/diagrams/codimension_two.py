@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,14 @@ from fastslow.continuation.curves import Frame
 from fastslow.continuation.location import newton
 from fastslow.continuation.settings import Continuation
 from fastslow.continuation.zeros import ROUNDING, Bracket, Node, brackets
+from fastslow.diagrams.center_manifolds import (
+    bogdanov_takens,
+    double_hopf,
+    double_hopf_case,
+    generalized_hopf,
+    zero_hopf,
+    zero_hopf_case,
+)
 from fastslow.diagrams.defining import Defining, OnInterface, Pair, row_sizes
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.normal_forms import (
@@ -483,25 +492,45 @@ def _imaginary(values: Vector) -> bool:
     return bool((first[k] * second[k]).real > IMAGINARY * size[k] ** 2)
 
 
-def coefficients(system: Defining, found: Found) -> dict[str, float]:
-    """Normal-form data of a point: the cusp's cubic, the other pair's frequency, l₁."""
+def coefficients(system: Defining, found: Found) -> dict[str, Any]:
+    """Normal-form data of a point, by the names of a special point's fields."""
     n, w = system.n, system.width
-    u, region = found.z[:w], found.criterion.region
-    raw = system.field.curve(region, u)[1][:, :n]
-    if found.criterion.code == "UZ":
+    code, u, region = found.criterion.code, found.z[:w], found.criterion.region
+    field = system.field
+    if code not in ("CP", "BT", "GH", "ZH", "HH", "BH"):
         return {}
-    if found.criterion.code == "CP":
-        return {"coefficient": cusp_form(forms_at(system.field, region, u), raw)}
+    raw = field.curve(region, u)[1][:, :n]
+    if code == "CP":
+        return {"coefficient": cusp_form(forms_at(field, region, u), raw)}
     values = np.linalg.eigvals(raw)
-    if found.criterion.code in ("ZH", "BH"):
-        return {"frequency": float(np.abs(values.imag).max())}
-    if found.criterion.code == "GH":
-        return {"frequency": float(np.sqrt(found.z[w]))}
-    if found.criterion.code == "HH":
-        own = np.sqrt(found.z[w])
+    if code == "GH":
+        frequency = float(np.sqrt(found.z[w]))
+        form = _form(generalized_hopf, field, region, u, frequency)
+        return {"frequency": frequency, "normal_form": form}
+    if code == "HH":
+        own = float(np.sqrt(found.z[w]))
         others = sorted(values[values.imag > 0].imag, key=lambda f: -abs(f - own))
-        return {"frequency": float(others[0])}
-    return {}
+        other = float(others[0])
+        form = _form(double_hopf, field, region, u, (own, other))
+        return {"frequency": other, "normal_form": form, "subtype": double_hopf_case(form)}
+    if code == "BT":
+        return {"normal_form": _form(bogdanov_takens, field, region, u)}
+    pair = values[np.argmin(np.where(values.imag > 0, np.abs(values.real / values), np.inf))]
+    frequency = float(abs(pair.imag))
+    if code == "BH":
+        return {"frequency": frequency}
+    form = _form(zero_hopf, field, region, u, frequency)
+    return {"frequency": frequency, "normal_form": form, "subtype": zero_hopf_case(form)}
+
+
+def _form(compute: Callable[..., dict[str, float]], *given: Any) -> dict[str, float]:
+    """Coefficients of a normal form, none where it is degenerate or has none."""
+    try:
+        with np.errstate(all="ignore"):
+            form = compute(*given)
+    except (np.linalg.LinAlgError, NotImplementedError):
+        return {}
+    return form if all(np.isfinite(list(form.values()))) else {}
 
 
 def along(system: Defining, rows: Array) -> Array:

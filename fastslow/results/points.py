@@ -275,7 +275,8 @@ class SpecialPoint(_Point):
     interface : str, optional
         The interface a boundary equilibrium lies on.
     subtype : str, optional
-        ``"persistence"``, ``"non-smooth fold"`` or ``"degenerate"``.
+        Of a boundary equilibrium ``"persistence"``, ``"non-smooth fold"`` or
+        ``"degenerate"``; of ZH and HH the case that the normal form decides.
     clarke : ClarkePath, optional
         For boundary equilibria of a continuous field.
     coefficient : float, optional
@@ -288,6 +289,11 @@ class SpecialPoint(_Point):
     lyapunov : float, optional
         First Lyapunov coefficient l₁ of a Hopf point (Kuznetsov 2004, eq. 5.34),
         for an eigenvector of length one.
+    normal_form : mapping
+        Coefficients on the center manifold of a codimension-two point, for eigenvectors
+        of length one (Kuznetsov 2004, sections 8.3 to 8.7): a and b of BT, l2 of GH, s,
+        theta and E of ZH, p11, p12, p21, p22, theta and delta of HH; empty where a
+        resonance leaves none.
     switch : ndarray, shape (n + 1,), optional
         At a branch point the unit tangent of the other branch.
     accuracy : float, optional
@@ -317,6 +323,7 @@ class SpecialPoint(_Point):
     coefficient: float | None = None
     frequency: float | None = None
     lyapunov: float | None = None
+    normal_form: Mapping[str, float] = field(default_factory=dict)
     switch: NDArray[np.float64] | None = field(default=None, repr=False)
     accuracy: float | None = None
     admissible: bool = True
