@@ -126,7 +126,7 @@ def bogdanov_takens(field: FrozenField, region: int, u: Array) -> dict[str, floa
 def zero_hopf_case(form: dict[str, float]) -> str:
     """Signs of s and θ; tori branch off where they differ (Kuznetsov 2004, section 8.5.2)."""
     if not form:
-        return "degenerate"
+        return "resonant or degenerate"
     positive = form["theta"] > 0
     torus = ", with tori" if (form["s"] > 0) != positive else ""
     return f"s = {form['s']:+.0f}, θ {'>' if positive else '<'} 0{torus}"
@@ -135,7 +135,7 @@ def zero_hopf_case(form: dict[str, float]) -> str:
 def double_hopf_case(form: dict[str, float]) -> str:
     """Simple (p₁₁p₂₂ > 0) or difficult, with the case of (θ, δ) in Kuznetsov 2004, section 8.6."""
     if not form:
-        return "degenerate"
+        return "resonant or degenerate"
     high = max(form["theta"], form["delta"])
     low = min(form["theta"], form["delta"])
     product = high * low

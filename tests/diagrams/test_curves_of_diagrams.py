@@ -103,10 +103,10 @@ def test_a_curve_traced_twice_is_recognised(reactor, curves):
     other = fs.continue_points(reactor.folds[1], ("p1", "p2"), over=PLANE)
     with pytest.raises(fs.ArgumentError, match="one curve, traced twice"):
         curves[0].intersections(other)
-    # folds and pairs touch at BT and cross elsewhere
+    # folds and pairs touch at BT, which costs half the digits, and cross elsewhere
     (bt,) = curves[0].special("BT")
     met = curves[0].intersections(curves[1])
-    assert np.abs(met - [bt["p1"], bt["p2"]]).max(axis=1).min() < 1e-9
+    assert np.abs(met - [bt["p1"], bt["p2"]]).max(axis=1).min() < 1e-5
     assert len(met) == 3
 
 

@@ -183,6 +183,8 @@ def test_generalized_hopf_of_the_bautin_normal_form():
     (gh,) = curve.special("GH")
     assert np.abs([gh["p"], gh["q"]]).max() < 1e-14
     assert gh.frequency == pytest.approx(2, rel=1e-14)
+    # |q| = 1: r = √2 |w|, so that c₂ = −4
+    assert gh.normal_form["l2"] == pytest.approx(-2, rel=1e-12)
     assert curve.coefficient == pytest.approx(curve["q"], abs=1e-12)
 
 
@@ -235,6 +237,9 @@ def test_double_hopf():
     (point,) = curve.special("HH")
     assert np.abs([point["p"], point["q"]]).max() < 1e-13
     assert point.frequency == pytest.approx(3, rel=1e-12)
+    # frequencies 1 and 3 are in resonance
+    assert point.normal_form == {}
+    assert point.subtype == "resonant or degenerate"
     # from there the other pair is followed
     other = fs.continue_points(point, ("p", "q"), over=over)
     assert np.abs(other["q"]).max() < 1e-12
