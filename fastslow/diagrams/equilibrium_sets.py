@@ -152,7 +152,7 @@ class Family:
             return [] if found is None else [found]
         if self.dimension == 1:
             return [self._interval(value, *piece) for piece in self._pieces(value)]
-        return []
+        return self._searched(value) if self.dimension == len(self.motion.slides) else []
 
     def _interval(self, value: float, low: float, high: float) -> EquilibriumSet:
         """A set of dimension 1 between two values of the free state."""
@@ -260,7 +260,7 @@ class Family:
             ends = [-np.inf, *sorted(set(ends)), np.inf]
         else:
             k = self.field.model.states.index(self.free[0].name)
-            reach = REACH * float(self.field.units_at(value)[k])
+            reach = REACH * float(self.field.units_at(abs(value))[k])
             grid = np.linspace(-reach, reach, PLACES)
             for number, row in enumerate(self.values(value, grid)):
                 for i in np.flatnonzero(row[1:] * row[:-1] < 0):
@@ -279,6 +279,75 @@ class Family:
             else:
                 joined.append((low, high))
         return joined
+
+    @cached_property
+    def _weights(self) -> Callable[..., Any]:
+        """The weights and their derivatives by the free states, at places along a last axis."""
+        weights = sp.Matrix([1 - e for e in self.bounds[: 2 * len(self.motion.slides) : 2]])
+        both = [list(weights), list(weights.jacobian(self.free))]
+        return sp.lambdify(self._symbols, both, "numpy")
+
+    def _newton(
+        self, value: float, places: Array, targets: Array
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Places at which the weights have target values, both of shape (N, d), and whether."""
+        d = self.dimension
+        with np.errstate(all="ignore"):
+            for _ in range(12):
+                given, slopes = self._weights(value, *places.T)
+                left = np.stack(np.broadcast_arrays(*given, places[:, 0])[:-1], axis=-1) - targets
+                table = np.stack(np.broadcast_arrays(*slopes, places[:, 0])[:-1], axis=-1)
+                matrices = table.reshape(-1, d, d)
+                finite = np.isfinite(matrices).all(axis=(1, 2))
+                sizes = np.abs(np.linalg.det(np.where(finite[:, None, None], matrices, 0.0)))
+                sound = np.logical_and(finite, sizes > 0)
+                matrices = np.where(sound[:, None, None], matrices, np.eye(d))
+                places = places - np.linalg.solve(matrices, left[..., None])[..., 0]
+        near = np.abs(left).max(axis=1) < SMALL
+        return places, np.logical_and(near, np.isfinite(places).all(axis=1))
+
+    def _searched(self, value: float) -> list[EquilibriumSet]:
+        """Sets of several dimensions: from where all weights vanish to the faces of the cube.
+
+        The ranges are those of the places reached on a grid on the faces.
+        """
+        d = self.dimension
+        names = self.field.model.states
+        units = self.field.units_at(abs(value))[[names.index(c.name) for c in self.free]]
+        line = np.linspace(-1.0, 1.0, 9)
+        grid = np.array(list(product(line, repeat=d))) * REACH * units
+        middles, found = self._newton(value, grid, np.zeros_like(grid))
+        inside = np.logical_and(found, (np.abs(middles) <= REACH * units).all(axis=1))
+        distinct: list[Array] = []
+        for middle in middles[inside]:
+            if not any((np.abs(middle - o) <= 1e-6 * units).all() for o in distinct):
+                distinct.append(middle)
+        cube = np.array(list(product(np.linspace(-1.0, 1.0, 9 if d == 2 else 5), repeat=d)))
+        cube = cube[np.abs(cube).max(axis=1) == 1.0]
+        sets = []
+        for middle in sorted(distinct, key=tuple):
+            if not (self.values(value, *middle) >= 0).all():
+                continue
+            places, alive = np.tile(middle, (len(cube), 1)), np.ones(len(cube), dtype=bool)
+            reached = [places]
+            for part in np.linspace(0.0, 1.0, 11)[1:]:
+                further, near = self._newton(value, places, part * cube)
+                alive &= near
+                places = np.where(alive[:, None], further, places)
+                reached.append(places)
+            states = np.array([self.state(value, *free) for free in np.concatenate(reached)])
+            corner = alive & np.asarray(np.abs(cube).min(axis=1) == 1.0)
+            corners = np.array([self.state(value, *free) for free in places[corner]])
+            sets.append(
+                self._made(
+                    value,
+                    tuple(middle.tolist()),
+                    states.min(axis=0),
+                    states.max(axis=0),
+                    corners if len(corners) else self.state(value, *middle)[None],
+                )
+            )
+        return sets
 
     def contains(self, u: Array, unit: Array | float) -> bool:
         """Whether a point (states, parameter) is in the set, its edges included.
@@ -334,9 +403,9 @@ def _family(field: FrozenField, motion: Motion) -> Family | None:
     functions = [exact(i.function).subs(numbers) for i in field.model.interfaces.values()]
     rates = [exact(r).subs(numbers) for r in motion.rates]
     parts = solved_along([functions[j] for j in motion.slides], rates, names)
-    if parts is None or (not parts[1] and len(motion.slides) == 1):
+    if parts is None or parts[1] is None or (not parts[1] and len(motion.slides) == 1):
         return None
-    solved, free = parts
+    solved, free = parts[0], parts[1]
     weights = [sp.cancel(exact(s).subs(numbers).subs(solved)) for s in motion.weights]
     others = [
         sp.expand(sign * functions[j].subs(solved)) for j, sign in enumerate(motion.signs) if sign
@@ -363,6 +432,29 @@ def _family(field: FrozenField, motion: Motion) -> Family | None:
 def sets_of(field: FrozenField, value: float) -> list[EquilibriumSet]:
     """All sets of equilibria at a value of the field's parameter."""
     return [one for family in families_of(field) for one in family.sets(value)]
+
+
+def all_known(field: FrozenField) -> bool:
+    """Whether no equilibria along several interfaces at once are left out.
+
+    Those of equations that stay implicit, and sets with no way to their ranges, are not
+    looked for; sets that are not exact may not be all.
+    """
+    return not _implicit(field) and all(f.exact for f in families_of(field))
+
+
+@lru_cache(maxsize=64)
+def _implicit(field: FrozenField) -> bool:
+    """Whether the equations of a motion along several interfaces stay implicit."""
+    numbers = _numbers(field)
+    for motion in motions_of(field.model).sliding:
+        if len(motion.slides) > 1:
+            heights = [exact(h).subs(numbers) for h in _heights(field, motion)]
+            rates = [exact(r).subs(numbers) for r in motion.rates]
+            parts = solved_along(heights, rates, field.model.states)
+            if parts is not None and parts[1] is None:
+                return True
+    return False
 
 
 def covered(field: FrozenField, lower: float, upper: float) -> set[int]:
@@ -397,8 +489,12 @@ def in_a_set(field: FrozenField, u: Array, unit: Array | float) -> bool:
 
 
 def bands_of(field: FrozenField, lower: float, upper: float) -> tuple[EquilibriumBand, ...]:
-    """The bands that the sets of equilibria make over a range of the parameter."""
-    return tuple(b for family in families_of(field) for b in _bands(family, lower, upper))
+    """The bands that the sets of equilibria make over a range of the parameter.
+
+    Sets of several dimensions that are searched for are too slow to follow: none of those.
+    """
+    followed = (f for f in families_of(field) if f.exact or f.dimension < 2)
+    return tuple(b for family in followed for b in _bands(family, lower, upper))
 
 
 def _bands(family: Family, lower: float, upper: float) -> list[EquilibriumBand]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import flag, instance, mapping, takes
 from fastslow.diagrams.equations import region_equations, same
-from fastslow.diagrams.equilibrium_sets import in_a_set, sets_of
+from fastslow.diagrams.equilibrium_sets import all_known, in_a_set, sets_of
 from fastslow.diagrams.fields import IDLE, FrozenField, require_frozen
 from fastslow.diagrams.windows import within
 from fastslow.errors import ModelError
@@ -101,13 +101,18 @@ def equilibria(
 
 
 def solve_at(
-    field: FrozenField, value: float, virtual: bool = False, still: FrozenField | None = None
+    field: FrozenField,
+    value: float,
+    virtual: bool = False,
+    still: FrozenField | None = None,
+    *,
+    with_sets: bool = True,
 ) -> Equilibria:
     """Equilibria of every region at a value of the field's parameter, and pseudo-equilibria.
 
     A virtual pseudo-equilibrium, where the flow crosses, is listed with the sliding motion.
     Sets of equilibria are those of the field over its parameter, or of ``still``, in which
-    nothing varies.
+    nothing varies; without ``with_sets`` what is in them is left out, and they are not listed.
     """
     along = field if still is None else still
     complete = True
@@ -128,9 +133,9 @@ def solve_at(
             wanted = virtual and not (sides and sides.escaping) and field.virtual(number, u, unit)
             if (admissible and not in_a_set(along, u, unit[:-1])) or (wanted and not admissible):
                 found.append(point_at(field, number, u, admissible, continuum=whole))
-    sets = sets_of(along, value)
+    sets = sets_of(along, value) if with_sets else []
     found += [corner for one in sets for corner in one.equilibria]
-    complete &= all(one.exact for one in sets)
+    complete &= all(one.exact for one in sets) and all_known(along)
     return Equilibria(_distinct(found, field.periods), "complete" if complete else "found", sets)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.diagrams.critical import critical_values
 from fastslow.diagrams.equations import region_equations
-from fastslow.diagrams.equilibrium_sets import covered
+from fastslow.diagrams.equilibrium_sets import all_known, covered
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.solving import solve_at
 from fastslow.diagrams.windows import Sides, edges_left, edges_of, known, size_of, within
@@ -49,7 +49,7 @@ class Starts:
         )
         self._edges = edges_of(window, window.given)
         between = [critical_values(e, lower, upper, self._edges) for e in equations]
-        self.complete = all(b is not None for b in between)
+        self.complete = all(b is not None for b in between) and all_known(field)
         self._continua = [
             (equation.region, value)
             for equation in equations
@@ -71,7 +71,7 @@ class Starts:
     def _asked_at(self, value: float, admissible: bool) -> list[Equilibrium]:
         """Equilibria within the bounds that were asked for."""
         if value not in self._found:
-            solved = solve_at(self._field, value, virtual=True)
+            solved = solve_at(self._field, value, virtual=True, with_sets=False)
             # no branch runs through what is in a set of equilibria
             single = [e for e in solved if not e.continuum and e.region in self._field.regions]
             self._found[value] = within(self._field, self._asked, single)

@@ -104,7 +104,7 @@ def _form(
     parts = solved_along(heights, [exact(r) for r in motion.rates], names, signs.nonzero)
     if parts is None or not parts[1]:
         return None
-    solved, free = parts
+    solved, free = parts[0], parts[1]
     others = [sp.expand(s * functions[j].subs(solved)) for j, s in enumerate(motion.signs) if s]
     if any(h == 0 for h in others):
         # the edge of a set within one more interface
@@ -170,7 +170,7 @@ def solved_along(
     rates: Sequence[sp.Expr],
     names: Sequence[str],
     nonzero: Callable[[sp.Expr], bool] = lambda c: bool(c.is_number and c != 0),
-) -> tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Symbol, ...]] | None:
+) -> tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Symbol, ...] | None] | None:
     """Solve h = 0 and f = 0 for as many states as they determine.
 
     Equations that are affine in a state are solved for it one after the other where
@@ -180,8 +180,9 @@ def solved_along(
     -------
     solved : dict
         States as functions of the free ones.
-    free : tuple of Symbol
-        None in place of both where an equation is left that is not solved so, or contradicts.
+    free : tuple of Symbol or None
+        None where an equation is left that is not solved so. None in place of both where
+        the equations contradict each other.
 
     Examples
     --------
@@ -211,7 +212,7 @@ def solved_along(
             None,
         )
         if pick is None:
-            return None
+            return solved, None
         equation, symbol = pick
         root = sp.cancel(symbol - equation / equation.diff(symbol))
         solved = {s: sp.expand(e.subs(symbol, root)) for s, e in solved.items()} | {symbol: root}

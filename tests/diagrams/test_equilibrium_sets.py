@@ -204,3 +204,19 @@ def test_a_friction_oscillator_with_a_filter_has_a_band_that_is_stable_across():
         (band,) = fs.equilibria(fs.Model(rates)).sets
         assert band["y"] == pytest.approx((-0.5, 0.5), abs=1e-14)
         assert band.stable is stable
+
+
+def test_two_hinges_with_dry_friction_have_a_set_that_is_searched_for():
+    # 2 sin x ∓ friction of both, sin y ∓ friction of the second
+    rates = {
+        x: v,
+        v: w - 2 * sp.sin(x) - 0.3 * sp.sign(v) - 0.2 * sp.sign(u),
+        y: u,
+        u: -sp.sin(y) - 0.2 * sp.sign(u),
+    }
+    found = fs.equilibria(fs.Model(rates, parameters={w: -0.1}))
+    assert found.coverage == "found"
+    (near,) = (s for s in found.sets if max(np.abs(s.lower).max(), np.abs(s.upper).max()) < 1)
+    assert not near.exact
+    assert near["y"] == pytest.approx((-math.asin(0.2), math.asin(0.2)), abs=1e-9)
+    assert near["x"] == pytest.approx((-math.asin(0.3), math.asin(0.2)), abs=1e-9)
