@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 import fastslow as fs
 from fastslow.continuation.zeros import brackets
-from fastslow.diagrams.fields import Source
+from fastslow.diagrams.fields import FrozenField, Source
+from fastslow.results.points import SpecialPoint
+from fastslow.results.windows import state_window
 
 x, y, p, q, e, d, tau = sp.symbols("x y p q e d tau")
 X, Y, Z, U, F, T = states = sp.symbols("X Y Z U F T")
@@ -170,3 +172,43 @@ def test_points_have_the_eigenvalues_that_define_them(circulation):
         assert len(pairs) == 2
     for point in (c for curve in curves for c in curve.special("BT")):
         assert np.sort(np.abs(point.eigenvalues))[1] < 1e-6
+
+
+@pytest.mark.parametrize("fast", [1.0, 1e3, 1e6])
+def test_fast_passive_states_hide_no_point(fast):
+    """A double Hopf point at p = q = 0, beside two states that follow at any rate."""
+    z, v, s1, s2, k = sp.symbols("z v s1 s2 k")
+    a, b = x**2 + y**2, z**2 + v**2
+    model = fs.Model(
+        {
+            x: (p - a - b / 2) * x - y,
+            y: x + (p - a - b / 2) * y,
+            z: (q - b - a / 3) * z - sp.sqrt(7) * v,
+            v: sp.sqrt(7) * z + (q - b - a / 3) * v,
+            s1: k * (x - s1),
+            s2: 2 * k * (x * z - s2),
+        },
+        parameters={p: 0, q: -1, k: fast},
+    )
+    over = {p: (-1, 1), q: (-1.5, 1)}
+    field = FrozenField(model, "p", "q")
+    point = SpecialPoint(
+        code="HB",
+        label="HB1",
+        states=model.states,
+        state=np.zeros(6),
+        parameters=dict(model.parameters),
+        regions=tuple(field.regions),
+        eigenvalues=field.eigenvalues(0, np.zeros(8)),
+        tangent=np.zeros(7),
+        residual=0.0,
+        converged=True,
+        frequency=1.0,
+        source=Source(model, np.ones(6), state_window(model.states)),
+    )
+    curve = fs.continue_points(point, (p, q), over=over)
+    (double,) = curve.special("HH")
+    assert np.abs([double["p"], double["q"]]).max() < 1e-11
+    assert double.normal_form["theta"] == pytest.approx(1 / 3, rel=1e-8)
+    assert double.normal_form["delta"] == pytest.approx(1 / 2, rel=1e-8)
+    assert curve["p"] == pytest.approx(np.zeros(len(curve)), abs=1e-11)
