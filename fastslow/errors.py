@@ -29,6 +29,10 @@ class OutOfRangeError(FastSlowError, IndexError):
     """A number in a sequence that there is not: of a branch, a row, a special point."""
 
 
+class IncompleteWarning(UserWarning):
+    """An answer may lack something, because what it was read from was cut short."""
+
+
 class FileError(FastSlowError, OSError):
     """A file cannot be written or read: it is missing, cut short, foreign or newer."""
 

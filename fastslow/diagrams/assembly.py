@@ -282,10 +282,16 @@ def _with_ends(
         u, tangent, interface = piece.u[side], piece.tangents[side], curve.ends[side]
         note = curve.outcomes[side].message
         if interface is None:
-            point = _special(field, "EP", piece.region, u, tangent, note=note)
-            if curve.outcomes[side].code == "two-fold":
+            outcome = curve.outcomes[side]
+            reason = None if outcome.success else outcome.code
+            point = _special(field, "EP", piece.region, u, tangent, note=note, subtype=reason)
+            sides = field.modes[piece.region].sides
+            if curve.outcomes[side].code == "two-fold" and sides is not None:
                 point = replace(point, residual=two_fold_residual(field, piece.region, u))
-            ends.append([point])
+                name = field.interfaces[sides.interface]
+                ends.append([replace(point, code="TF", label="TF", interface=name), point])
+            else:
+                ends.append([point])
             continue
         beyond = field.neighbour(piece.region, interface)
         names: tuple[str, ...] = (field.regions[piece.region],)

@@ -37,8 +37,8 @@ from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.branches import Branch
-from fastslow.results.diagrams import SEARCHED, Diagram
-from fastslow.results.outcome import Outcome
+from fastslow.results.diagrams import SEARCHED, TOO_MANY, Diagram
+from fastslow.results.outcome import Outcome, with_ends
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.windows import LEFT, state_window
 from fastslow.symbolic.symmetries import FreeDirection, free_directions
@@ -174,9 +174,10 @@ def continue_equilibria(
     full = len(branches) >= continuation.branches
     missed = starts.missed(branches)
     sound = all(o.success or o.code == LEFT for branch in branches for o in branch.outcomes)
-    traced = sound and not full and not missed
     corrector = _corrector(field)
     labelled = _labelled(branches, name, within)
+    unexplained = sum(len(branch.unexplained) for branch in labelled)
+    traced = sound and not full and not missed and not unexplained
     return Diagram(
         model.states,
         name,
@@ -189,7 +190,11 @@ def continue_equilibria(
         _interface_values(field),
         _text(model),
         corrector,
-        _ending(name, full, missed, continuation, from_points),
+        with_ends(
+            _ending(name, full, missed, continuation, from_points),
+            [branch.outcomes for branch in branches],
+            unexplained,
+        ),
         {quantity: str(law) for quantity, law in model.path.items()},
         asdict(continuation),
         starts.window,
@@ -259,7 +264,7 @@ def _continuum(name: str, missed: Sequence[tuple[str, float]]) -> Outcome:
 
 def _too_many(continuation: Continuation) -> Outcome:
     return Outcome(
-        "too many branches",
+        TOO_MANY,
         f"{continuation.branches} branches were traced and there may be more; raise "
         "Continuation(branches=…) to look for them.",
         False,

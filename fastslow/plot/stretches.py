@@ -56,8 +56,12 @@ def draw_points(
 
 
 def _words(point: SpecialPoint) -> str:
-    brief = point.code == "EP" and 0 < len(point.note) <= WORDY
-    return point.note if brief else point.label
+    if point.code != "EP":
+        return point.label
+    if 0 < len(point.note) <= WORDY:
+        return point.note
+    # of an end that was cut short, the reason
+    return point.subtype or point.label
 
 
 def worth_a_marker(branches: Sequence[Branch]) -> list[SpecialPoint]:

@@ -364,7 +364,15 @@ class Branch(Table, Result):
     def __repr__(self) -> str:
         low, high = self.range
         codes = "".join(f" {p.label}" for p in self.special)
+        failed = [
+            f"{outcome.code} at {self.parameter_name} = {self.parameter[row]:.6g}"
+            for outcome, row in zip(self.outcomes, (0, -1), strict=True)
+            if not outcome.success
+        ]
         return (
             f"Branch({len(self)} points, {self.parameter_name} from {low:.6g} to {high:.6g}, "
-            f"regions {' → '.join(self.regions)}" + (f";{codes})" if codes else ")")
+            f"regions {' → '.join(self.regions)}"
+            + (f";{codes}" if codes else "")
+            + "".join(f"; {words}" for words in dict.fromkeys(failed))
+            + ")"
         )

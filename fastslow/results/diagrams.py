@@ -2,31 +2,36 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import flag, position, takes, text, whole
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import ArgumentError, IncompleteWarning, unknown_name
 from fastslow.results import formulas, stretches
 from fastslow.results.branches import Branch
 from fastslow.results.equilibrium_sets import EquilibriumBand
 from fastslow.results.levels import asked, chosen, passages
 from fastslow.results.markup import diagram_html
 from fastslow.results.nearness import nearest_of
-from fastslow.results.outcome import Outcome
-from fastslow.results.points import Corrector, Equilibrium, SpecialPoints
+from fastslow.results.outcome import CUT_SHORT, Outcome
+from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.result import LIVE, Result
 from fastslow.results.selecting import limits_of
 from fastslow.results.tables import Table
+from fastslow.results.unexplained import UnexplainedChange, unexplained_changes
 from fastslow.results.windows import LEFT, StateWindow
 
 #: The usual end of the search for branches.
 SEARCHED = Outcome("searched", "every start was followed.", True)
+
+#: Code of a search that ended at the largest number of branches.
+TOO_MANY = "too many branches"
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +141,47 @@ class Diagram(Table, Result):
 
     @property
     def special(self) -> SpecialPoints:
-        """Every special point, branch by branch; ``diagram.special("BE")`` those of one code."""
-        return SpecialPoints(point for branch in self.branches for point in branch.special)
+        """Every special point, branch by branch; ``diagram.special("BE")`` those of one code.
+
+        A point that several branches share, as a branch point, is listed once.
+        """
+        kept: dict[str, SpecialPoint] = {}
+        for branch in self.branches:
+            for point in branch.special:
+                kept.setdefault(point.label, point)
+        return SpecialPoints(kept.values())
+
+    @cached_property
+    def unexplained(self) -> tuple[UnexplainedChange, ...]:
+        """Changes of the number of unstable eigenvalues that no special point explains.
+
+        Branch by branch, from row to row: at a fold or branch point the number of
+        eigenvalues with positive real part changes by one, at a Hopf point by two,
+        and it may change by any number from one region to another. An entry says
+        that a special point is missing, or that rounding decides a stability.
+        """
+        return tuple(
+            change
+            for number, branch in enumerate(self.branches)
+            for change in unexplained_changes(branch, number)
+        )
+
+    def _warn(self, query: str) -> None:
+        """Warn that a query may lack what a branch that was cut short would have added."""
+        cut = sum(any(o.code in CUT_SHORT for o in b.outcomes) for b in self.branches)
+        reasons = []
+        if cut:
+            reasons.append(f"{cut} of {len(self)} branches were cut short")
+        if self.outcome.code == TOO_MANY:
+            reasons.append("there may be more branches")
+        if self.unexplained:
+            reasons.append("a change of stability is unexplained")
+        if reasons:
+            warnings.warn(
+                f"{query} may lack something: {' and '.join(reasons)}; see diagram.outcome",
+                IncompleteWarning,
+                stacklevel=4,
+            )
 
     @property
     def folds(self) -> SpecialPoints:
@@ -180,6 +224,7 @@ class Diagram(Table, Result):
             If the value is outside the range of the diagram.
         """
         where = asked(self.parameter, self.over, "diagram", value)
+        self._warn("at()")
         found = [
             point
             for branch in self.branches
@@ -262,10 +307,12 @@ class Diagram(Table, Result):
         ArgumentError
             For a number below one.
         """
+        self._warn("bistable()")
         return stretches.multistable(self.branches, at_least)
 
     def nearest(self, **values: float) -> Equilibrium:
         """The point of any branch nearest to some values; see `Branch.nearest`."""
+        self._warn("nearest()")
         return nearest_of(self.branches, self.parameters, values, self.corrector)
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
@@ -294,6 +341,7 @@ class Diagram(Table, Result):
         ]
         if self.outcome.code != SEARCHED.code:
             lines.append(f"   {self.outcome}")
+        lines += [f"   {change}" for change in self.unexplained]
         for number, branch in enumerate(self.branches):
             last = number == len(self.branches) - 1
             lines.append(("└─ " if last else "├─ ") + repr(branch))

@@ -84,6 +84,7 @@ def diagram_html(diagram: Diagram) -> str:
     title = repr(diagram).split("\n")[0]
     if not diagram.outcome:
         title += f"\n{diagram.outcome}"
+    title += "".join(f"\n{change}" for change in diagram.unexplained)
     numbered = [(str(k), branch) for k, branch in enumerate(diagram.branches)]
     return _with_points(numbered, title, diagram.parameter)
 

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from fastslow.results.trajectories import Trajectory
+
+#: Codes of ends at which a branch goes on, though its tracing does not.
+CUT_SHORT = ("too many points", "step too small")
+
+#: Codes of ends that the model has, to which every branch there can be followed.
+ENDS_OF_MODEL = ("left the window",)
 
 
 @dataclass(frozen=True)
@@ -47,3 +55,47 @@ def stopped_early(run: Trajectory) -> str:
 def early_end(run: Trajectory) -> str:
     """The code of the outcome of a run that ended early, else empty."""
     return "" if run.outcome.success else run.outcome.code
+
+
+def with_ends(
+    search: Outcome, ends: Sequence[tuple[Outcome, Outcome]], unexplained: int
+) -> Outcome:
+    """How the search for branches ended, and how many of them ended before their time.
+
+    Parameters
+    ----------
+    search : Outcome
+        Of the search itself.
+    ends : sequence of (Outcome, Outcome)
+        Of every branch, at its first and last row.
+    unexplained : int
+        Changes of the number of unstable eigenvalues without a special point.
+
+    Examples
+    --------
+    >>> done, full = Outcome("end of range", "", True), Outcome("too many points", "", False)
+    >>> print(with_ends(Outcome("searched", "All.", True), [(done, full), (done, done)], 0))
+    1 of 2 branches ended unsuccessfully (too many points).
+    """
+    failed = [
+        {o.code for o in pair if not o.success and o.code not in ENDS_OF_MODEL} for pair in ends
+    ]
+    count = sum(map(bool, failed))
+    sentences = []
+    if count:
+        codes = Counter(code for pair in failed for code in pair)
+        words = ", ".join(f"{n} × {code}" if n > 1 else code for code, n in codes.items())
+        sentences.append(
+            f"{count} of {len(ends)} branch{'es' if len(ends) > 1 else ''} ended unsuccessfully "
+            f"({words})."
+        )
+    if unexplained:
+        sentences.append(
+            f"{unexplained} change{'s' if unexplained > 1 else ''} of the number of unstable "
+            "eigenvalues without a special point that explains it: see diagram.unexplained."
+        )
+    if not sentences:
+        return search
+    if not search.success:
+        return Outcome(search.code, " ".join([search.message, *sentences]), False)
+    return Outcome("cut short" if count else "unexplained", " ".join(sentences), False)

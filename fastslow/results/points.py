@@ -276,7 +276,8 @@ class SpecialPoint(_Point):
         The interface a boundary equilibrium lies on.
     subtype : str, optional
         Of a boundary equilibrium ``"persistence"``, ``"non-smooth fold"`` or
-        ``"degenerate"``; of ZH and HH the case that the normal form decides.
+        ``"degenerate"``; of ZH and HH the case that the normal form decides; of an end
+        point the code of the branch's outcome, where that is no success.
     clarke : ClarkePath, optional
         For boundary equilibria of a continuous field.
     coefficient : float, optional
@@ -374,8 +375,10 @@ class SpecialPoints(Table, Result, tuple[SpecialPoint, ...]):
 
     _row = "point"
 
-    def __call__(self, code: str) -> SpecialPoints:
-        """Those of one code; UnknownNameError for a code that there is not."""
+    def __call__(self, code: str | None = None) -> SpecialPoints:
+        """Those of one code, without one all; UnknownNameError for a code that there is not."""
+        if code is None:
+            return self
         word("special point code", POINT_TYPES)("code", code)
         return SpecialPoints(point for point in self if point.code == code)
 

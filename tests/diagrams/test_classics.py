@@ -231,8 +231,12 @@ def test_switching_at_branch_points_alone_finds_the_other_branches(monkeypatch):
 def test_transcritical_tangents():
     """x(p − 2x) = 0: slopes 0 and 1/2."""
     model = fs.Model({x: x * (p - 2 * x)}, parameters={p: 0})
-    points = fs.continue_equilibria(model, "p", (-1, 1)).special("BP")
+    diagram = fs.continue_equilibria(model, "p", (-1, 1))
+    points = [point for branch in diagram.branches for point in branch.special("BP")]
     slopes = sorted(point.switch[0] / point.switch[1] for point in points)
+    # of the two branches; the diagram lists the point once
+    assert len(diagram.special("BP")) == 1
+    assert {point.label for point in points} == {"BP1"}
     assert slopes == pytest.approx([0, 0.5], abs=1e-7)
 
 
