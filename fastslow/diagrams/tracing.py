@@ -37,7 +37,7 @@ from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.branches import Branch
-from fastslow.results.diagrams import SEARCHED, TOO_MANY, Diagram
+from fastslow.results.diagrams import SEARCHED, Diagram
 from fastslow.results.outcome import Outcome, with_ends
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.windows import LEFT, state_window
@@ -264,7 +264,7 @@ def _continuum(name: str, missed: Sequence[tuple[str, float]]) -> Outcome:
 
 def _too_many(continuation: Continuation) -> Outcome:
     return Outcome(
-        TOO_MANY,
+        "too many branches",
         f"{continuation.branches} branches were traced and there may be more; raise "
         "Continuation(branches=…) to look for them.",
         False,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -97,5 +97,7 @@ def with_ends(
     if not sentences:
         return search
     if not search.success:
-        return Outcome(search.code, " ".join([search.message, *sentences]), False)
-    return Outcome("cut short" if count else "unexplained", " ".join(sentences), False)
+        return replace(search, message=" ".join([search.message, *sentences]))
+    if count:
+        return Outcome("cut short", " ".join(sentences), False)
+    return Outcome("unexplained", " ".join(sentences), False)
