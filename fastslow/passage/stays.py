@@ -20,6 +20,12 @@ WAY = 2.0 / 3.0
 #: A state's extent is between these parts of what the branches span.
 LEAST, MOST = 1e-3, 20.0
 
+#: A range below this part of a state's size is rounding.
+FLAT = 1e-9
+
+#: Rounding of a rate that is a constant times a state: implicit steps correct derivatives.
+SAME = 1e-10
+
 #: Points that a course is drawn by when distances from it are measured.
 POINTS = 257
 
@@ -128,12 +134,12 @@ def measured(
     fastest = float(np.median([c.fastest() for c in courses] or [0.0]))
     size = np.abs(state).max(axis=0)
     # what moves by rounding only has no extent
-    extent = np.where(extent > 1e-9 * size, extent, np.where(size > 0, size, 1.0))
+    extent = np.where(extent > FLAT * size, extent, np.where(size > 0, size, 1.0))
     extent = _bounded(extent, courses)
     periods = periods_of(slow.states, run.periods)
     extent = np.where(periods > 0, np.minimum(extent, periods), extent)
-    for rate, of in _velocities(slow):
-        extent[rate] = max(extent[rate], extent[of] * fastest)
+    for rate, of, factor in _velocities(slow):
+        extent[rate] = max(extent[rate], extent[of] * fastest / factor)
     span = max(float(np.ptp(slow.table)), 1e-3 * (over[1] - over[0]))
     curves = tuple(_resampled(course.curve() / np.append(extent, span)) for course in courses)
     return Measured(
@@ -162,11 +168,13 @@ def _bounded(extent: Array, courses: tuple[Course, ...]) -> Array:
     rows = np.concatenate([c.curve()[:, :-1] for c in courses])
     span = np.ptp(rows, axis=0)
     low, high = LEAST * span, MOST * span
-    return np.where(span > 0, np.clip(extent, low, high), extent)
+    # a state that is constant along the branches but for rounding bounds nothing
+    spans = span > FLAT * np.maximum(np.abs(rows).max(axis=0), extent)
+    return np.where(spans, np.clip(extent, low, high), extent)
 
 
-def _velocities(slow: SlowQuantity) -> list[tuple[int, int]]:
-    """Pairs (i, j) of fast states where state i is the time derivative of state j.
+def _velocities(slow: SlowQuantity) -> list[tuple[int, int, float]]:
+    """Triples (i, j, |c|) where c times fast state i is the time derivative of fast state j.
 
     A sheet that drifts carries a velocity with it, which is no distance from the sheet:
     it is small beside the velocities of the fast motion.
@@ -176,17 +184,18 @@ def _velocities(slow: SlowQuantity) -> list[tuple[int, int]]:
     series = slow.run.series
     assert series is not None
     rows = [slow.run.columns.index(name) for name in slow.states]
-    return [
-        (i, j)
-        for j in range(len(rows))
-        for i in range(len(rows))
-        if i != j and _alike(series[:, rows[j], 1], series[:, rows[i], 0])
-    ]
-
-
-def _alike(one: Array, other: Array) -> bool:
-    """Whether two columns are the same but for rounding: implicit steps correct derivatives."""
-    return bool(np.abs(one - other).max(initial=0.0) <= 1e-10 * np.abs(other).max(initial=0.0))
+    found = []
+    for j, of in enumerate(rows):
+        for i, rate in enumerate(rows):
+            value, slope = series[:, rate, 0], series[:, of, 1]
+            if i == j or not len(series):
+                continue
+            largest = int(np.argmax(np.abs(value)))
+            factor = slope[largest] / value[largest] if value[largest] != 0 else 0.0
+            apart = np.abs(slope - factor * value).max()
+            if factor != 0 and apart <= SAME * np.abs(slope).max():
+                found.append((i, j, abs(float(factor))))
+    return found
 
 
 def _resampled(curve: Array) -> Array:
