@@ -135,7 +135,11 @@ def measured(
     size = np.abs(state).max(axis=0)
     # what moves by rounding only has no extent
     extent = np.where(extent > FLAT * size, extent, np.where(size > 0, size, 1.0))
-    extent = _bounded(extent, courses)
+    # by time: where a state grows without bound most samples are at the end
+    even = np.searchsorted(run.t, np.linspace(run.t[0], run.t[-1], POINTS))
+    usual = state[np.minimum(even, len(state) - 1)]
+    typical = np.median(np.abs(usual - np.median(usual, axis=0)), axis=0)
+    extent = _bounded(extent, typical, courses)
     periods = periods_of(slow.states, run.periods)
     extent = np.where(periods > 0, np.minimum(extent, periods), extent)
     for rate, of, factor in _velocities(slow):
@@ -158,7 +162,7 @@ def measured(
     )
 
 
-def _bounded(extent: Array, courses: tuple[Course, ...]) -> Array:
+def _bounded(extent: Array, typical: Array, courses: tuple[Course, ...]) -> Array:
     """Extents within reach of what the branches span, where they span anything.
 
     A run that hardly moves, or that grows without bound, is no measure for its own distances.
@@ -169,7 +173,7 @@ def _bounded(extent: Array, courses: tuple[Course, ...]) -> Array:
     span = np.ptp(rows, axis=0)
     low, high = LEAST * span, MOST * span
     # a state that is constant along the branches but for rounding bounds nothing
-    spans = span > FLAT * np.maximum(np.abs(rows).max(axis=0), extent)
+    spans = (span > FLAT * np.abs(rows).max(axis=0)) & (span > FLAT * typical)
     return np.where(spans, np.clip(extent, low, high), extent)
 
 
