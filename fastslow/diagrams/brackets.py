@@ -164,7 +164,7 @@ class Search:
             return False
         part = float(gap @ chord) / length
         aside = float(np.linalg.norm(gap - part * chord))
-        return -0.05 <= part <= 1.05 and aside <= 0.5 * np.sqrt(length) + 1e-9
+        return -1e-9 <= part <= 1.0 + 1e-9 and aside <= 0.5 * np.sqrt(length) + 1e-9
 
 
 def sign_changes(test: Array) -> list[tuple[int, int]]:

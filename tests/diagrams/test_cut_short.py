@@ -167,3 +167,13 @@ def test_random_polynomials_leave_nothing_unexplained():
         values = dict(zip("abcd", rng.uniform(-2, 2, 4), strict=True))
         diagram = fs.continue_equilibria(model.with_parameters(values), "p", (-2, 2))
         assert diagram.unexplained == (), values
+
+
+@pytest.mark.parametrize("half", [1e-2, 1e-4, 1e-6])
+def test_two_hopf_points_are_told_apart_however_near(half):
+    """Growth (p − 1/7)² − d²: a pair of Hopf points at 1/7 ± d."""
+    d = sp.Symbol("d")
+    growth = (p - sp.Rational(1, 7)) ** 2 - d**2 - x**2 - y**2
+    model = fs.Model({x: growth * x - y, y: x + growth * y}, parameters={p: 0, d: half})
+    points = fs.continue_equilibria(model, "p", (-1, 1.1)).special("HB")
+    assert [h["p"] - 1 / 7 for h in points] == pytest.approx([-half, half], abs=1e-9)
