@@ -190,7 +190,8 @@ def _numbers(
             for j, s in enumerate(symbols)
         ]
         with np.errstate(all="ignore"):
-            rows.append(np.array(function(*place), dtype=float))
+            # as NumPy's numbers: a division by zero is no error here
+            rows.append(np.array(function(*map(np.float64, place)), dtype=float))
     numbers = np.vstack(rows)
     numbers = numbers[np.isfinite(numbers).all(axis=1)]
     size = np.abs(numbers).max(axis=1, initial=0.0)
