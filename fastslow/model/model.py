@@ -175,11 +175,20 @@ class Model:
         return self._from(self.structure, values)
 
     @takes(name=formula)
-    def freed(self, name: str) -> Model:
+    def freed(self, name: object) -> Model:
         """The model with one parameter's value taken away, to vary it.
 
         Regions that are empty at the old value but not at every value are among
         its regions; names are kept.
+
+        Parameters
+        ----------
+        name : str or Symbol
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no parameter of the model.
 
         Examples
         --------
@@ -188,12 +197,13 @@ class Model:
         >>> len(model.regions), len(model.freed("D").regions)
         (3, 6)
         """
-        if name in self.free and name not in self.parameters:
+        key = str(name)
+        if key in self.free and key not in self.parameters:
             return self
-        if name not in self.parameters:
-            raise unknown_name("parameter", name, [*self.parameters, *self.free])
-        free = self.free if name in self.free else (*self.free, name)
-        values = {n: v for n, v in self.parameters.items() if n != name}
+        if key not in self.parameters:
+            raise unknown_name("parameter", key, [*self.parameters, *self.free])
+        free = self.free if key in self.free else (*self.free, key)
+        values = {n: v for n, v in self.parameters.items() if n != key}
         return self._from(replace(self.structure, free=free), values)
 
     @takes(slow=mapping)

@@ -28,6 +28,17 @@ def test_a_parameter_with_a_value_drifts_and_may_rest():
     assert fs.simulate(ramp, [2], t=(0, 5))["x"][-1] == 2.0
 
 
+def test_a_parameter_is_freed_by_symbol_or_name():
+    model = fs.Model({x: w - D * x}, parameters={D: 2, w: 1})
+    for name in ("D", D, sp.Symbol("D", real=True)):
+        freed = model.freed(name)
+        assert (freed.free, dict(freed.parameters)) == (("D",), {"w": 1.0})
+        assert freed.freed(name) is freed
+    for wrong in (sp.Symbol("d"), D + w):
+        with pytest.raises(fs.UnknownNameError, match="unknown parameter"):
+            model.freed(wrong)
+
+
 def test_what_cannot_drift():
     model = fs.Model({x: w - D * x}, forcing={w: sp.sin(t)}, parameters={D: 2})
     with pytest.raises(fs.ModelError, match="'w' already varies in time; ramp it in"):
