@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import sympy as sp
@@ -65,7 +66,7 @@ def with_noise(
             )
     if not found:
         return outcome
-    return Outcome(outcome.code, " ".join([outcome.message, *found]), outcome.success)
+    return replace(outcome, message=" ".join([outcome.message, *found]))
 
 
 def _grows(
