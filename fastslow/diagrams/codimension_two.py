@@ -37,6 +37,7 @@ from fastslow.diagrams.normal_forms import (
     forms_at,
     lyapunov_terms,
 )
+from fastslow.diagrams.row_tests import pair_sums
 
 Array = NDArray[np.float64]
 
@@ -342,13 +343,9 @@ def left_null(slopes: Array, v: Array) -> Array:
     return np.asarray(w / np.linalg.norm(w) * (side if side != 0 else 1.0))
 
 
-def smallest_sum(values: Vector) -> float:
-    """The smallest sum of a pair in units of itself, with the sign of the product of all sums."""
-    first, second = (values[k] for k in np.triu_indices(len(values), 1))
-    sums = (first + second) / np.maximum(np.abs(first) + np.abs(second), np.finfo(float).tiny)
-    # complex sums come with their conjugates
-    real = sums[np.abs(sums.imag) <= 1e-9 * np.abs(sums)].real
-    return float(np.prod(np.sign(real)) * np.abs(sums).min())
+def smallest_sum(values: Vector) -> tuple[float, float]:
+    """`pair_sums` of some eigenvalues as the test of a criterion."""
+    return float(pair_sums(values, rounding=0.0)), 1.0
 
 
 def smallest_value(matrix: Array) -> float:
@@ -389,9 +386,7 @@ def _fold_tests(system: Defining) -> Iterator[Criterion]:
         values = np.linalg.eigvals(system.jacobian(z))
         return np.asarray(values[np.argsort(np.abs(values))[1:]])
 
-    yield Criterion(
-        "ZH", lambda z: (smallest_sum(rest(z)), 1.0), lambda z: _imaginary(rest(z)), region
-    )
+    yield Criterion("ZH", lambda z: smallest_sum(rest(z)), lambda z: _imaginary(rest(z)), region)
 
 
 def _pair_tests(system: Pair) -> Iterator[Criterion]:
@@ -425,7 +420,7 @@ def _pair_tests(system: Pair) -> Iterator[Criterion]:
 
     yield Criterion(
         "HH",
-        lambda z: (smallest_sum(rest(z)), 1.0),
+        lambda z: smallest_sum(rest(z)),
         lambda z: hopf(z) and _imaginary(rest(z)),
         region,
     )
@@ -466,7 +461,7 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
         return
     yield Criterion(
         "BH",
-        lambda z: (smallest_sum(eigenvalues(z)), 1.0),
+        lambda z: smallest_sum(eigenvalues(z)),
         lambda z: _imaginary(eigenvalues(z)),
         region,
         interface,

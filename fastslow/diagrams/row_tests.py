@@ -33,7 +33,7 @@ SINGULAR = 1e-14
 ADDED, SHORTEST = 400, 1e-10
 
 
-def pair_sums(eigenvalues: Complex) -> Array:
+def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     """Smallest relative sum of two eigenvalues, with the sign of the product of all sums.
 
     The product of λᵢ + λⱼ over i < j vanishes at Hopf points and neutral saddles
@@ -46,6 +46,9 @@ def pair_sums(eigenvalues: Complex) -> Array:
     Parameters
     ----------
     eigenvalues : ndarray of complex, shape (..., n)
+    rounding : float
+        A sum below n times this part of the largest modulus is left out. With 0 none
+        is, so that the test is smooth at its zeros, as Newton's method needs it.
 
     Returns
     -------
@@ -58,6 +61,8 @@ def pair_sums(eigenvalues: Complex) -> Array:
     [0.333333, -0.333333]
     >>> float(pair_sums(np.array([3.0 + 4.0j, 3.0 - 4.0j])))
     0.6
+    >>> float(pair_sums(np.array([1e-9 + 1.0j, 1e-9 - 1.0j, -1e9]), rounding=0.0))
+    1e-09
     """
     values = np.asarray(eigenvalues, dtype=complex)
     n = values.shape[-1]
@@ -66,10 +71,10 @@ def pair_sums(eigenvalues: Complex) -> Array:
     finite = np.isfinite(values).all(axis=-1)
     values = np.where(finite[..., None], values, 1.0)
     modulus = np.abs(values)
-    noise = ROUNDING * n * modulus.max(axis=-1, keepdims=True)
+    noise = rounding * n * modulus.max(axis=-1, keepdims=True)
 
     # complex pairs, each by its upper member
-    pair = (values.imag > 0) & (np.abs(values.real) > noise)
+    pair = (values.imag > 0) & (np.abs(values.real) >= noise)
     relative = np.where(pair, np.abs(values.real) / np.where(pair, modulus, 1.0), 1.0)
     negative = (pair & (values.real < 0)).sum(axis=-1)
 
@@ -84,7 +89,7 @@ def pair_sums(eigenvalues: Complex) -> Array:
     one, other = np.where(real, size, 0.0)[..., :-1], np.where(real, size, 0.0)[..., 1:]
     both = real[..., 1:]
     opposite = both & (below[..., 1:] != below[..., :-1])
-    left_out = (opposite & (other - one <= noise)) | (both & (other <= noise))
+    left_out = (opposite & (other - one < noise)) | (both & (other < noise))
     negative = negative - (left_out & below[..., 1:]).sum(axis=-1)
     opposite &= ~left_out
     apart = np.where(opposite, (other - one) / np.where(opposite, other + one, 1.0), 1.0)
@@ -95,7 +100,7 @@ def pair_sums(eigenvalues: Complex) -> Array:
     return np.where(known & finite, np.where(negative % 2 == 1, -least, least), 0.0)
 
 
-def product_of_pair(eigenvalues: Complex) -> float:
+def product_of_pair(eigenvalues: Complex, rounding: float = ROUNDING) -> float:
     """Product of the two eigenvalues that decide `pair_sums`, positive for a complex pair.
 
     NaN where no sum is left.
@@ -110,12 +115,13 @@ def product_of_pair(eigenvalues: Complex) -> float:
         return np.nan
     first, second = np.triu_indices(len(values), 1)
     sums = values[first] + values[second]
-    noise = ROUNDING * len(values) * np.abs(values).max()
-    kept = (sums.imag == 0) & (np.abs(sums.real) > noise)
+    noise = rounding * len(values) * np.abs(values).max()
+    kept = (sums.imag == 0) & (np.abs(sums.real) >= noise)
     if not kept.any():
         return np.nan
     first, second, sums = first[kept], second[kept], sums[kept]
-    k = int(np.argmin(np.abs(sums) / (np.abs(values[first]) + np.abs(values[second]))))
+    size = np.maximum(np.abs(values[first]) + np.abs(values[second]), np.finfo(float).tiny)
+    k = int(np.argmin(np.abs(sums) / size))
     return float((values[first[k]] * values[second[k]]).real)
 
 

@@ -209,8 +209,8 @@ def test_switching_at_branch_points_alone_finds_the_other_branches(monkeypatch):
     """Starts are kept off every state but x = 0; the circle x² + p² = 1 crosses there twice."""
     solve = starts.solve_at
 
-    def at_zero(field, value, virtual=False):
-        found = solve(field, value, virtual)
+    def at_zero(*given, **settings):
+        found = solve(*given, **settings)
         return [e for e in found if abs(e["x"]) < 1e-8]
 
     monkeypatch.setattr(starts, "solve_at", at_zero)

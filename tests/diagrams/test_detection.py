@@ -140,6 +140,20 @@ def test_pair_sums_of_two_hundred_eigenvalues_do_not_underflow():
     assert str(stability_of(values)) == "unstable"
 
 
+def test_pair_sums_are_smooth_at_zero_where_nothing_is_left_out():
+    """Through a Hopf point and a neutral saddle, beside an eigenvalue of −1e12."""
+    real = np.array([-1e-3, -1e-9, -1e-15, 0.0, 1e-15, 1e-9, 1e-3])
+    zero, fast = np.zeros(7), np.full(7, -1e12)
+    hopf = np.stack([real + 2j, real - 2j, fast + 0j], axis=-1)
+    saddle = np.stack([1.0 + 2 * real, zero - 1.0, fast], axis=-1)
+    passive = pair_sums(hopf, rounding=0.0)
+    np.testing.assert_allclose(passive, real / np.hypot(real, 2.0), rtol=1e-12)
+    # of the two further sums both are negative
+    np.testing.assert_allclose(pair_sums(saddle, rounding=0.0), real / (1 + real), atol=1e-15)
+    # by default the sums that are lost in rounding are left out
+    assert np.all(pair_sums(hopf) == 0)
+
+
 def test_pair_sums_of_what_is_not_finite_or_alone():
     assert pair_sums(np.array([[np.nan, 1.0], [-1.0, -2.0]])).tolist() == [0.0, -1.0]
     assert float(pair_sums(np.array([2.0]))) == 0.0

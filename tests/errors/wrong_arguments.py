@@ -44,6 +44,10 @@ SIDES = [
     ({"edge": ("x", NAN)}, Wrong, "interfaces['edge'] = nan; expected a finite number"),
 ]
 
+INTEGRATION = [
+    *a("Integration"),
+    (fs.Integration(atol={"nowhere": 1.0}), Unknown, "unknown state 'nowhere'"),
+]
 REGION = [*TEXT, ("S9", Unknown, "unknown region 'S9'; did you mean 'S3'?")]
 NEAR = [
     ({"omga": 1.0}, Unknown, "unknown column 'omga'"),
@@ -308,6 +312,10 @@ BY_FUNCTION = {
     "slow_load_gap.C": POSITIVES[1:],
     "slow_load_gap.damping": POSITIVES,
     "slow_load_gap.omega": POSITIVES,
+    "bifurcation_sweep.integration": INTEGRATION,
+    "regime_map.integration": INTEGRATION,
+    "simulate.integration": INTEGRATION,
+    "simulate_many.integration": INTEGRATION,
 }
 #: Periods stand beside the t of the good call.
 for _name in ("simulate", "simulate_many"):
