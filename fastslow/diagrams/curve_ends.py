@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import curves
-from fastslow.diagrams.defining import Crossing, Defining
+from fastslow.diagrams.defining import ON, Crossing, Defining, TwoFold
 from fastslow.results.outcome import Outcome
 from fastslow.results.windows import StateWindow, left_window
 
@@ -23,6 +23,16 @@ def outcome_of(
         return Outcome("end of range", f"reached the end of the range at {where}.", True)
     if status == curves.CLOSED:
         return Outcome("closed loop", "the curve returned to its start: a closed loop.", True)
+    if status == curves.BOUND and isinstance(system, TwoFold):
+        share, sides = float(z[system.width]), system.sides
+        reason = f"beyond it the points leave {_region(system)}"
+        for side, weight in ((sides.above, share), (sides.below, 1.0 - share)):
+            if abs(weight) <= ON:
+                reason = (
+                    f"it is an equilibrium of region {system.field.regions[side]} there, and "
+                    "beyond it both fields point in one direction"
+                )
+        return Outcome("left the region", f"the two-fold is at {where}; {reason}.", True)
     if status == curves.BOUND:
         return Outcome(
             "interfaces meet",

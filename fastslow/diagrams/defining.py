@@ -1,4 +1,4 @@
-"""Equations that define folds, Hopf points, branch points and boundary equilibria.
+"""Equations that define folds, Hopf points, branch points, boundary equilibria and two-folds.
 
 In all of them z = (states, two parameters, extra unknowns), and each is a
 regular system at a generic point (Kuznetsov 2004, chapter 10). Rates and
@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.modes import Sides
+from fastslow.diagrams.two_folds import weight_of
 
 Array = NDArray[np.float64]
 
@@ -262,3 +264,49 @@ class OnInterface(Defining):
         rates, _, h, _ = self.field.at(self.region, rows)
         both = np.column_stack([rates, h[:, self.interface]])
         return both.reshape(*z.shape[:-1], self.n + 1)
+
+
+class TwoFold(Defining):
+    """(1 − α) f₁ + α f₂ = 0, h = 0, a = b: a pseudo-equilibrium at which both drifts vanish.
+
+    With the first equation a = ∇h·f₁ and b = ∇h·f₂ are both zero where they are equal. The extra
+    unknown is α; from 0 to 1 the fields point in opposite directions, and the point is one of
+    sliding. Its region is the sliding motion, whose own field is 0/0 there.
+    """
+
+    code: ClassVar[str] = "TF"
+
+    @property
+    def sides(self) -> Sides:
+        sides = self.field.modes[self.region].sides
+        assert sides is not None
+        return sides
+
+    def start(self, u: Array) -> Array:
+        return np.append(u, weight_of(self.field, self.region, u))
+
+    def residual(self, z: Array, guide: Array) -> Array:
+        rows = z.reshape(-1, self.width + 1)
+        u, share = rows[:, : self.width], rows[:, self.width :]
+        above, _, h, gradients = self.field.at(self.sides.above, u)
+        below = self.field.at(self.sides.below, u)[0]
+        interface, n = self.sides.interface, self.n
+        # the gradient in units of its own length, so that no unit of h matters
+        edge = gradients[:, interface] * self.scales
+        size = np.linalg.norm(edge[:, :n], axis=1, keepdims=True)
+        size = np.where(size > 0, size, 1.0)
+        first, second = above / self.unit, below / self.unit
+        drifts = np.einsum("ij,ij->i", edge[:, :n] / size, first - second)
+        both = np.column_stack(
+            [(1.0 - share) * first + share * second, h[:, interface] / size[:, 0], drifts]
+        )
+        return both.reshape(*z.shape[:-1], self.n + 2)
+
+    def edges(self, z: Array) -> Array:
+        """α, 1 − α and the heights of interfaces, positive where the point is one of sliding."""
+        share = z[self.width]
+        return np.append([share, 1.0 - share], self.heights(z)[: len(self.field.interfaces)])
+
+    def inside(self, z: Array, but: int | None = None) -> bool:
+        """Whether the fields point in opposite directions, within all other interfaces."""
+        return bool(np.all(self.edges(z) >= -ON))

@@ -249,7 +249,9 @@ class FrozenField:
             normal = gradients[..., sides.interface, : self.n, None]
             # the columns of Q after the first span the interface's tangent space
             along = np.linalg.qr(normal, mode="complete")[0][..., 1:]
-            jacobian = np.swapaxes(along, -1, -2) @ jacobian @ along
+            # at a two-fold it is 0/0
+            with np.errstate(invalid="ignore"):
+                jacobian = np.swapaxes(along, -1, -2) @ jacobian @ along
         return self.spectrum(jacobian)
 
     def survey(

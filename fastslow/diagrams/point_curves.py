@@ -33,7 +33,7 @@ from fastslow.diagrams.codimension_two import (
     search,
 )
 from fastslow.diagrams.curve_ends import outcome_of
-from fastslow.diagrams.defining import Crossing, Defining, Fold, OnInterface, Pair
+from fastslow.diagrams.defining import Crossing, Defining, Fold, OnInterface, Pair, TwoFold
 from fastslow.diagrams.fields import FrozenField
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
@@ -99,8 +99,8 @@ def continue_points(
 ) -> PointBranch | PointCurves:
     """Trace a curve of special points in the plane of two parameters.
 
-    Folds, Hopf points, branch points (in models with a symmetry) and boundary
-    equilibria are followed as extended systems (Kuznetsov 2004, chapter 10);
+    Folds, Hopf points, branch points (in models with a symmetry), boundary
+    equilibria and two-folds are followed as extended systems (Kuznetsov 2004, chapter 10);
     codimension-two points on the way are solved for: CP, BT, GH, ZH, HH, BF
     (the fold meets an interface) and BH (the Hopf point does).
 
@@ -400,6 +400,9 @@ def _system(
     if code == "BP":
         crossing = Crossing(field, region, unit, span)
         return crossing, crossing.start(u)
+    if code == "TF":
+        two_fold = TwoFold(field, region, unit, span)
+        return two_fold, two_fold.start(u)
     if point.interface not in field.interfaces:
         raise ArgumentError(f"the point {point.label} lies on no interface of the model")
     edge = OnInterface(field, region, unit, span, field.interfaces.index(point.interface))
@@ -437,6 +440,8 @@ def _traced(
         return np.delete(heights, system.interface if isinstance(system, OnInterface) else [])
 
     bounds = others if isinstance(system, OnInterface) else None
+    if isinstance(system, TwoFold) and not virtual and inside:
+        bounds = system.edges
     direction = _oriented(curves.tangent(system, start, frame), frame)
     rows, tangents, last = curves.follow(
         system, start, direction, frame, continuation, stop, bounds
@@ -468,7 +473,9 @@ def _traced(
         found = [f for f, k in zip(found, spots, strict=True) if kept.start <= k < kept.stop]
         spots = [k - kept.start for k in spots if kept.start <= k < kept.stop]
     ends = [
-        _two_interfaces(system, rows[k]) if s == curves.BOUND else None
+        _two_interfaces(system, rows[k])
+        if s == curves.BOUND and isinstance(system, OnInterface)
+        else None
         for s, k in ((first, 0), (last, -1))
     ]
     if ends[0] is not None:
@@ -533,7 +540,7 @@ def _corrector(rows: Rows, point: SpecialPoint, names: tuple[str, str]) -> Point
             label=code,
             tangent=curves.tangent(system, z, rows.frame)[: system.width],
             lyapunov=None if np.isnan(lyapunov) else float(lyapunov),
-            interface=point.interface if code == "BE" else None,
+            interface=point.interface if code in ("BE", "TF") else None,
         )
 
     return correct
@@ -563,9 +570,8 @@ def _tangent_at(system: Defining, z: Array, before: Array, frame: Frame) -> Arra
     return tangent if (tangent * frame.weight) @ before >= 0 else -tangent
 
 
-def _two_interfaces(system: Defining, z: Array) -> Found:
+def _two_interfaces(system: OnInterface, z: Array) -> Found:
     """The end of a curve of boundary equilibria at which another interface is met."""
-    assert isinstance(system, OnInterface)
     field, region = system.field, system.region
     apart = np.abs(system.heights(z))
     apart[(field.signs[region] == 0) | (np.arange(len(apart)) == system.interface)] = np.inf

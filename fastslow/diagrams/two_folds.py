@@ -1,7 +1,8 @@
 """Two-folds, at which a branch of pseudo-equilibria ends: both fields are tangent there.
 
 The sliding field is 0/0 at a = b = 0. Without division the point solves
-(1 − α) f₁ + α f₂ = 0, h = 0, a = b for (states, α, parameter), which is regular.
+(1 − α) f₁ + α f₂ = 0, h = 0, a = b for (states, α, parameter), which is regular;
+over two parameters the same equations define a curve (`defining.TwoFold`).
 """
 
 from __future__ import annotations
@@ -80,12 +81,16 @@ def cut_at_two_fold(u: Array, tangents: Array, end: Array, scale: Array) -> tupl
 
 def two_fold_residual(field: FrozenField, region: int, u: Array) -> float:
     """What is left of the equations of a two-fold at a point, with the best weight α."""
+    return float(np.abs(_regular(field, region, u, weight_of(field, region, u))).max())
+
+
+def weight_of(field: FrozenField, region: int, u: Array) -> float:
+    """The weight α that makes (1 − α) f₁ + α f₂ smallest at a point."""
     sides = field.modes[region].sides
     assert sides is not None
     above, below = field.curve(sides.above, u)[0], field.curve(sides.below, u)[0]
     jump = below - above
-    share = -float(above @ jump) / float(jump @ jump) if jump.any() else 0.5
-    return float(np.abs(_regular(field, region, u, share)).max())
+    return -float(above @ jump) / float(jump @ jump) if jump.any() else 0.5
 
 
 def _regular(field: FrozenField, region: int, u: Array, share: float) -> Array:

@@ -168,8 +168,10 @@ _ALL = (
         "interface; its branch ends there.",
         codimension=1,
         unstable=None,
+        curves=("TF",),
         marker="*",
         colour="purple",
+        line=((0, (1, 1.5)), 1.5),
     ),
     PointType(
         code="CP",
