@@ -26,6 +26,9 @@ MOST = 0.9
 #: Sine of the angle from which straight lines meet where the curves do.
 WIDE = 0.2
 
+#: A column with less than this part of its movement in the direction of its tangents is rounding.
+ONWARD = 0.5
+
 #: Cubics nearer to each other than this part of the extent of both curves meet.
 SAME = 1e-8
 
@@ -95,13 +98,19 @@ def step_slopes(curve: Curve) -> tuple[Array, Array]:
     The tangents, scaled to the length of the chord in units of the columns' extents.
     """
     points = curve.points
+    chords = np.diff(points, axis=0)
     unit = np.ptp(points, axis=0) if len(points) else np.ones(points.shape[1])
-    unit[unit == 0] = 1.0
+    # a column that is constant but for rounding does not move in the direction of its tangents
+    onward = (chords * np.sign(curve.tangent[:-1] + curve.tangent[1:])).sum(axis=0)
+    unit[onward <= ONWARD * np.abs(chords).sum(axis=0)] = np.inf
     tangents = curve.tangent / unit
     size = np.linalg.norm(tangents, axis=1, keepdims=True)
     tangents = tangents / np.where(size > 0, size, 1.0)
-    length = np.linalg.norm(np.diff(points / unit, axis=0), axis=1, keepdims=True)
-    return tangents[:-1] * length * unit, tangents[1:] * length * unit
+    length = np.linalg.norm(chords / unit, axis=1, keepdims=True)
+    leaving, arriving = tangents[:-1] * length, tangents[1:] * length
+    still = np.isinf(unit)
+    unit[still] = 0.0
+    return leaving * unit + chords * still, arriving * unit + chords * still
 
 
 def _along(
