@@ -90,11 +90,12 @@ class BoundaryForm:
         ``"persistence"``, ``"non-smooth fold"``, ``"degenerate"``, or ``"depends"``.
     test : sympy.Expr
         Positive for persistence, negative for a non-smooth fold: det J₁ det J₂,
-        or −CᵀN⁻¹E in a Filippov model.
+        or −CᵀN⁻¹E in a Filippov model. Where long equations are left the determinants
+        are not evaluated.
     continuous : bool
         Whether the rates are continuous across the interface.
     clarke : ClarkeForm or None
-        For a continuous field.
+        For a continuous field, unless long equations are left.
     singular : Named
         Region to the condition on one parameter under which its Jacobian is
         singular here: a fold of that region meets the interface.
@@ -230,6 +231,8 @@ def _form(
     found: _Place,
 ) -> BoundaryForm:
     place, left = found.values, found.left
+    if continuous and any(longer(e, LONG) for e in left):
+        return _implicit(interface, own, other, found)
     states = [real(n) for n in own.states]
     names = (own.region, other.region)
     matrices = [_at(jacobian(s.rates, s.states), place) for s in (own, other)]
@@ -271,6 +274,41 @@ def _form(
         implied(admissible, own.signs),
         OPEN if left else checked(zeros, place, own.signs),
     )
+
+
+def _implicit(interface: str, own: Setting, other: Setting, found: _Place) -> BoundaryForm:
+    """Give a boundary equilibrium whose long equations are left, with nothing expanded."""
+    states = [real(n) for n in own.states]
+    first, second = (
+        sp.ImmutableDenseMatrix(
+            [[s.rates[n].diff(x).xreplace(found.values) for x in states] for n in s.states]
+        )
+        for s in (own, other)
+    )
+    inside = [sp.sympify(e.xreplace(found.values)) for e in own.inside]
+    left = [e for e in inside if e != 0 and not _among(e, found.left)]
+    conditions = [sp.Gt(e, 0) for e in left] + [sp.Ge(e, 0) for e in found.radicands]
+    return BoundaryForm(
+        interface,
+        (own.region, other.region),
+        Named("state", {s.name: found.values[s] for s in states}),
+        Named("parameter", {s.name: e for s, e in found.values.items() if s not in states}),
+        found.left,
+        "depends",
+        sp.Determinant(first) * sp.Determinant(second),
+        True,
+        None,
+        Named("region", {}),
+        sp.And(*conditions),
+        None,
+        OPEN,
+    )
+
+
+def _among(expression: sp.Expr, equations: tuple[sp.Expr, ...]) -> bool:
+    """Whether an expression or its negative is one of the equations, once expanded."""
+    both = (spread(expression), spread(-expression))
+    return any(spread(e) in both for e in equations)
 
 
 def _at(

@@ -33,6 +33,9 @@ LONGEST = 120
 #: Parts of a longer equation up to which it is kept unexpanded where it is no polynomial.
 PARTS = 400
 
+#: Longer nonlinear parts of two equations, in terms, are not compared.
+SHARED = 30
+
 Nonzero = Callable[[sp.Expr], bool]
 
 
@@ -174,6 +177,8 @@ def _combined(
     for row, part in enumerate(bent):
         for other in range(row + 1, len(bent)):
             if part == 0 or bent[other] == 0:
+                continue
+            if max(_length(part), _length(bent[other])) > SHARED:
                 continue
             if not (light(part) and light(bent[other])):
                 continue

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 import sympy as sp
+from sympy.polys.rootoftools import ComplexRootOf
 from sympy.printing.str import StrPrinter
 
 from fastslow.model.rational import quotient
@@ -24,6 +25,9 @@ NAMES = 6
 
 #: Sums of so many terms are left as they are.
 FEW = 4
+
+#: Sums of more terms are too long for their forms to be compared.
+MANY = 24
 
 #: Letters that stand for subexpressions, those not in use first.
 LETTERS = "PQRSTUWXYZ"
@@ -102,7 +106,12 @@ def _best(expressions: Sequence[sp.Basic]) -> sp.Expr | None:
     """The subexpression to be named next."""
     counts: dict[sp.Expr, int] = {}
     for expression in expressions:
-        for node in sp.preorder_traversal(expression):
+        walk = sp.preorder_traversal(expression)
+        for node in walk:
+            if isinstance(node, ComplexRootOf):
+                # a number whose polynomial and index are no formulas
+                walk.skip()
+                continue
             if isinstance(node, sp.Expr) and (node.is_Add or node.is_Mul or node.is_Pow):
                 counts[node] = counts.get(node, 0) + 1
     under = [n.base for n in counts if n.is_Pow and not n.exp.is_Integer]
@@ -129,10 +138,14 @@ def compact(expression: sp.Basic) -> sp.Basic:
     -4*d + k*(a + b + c)**2
     """
     if not isinstance(expression, sp.Expr):
-        sums = {n for n in expression.atoms(sp.Add) if len(n.args) > FEW}
+        sums = {n for n in expression.atoms(sp.Add) if FEW < len(n.args) <= MANY}
         return expression.xreplace({n: compact(n) for n in sums})
     if expression.is_Add:
-        if len(expression.args) <= FEW or irrational(expression) or quotient(expression) is None:
+        if (
+            not FEW < len(expression.args) <= MANY
+            or irrational(expression)
+            or quotient(expression) is None
+        ):
             return expression
         forms = [expression, shortest(expression)]
         forms += [f for s in expression.free_symbols if (f := _completed(expression, s))]

@@ -197,6 +197,9 @@ def _continuous(family: Family) -> bool:
 
 def _stability_along(family: Family, whole: Stability, setting: Setting) -> Stability:
     """Give the stability of a family, with signs that hold all along it inside the region."""
+    if len(family.elimination.unknowns) == len(setting.states) > 1:
+        # nothing is solved for, so the Jacobian in states is all there is
+        return whole
     unknown = family.unknown
     inside = [family.reduced(e) for e in setting.inside]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,6 +14,7 @@ from fastslow.results.named import Named
 from fastslow.symbolic.algebra import (
     generators,
     growth,
+    irrational,
     light,
     longer,
     numerator,
@@ -36,8 +39,17 @@ PARTS = 100
 #: Rates that may have more terms than this once expanded are left as they are.
 EXPANDED = 300
 
-#: What is then said.
-PAST = "rates past the budget of expansion; given as they are"
+#: With roots of symbols, which make every later step longer.
+EXPANDED_RADICAL = 60
+
+#: Of several equations together, which elimination makes longer.
+EXPANDED_SEVERAL = 120
+
+#: What is said of equations that are left.
+OPEN = "not solved in closed form:"
+
+#: What is said of rates past the budget.
+PAST = f"{OPEN} rates past the budget of expansion"
 
 #: More branches of one set of equations than this are not split any further.
 BRANCHES = 24
@@ -128,9 +140,8 @@ def families(
     """
     candidates = Candidates.of(candidates)
     unknowns = tuple(real(n) for n in states)
-    if any(growth(rates[n]) > EXPANDED for n in states if not generators(rates[n])):
-        whole = Elimination(tuple(rates.values()), unknowns, Named("solved state", {}))
-        return [Family(whole, note=PAST)]
+    if any(_past(rates[n]) for n in states):
+        return _by_factors(rates, states, signs, candidates)
     direct = cramer(rates, states)
     if isinstance(direct, tuple):
         values, below = direct
@@ -146,6 +157,58 @@ def families(
         if not poles or _keeps(elimination, poles)
         for family in _solved(elimination, signs, candidates)
     ]
+
+
+def _past(rate: sp.Expr) -> bool:
+    """Whether a rate is too long to be expanded."""
+    if generators(rate):
+        return False
+    return growth(rate) > (EXPANDED_RADICAL if irrational(rate) else EXPANDED)
+
+
+def _by_factors(
+    rates: Mapping[str, sp.Expr], states: Sequence[str], signs: Signs, candidates: Candidates
+) -> list[Family]:
+    """Families of rates past the budget, one for each choice of a factor that vanishes.
+
+    A factor that is a state alone makes the other rates shorter, so that they may be
+    within the budget; what is not stays as it is.
+    """
+    unknowns = tuple(real(n) for n in states)
+    choices = [_factors_as_written(rates[n], unknowns) for n in states]
+    if math.prod(map(len, choices)) > BRANCHES:
+        choices = [[rates[n]] for n in states]
+    found: list[Family] = []
+    for picked in itertools.product(*choices):
+        zero = {e: sp.S.Zero for e in picked if e in unknowns}
+        names = [n for n in states if real(n) not in zero]
+        left = [sp.sympify(e.xreplace(zero)) for e in picked if e not in zero]
+        if any(undefined(e) or (e.is_number and e != 0) for e in left):
+            continue
+        if len(left) != len(names):
+            zero, names, left = {}, list(states), list(picked)
+        several = len(left) > 1 and sum(map(growth, left)) > EXPANDED_SEVERAL
+        short = not several and not any(_past(e) for e in left)
+        if zero and names and short:
+            inner = families(dict(zip(names, left, strict=True)), names, signs, candidates)
+        else:
+            open_ones = tuple(map(real, names))
+            rest = Elimination(tuple(left), open_ones, Named("solved state", {}))
+            inner = [Family(rest, note=PAST if names else "")]
+        known = {s.name: e for s, e in zero.items()}
+        for family in inner:
+            solved = Named("solved state", {**known, **dict(family.elimination.solved)})
+            whole = replace(family.elimination, solved=solved)
+            found.append(replace(family, elimination=_ordered(whole, states)))
+    return found
+
+
+def _factors_as_written(rate: sp.Expr, unknowns: Sequence[sp.Symbol]) -> list[sp.Expr]:
+    """Factors of a product with an unknown in them, or the whole where there are none."""
+    bases = [f.as_base_exp() for f in sp.Mul.make_args(rate)]
+    found = [b for b, e in bases if e.is_positive and b.free_symbols & set(unknowns)]
+    poles = [b for b, e in bases if not e.is_positive and b.free_symbols & set(unknowns)]
+    return [rate] if poles or not found else list(dict.fromkeys(found))
 
 
 def _poles(rates: Mapping[str, sp.Expr], states: Sequence[str]) -> list[sp.Expr]:
@@ -251,7 +314,8 @@ def _keeps(elimination: Elimination, divided: Sequence[sp.Expr]) -> bool:
     if elimination.is_univariate:
         (equation,), unknowns = elimination.remaining, elimination.unknowns
         both = [e for e in left if equation.is_polynomial(*unknowns) and light(e) and e != 0]
-        left += [sp.rem(numerator(e), equation, *unknowns) for e in both if light(equation)]
+        above = [numerator(e) for e in both if light(equation)]
+        left += [sp.rem(e, equation, *unknowns) for e in above if e.is_polynomial(*unknowns)]
     return all(e != 0 and not undefined(e) for e in left)
 
 
@@ -266,7 +330,7 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
         note = "found where " + ", ".join(f"{_short(d)} ≠ 0" for d in divided)
     if not slim.is_univariate:
         if bound:
-            many = f"{len(bound)} equations are left; given as they are"
+            many = f"{OPEN} {len(bound)} equations are left"
             note = _and(note, "1 equation is left" if len(bound) == 1 else many)
         return [Family(slim, condition=tuple(free), note=note)]
     (equation,), (unknown,) = slim.remaining, unknowns
@@ -291,9 +355,9 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
             discriminant = shortest(sp.discriminant(poly))
         if closed is None and curve is None:
             long = "past the budget" if poly.degree() > DEGREE else "no short radicals"
-            note = _and(note, f"degree {poly.degree()} in {unknown}: {long}; given implicitly")
+            note = _and(note, f"{OPEN} degree {poly.degree()} in {unknown}, {long}")
     elif curve is None:
-        note = _and(note, f"not a polynomial in {unknown}; given implicitly")
+        note = _and(note, f"{OPEN} not a polynomial in {unknown}")
     whole = Family(
         slim,
         parameter,

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import mpmath
 import sympy as sp
 
+from fastslow.model.rational import quotient
 from fastslow.symbolic.algebra import longer, numerator, spread, undefined
 from fastslow.symbolic.signs import Signs
 
@@ -21,6 +22,9 @@ PARTS = 400
 
 #: Newton steps from one start.
 STEPS = 40
+
+#: Points without a root, after which equations are not searched any further.
+ROOTLESS = 2
 
 #: How something was verified, the stronger first; the empty string where it was not.
 EXACT, NUMERIC, OPEN = "exact", f"{DIGITS} digits", ""
@@ -95,7 +99,7 @@ def checked(
     values = {s: e for s, e in place.items() if s != e}
     left = []
     for expression in map(sp.sympify, expressions):
-        if not _exactly(expression, values, equations):
+        if not _exactly(expression, values, equations, unknowns):
             left.append(expression)
     if not left:
         return EXACT
@@ -103,12 +107,28 @@ def checked(
     return NUMERIC if _at_points(left, values, known, equations, unknowns) else OPEN
 
 
-def _exactly(expression: sp.Expr, values: Place, equations: Sequence[sp.Expr]) -> bool:
+def _multiple(expression: sp.Expr, equation: sp.Expr, unknowns: Sequence[sp.Symbol]) -> bool:
+    """Whether an expression holds an equation as a factor, above any poles."""
+    over, under = quotient(expression), quotient(equation)
+    if over is None or under is None:
+        return False
+    ratio = quotient(over.numerator.as_expr() / under.numerator.as_expr())
+    return ratio is not None and not ratio.denominator.as_expr().free_symbols & set(unknowns)
+
+
+def _exactly(
+    expression: sp.Expr,
+    values: Place,
+    equations: Sequence[sp.Expr],
+    unknowns: Sequence[sp.Symbol],
+) -> bool:
     if expression == 0:
         return True
     if equations:
         inside = spread(expression.xreplace(dict(values)))
-        return inside == 0 or any(inside in (e, spread(-e)) for e in equations)
+        if inside == 0 or any(inside in (e, spread(-e)) for e in equations):
+            return True
+        return any(_multiple(inside, e, unknowns) for e in equations)
     used = [values[s] for s in expression.free_symbols if s in values]
     if longer(expression, PARTS) or any(longer(e, PARTS // 4) for e in used):
         return False
@@ -130,7 +150,7 @@ def _at_points(
     if equations:
         symbols -= set(unknowns)
     ordered = sorted(symbols, key=lambda s: s.name)
-    seen = 0
+    seen = rootless = 0
     for k in range(6 * POINTS):
         # quotients of primes, spread over four decades
         point: dict[sp.Symbol, sp.Expr] = {
@@ -142,6 +162,9 @@ def _at_points(
         if equations:
             found = _root([e.xreplace(point) for e in equations], unknowns, k)
             if found is None:
+                rootless += 1
+                if rootless == ROOTLESS:
+                    break
                 continue
             point |= found
         point |= {s: e.xreplace(point).evalf(DIGITS + 10) for s, e in values.items()}

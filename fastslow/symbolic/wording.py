@@ -152,8 +152,8 @@ def _wrapped(head: str, words: Sequence[str], indent: str) -> list[str]:
 
 
 def _region(region: RegionForms, taken: set[str]) -> list[str]:
-    where = ", ".join(text(c) for c in region.conditions) or "everywhere"
-    lines = _wrapped(f"  {region.name}:", where.split(", "), "  ")
+    where = [Piece("", c).shown(c) for c in region.conditions] or ["everywhere"]
+    lines = _wrapped(f"  {region.name}:", where, "  ")
     for form in region.equilibria:
         lines += entry(_equilibrium(form), taken, "    ")
     for continuum in region.continua:

@@ -106,15 +106,21 @@ def quantity_named_q() -> Model:
     ).frozen()
 
 
-def daisyworld(*, numbers: bool = False) -> Model:
-    """Two kinds of daisies (Watson and Lovelock 1983), luminosity frozen."""
+def daisyworld(*, numbers: bool = False, root: bool = False) -> Model:
+    """Two kinds of daisies (Watson and Lovelock 1983), luminosity frozen.
+
+    The temperature that radiates what is absorbed is a fourth root, or that linearised.
+    """
     white, black, light = sp.symbols("a_w a_b L")
     a_w, a_b, a_g, s, sigma, q, death, best, k, p = sp.symbols("A_w A_b A_g S sigma q g T_0 k p")
     ground = sp.Max(0, p - white - black)
     albedo = (p - white - black) * a_g + white * a_w + black * a_b
 
+    absorbed = s * light * (1 - albedo) / sigma
+    warmth = sp.root(absorbed, 4) - 273.15 if root else absorbed / (4 * 295**3) - 50
+
     def growth(own: sp.Symbol) -> sp.Expr:
-        local = 20 * (albedo - own) + s * light * (1 - albedo) / (4 * sigma * 295**3) - 50
+        local = 20 * (albedo - own) + warmth
         return sp.Max(0, 1 - k * (best - local) ** 2)
 
     values = {a_w: 0.75, a_b: 0.25, a_g: 0.5, s: 917.0, sigma: 5.67e-8, q: 20.0}

@@ -1,0 +1,89 @@
+"""Models past the budget: what is closed is given and holds, what is left is counted and said."""
+
+from functools import cache
+
+import pytest
+import sympy as sp
+
+import fastslow as fs
+from fastslow.model.structure import real
+from fastslow.symbolic.candidates import Candidates
+from fastslow.symbolic.naming import named
+from fastslow.symbolic.signs import Signs
+from fastslow.symbolic.solution_families import OPEN, PAST, families
+from tests.symbolic.field_models import daisyworld
+
+
+@cache
+def world():
+    return fs.derive(daisyworld(numbers=True, root=True))
+
+
+def test_daisyworld_with_a_fourth_root_has_its_bare_ground_in_every_region():
+    derivation = world()
+    assert len(derivation) == 8
+    for region in derivation.regions.values():
+        bare = [e for e in region.equilibria if set(e.state.values()) == {sp.S.Zero}]
+        assert len(bare) == 1
+        assert bare[0].check == "exact"
+
+
+def test_what_is_left_implicit_is_counted_and_said():
+    left = []
+    for name, region in world().regions.items():
+        for form in region.equilibria:
+            if form.kind == "implicit":
+                left.append((name, {n for n, e in form.state.items() if e == 0}))
+                assert form.check == "exact"
+                assert form.note.startswith(OPEN)
+                assert form.note in region.notes
+    # one kind of daisies where it grows, both where both grow
+    assert left == [
+        ("S4", {"a_w"}),
+        ("S7", {"a_b"}),
+        ("S8", {"a_w"}),
+        ("S8", {"a_b"}),
+        ("S8", set()),
+    ]
+
+
+def test_no_line_of_it_is_long():
+    printed = repr(world())
+    assert max(map(len, printed.splitlines())) <= 200
+    assert printed.count(f"note: {OPEN}") == 5
+
+
+def test_rates_past_the_budget_are_taken_apart_by_their_factors():
+    model = daisyworld()
+    rates = {n: sp.nsimplify(e, rational=True) for n, e in model.regions["S8"].rates.items()}
+    signs = Signs({real(n): 1 for n in model.parameters if n != "L"})
+    found = families(rates, model.states, signs, Candidates((real("L"),), ()))
+    zeros = [{n for n, e in f.elimination.solved.items() if e == 0} for f in found]
+    assert zeros.count({"a_w", "a_b"}) == 1, "bare ground"
+    assert {"a_w"} in zeros
+    assert {"a_b"} in zeros
+    (both,) = [f for f, none in zip(found, zeros, strict=True) if not none]
+    assert both.note == PAST
+    for family, zero in zip(found, zeros, strict=True):
+        if len(zero) == 1:
+            assert family.elimination.is_univariate, "one kind of daisies alone"
+            assert family.note.startswith(OPEN)
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_more_choices_of_factors_than_the_budget_stay_whole(count):
+    states = [f"x{k}" for k in range(3 * count)]
+    symbols = list(map(real, states))
+    inner = (sum(symbols) + 1) ** 4
+    rates = {n: x * (inner - k) for k, (n, x) in enumerate(zip(states, symbols, strict=True))}
+    (whole,) = families(rates, states, Signs({}), Candidates())
+    assert whole.note == PAST
+    assert whole.equations == tuple(rates.values())
+
+
+def test_roots_of_numbers_are_printed_whole():
+    z, a = sp.symbols("z a")
+    number = sp.rootof(z**5 - 3 * z**2 + 7 * z - 12345678, 0)
+    short, defined = named([a * number + 1, a * number - 1], "a")
+    place = dict(defined)
+    assert [e.xreplace(place) for e in short] == [a * number + 1, a * number - 1]
