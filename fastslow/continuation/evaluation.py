@@ -30,11 +30,11 @@ def value_at(address, mode, point, parameters, width):  # type: ignore[no-untype
 
 @njit(error_model="numpy")
 def newton_from(  # type: ignore[no-untyped-def]
-    address, mode, parameters, starts, value, width, iterations
+    address, mode, parameters, starts, value, unit, width, iterations
 ):
     """Newton's method at a fixed last component from many starts.
 
-    A step longer than ten times the state's size is shortened to it.
+    A step longer than ten times the state's size, in the units, is shortened to it.
 
     Returns
     -------
@@ -63,8 +63,8 @@ def newton_from(  # type: ignore[no-untyped-def]
             length = 0.0
             size = 1.0
             for i in range(n):
-                length = max(length, abs(right[i]))
-                size = max(size, abs(u[i]))
+                length = max(length, abs(right[i]) / unit[i])
+                size = max(size, abs(u[i]) / unit[i])
             shrink = min(1.0, 10.0 * size / length) if length > 0.0 else 1.0
             for i in range(n):
                 u[i] += shrink * right[i]

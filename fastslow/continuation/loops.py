@@ -10,6 +10,7 @@ from fastslow.compiled.generic import load_loop
 
 _ENGINE = "fastslow.continuation.engine"
 _EVALUATION = "fastslow.continuation.evaluation"
+_ISOLATION = "fastslow.continuation.isolation"
 _SOURCES = ("fastslow.compiled.pointers",)
 _ARGUMENTS = {
     "trace": (
@@ -22,7 +23,8 @@ _ARGUMENTS = {
     "pairs": "jacobians",
     "passing": "points scale u within",
     "value_at": "address mode point parameters width",
-    "newton_from": "address mode parameters starts value width iterations",
+    "newton_from": "address mode parameters starts value unit width iterations",
+    "isolate": ("power degrees low high logarithmic floor tolerance budget large small share"),
 }
 
 # how `trace` ends, as in the engine, whose import would bring Numba with it
@@ -35,4 +37,6 @@ def loop(name: str) -> Callable[..., Any]:
     arguments = tuple(_ARGUMENTS[name].split())
     if name == "trace":
         return load_loop(_ENGINE, name, arguments, _SOURCES)
+    if name == "isolate":
+        return load_loop(_ISOLATION, name, arguments, ())
     return load_loop(_EVALUATION, name, arguments, (_ENGINE, *_SOURCES))

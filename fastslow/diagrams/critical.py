@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 import sympy as sp
 
-from fastslow.diagrams.equations import RegionEquations, real_roots
+from fastslow.continuation.polynomial_systems import (
+    FARTHEST,
+    Terms,
+    at_value,
+    solve_polynomials,
+    units,
+)
+from fastslow.diagrams.equations import RegionEquations, real_roots, terms_of
 from fastslow.model.structure import real
 
 #: Degree in the unknown up to which discriminants and resultants are formed.
 DEGREE = 8
+
+#: Critical values closer than this fraction of the range are one.
+SHORTEST = 1e-8
+
+#: Highest degree of a discriminant or resultant in the parameter whose roots are trusted.
+ROOTS = 12
 
 
 def critical_values(
@@ -19,11 +33,14 @@ def critical_values(
 ) -> list[float] | None:
     """Values between which a region's admissible equilibria move without meeting or leaving.
 
-    These are the real roots in the parameter of the discriminant and leading
-    coefficient of the eliminated polynomial and of its resultant with every
-    interface function (for sliding also with both drifts, which vanish at
-    boundary equilibria and two-folds). A start in every interval between them is therefore a
-    start on every branch.
+    These are the values at which two equilibria meet (the rates and the determinant of their
+    Jacobian vanish), at which one runs to infinity, and at which one meets an interface (for
+    sliding also where a drift vanishes, at boundary equilibria and two-folds). A start in every
+    interval between them is therefore a start on every branch.
+
+    One polynomial of low degree in one unknown has its discriminant, leading coefficient
+    and resultants. For up to three unknowns the solutions of these polynomial systems in
+    unknowns and parameter are isolated (see `solve_polynomials`).
 
     Parameters
     ----------
@@ -36,13 +53,34 @@ def critical_values(
     Returns
     -------
     list of float or None
-        None where the region's equations are no polynomial of moderate degree
-        in unknown and parameter, so that nothing is proved.
+        None where the region's equations are no polynomials in few unknowns and the
+        parameter, or too large, so that nothing is proved.
     """
-    conditions = _conditions(equations, edges)
-    if conditions is None:
-        return None
+    left = equations.elimination
+    if equations.impossible:
+        return []
+    alone = [e for e in left.remaining if not e.has(*left.unknowns)] if left.unknowns else []
+    alone = list(left.remaining) if not left.unknowns else alone
     p = real(equations.field.parameter)
+    if not all(e.is_polynomial(p) for e in alone):
+        return None
+    if len(alone) == len(left.remaining) and (alone or left.unknowns):
+        return _values(alone, p, lower, upper)
+    if alone:
+        return None
+    bounds = _along(equations, [*equations.bounds, *edges])
+    if bounds is None:
+        return None
+    conditions = _resultants(equations, bounds)
+    if conditions is not None and all(sp.degree(c, p) <= ROOTS for c in conditions):
+        return _values(conditions, p, lower, upper)
+    return _isolated(equations, bounds, lower, upper)
+
+
+def _values(
+    conditions: Sequence[sp.Expr], p: sp.Symbol, lower: float, upper: float
+) -> list[float] | None:
+    """Real roots in a range of polynomials in the parameter; None if one vanishes identically."""
     values: set[float] = set()
     for condition in conditions:
         polynomial = sp.Poly(condition, p)
@@ -54,26 +92,36 @@ def critical_values(
     return sorted(values)
 
 
-def _conditions(equations: RegionEquations, more: Sequence[sp.Expr]) -> list[sp.Expr] | None:
-    """Polynomials in the parameter whose roots are the critical values."""
+def _along(equations: RegionEquations, bounds: Sequence[sp.Expr]) -> list[sp.Expr] | None:
+    """Functions of the states along equilibria, over unknowns and parameter; None if no polynomial.
+
+    A denominator has been shown not to vanish, or is a zero of the rates' own.
+    """
     left = equations.elimination
     p = real(equations.field.parameter)
-    if equations.impossible:
-        return []
-    if left.divisors or len(left.unknowns) > 1:
-        return None
-    alone = [e for e in left.remaining if not e.has(*left.unknowns)] if left.unknowns else []
-    alone = list(left.remaining) if not left.unknowns else alone
-    if not all(e.is_polynomial(p) for e in alone):
-        return None
-    if len(alone) == len(left.remaining) and (alone or left.unknowns):
-        return alone
-    edges = _edges(equations, more)
-    if edges is None or not left.unknowns:
-        return edges
-    (x,) = left.unknowns
+    solved = {real(n): e for n, e in left.solved.items()}
+    found = []
+    for bound in bounds:
+        h = bound.subs(solved)
+        if not h.is_polynomial(p, *left.unknowns):
+            h = sp.together(h).as_numer_denom()[0]
+        if not h.is_polynomial(p, *left.unknowns):
+            return None
+        found.append(sp.expand(h))
+    return found
+
+
+def _resultants(equations: RegionEquations, edges: Sequence[sp.Expr]) -> list[sp.Expr] | None:
+    """Polynomials in the parameter, for at most one unknown and a low degree."""
+    left = equations.elimination
+    p = real(equations.field.parameter)
+    if not left.unknowns:
+        return list(edges)
     equation = left.remaining[0]
-    if not equation.is_polynomial(x, p) or sp.degree(equation, x) > DEGREE:
+    if len(left.unknowns) > 1 or not equation.is_polynomial(*left.unknowns, p):
+        return None
+    (x,) = left.unknowns
+    if sp.degree(equation, x) > DEGREE:
         return None
     polynomial = sp.Poly(equation, x)
     found = [polynomial.LC()]
@@ -84,15 +132,83 @@ def _conditions(equations: RegionEquations, more: Sequence[sp.Expr]) -> list[sp.
     return [sp.expand(f) for f in found]
 
 
-def _edges(equations: RegionEquations, more: Sequence[sp.Expr]) -> list[sp.Expr] | None:
-    """What bounds the region, along its equilibria; None unless polynomial in both."""
-    left = equations.elimination
+def _isolated(
+    equations: RegionEquations, bounds: Sequence[sp.Expr], lower: float, upper: float
+) -> list[float] | None:
+    """Values at which systems in unknowns and parameter have solutions."""
+    if equations.system is None:
+        return None
+    unknowns = equations.elimination.unknowns
     p = real(equations.field.parameter)
-    solved = {real(n): e for n, e in left.solved.items()}
-    edges = []
-    for bound in (*equations.bounds, *more):
-        h = bound.subs(solved)
-        if not h.is_polynomial(p, *left.unknowns):
+    symbols = [*unknowns, p]
+    rates = list(equations.elimination.remaining)
+    if not all(r.is_polynomial(*symbols) for r in rates):
+        return None
+    # as polynomials the determinant is expanded while it is formed
+    slopes = [[sp.Poly(r, *symbols).diff(x) for x in unknowns] for r in rates]
+    values: set[float] = set()
+    for condition in (None, _determinant(slopes).as_expr(), *bounds):
+        found = _meetings(equations, condition, lower, upper)
+        if found is None:
             return None
-        edges.append(sp.expand(h))
-    return edges
+        values |= set(found)
+    kept: list[float] = []
+    for value in sorted(v for v in values if lower < v < upper):
+        # what runs to infinity gives several values that are nearly equal
+        if not kept or value - kept[-1] > SHORTEST * (upper - lower):
+            kept.append(value)
+    return kept
+
+
+@lru_cache(maxsize=512)
+def _meetings(
+    equations: RegionEquations, condition: sp.Expr | None, lower: float, upper: float
+) -> list[float] | None:
+    """Values at which a function vanishes at an equilibrium, or without one those at infinity."""
+    unknowns = equations.elimination.unknowns
+    p = real(equations.field.parameter)
+    symbols = [*unknowns, p]
+    base = terms_of(equations.elimination.remaining, symbols)
+    if base is None:
+        return None
+    if condition is None:
+        systems = _at_infinity(base, {len(unknowns): (lower, upper)})
+    elif condition.has(*unknowns) or condition == 0:
+        extra = terms_of([condition], symbols)
+        if extra is None:
+            return None
+        systems = [[*base, *extra]]
+    else:
+        return _values([condition], p, lower, upper)
+    values: set[float] = set()
+    for system in systems:
+        solved = solve_polynomials(system, {len(system) - 1: (lower, upper)})
+        if not solved.complete:
+            return None
+        values |= {float(v) for v in solved.simple[:, -1]}
+        # on either side of what is not told apart
+        values |= {float(v) for v in solved.clusters[:, :, -1].ravel()}
+    return sorted(values)
+
+
+def _at_infinity(rates: list[Terms], ranges: dict[int, tuple[float, float]]) -> list[list[Terms]]:
+    """Systems for the parameter at which an unknown has the largest size that is looked at."""
+    count = len(rates)
+    scales, _ = units(rates, ranges)
+    return [
+        [at_value(terms, m, sign * scales[m] * int(FARTHEST)) for terms in rates]
+        for m in range(count)
+        for sign in (1, -1)
+    ]
+
+
+def _determinant(rows: list[list[sp.Poly]]) -> sp.Poly:
+    if len(rows) == 1:
+        return rows[0][0]
+    total = rows[0][0] * 0
+    for k, entry in enumerate(rows[0]):
+        if not entry.is_zero:
+            minor = [[*row[:k], *row[k + 1 :]] for row in rows[1:]]
+            term = entry * _determinant(minor)
+            total = total - term if k % 2 else total + term
+    return total

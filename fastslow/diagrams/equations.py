@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -12,6 +13,7 @@ import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.continuation.loops import loop
+from fastslow.continuation.polynomial_systems import FARTHEST, Terms, solve_polynomials
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.modes import Sides
 from fastslow.model.structure import real
@@ -28,6 +30,9 @@ SHARE = "(alpha)"
 
 #: Degree up to which the roots of a univariate polynomial are trusted to be complete.
 DEGREE = 60
+
+#: Unknowns up to which the roots of a polynomial system are isolated.
+UNKNOWNS = 3
 
 
 def exact(expression: sp.Expr) -> sp.Expr:
@@ -62,11 +67,16 @@ class RegionEquations:
         return {real(n): sp.Rational(v) for n, v in values.items() if n != self.field.parameter}
 
     @cached_property
-    def elimination(self) -> Elimination:
-        """Of the rates with every other parameter a number, so that its sign is known."""
+    def equations(self) -> dict[str, sp.Expr]:
+        """What vanishes at an equilibrium, by unknown, with numbers for the other parameters."""
         states = self.field.model.states
         rates = [exact(rate).subs(self.numbers) for rate in self.field.modes[self.region].rates]
-        return eliminate(dict(zip(states, rates, strict=True)), states)
+        return dict(zip(states, rates, strict=True))
+
+    @cached_property
+    def elimination(self) -> Elimination:
+        """Of the rates with every other parameter a number, so that its sign is known."""
+        return eliminate(self.equations, tuple(self.equations))
 
     @property
     def bounds(self) -> list[sp.Expr]:
@@ -83,10 +93,22 @@ class RegionEquations:
         return polynomial if polynomial.degree() <= DEGREE else None
 
     @cached_property
-    def _coefficients(self) -> Any:
-        assert self.polynomial is not None
+    def system(self) -> tuple[sp.Poly, ...] | None:
+        """The remaining equations as polynomials in few unknowns, if they are."""
+        left = self.elimination
+        square = len(left.remaining) == len(left.unknowns)
+        if not (square and 1 <= len(left.unknowns) <= UNKNOWNS and left.is_polynomial):
+            return None
+        if len(left.unknowns) == 1 and self.polynomial is None:
+            return None
+        return tuple(sp.Poly(e, *left.unknowns) for e in left.remaining)
+
+    @cached_property
+    def _coefficients(self) -> list[list[tuple[tuple[int, ...], Any]]]:
+        """Exponents in every equation of the system, and their coefficients over the parameter."""
+        assert self.system is not None
         p = real(self.field.parameter)
-        return sp.lambdify(p, [sp.N(c, 17) for c in self.polynomial.all_coeffs()], "math")
+        return [[(e, _function_of(c, p)) for e, c in q.terms()] for q in self.system]
 
     @cached_property
     def _formula(self) -> Any:
@@ -103,13 +125,6 @@ class RegionEquations:
             return []
 
     @property
-    def complete(self) -> bool:
-        """Whether `states` is sure to find every equilibrium."""
-        left = self.elimination
-        known = self.polynomial is not None or self._conditions is not None
-        return not left.unknowns or known or self.impossible
-
-    @property
     def impossible(self) -> bool:
         """Whether an equation without states can never hold, as where a rate is a constant."""
         return any(e.is_number and e.is_nonzero for e in self.elimination.remaining)
@@ -122,21 +137,46 @@ class RegionEquations:
             return list(left.remaining)
         return None
 
-    def states(self, value: float) -> list[Array]:
-        """Isolated equilibria of the region's rates at a parameter value, admissible or not."""
+    def solutions(self, value: float) -> tuple[list[Array], bool]:
+        """Isolated equilibria of the region's rates at a value, and whether these are all.
+
+        Admissible or not.
+        """
         left = self.elimination
         if not left.unknowns:
-            return self._holding(value, self._whole(value))
+            return self._holding(value, self._whole(value)), True
         if self._conditions is not None or self.impossible:
-            return []
-        if self.polynomial is None:
-            return self._searched(value)
+            return [], True
+        if self.system is not None:
+            found, complete = self._isolated(value)
+            if complete:
+                return found, True
+            return self._searched(value, found), False
+        return self._searched(value), False
+
+    def _isolated(self, value: float) -> tuple[list[Array], bool]:
+        """All solutions of the system, and whether none is missing or undecided."""
         try:
-            coefficients = np.array(self._coefficients(value), dtype=float)
+            terms = [{e: c(value) for e, c in q} for q in self._coefficients]
         except (ArithmeticError, ValueError, TypeError):
-            return []
-        found = [s for root in real_roots(coefficients) for s in self._whole(value, root)]
-        return self._polished(value, found)
+            return [], False
+        solved = solve_polynomials([{e: c for e, c in q.items() if c} for q in terms])
+        states: list[Array] = []
+        complete = solved.complete
+        for sure, roots in ((True, solved.simple), (False, solved.clusters.mean(axis=1))):
+            for root in roots:
+                whole = self._whole(value, *root)
+                fresh = [s for s in (self.corrected(w, value) for w in whole) if s is not None]
+                # what is no equilibrium here is a zero of a denominator, or a two-fold
+                complete &= bool(fresh) or (sure and not self._regular(value, whole))
+                states += [s for s in fresh if not any(self.same(s, o, value) for o in states)]
+        return states, complete
+
+    def _regular(self, value: float, states: Sequence[Array]) -> bool:
+        """Whether the rates are finite at states and an equilibrium should be there."""
+        return any(
+            np.isfinite(self.field.curve(self.region, np.append(s, value))[1]).all() for s in states
+        )
 
     def continuum(self, value: float) -> bool:
         """Whether the region's equilibria at this value form a continuum."""
@@ -191,45 +231,112 @@ class RegionEquations:
         for state in states:
             solved = self.corrected(state, value)
             solved = None if solved is None else self.field.wrapped(solved)
-            if solved is not None and not any(same(solved, o, self.field.periods) for o in kept):
+            if solved is not None and not any(self.same(solved, o, value) for o in kept):
                 kept.append(solved)
         return kept
 
+    def unit(self, value: float) -> Array:
+        """Natural unit of each state where the parameter has a value."""
+        return self.field.units_at(abs(value))[: self.field.n]
+
+    def _size(self, value: float, unit: Array) -> Array:
+        """Size of each rate where the states have their units."""
+        rates, slopes = self.field.curve(self.region, np.append(unit, value))
+        with np.errstate(all="ignore"):
+            size = np.abs(rates) + np.abs(slopes[:, :-1]) @ unit
+        return np.where(np.isfinite(size), size, 0.0)
+
+    def same(self, one: Array, other: Array, value: float) -> bool:
+        """Whether two states are equal, but for what a double root may be off."""
+        return same(one, other, self.unit(value), self.field.periods)
+
     def corrected(self, state: Array, value: float) -> Array | None:
         """The equilibrium near a state at a parameter value, None without convergence."""
+        unit = self.unit(value)
         target = np.append(np.zeros(len(state)), 1.0)
-        scale = np.append(np.maximum(1.0, np.abs(state)), max(1.0, abs(value)))
+        scale = np.append(np.maximum(unit, np.abs(state)), max(1.0, abs(value)))
         u = np.append(state, value)
         found = self.field.refined(self.region, u, scale, normal=target, point=value * target)
         # at a double root Newton's last corrections stay near the root of the rounding
         if not (np.isfinite(found.residual) and found.correction < 1e-6):
             return None
+        solved = found.u[:-1]
         rates, slopes = self.field.curve(self.region, found.u)
-        terms = np.abs(slopes[:, :-1]) @ np.maximum(1.0, np.abs(found.u[:-1]))
-        small = np.abs(rates) <= 1e-9 * np.maximum(1.0, terms)
-        moved = np.abs(found.u[:-1] - state) / scale[:-1]
+        # not of the unit where a state is far below it: a slope that is large because another
+        # state is far away would forgive any residual
+        terms = self._size(value, unit) + np.abs(slopes[:, :-1]) @ np.abs(solved)
+        small = np.abs(rates) <= 1e-9 * terms
+        near = np.abs(solved - state) < 1e6 * scale[:-1]
+        within = np.abs(solved) <= FARTHEST * np.maximum(unit, np.abs(state))
         there = abs(found.u[-1] - value) <= 1e-12 * scale[-1]
-        return found.u[:-1] if there and small.all() and moved.max() < 1e6 else None
+        return solved if there and small.all() and near.all() and within.all() else None
 
-    def _searched(self, value: float) -> list[Array]:
+    def _searched(self, value: float, known: Sequence[Array] = ()) -> list[Array]:
         """Newton's method from many states, a fixed sequence spread over several scales."""
-        field, n = self.field, self.field.n
+        field, n, unit = self.field, self.field.n, self.unit(value)
         generator = np.random.default_rng(20231)
-        spread = 10.0 ** generator.uniform(-2, 1.5, (STARTS, 1))
-        starts = np.vstack([np.zeros(n), generator.standard_normal((STARTS, n)) * spread])
-        states, converged = loop("newton_from")(
-            field.compiled.address, self.region, field.values, starts, value,
-            field.compiled.size, 100,
-        )  # fmt: skip
-        distinct: list[Array] = []
-        for state in field.wrapped(states[converged]):
-            near = (
-                np.abs(apart(state, o, field.periods)).max() / max(1.0, np.abs(o).max())
-                for o in distinct
+        distinct = [np.asarray(k) for k in known]
+        for _ in range(2):
+            spread = 10.0 ** generator.uniform(-2, 1.5, (STARTS, 1))
+            # the size of each state by itself, too
+            spread = np.where(
+                np.arange(STARTS)[:, None] % 2,
+                spread,
+                10.0 ** generator.uniform(-3, 3, (STARTS, n)),
             )
-            if min(near, default=1.0) > 1e-5:
-                distinct.append(state)
-        return sorted(self._polished(value, distinct), key=lambda s: tuple(s))
+            starts = np.vstack(
+                [np.zeros(n), unit * generator.standard_normal((STARTS, n)) * spread]
+            )
+            states, converged = loop("newton_from")(
+                field.compiled.address, self.region, field.values, starts, value, unit,
+                field.compiled.size, 100,
+            )  # fmt: skip
+            for state in field.wrapped(states[converged]):
+                if np.all(np.abs(state) <= FARTHEST * unit) and not any(
+                    _near(state, o, unit, 1e-5, field.periods) for o in distinct
+                ):
+                    distinct.append(state)
+            distinct = self._polished(value, distinct)
+            # once more in units of what was found
+            sizes = np.abs(distinct).max(axis=0) if distinct else unit
+            unit = np.where(sizes > 0, sizes, unit)
+        return sorted(distinct, key=lambda s: tuple(s))
+
+
+def _function_of(coefficient: sp.Expr, p: sp.Symbol) -> Any:
+    """A coefficient as a function of the parameter's value, exact where it is a polynomial."""
+    if coefficient.is_Rational:
+        number = Fraction(int(coefficient.p), int(coefficient.q))
+        return lambda value: number
+    if coefficient.is_polynomial(p):
+        powers = [_fraction(c) for c in sp.Poly(coefficient, p).all_coeffs()]
+
+        def horner(value: float) -> Fraction:
+            total, at = Fraction(0), Fraction(value)
+            for power in powers:
+                total = total * at + power
+            return total
+
+        return horner
+    function = sp.lambdify(p, sp.N(coefficient, 17), "math")
+    return lambda value: Fraction(float(function(value)))
+
+
+def _fraction(number: sp.Expr) -> Fraction:
+    """A number as a fraction, exact or to 40 digits."""
+    rational = number if number.is_Rational else sp.Rational(sp.N(number, 40))
+    return Fraction(int(rational.p), int(rational.q))
+
+
+def terms_of(expressions: Sequence[sp.Expr], symbols: Sequence[sp.Symbol]) -> list[Terms] | None:
+    """Polynomials by exponents of symbols; None where one is no polynomial in them."""
+    found: list[Terms] = []
+    for expression in expressions:
+        if not expression.is_polynomial(*symbols):
+            return None
+        polynomial = sp.Poly(expression, *symbols)
+        found.append({e: _fraction(c) for e, c in polynomial.terms() if c != 0})
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,6 +355,12 @@ class SlidingEquations(RegionEquations):
             return whole
         crossed = self._without_share
         return crossed if crossed is not None and crossed.is_univariate else whole
+
+    @cached_property
+    def equations(self) -> dict[str, sp.Expr]:
+        states, alpha = self.field.model.states, real(SHARE)
+        rates = [f + alpha * (g - f) for f, g in self._fields]
+        return {**dict(zip(states, rates, strict=True)), SHARE: self._height}
 
     @property
     def _sides(self) -> Sides:
@@ -269,10 +382,7 @@ class SlidingEquations(RegionEquations):
 
     @cached_property
     def _with_share(self) -> Elimination:
-        states, alpha = self.field.model.states, real(SHARE)
-        rates = [f + alpha * (g - f) for f, g in self._fields]
-        equations = {**dict(zip(states, rates, strict=True)), SHARE: self._height}
-        return eliminate(equations, (*states, SHARE))
+        return eliminate(self.equations, tuple(self.equations))
 
     @cached_property
     def _without_share(self) -> Elimination | None:
@@ -323,10 +433,15 @@ def real_roots(coefficients: Array) -> list[float]:
     return sorted(float(r) for r in roots.real[np.abs(roots.imag) < 1e-6 * scale])
 
 
-def same(one: Array, other: Array, periods: ArrayLike = 0.0) -> bool:
+def _near(one: Array, other: Array, unit: Array, within: float, periods: ArrayLike) -> bool:
+    """Whether two states agree modulo periods, relative to each component or to its unit."""
+    gap = np.abs(apart(one, other, periods))
+    return bool(np.all(gap <= within * np.maximum(unit, np.abs(one))))
+
+
+def same(one: Array, other: Array, unit: ArrayLike = 1.0, periods: ArrayLike = 0.0) -> bool:
     """Whether two states are equal modulo periods, but for what a double root may be off."""
-    near = np.abs(apart(one, other, periods))
-    return bool(np.all(near <= 1e-8 * np.maximum(1.0, np.abs(one))))
+    return _near(one, other, np.asarray(unit), 1e-8, periods)
 
 
 @lru_cache(maxsize=64)

@@ -118,9 +118,9 @@ def solve_at(
     complete = True
     solved: list[tuple[int, bool, list[Array]]] = []
     for number, equations in enumerate(region_equations(field)):
-        complete &= equations.complete
         whole = equations.continuum(value)
-        states = equations.edges(value) if whole else equations.states(value)
+        states, sure = (equations.edges(value), True) if whole else equations.solutions(value)
+        complete &= sure
         solved.append((number, whole, states))
     known = [(number, np.append(s, value)) for number, _, states in solved for s in states]
     unit = np.append(field.sizes(known), abs(value))
@@ -136,7 +136,8 @@ def solve_at(
     sets = sets_of(along, value) if with_sets else []
     found += [corner for one in sets for corner in one.equilibria]
     complete &= all(one.exact for one in sets) and all_known(along)
-    return Equilibria(_distinct(found, field.periods), "complete" if complete else "found", sets)
+    distinct = _distinct(found, unit[:-1], field.periods)
+    return Equilibria(distinct, "complete" if complete else "found", sets)
 
 
 def point_at(
@@ -156,7 +157,7 @@ def point_at(
     )
 
 
-def _distinct(points: list[Equilibrium], periods: Array) -> list[Equilibrium]:
+def _distinct(points: list[Equilibrium], unit: Array, periods: Array) -> list[Equilibrium]:
     """Each admissible state once: on an interface two regions share it; a continuum wins.
 
     Ends of a continuum of pseudo-equilibria that is no `EquilibriumSet` stand beside the
@@ -165,7 +166,9 @@ def _distinct(points: list[Equilibrium], periods: Array) -> list[Equilibrium]:
     kept: list[Equilibrium] = []
     for point in sorted(points, key=lambda p: not p.continuum):
         shared = point.admissible and any(
-            k.admissible and same(k.state, point.state, periods) and not (k.continuum and k.pseudo)
+            k.admissible
+            and same(k.state, point.state, unit, periods)
+            and not (k.continuum and k.pseudo)
             for k in kept
         )
         if not shared:

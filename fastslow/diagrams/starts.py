@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cached_property, lru_cache
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,10 @@ SAME = 1e-10
 #: Where a state is typically below this part of its largest size, it is zero but at a few
 #: equilibria, and these set its unit.
 FAINT = 1e-14
+
+#: Between critical values nearer than this equilibria may be far away, next to a pole. They
+#: do not count for the units and the window.
+NARROW = 1e-3
 
 
 class Starts:
@@ -60,7 +64,16 @@ class Starts:
         least = SAME * (upper - lower)
         middles = [0.5 * (a + b) for a, b in pairwise(levels) if b - a > least]
         self._first = [lower, upper, *(middles if self.complete else [*middles, *spread])]
+        wide = NARROW * (upper - lower)
+        self._typical = [
+            lower,
+            upper,
+            *(0.5 * (a + b) for a, b in pairwise(levels) if b - a > wide),
+        ]
+        if not self.complete:
+            self._typical += spread
         self._found: dict[float, list[Equilibrium]] = {}
+        self._sure: dict[float, bool] = {}
 
     def at(self, value: float, admissible: bool) -> list[Equilibrium]:
         """Equilibria in the window."""
@@ -72,6 +85,7 @@ class Starts:
         """Equilibria within the bounds that were asked for."""
         if value not in self._found:
             solved = solve_at(self._field, value, virtual=True, with_sets=False)
+            self._sure[value] = solved.coverage == "complete"
             # no branch runs through what is in a set of equilibria
             single = [e for e in solved if not e.continuum and e.region in self._field.regions]
             self._found[value] = within(self._field, self._asked, single)
@@ -98,8 +112,8 @@ class Starts:
     @cached_property
     def window(self) -> StateWindow:
         """The window asked for, with defaults about the equilibria at the first values."""
-        for admissible in (True, False):
-            points = [e for v in self._first for e in self._asked_at(v, admissible)]
+        for values, admissible in product((self._typical, self._first), (True, False)):
+            points = [e for v in values for e in self._asked_at(v, admissible)]
             if points:
                 break
         states = np.reshape([e.state for e in points], (-1, self._field.n))
@@ -126,7 +140,10 @@ class Starts:
 
     def prove(self, branches: Sequence[Branch]) -> bool:
         """Whether these branches are sure to be all in the window."""
-        return self.complete and self._beside_edges(edges_left(self.window, branches))[0]
+        provable, middles = self._beside_edges(edges_left(self.window, branches))
+        return (
+            self.complete and provable and all(self._sure.get(v) for v in (*self._first, *middles))
+        )
 
     def _beside_edges(self, left: Sides) -> tuple[bool, list[float]]:
         """Values between those at which an equilibrium is on an edge that a branch has left by.
@@ -169,7 +186,7 @@ class Starts:
     def scale(self) -> Array:
         """Unit of each state, the size of its equilibria, and the length of the range."""
         n = self._field.n
-        both = [e for v in self._first for k in (True, False) for e in self._asked_at(v, k)]
+        both = [e for v in self._typical for k in (True, False) for e in self._asked_at(v, k)]
         table = np.reshape([e.state for e in both], (-1, n))
         inside = self.window.contains(self.window.shifted(table))
         states = table[inside]

@@ -51,6 +51,9 @@ INSIDE = 1e-9
 #: Rows of a branch outside the window along which is looked for where it enters.
 COARSE = 2000
 
+#: A state counts in units of this part of itself where that is more than its unit.
+FAR = 0.5
+
 #: First step along the branch that crosses at a branch point, in units of the window.
 SWITCH = 1e-3
 
@@ -438,15 +441,18 @@ def _holds(field: FrozenField, branch: Branch, rows: Array, u: Array, window: Wi
         # where the equations are singular all along a line, one point of it is enough
         apart = np.abs((rows[0] - u) / window.scale)
         return bool(apart[:-1].max() < 1e-6)
-    for k in loop("passing")(rows, window.scale, u, 1e-2):
-        chord = (rows[k + 1] - rows[k]) / window.scale
+    # far away the rows of a branch are as far apart as they are away
+    scale = window.scale.copy()
+    scale[:-1] = np.maximum(scale[:-1], FAR * np.abs(u[:-1]))
+    for k in loop("passing")(rows, scale, u, 1e-2):
+        chord = (rows[k + 1] - rows[k]) / scale
         length = max(float(chord @ chord), 1e-300)
-        part = float(np.clip(((u - rows[k]) / window.scale) @ chord / length, 0.0, 1.0))
+        part = float(np.clip(((u - rows[k]) / scale) @ chord / length, 0.0, 1.0))
         near = rows[k] + part * (rows[k + 1] - rows[k])
-        normal = chord / np.sqrt(length) / window.scale
+        normal = chord / np.sqrt(length) / scale
         region = field.regions.index(str(branch.region[k]))
         found = beside(field, region, u, normal, near, window)
-        if found.converged and np.abs((found.u - u) / window.scale).max() < 1e-6:
+        if found.converged and np.abs((found.u - u) / scale).max() < 1e-6:
             return True
     return False
 

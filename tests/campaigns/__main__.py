@@ -5,7 +5,10 @@ from importlib import import_module
 
 #: Name of each campaign, and what one of its counts is. A module of the name has
 #: ``campaign(count, seed)``, which returns a report with ``failures``, and prints as text.
-CAMPAIGNS = {"crossings": "crossings of random piecewise-linear systems"}
+CAMPAIGNS = {
+    "crossings": "crossings of random piecewise-linear systems",
+    "polynomial_systems": "equilibria and diagrams of random polynomial systems",
+}
 
 
 def main(arguments):

@@ -6,6 +6,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.diagrams import starts
+from fastslow.results.points import Equilibria
 
 x, y, z, p, q, rho, u1, u2, p1, p2, p3 = sp.symbols("x y z p q rho u1 u2 p1 p2 p3")
 
@@ -211,7 +212,7 @@ def test_switching_at_branch_points_alone_finds_the_other_branches(monkeypatch):
 
     def at_zero(*given, **settings):
         found = solve(*given, **settings)
-        return [e for e in found if abs(e["x"]) < 1e-8]
+        return Equilibria([e for e in found if abs(e["x"]) < 1e-8], found.coverage)
 
     monkeypatch.setattr(starts, "solve_at", at_zero)
     model = fs.Model({x: x * (1 - p**2 - x**2)}, parameters={p: 0})

@@ -1,0 +1,423 @@
+"""Compiled isolation of all real solutions of a square polynomial system in boxes.
+
+Subdivision in the Bernstein basis (Sherbrooke & Patrikalakis 1993; Garloff & Smith 2001): a box
+holds no solution where the coefficients of one polynomial, or of one preconditioned by the
+inverse Jacobian at the middle, have one sign. It holds exactly one where Krawczyk's operator
+(Krawczyk 1969; Neumaier 1990, theorem 5.1.8) maps the slightly larger box into itself. Rounding
+is bounded along with the coefficients, so that it excludes nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+#: By how much a box is enlarged on either side before Krawczyk's test, in units of its width.
+#: A solution on the face of two boxes is then inside both.
+MARGIN = 0.1
+
+#: An interval of one sign is divided at its geometric mean as long as its ends differ by more.
+RATIO = 4.0
+
+#: Where other intervals are divided: not in the middle, on which solutions often lie.
+CUT = 0.4871
+
+#: Rounding of one operation.
+EPS = 2.220446049250313e-16
+
+
+@njit(error_model="numpy")
+def _binomials(most):  # type: ignore[no-untyped-def]
+    table = np.zeros((most + 1, most + 1))
+    for i in range(most + 1):
+        table[i, 0] = 1.0
+        for j in range(1, i + 1):
+            table[i, j] = table[i - 1, j - 1] + (table[i - 1, j] if j < i else 0.0)
+    return table
+
+
+@njit(error_model="numpy")
+def _along(matrix, degree, stride, tensor, scratch):  # type: ignore[no-untyped-def]
+    """Multiply a flat tensor by a matrix along the axis of a degree and stride, in place."""
+    size = tensor.shape[0]
+    block = stride * (degree + 1)
+    for first in range(0, size, block):
+        for offset in range(first, first + stride):
+            for i in range(degree + 1):
+                total = 0.0
+                for j in range(degree + 1):
+                    total += matrix[i, j] * tensor[offset + j * stride]
+                scratch[i] = total
+            for i in range(degree + 1):
+                tensor[offset + i * stride] = scratch[i]
+
+
+@njit(error_model="numpy")
+def _converted(power, degrees, strides, low, high, table, out, error):  # type: ignore[no-untyped-def]
+    """Bernstein coefficients on a box of polynomials given by powers, and their rounding."""
+    equations, size = power.shape
+    most = degrees.max()
+    matrix = np.zeros((most + 1, most + 1))
+    scratch = np.empty(most + 1)
+    sizes = np.empty(size)
+    for k in range(equations):
+        out[k] = power[k]
+        for s in range(size):
+            sizes[s] = abs(power[k, s])
+        operations = 8.0
+        for m in range(degrees.shape[0]):
+            d = degrees[m]
+            operations += 4.0 * d + 4.0
+            for weighed in range(2):
+                a = low[m] if weighed == 0 else abs(low[m])
+                b = high[m] if weighed == 0 else abs(high[m])
+                for i in range(d + 1):
+                    for j in range(d + 1):
+                        total = 0.0
+                        for chosen in range(max(0, j - (d - i)), min(i, j) + 1):
+                            total += (
+                                table[i, chosen]
+                                * table[d - i, j - chosen]
+                                * b**chosen
+                                * a ** (j - chosen)
+                            )
+                        matrix[i, j] = total / table[d, j]
+                _along(matrix, d, strides[m], out[k] if weighed == 0 else sizes, scratch)
+        error[k] = operations * EPS * sizes.max()
+
+
+@njit(error_model="numpy")
+def _halves(tensor, degree, stride, cut, left):  # type: ignore[no-untyped-def]
+    """De Casteljau: the part above the cut in place, the part below into ``left``."""
+    size = tensor.shape[0]
+    block = stride * (degree + 1)
+    for first in range(0, size, block):
+        for offset in range(first, first + stride):
+            left[offset] = tensor[offset]
+            for level in range(1, degree + 1):
+                for i in range(degree - level + 1):
+                    at = offset + i * stride
+                    tensor[at] += cut * (tensor[at + stride] - tensor[at])
+                left[offset + level * stride] = tensor[offset]
+
+
+@njit(error_model="numpy")
+def _inverted(matrix, inverse):  # type: ignore[no-untyped-def]
+    """Inverse by elimination with row pivots; False where it is singular to rounding."""
+    n = matrix.shape[0]
+    for i in range(n):
+        largest = 0.0
+        for j in range(n):
+            largest = max(largest, abs(matrix[i, j]))
+        if not (largest > 0.0 and np.isfinite(largest)):
+            return False
+        for j in range(n):
+            matrix[i, j] /= largest
+            inverse[i, j] = 1.0 / largest if i == j else 0.0
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        if abs(matrix[best, k]) < 1e-13:
+            return False
+        for j in range(n):
+            matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+            inverse[k, j], inverse[best, j] = inverse[best, j], inverse[k, j]
+        pivot = matrix[k, k]
+        for j in range(n):
+            matrix[k, j] /= pivot
+            inverse[k, j] /= pivot
+        for i in range(n):
+            if i != k:
+                factor = matrix[i, k]
+                for j in range(n):
+                    matrix[i, j] -= factor * matrix[k, j]
+                    inverse[i, j] -= factor * inverse[k, j]
+    return True
+
+
+@njit(error_model="numpy")
+def _deviation(tensor, degrees, strides, row, width, rounding, deviation):  # type: ignore[no-untyped-def]
+    """Bounds on row ``row`` of |G' − I| over a box of a width, from coefficients of G."""
+    size = tensor.shape[0]
+    for m in range(degrees.shape[0]):
+        d = degrees[m]
+        stride = strides[m]
+        block = stride * (d + 1)
+        one = 1.0 if m == row else 0.0
+        worst = one if d == 0 else 0.0
+        for first in range(0, size, block):
+            for at in range(first, first + stride * d):
+                slope = d * (tensor[at + stride] - tensor[at]) / width
+                worst = max(worst, abs(slope - one))
+        deviation[m] = worst + 2.0 * d * rounding / width
+
+
+@njit(error_model="numpy")
+def isolate(  # type: ignore[no-untyped-def]
+    power, degrees, low, high, logarithmic, floor, tolerance, budget, large, small, share
+):
+    """Every solution of N polynomial equations in N unknowns inside boxes.
+
+    Parameters
+    ----------
+    power : ndarray, shape (N, S)
+        Coefficients of powers, the last unknown running fastest, S = ∏ (degree + 1).
+    degrees : ndarray of int, shape (N,)
+        Of all equations in each unknown.
+    low, high : ndarray, shape (B, N)
+        The boxes.
+    logarithmic : ndarray of bool, shape (N,)
+        Unknowns whose intervals of one sign are divided at the geometric mean.
+    floor : ndarray, shape (N,)
+        Size of each unknown below which ``tolerance`` is absolute.
+    tolerance : float
+        Width of a box along one of the unknowns, in units of its place, at which it is not
+        divided further.
+    budget : int
+        Boxes that are looked at.
+    large : int
+        Number of the unknown that is the inverse of a large one, or -1.
+    small : ndarray of bool, shape (N,)
+        Unknowns that are looked at up to ``share`` times the large one only.
+    share : float
+
+    Returns
+    -------
+    solutions : ndarray, shape (R, N)
+        Each in a box of its own, accurate to Krawczyk's operator; some are given twice.
+    clusters : ndarray, shape (C, 2, N)
+        Boxes with nothing proved, at the tolerance or at rounding: around multiple
+        solutions, and along what runs to infinity.
+    looked_at : int
+        Boxes looked at; above the budget where it did not suffice.
+    """
+    n = degrees.shape[0]
+    size = power.shape[1]
+    strides = np.empty(n, dtype=np.int64)
+    stride = 1
+    for m in range(n - 1, -1, -1):
+        strides[m] = stride
+        stride *= degrees[m] + 1
+    most = degrees.max()
+    table = _binomials(most)
+    # value and derivatives at the middle of the unit box, as sums over coefficients
+    weights = np.ones((n + 1, size))
+    for m in range(n):
+        d = degrees[m]
+        for s in range(size):
+            i = (s // strides[m]) % (d + 1)
+            plain = table[d, i] / 2.0**d
+            for row in range(n + 1):
+                if row == m + 1:
+                    slope = 0.0
+                    if d > 0:
+                        upper = table[d - 1, i - 1] if i > 0 else 0.0
+                        under = table[d - 1, i] if i < d else 0.0
+                        slope = d * (upper - under) / 2.0 ** (d - 1)
+                    weights[row, s] *= slope
+                else:
+                    weights[row, s] *= plain
+    # blossoms from the unit interval to the one with a margin
+    enlarging = np.zeros((n, most + 1, most + 1))
+    growth = 1.0
+    for m in range(n):
+        d = degrees[m]
+        largest = 0.0
+        for i in range(d + 1):
+            # value of the blossom at i copies of 1 + margin and d − i copies of −margin
+            blossom = np.zeros(d + 1)
+            blossom[0] = 1.0
+            for step in range(d):
+                t = 1.0 + MARGIN if step < i else -MARGIN
+                for j in range(step + 1, 0, -1):
+                    blossom[j] = blossom[j] * (1.0 - t) + blossom[j - 1] * t
+                blossom[0] *= 1.0 - t
+            total = 0.0
+            for j in range(d + 1):
+                enlarging[m, i, j] = blossom[j]
+                total += abs(blossom[j])
+            largest = max(largest, total)
+        growth *= largest
+
+    capacity = 128 * n + 16
+    tensors = np.empty((capacity, n, size))
+    errors = np.empty((capacity, n))
+    lows = np.empty((capacity, n))
+    highs = np.empty((capacity, n))
+    solutions = np.empty((64, n))
+    clusters = np.empty((64, 2, n))
+    found = 0
+    unclear = 0
+    jacobian = np.empty((n, n))
+    inverse = np.empty((n, n))
+    preconditioned = np.empty((n, size))
+    enlarged = np.empty(size)
+    rounding = np.empty(n)
+    centre = np.empty(n)
+    deviation = np.empty(n)
+    scratch = np.empty(most + 1)
+    sizes = np.empty(n)
+    looked_at = 0
+    for seed in range(low.shape[0]):
+        lows[0] = low[seed]
+        highs[0] = high[seed]
+        _converted(power, degrees, strides, lows[0], highs[0], table, tensors[0], errors[0])
+        waiting = 1
+        while waiting > 0:
+            looked_at += 1
+            if looked_at > budget:
+                return solutions[:found], clusters[:unclear], looked_at
+            waiting -= 1
+            here = waiting
+            tensor = tensors[here]
+            empty = False
+            spent = False
+            for k in range(n):
+                least = tensor[k].min()
+                largest = tensor[k].max()
+                sizes[k] = max(abs(least), abs(largest))
+                if least > errors[here, k] or largest < -errors[here, k]:
+                    empty = True
+                    break
+                spent = spent or sizes[k] <= 4.0 * errors[here, k]
+            if empty:
+                continue
+            if large >= 0:
+                least = min(abs(lows[here, large]), abs(highs[here, large]))
+                for m in range(n):
+                    if small[m] and lows[here, m] * highs[here, m] > 0.0:
+                        size_here = min(abs(lows[here, m]), abs(highs[here, m]))
+                        empty = empty or size_here * least > share * (1.0 + 1e-9)
+            if empty:
+                continue
+            # the interval with the largest ratio of its ends is divided first
+            axis = -1
+            widest = RATIO
+            for m in range(n):
+                a = lows[here, m]
+                b = highs[here, m]
+                if logarithmic[m] and a * b > 0.0:
+                    ratio = max(b / a, a / b)
+                    if ratio > widest:
+                        widest = ratio
+                        axis = m
+            if axis >= 0:
+                a = lows[here, axis]
+                b = highs[here, axis]
+                middle = np.sqrt(a * b) if a > 0.0 else -np.sqrt(a * b)
+                lows[here + 1] = lows[here]
+                highs[here + 1] = highs[here]
+                highs[here, axis] = middle
+                lows[here + 1, axis] = middle
+                for part in range(here, here + 2):
+                    _converted(
+                        power, degrees, strides, lows[part], highs[part], table,
+                        tensors[part], errors[part],
+                    )  # fmt: skip
+                waiting += 2
+                continue
+            for k in range(n):
+                for m in range(n):
+                    total = 0.0
+                    for s in range(size):
+                        total += weights[m + 1, s] * tensor[k, s]
+                    jacobian[k, m] = total
+            if _inverted(jacobian, inverse):
+                near = True
+                for k in range(n):
+                    row = preconditioned[k]
+                    row[:] = 0.0
+                    rounding[k] = 0.0
+                    for j in range(n):
+                        factor = inverse[k, j]
+                        rounding[k] += abs(factor) * (errors[here, j] + 4.0 * n * EPS * sizes[j])
+                        for s in range(size):
+                            row[s] += factor * tensor[j, s]
+                    if row.min() > rounding[k] or row.max() < -rounding[k]:
+                        empty = True
+                        break
+                    value = 0.0
+                    for s in range(size):
+                        value += weights[0, s] * row[s]
+                    _deviation(row, degrees, strides, k, 1.0, rounding[k], deviation)
+                    centre[k] = 0.5 - value
+                    reach = 0.5 * deviation.sum() + rounding[k]
+                    if centre[k] + reach < 0.0 or centre[k] - reach > 1.0:
+                        empty = True
+                        break
+                    near = near and deviation.sum() < 0.8
+                if empty:
+                    continue
+                if near:
+                    width = 1.0 + 2.0 * MARGIN
+                    for k in range(n):
+                        enlarged[:] = preconditioned[k]
+                        for m in range(n):
+                            _along(enlarging[m], degrees[m], strides[m], enlarged, scratch)
+                        _deviation(
+                            enlarged, degrees, strides, k, width, growth * rounding[k], deviation
+                        )
+                        total = deviation.sum()
+                        reach = 0.5 * width * total + rounding[k]
+                        near = (
+                            near
+                            and total < 1.0
+                            and centre[k] - reach > -MARGIN
+                            and centre[k] + reach < 1.0 + MARGIN
+                        )
+                    if near:
+                        if found == solutions.shape[0]:
+                            more = np.empty((2 * found, n))
+                            more[:found] = solutions
+                            solutions = more
+                        for m in range(n):
+                            wide = highs[here, m] - lows[here, m]
+                            solutions[found, m] = lows[here, m] + centre[m] * wide
+                        found += 1
+                        continue
+            # divided along the axis on which the polynomials change most, but where one of them
+            # is rounding all over the box nothing more can be said
+            axis = -1
+            most_change = -1.0
+            for m in range(0 if spent else n):
+                a = lows[here, m]
+                b = highs[here, m]
+                if b - a <= tolerance * max(abs(a), abs(b), floor[m]):
+                    # near a multiple solution, or along what runs to infinity, the other
+                    # unknowns would be divided without end
+                    axis = -1
+                    break
+                change = 0.0
+                d = degrees[m]
+                block = strides[m] * (d + 1)
+                for k in range(n):
+                    steep = 0.0
+                    for first in range(0, size, block):
+                        for at in range(first, first + strides[m] * d):
+                            steep = max(steep, abs(tensor[k, at + strides[m]] - tensor[k, at]))
+                    change += d * steep / sizes[k] if sizes[k] > 0.0 else 0.0
+                if change > most_change:
+                    most_change = change
+                    axis = m
+            if axis < 0 or here + 2 >= capacity:
+                if unclear == clusters.shape[0]:
+                    wider = np.empty((2 * unclear, 2, n))
+                    wider[:unclear] = clusters
+                    clusters = wider
+                clusters[unclear, 0] = lows[here]
+                clusters[unclear, 1] = highs[here]
+                unclear += 1
+                continue
+            lows[here + 1] = lows[here]
+            highs[here + 1] = highs[here]
+            cut = lows[here, axis] + CUT * (highs[here, axis] - lows[here, axis])
+            for k in range(n):
+                _halves(tensors[here, k], degrees[axis], strides[axis], CUT, tensors[here + 1, k])
+                errors[here, k] += 2.0 * degrees[axis] * EPS * sizes[k]
+                errors[here + 1, k] = errors[here, k]
+            lows[here, axis] = cut
+            highs[here + 1, axis] = cut
+            waiting += 2
+    return solutions[:found], clusters[:unclear], looked_at

@@ -1,0 +1,368 @@
+"""All real solutions of square polynomial systems, independent of the units of the unknowns."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation.loops import loop
+
+Array = NDArray[np.float64]
+
+#: Exponents of the unknowns to the coefficient of their product.
+Terms = Mapping[tuple[int, ...], Fraction]
+
+#: Solutions are looked for up to this multiple of each unknown's unit (see `units`), and
+#: farther where coefficients differ by many decades.
+FARTHEST = 1e9
+
+#: Next to the largest unknown another one counts as comparable down to this ratio.
+COMPARABLE = 1e-3
+
+#: Below this multiple of its unit an unknown is resolved absolutely, above it relatively.
+NEAREST = 1e-3
+
+#: Widths of boxes, relative as above, that are not divided further.
+NARROWEST = 1e-12
+
+#: Multiple solutions within boxes of this width, in units of their place, are one cluster.
+RESOLUTION = 1e-5
+
+#: Coefficients that the subdivision of one system may look at, which takes a few seconds.
+BUDGET = 100_000_000
+
+#: Largest number of coefficients of one equation.
+LARGEST = 20_000
+
+
+@dataclass(frozen=True)
+class Solutions:
+    """Real solutions of a polynomial system.
+
+    Parameters
+    ----------
+    simple : ndarray, shape (R, N)
+        Solutions proved to exist and to be simple.
+    clusters : ndarray, shape (C, 2, N)
+        Boxes in which solutions that are multiple, closer to each other than
+        the resolution, or near infinity are neither proved nor excluded.
+    complete : bool
+        Whether there is no solution elsewhere in the domain, and the boxes are as narrow as
+        the resolution: in the unknowns with a range, or in all if none has one.
+    """
+
+    simple: Array
+    clusters: Array
+    complete: bool
+
+
+def solve_polynomials(
+    equations: Sequence[Terms], ranges: Mapping[int, tuple[float, float]] | None = None
+) -> Solutions:
+    """Isolate every real solution of N polynomial equations in N unknowns.
+
+    Unknowns without a range are looked for up to `FARTHEST` of their unit: where all are
+    at most one unit, and for each of them where it is the largest. Its inverse is then the
+    coordinate, with the ratio to it in place of those unknowns that are comparable: what runs
+    to infinity is nearly straight along coordinates.
+
+    Parameters
+    ----------
+    equations : sequence of mapping
+        Each from exponents of the N unknowns to an exact coefficient.
+    ranges : mapping, optional
+        Number of an unknown to the interval in which it is looked for.
+
+    Returns
+    -------
+    Solutions
+
+    Examples
+    --------
+    A circle and a parabola, x² + y² = 2 and y = x²:
+
+    >>> circle = {(2, 0): Fraction(1), (0, 2): Fraction(1), (0, 0): Fraction(-2)}
+    >>> parabola = {(2, 0): Fraction(1), (0, 1): Fraction(-1)}
+    >>> found = solve_polynomials([circle, parabola])
+    >>> found.complete, np.round(found.simple, 12).tolist()
+    (True, [[-1.0, 1.0], [1.0, 1.0]])
+    """
+    ranges = ranges or {}
+    count = len(equations)
+    nothing, none = np.empty((0, count)), np.empty((0, 2, count))
+    if any(len(e) == 0 for e in equations):
+        return Solutions(nothing, none, False)
+    if any(len(e) == 1 and not any(next(iter(e))) for e in equations):
+        return Solutions(nothing, none, True)
+    scales, sizes = units(equations, ranges)
+    scaled = [_scaled(q, scales, sizes[k]) for k, q in enumerate(equations)]
+    free = [m for m in range(count) if m not in ranges]
+    limits = {m: tuple(float(Fraction(v) / scales[m]) for v in ranges[m]) for m in ranges}
+    # coefficients far from one leave room for solutions far from their units
+    reach = max(abs(math.log10(abs(c))) for q in scaled for c in q.values() if c)
+    widest = 200.0 / max(1, *(sum(e) for q in scaled for e in q))
+    farthest = 10.0 ** min(math.log10(FARTHEST) + reach, widest)
+    nearest = 10.0 ** -min(-math.log10(NEAREST) + reach, widest)
+    floor = np.array(
+        [limits[m][1] - limits[m][0] if m in limits else nearest for m in range(count)]
+    )
+    simple: list[Array] = []
+    clusters: list[Array] = []
+    budget = BUDGET
+    for chart in _charts(free):
+        found = _isolated(
+            [_charted(q, chart) for q in scaled], limits, floor, chart, farthest, budget
+        )
+        if found is None:
+            return Solutions(nothing, none, False)
+        budget -= found[2]
+        points, boxes = found[:2]
+        simple += [_back(x, chart) for x in points]
+        for low, high in boxes:
+            corners = np.array(
+                [_back(x, chart) for x in itertools.product(*zip(low, high, strict=True))]
+            )
+            clusters.append(np.array([corners.min(axis=0), corners.max(axis=0)]))
+    system = [_arrays(q) for q in scaled]
+    distinct = _distinct([_polished(system, x) for x in simple], floor, 1e-10)
+    merged = _merged(clusters, floor)
+    decisive = np.array([m in ranges or not ranges for m in range(count)])
+    wide = np.where(decisive, floor, 1.0) if ranges else np.ones(count)
+    width = (merged[:, 1] - merged[:, 0]) / np.maximum(np.abs(merged).max(axis=1), wide)
+    inside = np.ones(len(distinct), dtype=bool)
+    for m, (low, high) in limits.items():
+        slack = 1e-9 * floor[m]
+        inside &= (distinct[:, m] >= low - slack) & (distinct[:, m] <= high + slack)
+    unit = np.array([float(s) for s in scales])
+    order = sorted(map(tuple, distinct[inside] * unit))
+    return Solutions(
+        np.array(order).reshape(-1, count),
+        merged * unit,
+        bool(np.all(width[:, decisive] <= RESOLUTION)),
+    )
+
+
+def _isolated(
+    equations: Sequence[Mapping[tuple[int, ...], float]],
+    limits: Mapping[int, tuple[float, ...]],
+    floor: Array,
+    chart: tuple[int, ...],
+    farthest: float,
+    budget: int,
+) -> tuple[Array, Array, int] | None:
+    """Solutions and clusters in one chart, and the coefficients looked at; None past the budget."""
+    count = len(equations)
+    degrees = np.array([max(e[m] for q in equations for e in q) for m in range(count)])
+    size = math.prod(int(d) + 1 for d in degrees)
+    if size > LARGEST:
+        return None
+    power = np.zeros((count, size))
+    for k, terms in enumerate(equations):
+        tensor = power[k].reshape(tuple(int(d) + 1 for d in degrees))
+        for exponents, coefficient in terms.items():
+            tensor[exponents] = coefficient
+    intervals: list[list[tuple[float, ...]]] = []
+    for m in range(count):
+        if m in limits:
+            intervals.append([limits[m]])
+        elif m in chart:
+            least = 1.0 / farthest if m == chart[0] else COMPARABLE
+            intervals.append([(-1.0, -least), (least, 1.0)])
+        else:
+            outer, inner = COMPARABLE * farthest if chart else 1.0, float(floor[m])
+            intervals.append([(-outer, -inner), (-inner, inner), (inner, outer)])
+    boxes = np.array(list(itertools.product(*intervals)))
+    most = budget // (count * size)
+    free = np.array([m not in limits for m in range(count)])
+    inverse = chart[0] if chart else -1
+    small = np.array([bool(chart) and m not in limits and m not in chart for m in range(count)])
+    simple, clusters, looked_at = loop("isolate")(
+        power, degrees, np.ascontiguousarray(boxes[:, :, 0]),
+        np.ascontiguousarray(boxes[:, :, 1]), free, floor, NARROWEST, most,
+        inverse, small, COMPARABLE,
+    )  # fmt: skip
+    return (simple, clusters, looked_at * count * size) if looked_at <= most else None
+
+
+def _charts(free: Sequence[int]) -> list[tuple[int, ...]]:
+    """The largest unknown and those comparable to it; first the chart where none is large."""
+    charts: list[tuple[int, ...]] = [()]
+    for largest in free:
+        others = [m for m in free if m != largest]
+        for count in range(len(others) + 1):
+            charts += [(largest, *some) for some in itertools.combinations(others, count)]
+    return charts
+
+
+def _charted(
+    terms: Mapping[tuple[int, ...], float], chart: tuple[int, ...]
+) -> Mapping[tuple[int, ...], float]:
+    """The equation in the coordinates of a chart, times a power of the first of them."""
+    if not chart:
+        return terms
+    degree = max(sum(powers[m] for m in chart) for powers in terms)
+    found = {}
+    for powers, coefficient in terms.items():
+        changed = list(powers)
+        changed[chart[0]] = degree - sum(powers[m] for m in chart)
+        found[tuple(changed)] = coefficient
+    return found
+
+
+def _back(point: Sequence[float], chart: tuple[int, ...]) -> Array:
+    """A point of a chart in the unknowns themselves."""
+    x = np.array(point, dtype=float)
+    if chart:
+        x[list(chart)] /= point[chart[0]]
+        x[chart[0]] = 1.0 / point[chart[0]]
+    return x
+
+
+def units(
+    equations: Sequence[Terms], ranges: Mapping[int, tuple[float, float]]
+) -> tuple[list[Fraction], list[Fraction]]:
+    """Units of the unknowns and equations, powers of two, that bring coefficients nearest to one.
+
+    The logarithms of all coefficients are made small in least squares, as are their
+    differences within each equation (Morgan 1987, chapter 5). In other units of the unknowns
+    the same solutions are found.
+
+    Returns
+    -------
+    list of Fraction, list of Fraction
+        An unknown is its unit times what is solved for, an equation is multiplied by its size.
+    """
+    count = len(equations)
+    unknowns = len(next(iter(equations[0])))
+    free = [m for m in range(unknowns) if m not in ranges]
+    rows: list[Array] = []
+    values: list[Array] = []
+    for k, terms in enumerate(equations):
+        logs, exponents = [], []
+        for powers, coefficient in terms.items():
+            size = _log2(coefficient)
+            for m, (low, high) in ranges.items():
+                size += powers[m] * math.log2(max(abs(low), abs(high), 1e-300))
+            logs.append(size)
+            exponents.append([powers[m] for m in free])
+        block = np.array(exponents, dtype=float).reshape(len(logs), len(free))
+        marks = np.zeros((len(logs), count))
+        marks[:, k] = 1.0
+        rows.append(np.hstack([block, marks]))
+        values.append(-np.array(logs))
+        # the sum of squared differences of all pairs, as distances from their mean
+        weight = math.sqrt(len(logs))
+        rows.append(weight * np.hstack([block - block.mean(axis=0), 0.0 * marks]))
+        values.append(-weight * (np.array(logs) - np.mean(logs)))
+    found = np.linalg.lstsq(np.vstack(rows), np.hstack(values), rcond=1e-10)[0]
+    whole = [round(float(v)) for v in found]
+    scales = [Fraction(1)] * unknowns
+    for m, exponent in zip(free, whole, strict=False):
+        scales[m] = Fraction(2) ** exponent
+    for m, (low, high) in ranges.items():
+        largest = max(abs(low), abs(high))
+        scales[m] = Fraction(2) ** round(math.log2(largest)) if largest > 0 else Fraction(1)
+    sizes = []
+    for terms in equations:
+        largest = max(
+            _log2(c) + sum(p * _log2(s) for p, s in zip(powers, scales, strict=True))
+            for powers, c in terms.items()
+        )
+        sizes.append(Fraction(2) ** -round(largest))
+    return scales, sizes
+
+
+def at_value(terms: Terms, unknown: int, value: Fraction) -> Terms:
+    """The equation with a number in place of an unknown.
+
+    Examples
+    --------
+    >>> at_value({(1, 2): Fraction(3), (0, 1): Fraction(1)}, 0, Fraction(2))
+    {(2,): Fraction(6, 1), (1,): Fraction(1, 1)}
+    """
+    found: dict[tuple[int, ...], Fraction] = {}
+    for powers, coefficient in terms.items():
+        rest = (*powers[:unknown], *powers[unknown + 1 :])
+        found[rest] = found.get(rest, Fraction(0)) + coefficient * value ** powers[unknown]
+    return {powers: c for powers, c in found.items() if c != 0}
+
+
+def _log2(value: Fraction) -> float:
+    return math.log2(abs(value.numerator)) - math.log2(value.denominator)
+
+
+def _scaled(
+    terms: Terms, scales: Sequence[Fraction], size: Fraction
+) -> dict[tuple[int, ...], float]:
+    """An equation in the units, rounded only here."""
+    return {
+        powers: float(c * size * math.prod(s**p for s, p in zip(scales, powers, strict=True)))
+        for powers, c in terms.items()
+    }
+
+
+def _arrays(terms: Mapping[tuple[int, ...], float]) -> tuple[NDArray[np.int64], Array]:
+    """Exponents (T, N) and coefficients (T,) of an equation."""
+    return np.array(list(terms), dtype=np.int64), np.array(list(terms.values()))
+
+
+@np.errstate(all="ignore")
+def _polished(system: Sequence[tuple[NDArray[np.int64], Array]], point: Array) -> Array:
+    """Newton's last digits at a simple solution."""
+    count = len(point)
+    best, least = point, np.inf
+    for _ in range(20):
+        value, slopes = np.empty(count), np.empty((count, count))
+        for k, (exponents, coefficients) in enumerate(system):
+            value[k] = coefficients @ np.prod(point**exponents, axis=1)
+            for m in range(count):
+                lowered = exponents.copy()
+                lowered[:, m] = np.maximum(lowered[:, m] - 1, 0)
+                powers = np.prod(point**lowered, axis=1) * exponents[:, m]
+                slopes[k, m] = coefficients @ powers
+        try:
+            step = np.linalg.solve(slopes, -value)
+        except np.linalg.LinAlgError:
+            return best
+        size = float(np.abs(step).max())
+        if not size < least:
+            return best
+        best, least = point + step, size
+        point = best
+    return best
+
+
+def _distinct(points: Sequence[Array], floor: Array, within: float) -> Array:
+    """Points that differ by more than a tolerance relative to their place."""
+    kept: list[Array] = []
+    for point in points:
+        near = within * np.maximum(np.abs(point), floor)
+        if not any(np.all(np.abs(point - other) <= near) for other in kept):
+            kept.append(point)
+    return np.array(kept).reshape(-1, len(floor))
+
+
+def _merged(boxes: Sequence[Array], floor: Array) -> Array:
+    """Boxes that touch each other as one, which holds them."""
+    kept: list[Array] = []
+    for box in boxes:
+        here = box
+        while True:
+            slack = 1e-9 * np.maximum(np.abs(here).max(axis=0), floor)
+            touching = [
+                k
+                for k, other in enumerate(kept)
+                if np.all((other[0] <= here[1] + slack) & (here[0] <= other[1] + slack))
+            ]
+            if not touching:
+                break
+            joined = [here, *(kept.pop(k) for k in reversed(touching))]
+            here = np.array([np.min(joined, axis=0)[0], np.max(joined, axis=0)[1]])
+        kept.append(here)
+    return np.array(kept).reshape(-1, 2, len(floor))
