@@ -24,6 +24,10 @@ DEGREE = 8
 #: Critical values closer than this fraction of the range are one.
 SHORTEST = 1e-8
 
+#: Size of a resultant up to which its discriminant is formed: its degrees in the unknown, twice,
+#: and in the parameter, times the bits of its coefficients. A few seconds at the most.
+LARGEST = 400_000
+
 #: Highest degree of a discriminant or resultant in the parameter whose roots are trusted.
 ROOTS = 12
 
@@ -147,8 +151,11 @@ def _isolated(
     # as polynomials the determinant is expanded while it is formed
     slopes = [[sp.Poly(r, *symbols).diff(x) for x in unknowns] for r in rates]
     values: set[float] = set()
-    for condition in (None, _determinant(slopes).as_expr(), *bounds):
+    determinant = _determinant(slopes).as_expr()
+    for condition in (None, determinant, *bounds):
         found = _meetings(equations, condition, lower, upper)
+        if found is None and condition is determinant:
+            found = _double_roots(equations, lower, upper)
         if found is None:
             return None
         values |= set(found)
@@ -188,6 +195,70 @@ def _meetings(
         values |= {float(v) for v in solved.simple[:, -1]}
         # on either side of what is not told apart
         values |= {float(v) for v in solved.clusters[:, :, -1].ravel()}
+    return sorted(values)
+
+
+@lru_cache(maxsize=64)
+def _double_roots(equations: RegionEquations, lower: float, upper: float) -> list[float] | None:
+    """Values at which two equilibria in two unknowns meet, by exact elimination.
+
+    Where the determinant nearly vanishes along branches that run to infinity, folds are not
+    isolated there. Two equilibria that meet are a double root of the resultant R of both rates:
+    they are among the real roots of its discriminant, its leading coefficient and its content.
+
+    Returns
+    -------
+    list of float or None
+        None for more unknowns, a resultant that is too large (see `LARGEST`), or one with a
+        multiple factor, which has double roots everywhere.
+    """
+    unknowns = equations.elimination.unknowns
+    p = real(equations.field.parameter)
+    terms = terms_of(equations.elimination.remaining, [*unknowns, p])
+    if len(unknowns) != 2 or terms is None:
+        return None
+    symbols = [*unknowns, p]
+    first, second = (
+        sp.Poly({e: sp.Rational(c.numerator, c.denominator) for e, c in one.items()}, *symbols)
+        .clear_denoms(convert=True)[1]
+        .as_expr()
+        for one in terms
+    )
+    smallest: tuple[int, list[sp.Poly]] | None = None
+    for kept, gone in (unknowns, unknowns[::-1]):
+        resultant = sp.Poly(sp.resultant(first, second, gone), kept, p)
+        if resultant.is_zero:
+            return None
+        factors = resultant.factor_list()[1]
+        if any(power > 1 and factor.degree(kept) > 0 for factor, power in factors):
+            continue
+        bits = max(abs(int(c)).bit_length() for c in resultant.primitive()[1].coeffs())
+        size = resultant.degree(kept) ** 2 * max(resultant.degree(p), 1) * bits
+        conditions = [factor for factor, _ in factors if factor.degree(kept) == 0]
+        whole = sp.Mul(*(factor.as_expr() for factor, _ in factors if factor.degree(kept) > 0))
+        if size <= LARGEST and (smallest is None or size < smallest[0]):
+            smallest = (size, [*conditions, sp.Poly(whole, kept)])
+    if smallest is None:
+        return None
+    *content, polynomial = smallest[1]
+    conditions = [c.as_expr() for c in content] + [polynomial.LC()]
+    if polynomial.degree() > 1:
+        conditions.append(polynomial.discriminant().as_expr())
+    return _exact_roots(conditions, p, lower, upper)
+
+
+def _exact_roots(
+    conditions: Sequence[sp.Expr], p: sp.Symbol, lower: float, upper: float
+) -> list[float]:
+    """Ends of the intervals that isolate the real roots, in a range, of exact polynomials."""
+    low, high = sp.Rational(lower), sp.Rational(upper)
+    values: set[float] = set()
+    for condition in conditions:
+        polynomial = sp.Poly(condition, p)
+        if polynomial.degree() > 0:
+            for factor, _ in polynomial.factor_list()[1]:
+                for (a, b), _ in factor.intervals(inf=low, sup=high):
+                    values |= {float(a), float(b)}
     return sorted(values)
 
 
