@@ -163,7 +163,10 @@ class RegionEquations:
         solved = solve_polynomials([{e: c for e, c in q.items() if c} for q in terms])
         states: list[Array] = []
         complete = solved.complete
-        for sure, roots in ((True, solved.simple), (False, solved.clusters.mean(axis=1))):
+        middles = solved.clusters.mean(axis=1)
+        if len(terms) == 1:
+            middles = np.array([[_multiple_root(terms[0], *m)] for m in middles]).reshape(-1, 1)
+        for sure, roots in ((True, solved.simple), (False, middles)):
             for root in roots:
                 whole = self._whole(value, *root)
                 fresh = [s for s in (self.corrected(w, value) for w in whole) if s is not None]
@@ -301,6 +304,16 @@ class RegionEquations:
             sizes = np.abs(distinct).max(axis=0) if distinct else unit
             unit = np.where(sizes > 0, sizes, unit)
         return sorted(distinct, key=lambda s: tuple(s))
+
+
+def _multiple_root(terms: Terms, near: float) -> float:
+    """The root of the derivative next to a multiple root, where it is simple and well known."""
+    powers = np.zeros(1 + max(e for (e,) in terms))
+    for (exponent,), coefficient in terms.items():
+        powers[exponent] = float(coefficient)
+    roots = np.polynomial.Polynomial(powers).deriv().roots()
+    roots = roots.real[np.abs(roots - near) < 1e-3 * abs(near)]
+    return float(roots[np.argmin(np.abs(roots - near))]) if len(roots) else near
 
 
 def _function_of(coefficient: sp.Expr, p: sp.Symbol) -> Any:

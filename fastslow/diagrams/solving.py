@@ -21,6 +21,9 @@ from fastslow.symbolic.symmetries import free_directions
 
 Array = NDArray[np.float64]
 
+#: Equilibria set the size of a state up to this multiple of its natural unit.
+FAR = 1e3
+
 
 @takes(model=instance(Model), values=mapping, virtual=flag, window=mapping)
 def equilibria(
@@ -123,7 +126,9 @@ def solve_at(
         complete &= sure
         solved.append((number, whole, states))
     known = [(number, np.append(s, value)) for number, _, states in solved for s in states]
-    unit = np.append(field.sizes(known), abs(value))
+    # one equilibrium next to a pole, far from all others, would make any point admissible
+    natural = field.units_at(abs(value))[: field.n]
+    unit = np.append(np.minimum(field.sizes(known), FAR * natural), abs(value))
     found: list[Equilibrium] = []
     for number, whole, states in solved:
         sides = field.modes[number].sides

@@ -209,6 +209,8 @@ def test_two_discontinuities_at_once_end_the_branch_in_words():
 def test_symmetry(c, m, d, stiffness):
     """(x, y, p) → −(x, y, p) maps a relay system's diagram to itself; y = c p/(c d + m)."""
     assume(abs(c * d + m) > 0.1)
+    # natural units of the states are lost where coefficients differ by more than 30 decades
+    assume(d == 0 or abs(d) > 1e-30)
     model = RELAY.with_parameters(k1=c, k2=m, k3=d, k4=stiffness)
     diagram = fs.continue_equilibria(model, p, (-4, 4))
     for branch in diagram.branches:
