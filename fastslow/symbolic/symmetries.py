@@ -138,10 +138,10 @@ def _branches(expression: sp.Expr) -> list[sp.Expr]:
 
 
 def _shifts(
-    rows: Sequence[sp.Expr], states: Sequence[sp.Symbol], values: Mapping[sp.Symbol, float]
+    functions: Sequence[sp.Expr], states: Sequence[sp.Symbol], values: Mapping[sp.Symbol, float]
 ) -> list[list[sp.Expr]]:
-    """Constant vectors that every row is constant along."""
-    slopes = list(dict.fromkeys(tuple(r.diff(s) for s in states) for r in rows))
+    """Constant vectors that every function is constant along."""
+    slopes = list(dict.fromkeys(tuple(f.diff(s) for s in states) for f in functions))
     slopes = [row for row in slopes if any(e != 0 for e in row)]
     if not slopes:
         return []
@@ -153,9 +153,8 @@ def _shifts(
         return []
     # only the states that move are looked at symbolically
     moving = [k for k in range(len(states)) if np.abs(null[:, k]).max() > 1e-9]
-    matrix = sp.Matrix(
-        [[sp.nsimplify(row[k], rational=True) for k in moving] for row in _few(slopes, moving)]
-    )
+    rows = [[sp.nsimplify(row[k], rational=True) for k in moving] for row in _few(slopes, moving)]
+    matrix = sp.Matrix([part for row in rows for part in _by_monomials(row, states)])
     found = []
     for vector in matrix.nullspace(simplify=tidy):
         scale = next(e for e in vector if e != 0)
@@ -166,6 +165,18 @@ def _shifts(
         if not any(e.free_symbols & set(states) for e in shift) and not any(along):
             found.append(shift)
     return found
+
+
+def _by_monomials(row: Sequence[sp.Expr], states: Sequence[sp.Symbol]) -> list[list[sp.Expr]]:
+    """A row of polynomials in the states as one of coefficients for each monomial.
+
+    What is constant in the states vanishes with the row where it does with all of them.
+    """
+    if not all(e.is_polynomial(*states) for e in row):
+        return [list(row)]
+    polys = [sp.Poly(e, *states) for e in row]
+    monomials = sorted({m for p in polys for m in p.monoms()})
+    return [[p.coeff_monomial(m) for p in polys] for m in monomials]
 
 
 def _few(slopes: Sequence[Sequence[sp.Expr]], columns: Sequence[int]) -> list[Sequence[sp.Expr]]:
