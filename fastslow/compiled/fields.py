@@ -18,6 +18,9 @@ from fastslow.errors import ModelError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 
+#: Output entries from which zeros are written by a loop: every assignment is compiled by itself.
+FILLED = 200
+
 #: Rates and switching functions of one smooth motion.
 Equations = tuple[Sequence[sp.Expr], Sequence[sp.Expr]]
 
@@ -111,17 +114,29 @@ def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -
     """Assignments that fill the output array for one region."""
     unknowns = [s for s, new in rename.items() if new.name.startswith("u")]
     values = [r.xreplace(rename) for r in rows]
-    slopes = [[r.diff(u).xreplace(rename) for u in unknowns] for r in rows]
+    slopes = [_slopes(r, unknowns, rename) for r in rows]
     first, second = (list(chain.from_iterable(rows)) for rows in (slopes[:n], slopes[n:]))
     ordered = [*values[:n], *first, *values[n:], *second]
-    shared, results = sp.cse(ordered, symbols=sp.numbered_symbols("s"))
+    filled = len(ordered) >= FILLED
+    kept = [k for k, value in enumerate(ordered) if not (filled and value == 0)]
+    shared, results = sp.cse([ordered[k] for k in kept], symbols=sp.numbered_symbols("s"))
     printer = _Printer({"fully_qualified_modules": True})
     try:
         lines = [f"{symbol} = {printer.doprint(value)}" for symbol, value in shared]
-        lines += [f"out[{k}] = {_float(printer.doprint(v))}" for k, v in enumerate(results)]
+        codes = [_float(printer.doprint(v)) for v in results]
     except PrintMethodNotImplementedError:
         raise refusal(ordered) from None
-    return lines
+    if filled:
+        lines += [f"for k in range({len(ordered)}):", "    out[k] = 0.0"]
+    return [*lines, *(f"out[{k}] = {code}" for k, code in zip(kept, codes, strict=True))]
+
+
+def _slopes(
+    row: sp.Expr, unknowns: Sequence[sp.Symbol], rename: dict[sp.Symbol, sp.Symbol]
+) -> list[sp.Expr]:
+    """Derivatives by the unknowns, renamed."""
+    inside = row.free_symbols
+    return [row.diff(u).xreplace(rename) if u in inside else sp.Integer(0) for u in unknowns]
 
 
 class _Printer(PythonCodePrinter):

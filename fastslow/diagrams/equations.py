@@ -25,6 +25,12 @@ Array = NDArray[np.float64]
 #: Starting states tried by Newton's method where a region has no univariate polynomial.
 STARTS = 200
 
+#: Starts times the cube of the number of states, up to which all of them are tried.
+COST = 1.6e8
+
+#: Starts that are tried in any case.
+FEWEST = 10
+
 #: Stands for the weight of the field below in a sliding field.
 SHARE = "(alpha)"
 
@@ -43,7 +49,13 @@ def exact(expression: sp.Expr) -> sp.Expr:
     >>> exact(sp.Float(0.25) * sp.Symbol("x"))
     x/4
     """
-    return sp.nsimplify(expression, rational=True) if expression.has(sp.Float) else expression
+    return expression.xreplace({f: _rational(f) for f in expression.atoms(sp.Float)})
+
+
+@lru_cache(maxsize=4096)
+def _rational(number: sp.Float) -> sp.Expr:
+    """A float as the rational number it is written as; searched for once."""
+    return sp.nsimplify(number, rational=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,19 +289,18 @@ class RegionEquations:
     def _searched(self, value: float, known: Sequence[Array] = ()) -> list[Array]:
         """Newton's method from many states, a fixed sequence spread over several scales."""
         field, n, unit = self.field, self.field.n, self.unit(value)
+        count = starts_tried(n)
         generator = np.random.default_rng(20231)
         distinct = [np.asarray(k) for k in known]
         for _ in range(2):
-            spread = 10.0 ** generator.uniform(-2, 1.5, (STARTS, 1))
+            spread = 10.0 ** generator.uniform(-2, 1.5, (count, 1))
             # the size of each state by itself, too
             spread = np.where(
-                np.arange(STARTS)[:, None] % 2,
+                np.arange(count)[:, None] % 2,
                 spread,
-                10.0 ** generator.uniform(-3, 3, (STARTS, n)),
+                10.0 ** generator.uniform(-3, 3, (count, n)),
             )
-            starts = np.vstack(
-                [np.zeros(n), unit * generator.standard_normal((STARTS, n)) * spread]
-            )
+            starts = np.vstack([np.zeros(n), unit * generator.standard_normal((count, n)) * spread])
             states, converged = loop("newton_from")(
                 field.compiled.address, self.region, field.values, starts, value, unit,
                 field.compiled.size, 100,
@@ -314,6 +325,17 @@ def _multiple_root(terms: Terms, near: float) -> float:
     roots = np.polynomial.Polynomial(powers).deriv().roots()
     roots = roots.real[np.abs(roots - near) < 1e-3 * abs(near)]
     return float(roots[np.argmin(np.abs(roots - near))]) if len(roots) else near
+
+
+def starts_tried(states: int) -> int:
+    """How many starts of Newton's method are tried, fewer where each of them takes long.
+
+    Examples
+    --------
+    >>> starts_tried(60), starts_tried(200), starts_tried(1000)
+    (200, 20, 10)
+    """
+    return min(STARTS, max(FEWEST, int(COST / states**3)))
 
 
 def _function_of(coefficient: sp.Expr, p: sp.Symbol) -> Any:

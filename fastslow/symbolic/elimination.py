@@ -174,9 +174,11 @@ def _combined(
 ) -> tuple[sp.Expr, ...]:
     """Give the equations with nonlinear terms shared by two of them taken out of the second."""
     bent = [_nonlinear(e, symbols) for e in equations]
+    # a ratio without states needs the same states above and below
+    inside = [part.free_symbols & set(symbols) for part in bent]
     for row, part in enumerate(bent):
         for other in range(row + 1, len(bent)):
-            if part == 0 or bent[other] == 0:
+            if part == 0 or bent[other] == 0 or inside[row] != inside[other]:
                 continue
             if max(_length(part), _length(bent[other])) > SHARED:
                 continue
@@ -196,9 +198,8 @@ def _nonlinear(equation: sp.Expr, symbols: Sequence[sp.Symbol]) -> sp.Expr:
     terms = sp.Add.make_args(equation)
     bent = []
     for term in terms:
-        inside = [s for s in symbols if s in term.free_symbols]
-        slopes = [term.diff(s) for s in inside]
-        if any(slope.free_symbols & set(symbols) for slope in slopes):
+        inside = term.free_symbols.intersection(symbols)
+        if any(not term.diff(s).free_symbols.isdisjoint(inside) for s in inside):
             bent.append(term)
     return sp.Add(*bent)
 
@@ -222,16 +223,18 @@ def _best(start: _Step, nonzero: Nonzero) -> _Step:
 def _further(step: _Step, nonzero: Nonzero) -> list[_Step]:
     """Every way to solve one more equation for one more state."""
     found = []
+    left = step.left
     for row, equation in enumerate(step.equations):
         if _length(equation) > TERMS:
             continue
-        for symbol in step.left:
+        inside = equation.free_symbols
+        for symbol in [s for s in left if s in inside]:
             slope = equation.diff(symbol)
             if slope == 0 or symbol in slope.free_symbols or not nonzero(slope):
                 continue
             value = _compact(-equation.subs(symbol, 0) / slope)
             rest = [e for k, e in enumerate(step.equations) if k != row]
-            others = tuple(_put(e, symbol, value, step.left) for e in rest)
+            others = tuple(_put(e, symbol, value, left) for e in rest)
             if None in others:
                 continue
             found.append(
@@ -287,7 +290,8 @@ def _length(expression: sp.Expr) -> int:
 
 def _degree(equation: sp.Expr, symbols: Sequence[sp.Symbol]) -> int:
     """Total degree in the symbols; 99 where the equation is no polynomial in them."""
-    inside = [s for s in symbols if s in equation.free_symbols]
+    present = equation.free_symbols
+    inside = [s for s in symbols if s in present]
     if not inside:
         return 0
     if not equation.is_polynomial(*inside):
