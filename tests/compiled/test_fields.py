@@ -31,6 +31,29 @@ def test_field_equals_sympy_to_rounding(gear):
             np.testing.assert_allclose(found, exact, rtol=1e-13, atol=1e-13)
 
 
+def test_zeros_of_a_large_field_are_written_in_every_region():
+    """Rates of 16 states that differ on both sides of x1 = 0, into an array that is not empty."""
+    states = sp.symbols("x1:17")
+    p = sp.Symbol("p")
+    ahead, behind = (*states[1:], states[0]), (states[-1], *states[:-1])
+    kink = sp.Max(states[0], 0)
+    rates = {
+        x: p * x * a - x**3 / 2 + kink * b for x, a, b in zip(states, ahead, behind, strict=True)
+    }
+    field = FrozenField(fs.Model(rates, parameters={p: 1}), "p")
+    names = [sp.Symbol(n, real=True) for n in (*field.model.states, "p")]
+    generator = np.random.default_rng(4)
+    for number in (0, 1, 0):
+        rows = generator.normal(size=(2, 17))
+        expected = sp.Matrix(field.rates(number))
+        for u, value, slopes in zip(rows, *field.at(number, rows)[:2], strict=True):
+            at = dict(zip(names, u, strict=True))
+            for found, exact in ((value, expected), (slopes, expected.jacobian(names))):
+                exact = np.array(exact.subs(at), dtype=float).reshape(found.shape)
+                np.testing.assert_allclose(found, exact, rtol=1e-13, atol=1e-13)
+                assert np.array_equal(found == 0, exact == 0)
+
+
 def test_new_parameter_values_compile_nothing(gear):
     fast = gear.frozen()
     one = compile_field(fast.freed("w"), "w")

@@ -66,7 +66,7 @@ def crossing_model(size, seed):
     return fs.Model(rates, parameters={P: 0}), sorted(hopf), sorted(zero)
 
 
-def brusselator(cells):
+def brusselator(cells, feed=2.0):
     """The Brusselator on a line of length L with fixed ends, two states for each cell.
 
     Returns
@@ -78,7 +78,7 @@ def brusselator(cells):
         discrete Laplacian, and the determinant is positive.
     """
     length = sp.Symbol(LENGTH)
-    first, second, feed, ratio = 0.008, 0.004, 2.0, 5.45
+    first, second, ratio = 0.008, 0.004, 5.45
     x, y = sp.symbols(f"x1:{cells + 1}"), sp.symbols(f"y1:{cells + 1}")
     step = 1.0 / (cells + 1)
 
