@@ -322,7 +322,7 @@ def _multiple_root(terms: Terms, near: float) -> float:
     powers = np.zeros(1 + max(e for (e,) in terms))
     for (exponent,), coefficient in terms.items():
         powers[exponent] = float(coefficient)
-    roots = np.polynomial.Polynomial(powers).deriv().roots()
+    roots: NDArray[Any] = np.polynomial.Polynomial(powers).deriv().roots()
     roots = roots.real[np.abs(roots - near) < 1e-3 * abs(near)]
     return float(roots[np.argmin(np.abs(roots - near))]) if len(roots) else near
 
