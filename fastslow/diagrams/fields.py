@@ -36,8 +36,8 @@ CLOSURE = 1e-9
 #: A state below this part of its natural unit may be zero but for rounding.
 DOUBTFUL = 1e-8
 
-#: A state is zero when it is below what so many units in the last place of all terms make.
-ROUNDINGS = 16 * float(np.finfo(float).eps)
+#: A component of a state below this many times its rounding error counts as zero.
+NOISE = 100.0
 
 
 def require_frozen(model: Model, instead: str) -> None:
@@ -172,18 +172,9 @@ class FrozenField:
         size, natural = largest[:-1], self.units_at(float(largest[-1]))[: self.n]
         doubtful = size <= DOUBTFUL * natural
         if doubtful.any():
-            noise = np.max([self._noise(*point) for point in points], axis=0, initial=0.0)
-            size = np.where(doubtful & (size <= noise), natural, size)
+            known = np.any([self.certain(*point) for point in points], axis=0)
+            size = np.where(doubtful & ~known, natural, size)
         return size
-
-    @np.errstate(all="ignore")
-    def _noise(self, region: int, u: Array) -> Array:
-        """What rounding in the terms of the rates amounts to in each state of an equilibrium."""
-        _, slopes = self.curve(region, u)
-        if not np.isfinite(slopes).all():
-            return np.zeros(self.n)
-        inverse = np.abs(np.linalg.pinv(slopes[:, : self.n]))
-        return np.asarray(ROUNDINGS * inverse @ (np.abs(slopes) @ np.abs(u)))
 
     @cached_property
     def periods(self) -> Array:
@@ -390,6 +381,11 @@ class FrozenField:
         same = (np.abs(crossed) <= 1e-12 * np.abs(products)).all(axis=0)
         return [np.flatnonzero(same[k] | (np.arange(count) == k)).tolist() for k in range(count)]
 
+    def certain(self, region: int, u: Array) -> NDArray[np.bool_]:
+        """Which states of an equilibrium are more than rounding, shape (n,)."""
+        return np.asarray(np.abs(u[: self.n]) > NOISE * self.rounding(region, u))
+
+    @np.errstate(all="ignore")
     def rounding(self, region: int, u: Array) -> Array:
         """Bound on the error of each state at an equilibrium, shape (n,).
 

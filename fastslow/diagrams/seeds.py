@@ -16,7 +16,7 @@ from fastslow.diagrams.equations import region_equations
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.solving import point_at
 from fastslow.diagrams.walking import Window, walk
-from fastslow.diagrams.windows import NOISE, known, size_of
+from fastslow.diagrams.windows import known, size_of
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.angles import apart
 from fastslow.results.branches import Branch
@@ -154,8 +154,8 @@ class Seeds:
                     moved = np.arange(len(piece.u), dtype=float)
                 places = np.searchsorted(moved, np.linspace(0, moved[-1], SAMPLES))
                 for row in piece.u[places]:
-                    noise = NOISE * field.rounding(piece.region, row)
-                    samples.append(np.where(np.abs(row[:-1]) > noise, row[:-1], 0.0))
+                    certain = field.certain(piece.region, row)
+                    samples.append(np.where(certain, row[:-1], 0.0))
         return np.array(samples)
 
     def _read(self, name: str, given: Any, window: StateWindow) -> list[Equilibrium]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -19,9 +18,6 @@ Array = NDArray[np.float64]
 
 #: For each state, whether its lower and its upper bound are meant.
 Sides = tuple[tuple[bool, bool], ...]
-
-#: A component below this many times its rounding error counts as zero.
-NOISE = 100.0
 
 
 def edges_of(window: StateWindow, sides: Sides) -> tuple[sp.Expr, ...]:
@@ -45,12 +41,12 @@ def known(field: FrozenField, points: Sequence[Equilibrium]) -> np.ndarray:
     """Which components of equilibria are more than rounding, shape (m, n)."""
     found = []
     for e in points:
-        rounding: Any = 0.0
         # sliding along several interfaces is no mode of the field
         if e.region in field.regions:
             u = np.append(e.state, e.parameters.get(field.parameter, 0.0))
-            rounding = NOISE * field.rounding(field.regions.index(e.region), u)
-        found.append(np.abs(e.state) > rounding)
+            found.append(field.certain(field.regions.index(e.region), u))
+        else:
+            found.append(np.abs(e.state) > 0)
     return np.reshape(found, (-1, field.n)).astype(bool)
 
 
