@@ -72,9 +72,12 @@ PHASES: dict[str, dict[str, Any]] = {
     "transit": {"facecolor": PURPLE},
     "excursion": {"facecolor": ORANGE},
     "transient": {"facecolor": "#EBEBEB"},
-    "sticking": {"facecolor": "#BFBFBF"},
+    "sticking": {"facecolor": "#727272"},
     "outside": {"facecolor": "white", "hatch": "/////", "edgecolor": GREY},
 }
+
+#: Phases whose name is drawn in white.
+DARK = ("sticking",)
 
 #: Light fills of the regions, in turn.
 BANDS = ("#D6E7F4", "#FFFFFF", "#FEF0D8")

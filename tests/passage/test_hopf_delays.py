@@ -86,7 +86,7 @@ def test_wrong_arguments(turned, cusp_fold):
     other = fs.continue_equilibria(fs.systems.van_der_pol().frozen(), "w", over=(-2, 2))
     with pytest.raises(fs.ArgumentError, match="is not a point of this diagram"):
         fs.hopf_exit(turned, other.special("HB")[0], entry=-1, rate=EPS)
-    with pytest.raises(fs.ArgumentError, match="see hopf_exit"):
+    with pytest.raises(fs.ArgumentError, match="give diagram= and entry="):
         fs.predict_delay(hopf, EPS)
 
 
