@@ -86,7 +86,7 @@ def test_van_der_pol_under_a_slow_load():
         assert abs(abs(t.value) - 1) < 0.05
     # the branch is followed along its unstable part as well: there the lag has a meaning still
     unstable = (np.abs(lay.slow) < 0.9) & (lay.followed >= 0)
-    # near is near the curve; at the same value of the load a growing oscillation is a little farther
+    # near means near the curve; at the same load a growing oscillation is a little farther off
     assert lay.distance[unstable].max() < 1.2 * lay.radius
     assert np.isnan(lay.relaxation[unstable]).all()
 
