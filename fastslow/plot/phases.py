@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
-from fastslow.plot.style import BLACK, DARK, PHASES, root
+from fastslow.plot.style import BLACK, PHASES, WHITE_WORDS, root
 from fastslow.results.transitions import Phase
 
 #: Height of the strip and size of its words, in points.
@@ -64,7 +64,7 @@ def draw_phases(
                 ha="center",
                 va="center",
                 fontsize=WORDS,
-                color="white" if phase.kind in DARK else BLACK,
+                color="white" if phase.kind in WHITE_WORDS else BLACK,
                 zorder=4.9,
                 clip_on=True,
             )

@@ -77,7 +77,7 @@ PHASES: dict[str, dict[str, Any]] = {
 }
 
 #: Phases whose name is drawn in white.
-DARK = ("sticking",)
+WHITE_WORDS = ("sticking",)
 
 #: Light fills of the regions, in turn.
 BANDS = ("#D6E7F4", "#FFFFFF", "#FEF0D8")
