@@ -60,7 +60,7 @@ def test_units_change_nothing(system):
         compare(system, units, reference)
 
 
-@pytest.mark.parametrize("s", [1.0, 10.0])
+@pytest.mark.parametrize("s", [1e-4, 1.0, 10.0, 1e4])
 def test_predator_and_prey_in_any_unit(s):
     """Zero, prey alone at K, and coexistence at x = d h/(c − d), y = r (1 − x/K)(h + x)/a."""
     x, y, k, h, d = sp.symbols("x y K h d")
