@@ -279,11 +279,11 @@ def _special_marks(view: View) -> list[dict[str, Any]]:
     assert view.diagram is not None
     diagram = view.diagram
     found: dict[str, list[list[Any]]] = {}
-    numbers = {id(point): k for k, point in enumerate(diagram.special)}
+    numbers = {point.label: k for k, point in enumerate(diagram.special)}
     named = set()
     for branch in diagram.branches:
         for point in worth_a_marker([branch]) if branch.admissible else ():
-            k = numbers[id(point)]
+            k = numbers[point.label]
             # branches that cross share their branch point: it is named once
             name = point.label, *np.round([point[diagram.parameter], *point.state], 9)
             found.setdefault(point.code, []).append(

@@ -253,7 +253,7 @@ def note_early_end(ax: Axes, why: str) -> None:
 
     Examples
     --------
-    >>> ax = axes_for(None, None)
+    >>> ax = axes_for(None, 85)
     >>> note_early_end(ax, "too many steps")
     >>> ax.texts[0].get_text()
     'run ended early: too many steps'
