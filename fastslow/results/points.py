@@ -256,7 +256,7 @@ class SpecialPoint(_Point):
     ----------
     code : str
         LP, HB, BP, NSD, BE, TF, UZ or EP; on a curve of such points CP, BT, GH, ZH,
-        HH, BF or BH (see `fastslow.results.point_types`).
+        HH, BF or BH (see ``fastslow.results.point_types``).
     label : str
         The code with its number along the diagram, such as ``"BE2"``.
     states, state, parameters
