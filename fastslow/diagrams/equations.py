@@ -82,8 +82,12 @@ class RegionEquations:
     def equations(self) -> dict[str, sp.Expr]:
         """What vanishes at an equilibrium, by unknown, with numbers for the other parameters."""
         states = self.field.model.states
-        rates = [exact(rate).subs(self.numbers) for rate in self.field.modes[self.region].rates]
+        rates = [self._number(rate) for rate in self.field.modes[self.region].rates]
         return dict(zip(states, rates, strict=True))
+
+    def _number(self, expression: sp.Expr) -> sp.Expr:
+        """An expression with exact numbers for the other parameters."""
+        return exact(expression).subs(self.numbers)
 
     @cached_property
     def elimination(self) -> Elimination:
@@ -93,7 +97,7 @@ class RegionEquations:
     @property
     def bounds(self) -> list[sp.Expr]:
         """Functions one of which vanishes where an equilibrium leaves the region."""
-        return [exact(i.function).subs(self.numbers) for i in self.field.model.interfaces.values()]
+        return [self._number(i.function) for i in self.field.model.interfaces.values()]
 
     @cached_property
     def polynomial(self) -> sp.Poly | None:
@@ -406,14 +410,20 @@ class SlidingEquations(RegionEquations):
     @property
     def _height(self) -> sp.Expr:
         """The function h of the interface that is slid along."""
-        return self.field.modes[self.region].rows[self._sides.interface].subs(self.numbers)
+        return self._number(self.field.modes[self.region].rows[self._sides.interface])
+
+    @property
+    def _drifts(self) -> tuple[sp.Expr, sp.Expr]:
+        """The drifts a and b of h on both sides."""
+        a, b = self._sides.drifts
+        return self._number(a), self._number(b)
 
     @property
     def _fields(self) -> list[tuple[sp.Expr, sp.Expr]]:
         """The rates on both sides, state by state."""
         modes, sides = self.field.modes, self._sides
         both = zip(modes[sides.above].rates, modes[sides.below].rates, strict=True)
-        return [(f.subs(self.numbers), g.subs(self.numbers)) for f, g in both]
+        return [(self._number(f), self._number(g)) for f, g in both]
 
     @cached_property
     def _with_share(self) -> Elimination:
@@ -422,7 +432,7 @@ class SlidingEquations(RegionEquations):
     @cached_property
     def _without_share(self) -> Elimination | None:
         states, h = self.field.model.states, self._height
-        a, b = (drift.subs(self.numbers) for drift in self._sides.drifts)
+        a, b = self._drifts
         crossed = [b * f - a * g for f, g in self._fields]
         for k, name in enumerate(states):
             # sum of ∂h/∂x times these vanishes: one with ∂h/∂x ≠ 0 may be left out
@@ -435,7 +445,7 @@ class SlidingEquations(RegionEquations):
     def bounds(self) -> list[sp.Expr]:
         functions = super().bounds
         del functions[self._sides.interface]
-        return [*functions, *(drift.subs(self.numbers) for drift in self._sides.drifts)]
+        return [*functions, *self._drifts]
 
     def corrected(self, state: Array, value: float) -> Array | None:
         """As for a region; None at a two-fold, where the sliding field is 0/0."""

@@ -228,6 +228,25 @@ def test_symmetry(c, m, d, stiffness):
         assert min(apart) < 1e-11
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_decimal_numbers_are_read_as_they_are_written(seed):
+    """Coefficients as decimals and as fractions give the same diagram of a relay system."""
+    generator = np.random.default_rng(seed)
+    a, b, c, d, e = (round(float(v), 2) for v in generator.uniform(0.1, 1, 5))
+
+    def diagram(write):
+        k = [write(v) for v in (a, b, c, d, e)]
+        mixing = sp.Piecewise((k[0], y - x > p), (k[1], True))
+        rates = {x: k[2] - x - mixing * x, y: k[3] * (k[4] - y) - mixing * y}
+        return fs.continue_equilibria(fs.Model(rates, parameters={p: -0.1}), p, (-1, 0.5))
+
+    decimal, exact = diagram(float), diagram(lambda v: sp.Rational(str(v)))
+    assert decimal.coverage == exact.coverage
+    assert [q.label for q in decimal.special] == [q.label for q in exact.special]
+    for one, other in zip(decimal.special, exact.special, strict=True):
+        assert one["p"] == pytest.approx(other["p"], rel=1e-12, abs=1e-12)
+
+
 # ---------------------------------------------------------------- curved interfaces
 
 
