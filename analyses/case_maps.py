@@ -32,6 +32,7 @@ from analyses.cases import (
 from analyses.output import Output
 from analyses.passages import OMEGA
 from analyses.regime_maps import critical_ratio
+from fastslow.passage.regimes import regimes_at
 from fastslow.plot.areas import FILLS
 from fastslow.plot.style import FULL, MM, SMALL, TEXT, VERMILION, dressed, new_figure
 from fastslow.results.refined_maps import MapComparison
@@ -40,8 +41,8 @@ from fastslow.systems.gears import SCALINGS
 Floats = NDArray[np.float64]
 Values = dict[str, Floats]
 
-#: Loads faster than this are run over more periods, so that the start is forgotten.
-FAST = 0.1
+#: Runs that do not settle within two periods are continued up to so many.
+LONGEST = 64
 
 #: Mean torque of the cases and the amplitude of figures 3 and 4, N m.
 MEAN, SWING = 10.0, 15.0
@@ -126,19 +127,15 @@ def simulated(plane: CaseMap, scaling: str) -> fs.RefinedMap:
 
     def regimes(first: Floats, second: Floats) -> list[str]:
         given = values(plane, scaling, first, second)
-        found = np.empty(len(first), dtype=object)
         starts = np.column_stack([given["D"], np.zeros_like(first)])
-        quick = given["omega"] > FAST
-        for rows, periods in ((~quick, 2), (quick, 20)):
-            if rows.any():
-                chosen = {name: column[rows] for name, column in given.items()}
-                many = fs.simulate_many(model, starts[rows], parameters=chosen, periods=periods)
-                found[rows] = [str(regime) for regime in many.regime]
-        return list(found)
+        found = regimes_at(model, starts, given, periods=2, longest=LONGEST)
+        return [str(regime) for regime in found]
 
-    # the stiff gear of the printed scaling takes four times as long
-    levels = 2 if scaling == "printed" and all(plane.logarithmic) else 3
-    return fs.refined_map(regimes, plane.over, cells=(8, 7), levels=levels, tol=2e-3)
+    # the stiff gear of the printed scaling takes four times as long, and chaos longer than that
+    chaotic = plane.name == "map_frequency_width"
+    levels = 3 - (scaling == "printed" and all(plane.logarithmic)) - chaotic
+    tol = 1e-2 if chaotic else 2e-3
+    return fs.refined_map(regimes, plane.over, cells=(8, 7), levels=levels, tol=tol)
 
 
 def criterion(plane: CaseMap, scaling: str) -> MapComparison:

@@ -44,7 +44,7 @@ ALLOWED = FASTEST * np.geomspace(0.1, 1.0, 10)
 def gear(scaling: str, omega: float = OMEGA, **values: float) -> fs.Model:
     """The dimensionless gear from physical values, with a dimensionless load frequency."""
     chosen: Scaling = "printed" if scaling == "printed" else "consistent"
-    physical = fs.systems.harmonic_gear_physical(chosen, **values)
+    physical = fs.systems.harmonic_gear_from_physical(chosen, **values)
     return physical.with_parameters(omega=omega)
 
 

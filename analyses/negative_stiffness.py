@@ -68,6 +68,21 @@ def relaxation() -> fs.RefinedMap:
     return fs.regime_map(model, OVER, [1.0, 0.0], cells=(8, 8), levels=2, tol=5e-4, periods=3)
 
 
+def onset_at(A: float) -> float:
+    """Amplitude at which oscillations begin at one stiffness, in loads of the fold."""
+    model = case().setting.model.with_parameters(A=A)
+    fold = float(fold_load(np.array([A]))[0])
+    low, high = 1.0, 1.1
+    # each round divides the interval by nine
+    for _ in range(4):
+        factors = np.linspace(low, high, 10)
+        many = fs.simulate_many(model, [1.5, 0.0], parameters={"C": factors * fold}, periods=3)
+        first = int(np.argmax(many.regime == "bilateral"))
+        assert first > 0, "the interval holds the onset"
+        low, high = factors[first - 1], factors[first]
+    return float(high)
+
+
 def onset() -> tuple[float, float]:
     """Amplitude at which oscillations begin, in loads of the fold: least and most."""
     lines = relaxation().boundary("bilateral", "meshed upper")
@@ -92,16 +107,17 @@ def claims() -> tuple[Claim, ...]:
             "B4",
             "Folds and relaxation oscillations need negative stiffness: A < −D².",
             "The fold continued over load and A, against its closed form; the regime over A and "
-            "the amplitude of a load without a mean, ω_o = 0.01, D = 0.25.",
+            "the amplitude of a load without a mean, −1 ≤ A ≤ −0.2, ω_o = 0.01, D = 0.25.",
             (
                 Finding(
                     "either",
                     "beyond the paper",
                     "The fold meets the corner at A = {meet:.6f} = −D², which is k1 = {soft:.3g} "
                     "(consistent) or {hard:.2g} N m/rad (printed) at D = 0.25; the cases have "
-                    "1000 or more. It is the closed form within {apart:.0e}. For A < −0.6 the gear "
-                    "jumps from side to side when the load swings {least:.2f} to {most:.2f} times "
-                    "as far as the fold; in the case drawn {jumps:.0f} times in three periods.",
+                    "1000 or more. It is the closed form within {apart:.0e}. For −1 ≤ A < −0.6, "
+                    "the range scanned, the gear jumps from side to side when the load swings "
+                    "{least:.2f} to {most:.2f} times as far as the fold; at A = −1.5 {beyond:.3f} "
+                    "times. In the case drawn it jumps {jumps:.0f} times in three periods.",
                     {
                         "meet": meets[0]["A"],
                         "soft": stiff[0],
@@ -109,6 +125,7 @@ def claims() -> tuple[Claim, ...]:
                         "apart": within(apart),
                         "least": least,
                         "most": most,
+                        "beyond": onset_at(-1.5),
                         "jumps": len(jumps),
                     },
                 ),

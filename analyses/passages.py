@@ -115,7 +115,7 @@ def row(case: Case) -> Row:
         len(case.diagram.folds),
         len(case.run.crossings),
         kinds.count("jump"),
-        kinds.count("transit"),
+        kinds.count("gap crossing"),
         case.run.regime or "none",
         case.setting.stated,
         float(np.nanmax(delays)) if np.isfinite(delays).any() else float("nan"),

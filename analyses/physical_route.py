@@ -3,7 +3,8 @@
 The source reduces the two inertias (2) to the relative twist (5) and scales that
 to (6). Here both steps are derived, and the same motion is simulated with the two
 inertias, with the twist alone, with the dimensionless gear, and with the
-dimensionless gear whose A, B and C are those that the source prints.
+dimensionless gear whose A, B and C are those that the source prints. The overlay
+of the twist on its frozen equilibria is drawn in rad and N m.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 import fastslow as fs
-from analyses.cases import FASTEST, WIDTHS, gear
+from analyses.cases import FASTEST, GAP, NARROW, STIFFNESSES, WIDTHS, gear
 from analyses.claims import Claim, Finding
 from analyses.output import Output
 from fastslow.model.structure import real
@@ -33,12 +34,7 @@ from fastslow.plot.style import (
     new_figure,
 )
 from fastslow.systems.gears import SCALINGS, gear_scales
-from fastslow.systems.geartrain import (
-    dimensionless_model,
-    gear_scaling,
-    physical_model,
-    two_inertia_model,
-)
+from fastslow.systems.geartrain import gear_scaling
 
 Floats = NDArray[np.float64]
 
@@ -101,13 +97,13 @@ def route() -> Route:
     """Derive the three models, simulate each, and bring the twist back to rad."""
     scales = gear_scales()
     derived = gear_scaling().consistent
-    pair = two_inertia_model().with_parameters(c=scales.damping, Omega=SPEED)
-    single = physical_model().with_parameters(J=scales.inertia, c=scales.damping, Omega=SPEED)
+    pair = fs.systems.harmonic_gear_two_inertias(omega=SPEED)
+    single = fs.systems.harmonic_gear_twist(omega=SPEED)
     known = {real(name): value for name, value in single.parameters.items()}
-    scaled = dimensionless_model().with_parameters(
+    scaled = fs.systems.harmonic_gear().with_parameters(
         {name: float(law.subs(known)) for name, law in derived.items()}
     )
-    wrong = fs.systems.harmonic_gear_physical("printed", omega=SPEED)
+    wrong = fs.systems.harmonic_gear_from_physical("printed", omega=SPEED)
     span = 6 * np.pi / SPEED
     runs = [
         fs.simulate(
@@ -125,20 +121,39 @@ def route() -> Route:
         )
     ]
     p = pair.parameters
-    moment = p["Jo"] + p["N"] ** 2 * p["Ji"]
+    moment = p["J_o"] + p["N"] ** 2 * p["J_i"]
     outer, inner = runs[0]["theta_o"], runs[0]["theta_i"]
     time = runs[0].t
     return Route(
         time,
         outer,
-        (p["Jo"] * outer + p["N"] * p["Ji"] * inner) / moment,
+        (p["J_o"] * outer + p["N"] * p["J_i"] * inner) / moment,
         outer - inner / p["N"],
         runs[1]["theta"],
         scales.angle * runs[2]["x"],
         gear_scales("printed").angle * runs[3]["x"],
-        p["Tam"] * (SPEED * time - np.sin(SPEED * time)) / (SPEED**2 * moment),
+        p["T_am"] * (SPEED * time - np.sin(SPEED * time)) / (SPEED**2 * moment),
         scales.angle,
     )
+
+
+@cache
+def overlay() -> fs.Overlay:
+    """The twist in rad over the torque in N m, ω = 1 rad/s, on its frozen equilibria."""
+    model = fs.systems.harmonic_gear_twist(omega=SPEED)
+    p = model.parameters
+    swing = p["T_am"] * p["J_eq"] / p["J_o"]
+    over = (p["T_m"] - 1.1 * swing, p["T_m"] + 1.1 * swing)
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=over)
+    return fs.overlay(diagram, fs.simulate(model, [0.0, 0.0], periods=3))
+
+
+def draw_overlay(into: Output) -> None:
+    """Draw that overlay, the twist in milliradians."""
+    drawing = fs.plot.overlay(overlay(), "1000*theta")
+    drawing.ax.set_xlabel(r"load torque $w$ (N m)")
+    drawing.ax.set_ylabel(r"relative twist $\theta$ (mrad)")
+    into.save(drawing.figure, "physical_overlay")
 
 
 def within(difference: float, bound: float = AGREEMENT) -> float:
@@ -152,9 +167,6 @@ def claims() -> tuple[Claim, ...]:
     found, law = route(), gear_scaling()
     ratios = {name: float(value.subs(_physical())) for name, value in law.ratios.items()}
     reduces = law.reduced and found.spread <= AGREEMENT
-    separations = {
-        scaling: _separation(scaling, gear(scaling, FASTEST, D=0.25)) for scaling in SCALINGS
-    }
     return (
         Claim(
             "2",
@@ -174,7 +186,7 @@ def claims() -> tuple[Claim, ...]:
                     },
                 ),
             ),
-            ("physical_route",),
+            ("physical_route", "physical_overlay"),
         ),
         Claim(
             "3",
@@ -205,19 +217,63 @@ def claims() -> tuple[Claim, ...]:
             tuple(map(_width, SCALINGS)),
         ),
         Claim(
+            "3c",
+            "The symbols of (2) to (6) are those that the text explains.",
+            "Each read from its place in the equations; (5) and (6) derived with the other "
+            "reading of T_im and with θ_Γ left in.",
+            (_misprints(),),
+        ),
+        Claim(
             "4",
             'Excitation and natural frequency: this "involves a magnitude difference" (fast-slow).',
-            "Natural frequency at the corner, √(A + D² − 1/4), over ω_o at ω = 1 rad/s, D = 0.25.",
-            tuple(
-                Finding(
-                    scaling,
-                    "holds" if separation > 10 else "does not hold",
-                    "The natural frequency is {separation:.0f} times that of the load, or more.",
-                    {"separation": separation},
-                )
-                for scaling, separation in separations.items()
-            ),
+            "Natural frequency at the corner, √(A + D² − 1/4), over ω_o at ω = 1 rad/s, for the "
+            "softest and the stiffest gear of figures 3 to 5.",
+            tuple(map(_separates, SCALINGS)),
         ),
+    )
+
+
+def _separates(scaling: str) -> Finding:
+    soft, hard = (
+        _separation(gear(scaling, FASTEST, k1=k1, D=NARROW))
+        for k1 in (STIFFNESSES[0], STIFFNESSES[-1])
+    )
+    usual = _separation(gear(scaling, FASTEST, D=GAP))
+    return Finding(
+        scaling,
+        "holds" if soft > 10 else "does not hold",
+        "At ω = 1 rad/s the natural frequency is {soft:.1f} times that of the load at k1 = 1000, "
+        "{usual:.1f} times at 3000 and {hard:.1f} times at 7000; at smaller ω more.",
+        {"soft": soft, "usual": usual, "hard": hard},
+    )
+
+
+def shaft_torque() -> float:
+    """Mean of the right side of (5), N m, were T_im the torque of the input shaft itself.
+
+    (2) then has −T_im for −T_im/N, and the mean is J_eq [T_m/J_o + T_m/(N J_i)].
+    """
+    p = fs.systems.harmonic_gear_two_inertias().parameters
+    return float(gear_scales().inertia * p["T_m"] * (1 / p["J_o"] + 1 / (p["N"] * p["J_i"])))
+
+
+def allowed_shift() -> float:
+    """The θ_Γ/θ_s for which x = (θ − θ_Γ)/θ_s leaves the factor x² + A of (6) as it is."""
+    x, shift, A = map(real, ("x", "x_shift", "A"))
+    left = sp.Poly((x + shift) ** 2 + A - (x**2 + A), x).coeffs()
+    (found,) = sp.solve(left, [shift])
+    return float(found[0])
+
+
+def _misprints() -> Finding:
+    return Finding(
+        "either",
+        "does not hold",
+        "T_on and T_cm are T_om; T_in is T_im; J_ea is J_eq; θ_c is θ_o; ω_c is ω_o. θ_Γ is not "
+        "explained: the factor x² + A of (6) follows for θ_Γ = {shift:.0f} only. T_im, "
+        '"of the input shaft", enters (2) as a torque on the output side: were it that of the '
+        "shaft, the mean of (5) would be {shaft:.2f} N m and not T_m = 10.",
+        {"shift": allowed_shift(), "shaft": shaft_torque()},
     )
 
 
@@ -239,14 +295,13 @@ def _width(scaling: str) -> Finding:
     )
 
 
-def _separation(scaling: str, model: fs.Model) -> float:
+def _separation(model: fs.Model) -> float:
     p = model.parameters
     return float(np.sqrt(p["A"] + p["D"] ** 2 - 0.25) / p["omega"])
 
 
 def _physical() -> dict[sp.Symbol, float]:
-    scales = gear_scales()
-    given = {**physical_model().parameters, "J": scales.inertia, "c": scales.damping}
+    given = fs.systems.harmonic_gear_twist(omega=SPEED).parameters
     return {real(name): value for name, value in given.items()}
 
 
@@ -270,12 +325,13 @@ def main(into: Output) -> Route:
     middle.set_ylabel(r"$\theta$ (mrad)")
     middle.set_ylim(-24, 44)
     notes = [(middle, 0.96, "consistent (6) and (5)", BLUE), (middle, 0.87, "printed", VERMILION)]
-    for other, colour in ((found.dimensionless, GREY), (found.twist, BLUE)):
-        apart = np.abs(found.inertias - other) / found.scale
-        right.semilogy(found.time, np.maximum(apart, 1e-18), color=colour, linewidth=0.6)
+    # the largest distance so far: that at each time is rounding, and one hides the other
+    for other, colour, width in ((found.dimensionless, GREY, 2.6), (found.twist, BLUE, 1.0)):
+        apart = np.maximum.accumulate(np.abs(found.inertias - other)) / found.scale
+        right.semilogy(found.time, np.maximum(apart, 1e-18), color=colour, linewidth=width)
     right.axhline(AGREEMENT, color=BLACK, linewidth=1.0, linestyle=(0, (4, 2)))
     right.set_ylim(1e-18, 1e-6)
-    right.set_ylabel(r"distance from (2) in $\theta_\mathrm{s}$")
+    right.set_ylabel(r"largest distance from (2) in $\theta_\mathrm{s}$")
     notes += [(right, 0.96, "dimensionless (6)", GREY), (right, 0.87, "twist alone (5)", BLUE)]
     for ax, height, words, colour in notes:
         ax.annotate(
@@ -291,4 +347,5 @@ def main(into: Output) -> Route:
         ax.set_xlabel(r"$t_0$ (s)")
         ax.set_xlim(0, found.time[-1])
     into.save(sheet, "physical_route")
+    draw_overlay(into)
     return found

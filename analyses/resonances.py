@@ -2,7 +2,8 @@
 
 A load that changes sign as far as that of figure 3 carries the teeth across gaps of these widths,
 whatever its frequency within the source's range. Loads nearly as fast as the vibration in
-contact do not: the gap is too wide for the time that they leave.
+contact do not: the gap is too wide for the time that they leave. In between many motions are
+chaotic, and meet both sides in some periods and not in others: these have no regime.
 """
 
 from __future__ import annotations
@@ -19,49 +20,70 @@ import fastslow as fs
 from analyses.cases import WIDTHS, gear
 from analyses.gap_region import STATED
 from analyses.output import Output
+from fastslow.passage.regimes import regimes_at
 from fastslow.plot.areas import FILLS
 from fastslow.plot.style import FULL, GREY, MM, SMALL, TEXT, dressed, new_figure
 
 Floats = NDArray[np.float64]
 
 #: Frequencies scanned.
-SCANNED = {"consistent": np.arange(0.1, 6.01, 0.02), "printed": np.arange(5.0, 50.01, 0.25)}
+SCANNED = {"consistent": np.arange(0.1, 6.01, 0.02), "printed": np.arange(5.0, 100.01, 0.5)}
 
-#: Runs are at least so long: the start is forgotten as e^(−t/2).
-LENGTH = 40.0
+#: Periods of the load that runs have at first, and at most.
+PERIODS, LONGEST = 32, 256
+
+#: Where runs begin: at rest in the middle of the gap, or at its upper end.
+STARTS = ("rest", "corner")
 
 #: The plane.
 OVER = {"omega": (0.25, 6.25), "D": (0.05, 0.65)}
 
+#: A chaotic load, in the consistent scaling, and how many of its periods are looked at.
+CHAOTIC, MANY = 1.3, 4000
 
-def regimes(scaling: str, omega: Floats, width: Floats) -> list[str]:
-    """Regimes at the torques of figure 3, from rest."""
-    found = np.empty(len(omega), dtype=object)
-    periods = np.maximum(3, 2 ** np.ceil(np.log2(LENGTH * omega / (2 * np.pi))))
-    for count in np.unique(periods):
-        rows = periods == count
-        given = {"omega": omega[rows], "D": width[rows]}
-        many = fs.simulate_many(gear(scaling), [0.0, 0.0], parameters=given, periods=int(count))
-        found[rows] = [str(regime) for regime in many.regime]
-    return list(found)
+
+def regimes(scaling: str, omega: Floats, width: Floats, start: str = "rest") -> list[str]:
+    """Regimes of the motions that runs settle on at the torques of figure 3."""
+    begin = np.stack([width * (start == "corner"), np.zeros_like(width)], axis=1)
+    given = {"omega": omega, "D": width}
+    found = regimes_at(gear(scaling), begin, given, periods=PERIODS, longest=LONGEST)
+    return [str(regime) for regime in found]
 
 
 @cache
-def scanned(scaling: str) -> tuple[list[str], ...]:
+def scanned(scaling: str, start: str = "rest") -> tuple[list[str], ...]:
     """Regimes over the frequencies, one list for each width of figure 3."""
     omega = SCANNED[scaling]
-    return tuple(regimes(scaling, omega, np.full_like(omega, D)) for D in WIDTHS)
+    return tuple(regimes(scaling, omega, np.full_like(omega, D), start) for D in WIDTHS)
 
 
 @cache
-def bands(scaling: str) -> list[tuple[float, float]]:
+def bands(scaling: str, start: str = "rest") -> list[tuple[float, float]]:
     """Runs of frequencies at which figure 3 is as stated, the longest first."""
     omega = SCANNED[scaling]
-    stated = [tuple(column) == STATED for column in zip(*scanned(scaling), strict=True)]
+    stated = [tuple(column) == STATED for column in zip(*scanned(scaling, start), strict=True)]
     edges = [0, *(k for k in range(1, len(stated)) if stated[k] != stated[k - 1]), len(stated)]
     runs = [(a, b - 1) for a, b in pairwise(edges) if stated[a]]
     runs.sort(key=lambda ends: ends[0] - ends[1])
     return [(float(omega[a]), float(omega[b])) for a, b in runs]
+
+
+@cache
+def chaotic_below_one() -> tuple[float, ...]:
+    """Frequencies up to ω_o = 1 at which the widest gap is chaotic from some start."""
+    omega = SCANNED["consistent"]
+    found = zip(omega, *(scanned("consistent", start)[2] for start in STARTS), strict=True)
+    return tuple(float(w) for w, *words in found if w < 1.001 and "chaotic" in words)
+
+
+@cache
+def chaos() -> tuple[float, float]:
+    """Largest Lyapunov exponent per period, and the part of the periods that meet both sides."""
+    model = gear("consistent", CHAOTIC, D=WIDTHS[2])
+    exponent = fs.lyapunov_exponent(model, [0.0, 0.0], periods=MANY)
+    assert exponent.chaotic
+    many = fs.simulate_many(model, [0.0, 0.0], periods=MANY)
+    return exponent.per_period, float(many.fractions["bilateral"][0])
 
 
 @cache
@@ -72,7 +94,7 @@ def refined() -> fs.RefinedMap:
         # which side the impacts are on matters less than that there is one
         return [_side(word) for word in regimes("consistent", omega, width)]
 
-    return fs.refined_map(words, OVER, cells=(24, 12), levels=2, tol=1e-2)
+    return fs.refined_map(words, OVER, cells=(24, 12), levels=1, tol=1e-2)
 
 
 def _side(regime: str) -> str:
@@ -80,16 +102,17 @@ def _side(regime: str) -> str:
 
 
 @cache
-def longest(scaling: str) -> tuple[float, float]:
+def longest(scaling: str, start: str = "rest") -> tuple[float, float]:
     """Ends of the longest of those runs, by bisection of its neighbouring frequencies."""
     omega = SCANNED[scaling]
     step = float(omega[1] - omega[0])
     ends = []
-    for inside, outward in zip(bands(scaling)[0], (-step, step), strict=True):
+    for inside, outward in zip(bands(scaling, start)[0], (-step, step), strict=True):
         outside = inside + outward
         for _ in range(8):
             middle = 0.5 * (inside + outside)
-            as_stated = tuple(regimes(scaling, np.full(3, middle), np.array(WIDTHS))) == STATED
+            found = regimes(scaling, np.full(3, middle), np.array(WIDTHS), start)
+            as_stated = tuple(found) == STATED
             inside, outside = (middle, outside) if as_stated else (inside, middle)
         ends.append(inside)
     return ends[0], ends[1]
@@ -126,11 +149,11 @@ def draw(into: Output) -> None:
         ax.set_title(title, loc="left", fontsize=TEXT)
     handles = [
         *(Patch(facecolor=fills[w], edgecolor=GREY, linewidth=0.5, label=w)
-          for w in ("bilateral", "unilateral", "free")),
+          for w in ("bilateral", "unilateral", "chaotic", "not settled")),
         Line2D([], [], color=GREY, linestyle=(0, (4, 2)), label="widths of Fig. 3"),
         Line2D([], [], color="black", linewidth=3, label="as Fig. 3 states"),
     ]  # fmt: skip
     sheet.legend(
-        handles=handles, loc="outside lower center", ncols=5, fontsize=SMALL, frameon=False
+        handles=handles, loc="outside lower center", ncols=6, fontsize=SMALL, frameon=False
     )
     into.save(sheet, "resonances")

@@ -138,8 +138,11 @@ def claims() -> tuple[Claim, ...]:
                 "beyond the paper",
                 "The time in the gap, {least:.2f} to {most:.1f}, is that of t²/2 − t + 1 − e^(−t) "
                 "= 2D/s within {late:.1%}; √(4D/s) + 1, its limit for slow loads, within "
-                "{slow:.0%}. From k1 = 1000 to 7000 it changes by {stiff:.1%}. The twist is that "
-                "of the frozen gear within {far:.1%}.",
+                "{slow:.0%}. The law starts from rest at the corner under a load of constant "
+                "slope; that in the tables of overlays, of fs.predict_delay, starts on the elastic "
+                "flank, which is left late, and knows the load's curvature. From k1 = 1000 to 7000 "
+                "the time changes by {stiff:.1%}. The twist is that of the frozen gear within "
+                "{far:.1%}.",
                 {
                     "least": float(times.min()),
                     "most": float(times.max()),

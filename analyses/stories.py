@@ -59,7 +59,7 @@ class Story:
     behind : float
         Median time by which the motion is behind those equilibria.
     kind : str
-        Of the transitions: "transit" of the gap, "jump" at a fold, "" without any.
+        Of the transitions: "gap crossing", "jump" at a fold, "" without any.
     count : int
         Transitions in the run.
     down, up : float
@@ -123,13 +123,17 @@ def stories() -> dict[str, tuple[Story, ...]]:
 
 
 def told(found: Sequence[Story]) -> list[str]:
-    """The overlays of a figure as a table in Markdown, and their rhythm in a sentence."""
+    """The overlays of a figure as a table in Markdown, and their rhythm in a sentence.
+
+    The law is that of the overlay, `fastslow.predict_delay`, not the one of claim B1.
+    """
     jumps = any(s.kind == "jump" for s in found)
     lines = [
         f"What the overlay finds over {PERIODS} periods:",
         "",
         "| case | time on S1 | time on S3 | behind by | transitions | arrives below at w | "
-        f"above at w | {'load past the fold' if jumps else 'time in the gap'} | by the law |",
+        f"above at w | {'load past the fold' if jumps else 'time in the gap'} | "
+        "by the overlay's law |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for s in found:
@@ -157,10 +161,10 @@ def _alternates(scaling: str) -> Finding:
     near = [near_equilibria(case) for case in cases]
     return Finding(
         scaling,
-        "holds only where" if rhythmic == unloads and len(unloads) < len(cases) else "holds",
+        "holds conditionally" if rhythmic == unloads and len(unloads) < len(cases) else "holds",
         "In the {rhythmic} of {cases} cases whose load changes sign: slow drift along the "
         "equilibria, interrupted by fast crossings of the gap, each with a vibration that decays. "
-        "The gear is within 1% of its largest twist from the frozen equilibria for {least:.0%} of "
+        "The gear is within 1% of its largest twist from the frozen equilibria for {least:.1%} of "
         "the time or more, {most:.0%} at T_am = 10 N m, where it never leaves them.",
         {
             "rhythmic": len(rhythmic),
@@ -168,6 +172,7 @@ def _alternates(scaling: str) -> Finding:
             "least": min(near),
             "most": max(near),
         },
+        "in part",
     )
 
 

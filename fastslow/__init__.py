@@ -32,19 +32,22 @@ if TYPE_CHECKING:
     from fastslow.passage.delay_laws import predict_delay
     from fastslow.passage.hopf_delays import hopf_exit
     from fastslow.passage.overlays import overlay
-    from fastslow.passage.regimes import regime_map
+    from fastslow.passage.regimes import classify_regime, regime_map
     from fastslow.passage.scaling_runs import delay_scaling
     from fastslow.passage.slow_loads import slow_load_criterion, slow_load_gap
     from fastslow.results.auto_files import read_auto
     from fastslow.results.branches import Branch
     from fastslow.results.delay_scalings import DelayScaling
     from fastslow.results.diagrams import Diagram
+    from fastslow.results.drifts import Drift
     from fastslow.results.ensembles import Ensemble
     from fastslow.results.files import load
+    from fastslow.results.lyapunov import LyapunovExponent
     from fastslow.results.overlays import Overlay
     from fastslow.results.point_branches import PointBranch, PointCurves
     from fastslow.results.points import Equilibrium, SpecialPoint
     from fastslow.results.refined_maps import RefinedMap
+    from fastslow.results.regimes import Regimes, RegimeSet
     from fastslow.results.sections import Section
     from fastslow.results.slow_loads import SlowLoad
     from fastslow.results.spectra import Spectrum
@@ -52,6 +55,7 @@ if TYPE_CHECKING:
     from fastslow.results.sweeps import Sweep
     from fastslow.results.trajectories import Trajectory
     from fastslow.simulation.ensembles import simulate_many
+    from fastslow.simulation.separations import lyapunov_exponent
     from fastslow.simulation.settings import Integration
     from fastslow.simulation.sweeping import bifurcation_sweep
     from fastslow.simulation.trajectories import simulate
@@ -71,12 +75,14 @@ _HOME = {
     "DelayScaling": "results.delay_scalings",
     "Derivation": "symbolic.derivation",
     "Diagram": "results.diagrams",
+    "Drift": "results.drifts",
     "Ensemble": "results.ensembles",
     "Equilibrium": "results.points",
     "FastSlowError": "errors",
     "FileError": "errors",
     "Integration": "simulation.settings",
     "IncompleteWarning": "errors",
+    "LyapunovExponent": "results.lyapunov",
     "MissingPackageError": "errors",
     "Model": "model.model",
     "ModelError": "errors",
@@ -85,6 +91,8 @@ _HOME = {
     "PointBranch": "results.point_branches",
     "PointCurves": "results.point_branches",
     "RefinedMap": "results.refined_maps",
+    "RegimeSet": "results.regimes",
+    "Regimes": "results.regimes",
     "Section": "results.sections",
     "SlowLoad": "results.slow_loads",
     "SpecialPoint": "results.points",
@@ -94,6 +102,7 @@ _HOME = {
     "Trajectory": "results.trajectories",
     "UnknownNameError": "errors",
     "bifurcation_sweep": "simulation.sweeping",
+    "classify_regime": "passage.regimes",
     "continue_equilibria": "diagrams.tracing",
     "continue_points": "diagrams.point_curves",
     "delay_scaling": "passage.scaling_runs",
@@ -105,6 +114,7 @@ _HOME = {
     "hopf_exit": "passage.hopf_delays",
     "inspect": "interactive.pointers",
     "load": "results.files",
+    "lyapunov_exponent": "simulation.separations",
     "nondimensionalise": "symbolic.scaling",
     "overlay": "passage.overlays",
     "plot": "",
@@ -129,12 +139,14 @@ __all__ = [
     "DelayScaling",
     "Derivation",
     "Diagram",
+    "Drift",
     "Ensemble",
     "Equilibrium",
     "FastSlowError",
     "FileError",
     "IncompleteWarning",
     "Integration",
+    "LyapunovExponent",
     "MissingPackageError",
     "Model",
     "ModelError",
@@ -143,6 +155,8 @@ __all__ = [
     "PointBranch",
     "PointCurves",
     "RefinedMap",
+    "RegimeSet",
+    "Regimes",
     "Section",
     "SlowLoad",
     "SpecialPoint",
@@ -153,6 +167,7 @@ __all__ = [
     "UnknownNameError",
     "__version__",
     "bifurcation_sweep",
+    "classify_regime",
     "continue_equilibria",
     "continue_points",
     "delay_scaling",
@@ -164,6 +179,7 @@ __all__ = [
     "hopf_exit",
     "inspect",
     "load",
+    "lyapunov_exponent",
     "nondimensionalise",
     "overlay",
     "plot",

@@ -117,9 +117,6 @@ def _models():
 
 SYSTEMS = tuple(_models())
 
-#: Those whose equilibria do not depend on a search by Newton's method from many starts.
-SOLVED = tuple(s for s in SYSTEMS if s.name not in ("peroxidase-oxidase", "stirred tank"))
-
 
 def drawn(system, seed, decades=6):
     """A unit for every factor, log-uniform over so many decades to each side."""

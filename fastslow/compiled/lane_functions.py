@@ -120,6 +120,14 @@ class Mathematics:
     def sqrt(self, x: Any) -> Lanes:
         return self.trace.intrinsic("sqrt", x)
 
+    @property
+    def pi(self) -> float:
+        return math.pi
+
+    @property
+    def e(self) -> float:
+        return math.e
+
     def __getattr__(self, name: str) -> Callable[..., Lanes]:
         function = _by_name(name)
         return lambda *arguments: self.trace.one_by_one(function, *arguments)

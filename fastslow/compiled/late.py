@@ -7,6 +7,8 @@ again with each of them.
 from __future__ import annotations
 
 import ctypes
+import math
+import warnings
 from functools import cache
 from typing import Any
 
@@ -39,7 +41,7 @@ def late_function(
     """A function for compiled code to call, that is not compiled yet.
 
     Compiled code that was read from the disk finds it as well, once the module
-    that calls this has been imported.
+    that calls this has been imported. Where it cannot be compiled it warns and gives NaN.
 
     Parameters
     ----------
@@ -70,7 +72,15 @@ def late_function(
         )
         return prototype(load_generated(text, function).entry.address)
 
-    callback = prototype(lambda *given: loaded()(*given))
+    def called(*given: Any) -> float:
+        # an exception does not pass through compiled code, which would go on with any number
+        try:
+            return float(loaded()(*given))
+        except Exception as error:
+            warnings.warn(f"{function} was not compiled: {error}", RuntimeWarning, stacklevel=2)
+            return math.nan
+
+    callback = prototype(called)
     _callbacks.append(callback)
     symbol = f"fastslow_{function}"
     llvm.add_symbol(symbol, ctypes.cast(callback, ctypes.c_void_p).value)

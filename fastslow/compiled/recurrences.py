@@ -96,6 +96,8 @@ class Recurrences:
         Expression to the row its series must occupy.
     first_free : int
         First row for everything else.
+    clock : str
+        Source of the rate of time: 1, or a name where it may be 0.
     """
 
     order: int
@@ -103,6 +105,7 @@ class Recurrences:
     time: sp.Symbol
     reserved: Mapping[sp.Expr, int]
     first_free: int
+    clock: str = "1.0"
     rows: dict[sp.Expr, int] = field(default_factory=dict)
     nodes: list[Node] = field(default_factory=list)
     scalars: dict[str, str] = field(default_factory=dict)
@@ -140,7 +143,7 @@ class Recurrences:
         if self.is_scalar(expression):
             return self._add(expression, self.scalar(expression), ["{} = 0.0"], ())
         if expression == self.time:
-            start = "1.0 if k == 1 else 0.0"
+            start = f"{self.clock} if k == 1 else 0.0"
             return self._add(expression, "t", [f"{{}} = {start}"], ())
         if isinstance(expression, sp.Add):
             return self._sum(expression)
@@ -299,7 +302,8 @@ class Recurrences:
             g = self.row(slope)
             U, G = (r * (self.order + 1) for r in (arguments[argument], g))
             if steady is not None:
-                lines.append(f"s += {steady} * W[{G} + k - 1]")
+                clock = "" if self.clock == "1.0" else f"{self.clock} * "
+                lines.append(f"s += {clock}{steady} * W[{G} + k - 1]")
             else:
                 lines.append("for j in range(1, k + 1):")
                 lines.append(f"    s += j * W[{U} + j] * W[{G} + k - j]")

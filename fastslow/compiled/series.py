@@ -31,13 +31,26 @@ from numba import cfunc
 @cfunc(SIGNATURE, cache=True, error_model="numpy")
 def series(mode, inputs, parameters, W):
     n = {order}
-    if mode >= {short_from}:
-        mode -= {short_from}
-        n = {short}
+    clock = 1.0
+    if mode >= {number}:
+        if mode >= {directional}:
+            mode -= {directional}
+            n = {second}
+            clock = 0.0
+        elif mode >= {rates}:
+            mode -= {rates}
+            n = 1
+        else:
+            mode -= {number}
+            n = {short}
 '''
 
-#: Order of the short series, which a mode and the number of all modes ask for together.
+#: Order of the short series.
 SHORT = 4
+
+#: What a mode and so many times the number of all modes ask for: the short series, the rates
+#: alone, and the derivative of the rates in a direction.
+SHORTENED, RATES, DIRECTIONAL = 1, 2, 3
 
 
 #: Highest degree of the collocation polynomials that take the place of a Taylor series.
@@ -53,8 +66,11 @@ class CompiledSeries:
     slow states, slow quantities, interface functions, two bounds for each interface
     that is slid along (see `Motion`), then work space. In a gradient mode ``inputs``
     goes on with the slow quantities, and the output is h, the sum of the
-    moduli of its terms, and its gradient by states and slow states. A mode
-    beyond all these is the first of them again with only `SHORT` coefficients.
+    moduli of its terms, and its gradient by states and slow states. Beyond all
+    these the modes follow again with only `SHORT` coefficients; then with one, the
+    rates; and then for a direction u: the first coefficients of the states are u when
+    it is called, time stands still, and the second ones become J u / 2, with the
+    Jacobian J of the rates, exact as the derivatives of a series are.
 
     Parameters
     ----------
@@ -241,7 +257,11 @@ def _source(equations: Equations, n_parameters: int) -> tuple[str, int]:
     bodies: list[list[str]] = []
     alone = bool(equations.without_recurrence)
     for mode in equations.modes:
-        body, rows = _values_source(equations, mode) if alone else mode_source(equations, mode)
+        body, rows = (
+            _values_source(equations, mode)
+            if alone
+            else mode_source(equations, mode, clock="clock")
+        )
         bodies.append(body)
         n_rows = max(n_rows, rows)
     bodies += [_gradient_source(equations, h) for h in equations.interfaces]
@@ -258,13 +278,20 @@ def _source(equations: Equations, n_parameters: int) -> tuple[str, int]:
         modes=len(equations.modes),
         states=len(equations.states),
         short=min(SHORT, equations.order),
-        short_from=len(bodies),
+        second=min(2, equations.order),
+        number=SHORTENED * len(bodies),
+        rates=RATES * len(bodies),
+        directional=DIRECTIONAL * len(bodies),
     )
     return header + text, n_rows
 
 
-def mode_source(equations: Equations, mode: Motion) -> tuple[list[str], int]:
-    """Source lines that fill the series of one mode, and the number of its rows."""
+def mode_source(equations: Equations, mode: Motion, *, clock: str = "1.0") -> tuple[list[str], int]:
+    """Source lines that fill the series of one mode, and the number of its rows.
+
+    Where ``clock`` is the name of the rate of time, the first coefficients of the
+    states are kept as they are while it is 0.
+    """
     m, q, p = (len(g) for g in (equations.states, equations.quantities, equations.interfaces))
     targets = [*mode.laws, *equations.interfaces, *mode.bounds]
     symbols = {s: i for i, s in enumerate(equations.states)}
@@ -273,7 +300,8 @@ def mode_source(equations: Equations, mode: Motion) -> tuple[list[str], int]:
     for row, expression in outputs.items():
         if expression not in symbols:
             reserved.setdefault(expression, row)
-    work = Recurrences(equations.order, symbols, TIME, reserved, m + q + p + equations.n_bounds)
+    free = m + q + p + equations.n_bounds
+    work = Recurrences(equations.order, symbols, TIME, reserved, free, clock)
     for symbol, law in zip(equations.quantities, mode.laws, strict=True):
         work.name(symbol, work.row(law))
     rates = [work.row(rate) for rate in mode.rates]
@@ -283,7 +311,8 @@ def mode_source(equations: Equations, mode: Motion) -> tuple[list[str], int]:
     body += [f"{work.at(i, '0')} = inputs[{i + 1}]" for i in range(m)]
     body += [f"{name} = {code}" for code, name in work.scalars.items()]
     body += work.values()
-    body += [f"{work.at(i, '1')} = {work.at(r, '0')}" for i, r in enumerate(rates)]
+    first = [f"{work.at(i, '1')} = {work.at(r, '0')}" for i, r in enumerate(rates)]
+    body += first if clock == "1.0" else [f"if {clock} != 0.0:", *(f"    {s}" for s in first)]
     body += ["for k in range(1, n):", "    q = 1.0 / k"]
     body += ["    " + line for line in work.general()]
     body += ["    r = 1.0 / (k + 1)"]

@@ -25,6 +25,10 @@ GROWTH = 10.0
 #: the angle a in one step is off its tangent by a/2 of it; farther off is another curve.
 ASIDE = 0.2
 
+#: Half way between two points, Newton's method moves the cubic through both by less than this
+#: part of the step: if not, the second point is on another curve, over a fold or a pole.
+BETWEEN = 0.01
+
 #: How far beyond an edge of the window, in units of its state, a branch tangent to it may be.
 TANGENT = 1e-9
 
@@ -179,6 +183,7 @@ def trace(  # type: ignore[no-untyped-def]
     right = np.empty(size)
     guess = np.empty(size)
     turned = np.empty(size)
+    middle_point = np.empty(size)
     h = np.empty(m)
     slope = np.empty(m)
     new_h = np.empty(m)
@@ -244,6 +249,19 @@ def trace(  # type: ignore[no-untyped-def]
                 right[j] = guess[j] - last[j] - step * unit * direction[j]
             aside = _norm(right, local)
             accepted = cosine > math.cos(turn) and aside <= max(ASIDE, turn) * step
+        if accepted and step > 4.0 * smallest:
+            # where Newton's method has left for another curve, nothing lies between the two
+            for j in range(size):
+                bend = direction[j] * unit - turned[j] * new_unit
+                middle_point[j] = 0.5 * (last[j] + guess[j]) + 0.125 * step * bend
+            call_address(address, mode, middle_point, parameters, out)
+            for i in range(n):
+                right[i] = -out[i]
+            right[n] = 0.0
+            _bordered(out, n, direction, local, matrix)
+            if solve(matrix, right):
+                accepted = _norm(right, local) <= BETWEEN * step
+            call_address(address, mode, guess, parameters, out)
         if accepted:
             for k in range(m):
                 new_h[k] = signs[k] * out[heights + k]

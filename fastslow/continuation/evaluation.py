@@ -9,6 +9,10 @@ from numba import njit
 
 from fastslow.compiled.pointers import call_address
 from fastslow.continuation.engine import solve
+from fastslow.continuation.location import flush_to_zero, grown
+
+_flush_to_zero = njit(error_model="numpy")(flush_to_zero)
+_grown = njit(error_model="numpy")(grown)
 
 
 @njit(error_model="numpy")
@@ -143,9 +147,19 @@ def refine(  # type: ignore[no-untyped-def]
         for j in range(columns):
             u[j] += right[j] * scale[j]
             size = max(size, abs(right[j]))
-    for j in range(columns):
-        if abs(u[j]) < 1e-20 * scale[j]:
-            u[j] = 0.0
+    flushed = _flush_to_zero(u, scale)
+    call_address(address, mode, flushed, parameters, out)
+    for i in range(n):
+        right[i] = out[i]
+    if row >= 0:
+        right[n] = out[heights + row]
+    else:
+        right[n] = 0.0
+        for j in range(columns):
+            right[n] += normal[j] * (flushed[j] - point[j])
+    if not _grown(right, value, np.abs(slopes) @ np.abs(u)):
+        u[:] = flushed
+        value[:] = right
     residual = 0.0
     balanced = True
     for i in range(columns):
@@ -159,23 +173,42 @@ def refine(  # type: ignore[no-untyped-def]
 
 @njit(error_model="numpy")
 def survey(  # type: ignore[no-untyped-def]
-    address, mode, parameters, points, tangents, scale, width
+    address, mode, parameters, points, tangents, scale, reach, width
 ):
     """What is tested at every row of a piece.
 
     Returns
     -------
     branching : ndarray, shape (N,)
-        `signed_distance` of [F_x F_p; tangent], columns in units of the scale.
+        `signed_distance` of [F_x F_p; tangent], columns in units of the scale, rows in units
+        of their largest entry there and ``reach`` of the scale ahead and behind: at a branch
+        point in an invariant plane a whole row vanishes.
     jacobians : ndarray, shape (N, n, n)
     """
     count, columns = points.shape
     n = columns - 1
     out = np.empty(width)
     matrix = np.empty((columns, columns))
+    largest = np.empty(columns)
+    beside = np.empty(columns)
     branching = np.empty(count)
     jacobians = np.empty((count, n, n))
     for k in range(count):
+        largest[:] = 0.0
+        length = 0.0
+        for j in range(columns):
+            length = max(length, abs(tangents[k, j] / scale[j]))
+        length = length if length > 0.0 else 1.0
+        for side in (-1.0, 1.0):
+            for j in range(columns):
+                beside[j] = points[k, j] + side * reach / length * tangents[k, j]
+            call_address(address, mode, beside, parameters, out)
+            for i in range(n):
+                for j in range(columns):
+                    entry = abs(out[n + i * columns + j] * scale[j])
+                    # beside the edge of a domain it may be infinite
+                    if math.isfinite(entry):
+                        largest[i] = max(largest[i], entry)
         call_address(address, mode, points[k], parameters, out)
         for i in range(n):
             for j in range(n):
@@ -186,17 +219,18 @@ def survey(  # type: ignore[no-untyped-def]
                     matrix[i, j] = out[n + i * columns + j] * scale[j]
                 else:
                     matrix[i, j] = tangents[k, j] / scale[j]
-        branching[k] = signed_distance(matrix)
+        branching[k] = signed_distance(matrix, largest)
     return branching, jacobians
 
 
 @njit(error_model="numpy")
-def signed_distance(matrix):  # type: ignore[no-untyped-def]
+def signed_distance(matrix, least):  # type: ignore[no-untyped-def]
     """Size of a matrix's smallest singular value, with the sign of its determinant.
 
     The rows are brought to length one, so that neither depends on units or on the
-    number of rows. The size is 1/|A⁻¹ b| for a fixed vector b of length one, at least
-    the smallest singular value and zero with it. The matrix is spoiled.
+    number of rows, except that a row is never divided by less than ``least``: one that
+    vanishes makes the matrix singular. The size is 1/|A⁻¹ b| for a fixed vector b of length
+    one, at least the smallest singular value and zero with it. The matrix is spoiled.
     """
     size = matrix.shape[0]
     right = np.empty(size)
@@ -210,11 +244,13 @@ def signed_distance(matrix):  # type: ignore[no-untyped-def]
             return np.nan
         if largest == 0.0:
             return 0.0
+        largest = max(largest, least[i])
         for j in range(size):
             matrix[i, j] /= largest
             squares += matrix[i, j] * matrix[i, j]
+        # the least length counts as one entry of it
         for j in range(size):
-            matrix[i, j] /= math.sqrt(squares)
+            matrix[i, j] /= max(math.sqrt(squares), 1.0)
         # in general position: no symmetry of a model makes it orthogonal to a null vector
         right[i] = 0.5 + (0.6180339887498949 * (i + 1)) % 1.0
         total += right[i] * right[i]

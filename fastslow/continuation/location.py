@@ -24,6 +24,14 @@ Curve = Callable[[Array], tuple[Array, Array]]
 #: thirty times as fast.
 LARGE = 60
 
+#: Components below this part of the scale are left over by Newton's method where the solution
+#: is zero: each step reduces them by a factor.
+DUST = 1e-20
+
+#: Part of the scale beside a point at which the slopes of a rate are looked at as well, to know
+#: their size where they vanish.
+REACH = 0.1
+
 
 @dataclass(frozen=True)
 class Located:
@@ -86,8 +94,12 @@ def newton(
         if size < 1e-15 or (size < 1e-9 and size >= 0.5 * least):
             break
         least = size
-    z = without_dust(z, scale)
-    value = equations(z)
+    flushed = flush_to_zero(z, scale)
+    value, known = equations(flushed), value
+    if grown(value, known, np.abs(matrix) @ np.abs(z)):
+        value = known
+    else:
+        z = flushed
     residual = float(np.abs(value).max()) if np.all(np.isfinite(value)) else float("inf")
     return z, residual, bool(size < 1e-8 and _balanced(value, matrix, z, scale)), size
 
@@ -98,15 +110,31 @@ def _balanced(value: Array, slopes: Array, u: Array, scale: Array) -> bool:
     return bool(np.all(np.abs(value) <= 1e-9 * terms + 1e-300))
 
 
-def without_dust(u: Array, scale: Array) -> Array:
-    """The point with components far below rounding set to zero.
+def flush_to_zero(u: Array, scale: Array) -> Array:
+    """The point with components far below rounding of the scale set to zero.
+
+    The scale may be wrong: what the equations need is kept, see `grown`. Compiled in
+    `fastslow.continuation.evaluation`.
 
     Examples
     --------
-    >>> without_dust(np.array([1.0, -3e-38]), np.ones(2)).tolist()
+    >>> flush_to_zero(np.array([1.0, -3e-38]), np.ones(2)).tolist()
     [1.0, 0.0]
     """
-    return np.where(np.abs(u) < 1e-20 * scale, 0.0, u)
+    return np.where(np.abs(u) < DUST * scale, 0.0, u)
+
+
+def grown(after: Array, before: Array, terms: Array) -> bool:
+    """Whether a residual has grown by more than rounding in its terms, or is not a number.
+
+    Examples
+    --------
+    >>> one = np.ones(2)
+    >>> grown(np.array([0.0, -1e-9]), 0 * one, one), grown(1e-30 * one, 0 * one, one)
+    (True, False)
+    """
+    allowed = np.abs(before) + 2.3e-16 * terms
+    return bool(np.any(~(np.abs(after) <= allowed)))
 
 
 def _solved(matrix: Array, right: Array) -> Array:
@@ -165,8 +193,13 @@ def with_condition(
         if size < 1e-16 or (size < 1e-10 and size >= 0.5 * least):
             break
         least = size
-    u = without_dust(u, scale)
     right = np.append(curve(u)[0], condition(u)[0])
+    flushed = flush_to_zero(u, scale)
+    known, right = right, np.append(curve(flushed)[0], condition(flushed)[0])
+    if grown(right, known, np.abs(matrix / scale) @ np.abs(u)):
+        right = known
+    else:
+        u = flushed
     converged = bool(size < 1e-8 and _balanced(right, matrix / scale, u, scale))
     return Located(u, float(np.abs(right).max()), converged, np.empty(0), size)
 
@@ -291,15 +324,24 @@ def _pair_near(matrix: Array, squared: float) -> tuple[Array, Array, float]:
 
 
 def branch_point(curve: Curve, start: Array, scale: Array) -> Located:
-    """F + βψ = 0, [F_x F_p]ᵀψ = 0, |ψ| = 1; β = 0 at a true branch point (``extra`` is (β,))."""
+    """F + βψ = 0, [F_x F_p]ᵀψ = 0, |ψ| = 1; β = 0 at a true branch point (``extra`` is (β,)).
+
+    Each rate is in units of its largest slope around the start (`slope_sizes`).
+    """
     n = len(start) - 1
-    left, _, _ = np.linalg.svd(curve(start)[1] * scale)
+    sizes = slope_sizes(curve, start, scale)
+    slopes = curve(start)[1] * scale / sizes[:, None]
+    if not np.isfinite(slopes).all():
+        # the motion is not defined there, as that along a discontinuity at a two-fold
+        return Located(start, np.inf, False, np.array([np.nan]), np.inf)
+    left, _, _ = np.linalg.svd(slopes)
     guide = left[:, -1]
 
     def equations(z: Array) -> Array:
         value, slopes = curve(z[: n + 1])
         psi, beta = z[n + 1 : 2 * n + 1], z[-1]
-        return np.concatenate([value + beta * psi, scale * (slopes.T @ psi), [guide @ psi - 1.0]])
+        across = scale * ((slopes / sizes[:, None]).T @ psi)
+        return np.concatenate([value / sizes + beta * psi, across, [guide @ psi - 1.0]])
 
     z, residual, converged, size = newton(
         equations,
@@ -310,6 +352,18 @@ def branch_point(curve: Curve, start: Array, scale: Array) -> Located:
     return Located(z[: n + 1], residual, converged, z[-1:], size)
 
 
+def slope_sizes(curve: Curve, u: Array, scale: Array) -> Array:
+    """Largest slope of each rate at a point and `REACH` of the scale beside it, shape (n,).
+
+    At a branch point in an invariant plane all slopes of one rate vanish, so that its size
+    there is none.
+    """
+    moves = np.vstack([np.zeros(len(u)), REACH * np.diag(scale), -REACH * np.diag(scale)])
+    slopes = np.array([np.abs(curve(u + move)[1] * scale).max(axis=1) for move in moves])
+    size = np.where(np.isfinite(slopes), slopes, 0.0).max(axis=0)
+    return np.where(size > 0, size, 1.0)
+
+
 def crossing_tangents(curve: Curve, u: Array, scale: Array) -> Array | None:
     """Tangents of the two curves that cross at a branch point, shape (2, n + 1).
 
@@ -318,13 +372,14 @@ def crossing_tangents(curve: Curve, u: Array, scale: Array) -> Array | None:
     not cross with different tangents.
     """
     n = len(u) - 1
-    matrix = curve(u)[1] * scale
+    units = scale / slope_sizes(curve, u, scale)[:, None]
+    matrix = curve(u)[1] * units
     left, _, right = np.linalg.svd(matrix)
     psi, plane = left[:, -1], right[-2:]
     step = 1e-4
 
     def bent(along: Array) -> Array:
-        ahead, back = (curve(u + k * step * scale * along)[1] * scale for k in (1, -1))
+        ahead, back = (curve(u + k * step * scale * along)[1] * units for k in (1, -1))
         return np.asarray(psi @ (ahead - back) / (2.0 * step))
 
     first, second = bent(plane[0]), bent(plane[1])

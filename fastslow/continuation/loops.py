@@ -10,6 +10,7 @@ from fastslow.compiled.generic import load_loop
 
 _ENGINE = "fastslow.continuation.engine"
 _EVALUATION = "fastslow.continuation.evaluation"
+_LOCATION = "fastslow.continuation.location"
 _ISOLATION = "fastslow.continuation.isolation"
 _SOURCES = ("fastslow.compiled.pointers",)
 _ARGUMENTS = {
@@ -19,7 +20,7 @@ _ARGUMENTS = {
     ),
     "evaluate": "address modes points parameters width",
     "refine": "address mode parameters start scale row normal point width m iterations",
-    "survey": "address mode parameters points tangents scale width",
+    "survey": "address mode parameters points tangents scale reach width",
     "pairs": "jacobians",
     "passing": "points scale u within",
     "value_at": "address mode point parameters width",
@@ -39,4 +40,4 @@ def loop(name: str) -> Callable[..., Any]:
         return load_loop(_ENGINE, name, arguments, _SOURCES)
     if name == "isolate":
         return load_loop(_ISOLATION, name, arguments, ())
-    return load_loop(_EVALUATION, name, arguments, (_ENGINE, *_SOURCES))
+    return load_loop(_EVALUATION, name, arguments, (_ENGINE, _LOCATION, *_SOURCES))

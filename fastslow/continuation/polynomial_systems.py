@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.loops import loop
+from fastslow.continuation.ordering import in_order
 
 Array = NDArray[np.float64]
 
@@ -63,7 +64,10 @@ class Solutions:
 
 
 def solve_polynomials(
-    equations: Sequence[Terms], ranges: Mapping[int, tuple[float, float]] | None = None
+    equations: Sequence[Terms],
+    ranges: Mapping[int, tuple[float, float]] | None = None,
+    *,
+    bounds: Mapping[int, float] | None = None,
 ) -> Solutions:
     """Isolate every real solution of N polynomial equations in N unknowns.
 
@@ -78,6 +82,8 @@ def solve_polynomials(
         Each from exponents of the N unknowns to an exact coefficient.
     ranges : mapping, optional
         Number of an unknown to the interval in which it is looked for.
+    bounds : mapping, optional
+        Number of an unknown without a range to its largest modulus that is looked at.
 
     Returns
     -------
@@ -93,7 +99,7 @@ def solve_polynomials(
     >>> found.complete, np.round(found.simple, 12).tolist()
     (True, [[-1.0, 1.0], [1.0, 1.0]])
     """
-    ranges = ranges or {}
+    ranges, bounds = ranges or {}, bounds or {}
     count = len(equations)
     nothing, none = np.empty((0, count)), np.empty((0, 2, count))
     if any(len(e) == 0 for e in equations):
@@ -102,8 +108,9 @@ def solve_polynomials(
         return Solutions(nothing, none, True)
     scales, sizes = units(equations, ranges)
     scaled = [_scaled(q, scales, sizes[k]) for k, q in enumerate(equations)]
-    free = [m for m in range(count) if m not in ranges]
+    free = [m for m in range(count) if m not in ranges and m not in bounds]
     limits = {m: tuple(float(Fraction(v) / scales[m]) for v in ranges[m]) for m in ranges}
+    outer = {m: float(Fraction(v) / scales[m]) for m, v in bounds.items()}
     # coefficients far from one leave room for solutions far from their units
     reach = max(abs(math.log10(abs(c))) for q in scaled for c in q.values() if c)
     widest = 200.0 / max(1, *(sum(e) for q in scaled for e in q))
@@ -117,17 +124,16 @@ def solve_polynomials(
     budget = BUDGET
     for chart in _charts(free):
         found = _isolated(
-            [_charted(q, chart) for q in scaled], limits, floor, chart, farthest, budget
+            [_charted(q, chart) for q in scaled], limits, outer, floor, chart, farthest, budget
         )
         if found is None:
             return Solutions(nothing, none, False)
         budget -= found[2]
         points, boxes = found[:2]
         simple += [_back(x, chart) for x in points]
-        for low, high in boxes:
-            corners = np.array(
-                [_back(x, chart) for x in itertools.product(*zip(low, high, strict=True))]
-            )
+        sides = np.array(list(itertools.product((0, 1), repeat=count)))
+        for box in boxes:
+            corners = _back(box[sides, np.arange(count)], chart)
             clusters.append(np.array([corners.min(axis=0), corners.max(axis=0)]))
     system = [_arrays(q) for q in scaled]
     distinct = _distinct([_polished(system, x) for x in simple], floor, 1e-10)
@@ -140,9 +146,9 @@ def solve_polynomials(
         slack = 1e-9 * floor[m]
         inside &= (distinct[:, m] >= low - slack) & (distinct[:, m] <= high + slack)
     unit = np.array([float(s) for s in scales])
-    order = sorted(map(tuple, distinct[inside] * unit))
+    within = distinct[inside]
     return Solutions(
-        np.array(order).reshape(-1, count),
+        within[in_order(within, np.ones(count))] * unit,
         merged * unit,
         bool(np.all(width[:, decisive] <= RESOLUTION)),
     )
@@ -151,6 +157,7 @@ def solve_polynomials(
 def _isolated(
     equations: Sequence[Mapping[tuple[int, ...], float]],
     limits: Mapping[int, tuple[float, ...]],
+    bounds: Mapping[int, float],
     floor: Array,
     chart: tuple[int, ...],
     farthest: float,
@@ -175,13 +182,15 @@ def _isolated(
             least = 1.0 / farthest if m == chart[0] else COMPARABLE
             intervals.append([(-1.0, -least), (least, 1.0)])
         else:
-            outer, inner = COMPARABLE * farthest if chart else 1.0, float(floor[m])
+            outer = bounds.get(m, COMPARABLE * farthest if chart else 1.0)
+            inner = min(float(floor[m]), 0.5 * outer)
             intervals.append([(-outer, -inner), (-inner, inner), (inner, outer)])
     boxes = np.array(list(itertools.product(*intervals)))
     most = budget // (count * size)
     free = np.array([m not in limits for m in range(count)])
     inverse = chart[0] if chart else -1
-    small = np.array([bool(chart) and m not in limits and m not in chart for m in range(count)])
+    fixed = {*limits, *bounds, *chart}
+    small = np.array([bool(chart) and m not in fixed for m in range(count)])
     simple, clusters, looked_at = loop("isolate")(
         power, degrees, np.ascontiguousarray(boxes[:, :, 0]),
         np.ascontiguousarray(boxes[:, :, 1]), free, floor, NARROWEST, most,
@@ -215,12 +224,12 @@ def _charted(
     return found
 
 
-def _back(point: Sequence[float], chart: tuple[int, ...]) -> Array:
-    """A point of a chart in the unknowns themselves."""
-    x = np.array(point, dtype=float)
+def _back(points: Array, chart: tuple[int, ...]) -> Array:
+    """Points of a chart, shape (…, N), in the unknowns themselves."""
+    x = np.array(points, dtype=float)
     if chart:
-        x[list(chart)] /= point[chart[0]]
-        x[chart[0]] = 1.0 / point[chart[0]]
+        x[..., list(chart)] /= points[..., chart[:1]]
+        x[..., chart[0]] = 1.0 / points[..., chart[0]]
     return x
 
 
@@ -350,19 +359,18 @@ def _distinct(points: Sequence[Array], floor: Array, within: float) -> Array:
 
 def _merged(boxes: Sequence[Array], floor: Array) -> Array:
     """Boxes that touch each other as one, which holds them."""
-    kept: list[Array] = []
+    kept = np.empty((0, 2, len(floor)))
     for box in boxes:
         here = box
         while True:
             slack = 1e-9 * np.maximum(np.abs(here).max(axis=0), floor)
-            touching = [
-                k
-                for k, other in enumerate(kept)
-                if np.all((other[0] <= here[1] + slack) & (here[0] <= other[1] + slack))
-            ]
-            if not touching:
+            touching = np.all(
+                (kept[:, 0] <= here[1] + slack) & (here[0] <= kept[:, 1] + slack), axis=1
+            )
+            if not touching.any():
                 break
-            joined = [here, *(kept.pop(k) for k in reversed(touching))]
-            here = np.array([np.min(joined, axis=0)[0], np.max(joined, axis=0)[1]])
-        kept.append(here)
-    return np.array(kept).reshape(-1, 2, len(floor))
+            joined = np.vstack([here[None], kept[touching]])
+            here = np.array([joined[:, 0].min(axis=0), joined[:, 1].max(axis=0)])
+            kept = kept[~touching]
+        kept = np.vstack([kept, here[None]])
+    return kept

@@ -24,6 +24,17 @@ Array = NDArray[np.float64]
 Power = tuple[int, ...]
 
 
+#: A combination of critical eigenvalues that is off another one by less, relative to them, is it.
+RESONANT = 1e-9
+
+#: A coefficient below this part of the largest one of its order is zero but for rounding.
+VANISHING = 1e-10
+
+
+class NoNormalForm(Exception):
+    """Coefficients that are undefined at a point; says which and why."""
+
+
 @dataclass(frozen=True, eq=False)
 class Manifold:
     """Critical eigenvalues with their eigenvectors, and which monomials are resonant.
@@ -56,20 +67,27 @@ def generalized_hopf(
     return {"l2": float(g[0][3, 2].real / frequency)}
 
 
-def zero_hopf(field: FrozenField, region: int, u: Array, frequency: float) -> dict[str, float]:
+def zero_hopf(
+    field: FrozenField, region: int, u: Array, frequency: float, unit: Array | float = 1.0
+) -> dict[str, float]:
     """Coefficients s, θ and E of a zero-Hopf point.
 
     Of ẋ = x² + s r², ṙ = θ x r + E x² r up to scaling (Kuznetsov 2004, section 8.5; E is that
     of the amplitudes for eigenvectors of length one): s = sign(ab), θ = Re e/(2a) and
     E = Re f + Re e (Re g/b + d/(2b) − 3c/(2a)) − a Re g/b in the Poincaré normal form
     ẇ₀ = a w₀² + b|w₁|² + c w₀³ + d w₀|w₁|², ẇ₁ = iω w₁ + e w₀w₁ + f w₀²w₁ + g w₁|w₁|².
+    ``unit`` is the size of every state. Raises NoNormalForm where a or b vanishes.
     """
     manifold = _manifold(field, region, u, [0.0, 1j * frequency, -1j * frequency], _zero_hopf)
     zero, pair, _ = _normal_form(field, region, u, manifold, 3)
     a, b, c, d = (zero[p].real for p in ((2, 0, 0), (0, 1, 1), (3, 0, 0), (1, 1, 1)))
     e, f, g = (pair[p].real for p in ((1, 1, 0), (2, 1, 0), (0, 2, 1)))
-    if a == 0 or b == 0:
-        return {}
+    # with both amplitudes in units of the states
+    one, two = (np.linalg.norm(manifold.right[:, k] / unit) for k in (0, 1))
+    terms = {"a": abs(a) / one, "b": abs(b) * one / two**2, "e": abs(e) / one}
+    for name in ("a", "b"):
+        if terms[name] <= VANISHING * max(terms.values()):
+            raise NoNormalForm(f"s, theta and E undefined because {name} = 0")
     return {
         "s": float(np.sign(a * b)),
         "theta": float(e / (2.0 * a)),
@@ -78,12 +96,17 @@ def zero_hopf(field: FrozenField, region: int, u: Array, frequency: float) -> di
 
 
 def double_hopf(
-    field: FrozenField, region: int, u: Array, frequencies: tuple[float, float]
+    field: FrozenField,
+    region: int,
+    u: Array,
+    frequencies: tuple[float, float],
+    unit: Array | float = 1.0,
 ) -> dict[str, float]:
     """Coefficients p₁₁, p₁₂, p₂₁, p₂₂ with θ = p₁₂/p₂₂ and δ = p₂₁/p₁₁, faster pair first.
 
     Of ṙ₁ = r₁ (p₁₁ r₁² + p₁₂ r₂²), ṙ₂ = r₂ (p₂₁ r₁² + p₂₂ r₂²) (Kuznetsov 2004,
-    section 8.6, equations 8.89 and 8.90), for eigenvectors of length one.
+    section 8.6, equations 8.89 and 8.90), for eigenvectors of length one. Where p₁₁ or p₂₂
+    vanishes θ and δ are left out. ``unit`` is the size of every state.
     """
     fast, slow = sorted(frequencies, reverse=True)
     values = [1j * fast, -1j * fast, 1j * slow, -1j * slow]
@@ -91,24 +114,27 @@ def double_hopf(
     g = _normal_form(field, region, u, manifold, 3)
     p11, p12 = g[0][2, 1, 0, 0].real, g[0][1, 0, 1, 1].real
     p21, p22 = g[2][1, 1, 1, 0].real, g[2][0, 0, 2, 1].real
-    if p11 == 0 or p22 == 0:
-        return {}
     numbers = {"p11": p11, "p12": p12, "p21": p21, "p22": p22}
-    numbers |= {"theta": p12 / p22, "delta": p21 / p11}
+    one, two = (np.linalg.norm(manifold.right[:, k] / unit) ** 2 for k in (0, 2))
+    sizes = np.abs([p11 / one, p22 / two, p12 / two, p21 / one])
+    if sizes[:2].min() > VANISHING * sizes.max():
+        numbers |= {"theta": p12 / p22, "delta": p21 / p11}
     return {name: float(value) for name, value in numbers.items()}
 
 
-def bogdanov_takens(field: FrozenField, region: int, u: Array) -> dict[str, float]:
+def bogdanov_takens(
+    field: FrozenField, region: int, u: Array, unit: Array | float = 1.0
+) -> dict[str, float]:
     """Coefficients a and b of ẇ₀ = w₁, ẇ₁ = a w₀² + b w₀w₁ at a Bogdanov-Takens point.
 
     a = ½ ⟨p₁, B(q₀, q₀)⟩, b = ⟨p₀, B(q₀, q₀)⟩ + ⟨p₁, B(q₀, q₁)⟩ with J q₀ = 0, J q₁ = q₀,
     Jᵀp₁ = 0, Jᵀp₀ = p₁, |q₀| = 1, ⟨q₀, q₁⟩ = 0, ⟨p₀, q₀⟩ = ⟨p₁, q₁⟩ = 1, ⟨p₀, q₁⟩ = 0
     (Kuznetsov 2005). Both change their sign with the direction of q₀, whose largest
-    component is positive.
+    component is positive. ``unit`` is the size of every state.
     """
     n = field.n
     matrix = field.curve(region, u)[1][:, :n]
-    left, q0 = null_vectors(matrix)
+    left, q0 = null_vectors(matrix, unit)
     bordered = np.block([[matrix, left[:, None]], [q0[None, :], np.zeros((1, 1))]])
     q1 = np.linalg.solve(bordered, np.append(q0, 0.0))[:n]
     p1 = left / (left @ q1)
@@ -134,7 +160,7 @@ def zero_hopf_case(form: dict[str, float]) -> str:
 
 def double_hopf_case(form: dict[str, float]) -> str:
     """Simple (p₁₁p₂₂ > 0) or difficult, with the case of (θ, δ) in Kuznetsov 2004, section 8.6."""
-    if not form:
+    if "theta" not in form:
         return "resonant or degenerate"
     high = max(form["theta"], form["delta"])
     low = min(form["theta"], form["delta"])
@@ -194,10 +220,15 @@ def _manifold(
 def _normal_form(
     field: FrozenField, region: int, u: Array, manifold: Manifold, degree: int
 ) -> list[dict[Power, complex]]:
-    """Coefficients g_{i,α} of all resonant monomials up to a degree, for every amplitude."""
+    """Coefficients g_{i,α} of all resonant monomials up to a degree, for every amplitude.
+
+    Raises NoNormalForm where another eigenvalue is in resonance with the critical ones.
+    """
     n, m = manifold.right.shape
     space = JetSpace(m, degree)
     matrix = field.curve(region, u)[1][:, :n]
+    spectrum = np.linalg.eigvals(matrix)
+    near = RESONANT * np.abs(manifold.values).max()
     amplitudes = np.array([space.variable(k) for k in range(m)])
     # the manifold and the flow on it, as jets
     shape = manifold.right @ amplitudes
@@ -221,7 +252,13 @@ def _normal_form(
                 flow[k, at] = value
             for k in kept:
                 right = right - found[k][power] * manifold.right[:, k]
-            left = manifold.values @ np.array(power) * np.eye(n) - matrix
+            combined = complex(manifold.values @ np.array(power))
+            if np.sum(np.abs(spectrum - combined) <= near) > len(kept):
+                raise NoNormalForm(
+                    f"undefined because of a resonance: {combined:.6g}, a sum of its critical "
+                    "eigenvalues, is an eigenvalue"
+                )
+            left = combined * np.eye(n) - matrix
             columns, rows = manifold.right[:, kept], manifold.left[:, kept].conj().T
             bordered = np.block([[left, columns], [rows, np.zeros((len(kept), len(kept)))]])
             shape[:, at] = np.linalg.solve(bordered, np.append(right, np.zeros(len(kept))))[:n]

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from fastslow.continuation import curves
 from fastslow.continuation.curves import Frame
-from fastslow.continuation.location import newton
+from fastslow.continuation.location import newton, slope_sizes
 from fastslow.continuation.settings import Continuation
 from fastslow.continuation.zeros import ROUNDING, Bracket, Node, brackets
 from fastslow.diagrams.center_manifolds import (
+    NoNormalForm,
     bogdanov_takens,
     double_hopf,
     double_hopf_case,
@@ -348,15 +349,19 @@ def smallest_sum(values: Vector) -> tuple[float, float]:
     return float(pair_sums(values, rounding=0.0)), 1.0
 
 
-def smallest_value(matrix: Array) -> float:
+def smallest_value(matrix: Array, rate: Array | float = 0.0) -> float:
     """The smallest singular value of a matrix with rows of length one, with its determinant's sign.
+
+    Rows far shorter than ``rate``, one number or one for each, stay short: in a plane that is
+    invariant for all parameters the whole row of the state that leaves it vanishes.
 
     Parameters
     ----------
     matrix : ndarray, shape (n, n + 2)
         [F_x F_p]; the determinant is that of F_x, a row's length that of all.
     """
-    inner = (matrix / row_sizes(matrix)[:, None])[:, : len(matrix)]
+    size = np.hypot(row_sizes(matrix), rate)
+    inner = (matrix / size[:, None])[:, : len(matrix)]
     least = float(np.linalg.svd(inner, compute_uv=False)[-1])
     return float(np.linalg.slogdet(inner)[0]) * least
 
@@ -406,7 +411,9 @@ def _pair_tests(system: Pair) -> Iterator[Criterion]:
     yield Criterion("GH", lyapunov, hopf, region)
     if n < 3:
         return
-    yield Criterion("ZH", lambda z: (smallest_value(system.at(z)[1]), 1.0), hopf, region)
+    yield Criterion(
+        "ZH", lambda z: (smallest_value(system.at(z)[1], system.rate(z)), 1.0), hopf, region
+    )
     if n < 4:
         return
 
@@ -433,13 +440,22 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
         slopes = field.curve(region, z[:width])[1]
         return np.asarray(slopes * system.scales / system.unit[:, None])
 
+    def least(z: Array) -> Array:
+        sizes = slope_sizes(lambda u: field.curve(region, u), z[:width], system.scales)
+        return sizes / system.unit
+
     def eigenvalues(z: Array) -> Vector:
         return np.linalg.eigvals(matrix(z)[:, :n])
 
     interface = system.interface
     beyond = field.neighbour(region, interface)
     yield Criterion(
-        "BF", lambda z: (smallest_value(matrix(z)), 1.0), _always, region, interface, beyond
+        "BF",
+        lambda z: (smallest_value(matrix(z), least(z)), 1.0),
+        _always,
+        region,
+        interface,
+        beyond,
     )
     sliding = None if beyond is None else _sliding(field, region, beyond)
     if beyond is not None and sliding is not None:
@@ -454,7 +470,7 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
             edge = gradients[interface] * system.scales
             rows = np.column_stack([inner[:, :n], jump / size, inner[:, n:]])
             last = np.concatenate([edge[:n], [0.0], edge[n:]])
-            return smallest_value(np.vstack([rows, last])), 1.0
+            return smallest_value(np.vstack([rows, last]), np.append(least(z), 0.0)), 1.0
 
         yield Criterion("BF", bordered, _always, sliding, interface, region)
     if n < 2:
@@ -496,36 +512,57 @@ def coefficients(system: Defining, found: Found) -> dict[str, Any]:
         return {}
     raw = field.curve(region, u)[1][:, :n]
     if code == "CP":
-        return {"coefficient": cusp_form(forms_at(field, region, u), raw)}
+        return {"coefficient": cusp_form(forms_at(field, region, u), raw, system.unit)}
     values = np.linalg.eigvals(raw)
     if code == "GH":
         frequency = float(np.sqrt(found.z[w]))
-        form = _form(generalized_hopf, field, region, u, frequency)
-        return {"frequency": frequency, "normal_form": form}
+        form = _form(("l2",), generalized_hopf, field, region, u, frequency)
+        return {"frequency": frequency, **form}
     if code == "HH":
         own = float(np.sqrt(found.z[w]))
         others = sorted(values[values.imag > 0].imag, key=lambda f: -abs(f - own))
         other = float(others[0])
-        form = _form(double_hopf, field, region, u, (own, other))
-        return {"frequency": other, "normal_form": form, "subtype": double_hopf_case(form)}
+        listed = ("p11", "p12", "p21", "p22", "theta", "delta")
+        form = _form(listed, double_hopf, field, region, u, (own, other), system.unit)
+        return {"frequency": other, "subtype": double_hopf_case(form["normal_form"]), **form}
     if code == "BT":
-        return {"normal_form": _form(bogdanov_takens, field, region, u)}
-    pair = values[np.argmin(np.where(values.imag > 0, np.abs(values.real / values), np.inf))]
+        return _form(("a", "b"), bogdanov_takens, field, region, u, system.unit)
+    turning = values[values.imag > 0]
+    pair = turning[np.argmin(np.abs(turning.real / turning))]
     frequency = float(abs(pair.imag))
     if code == "BH":
         return {"frequency": frequency}
-    form = _form(zero_hopf, field, region, u, frequency)
-    return {"frequency": frequency, "normal_form": form, "subtype": zero_hopf_case(form)}
+    names = ("s", "theta", "E")
+    form = _form(names, zero_hopf, field, region, u, frequency, system.unit)
+    return {"frequency": frequency, "subtype": zero_hopf_case(form["normal_form"]), **form}
 
 
-def _form(compute: Callable[..., dict[str, float]], *given: Any) -> dict[str, float]:
-    """Coefficients of a normal form, none where it is degenerate or has none."""
+def _form(
+    names: Sequence[str], compute: Callable[..., dict[str, float]], *given: Any
+) -> dict[str, Any]:
+    """Coefficients of a normal form, and which of them are undefined and why."""
+    listed = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+    form: dict[str, float] = {}
+    reason = ""
     try:
         with np.errstate(all="ignore"):
             form = compute(*given)
-    except (np.linalg.LinAlgError, NotImplementedError):
-        return {}
-    return form if all(np.isfinite(list(form.values()))) else {}
+    except NoNormalForm as error:
+        reason = str(error)
+        if reason.startswith("undefined"):
+            reason = f"{listed} {reason}"
+    except np.linalg.LinAlgError:
+        reason = f"{listed} undefined because the equations of the normal form are singular"
+    except NotImplementedError as error:
+        reason = f"{listed} undefined because a rate has no Taylor polynomial here: {error}"
+    if not reason:
+        lost = [n for n in names if not np.isfinite(form.get(n, np.nan))]
+        if lost == ["theta", "delta"]:
+            reason = "theta and delta undefined because p11 or p22 vanishes"
+        elif lost:
+            reason = f"{' and '.join(lost)} undefined because a term is not finite"
+    kept = {n: v for n, v in form.items() if np.isfinite(v)}
+    return {"normal_form": kept, "degeneracy": reason}
 
 
 def along(system: Defining, rows: Array) -> Array:
@@ -541,7 +578,7 @@ def _coefficient(system: Defining, z: Array) -> float:
         return np.nan
     u = z[: system.width]
     raw = system.field.curve(system.region, u)[1][:, : system.n]
-    return fold_form(forms_at(system.field, system.region, u), raw)
+    return fold_form(forms_at(system.field, system.region, u), raw, system.unit)
 
 
 def _lyapunov(system: Pair, z: Array) -> tuple[float, float]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from fractions import Fraction
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 import sympy as sp
@@ -27,6 +30,9 @@ SHORTEST = 1e-8
 #: Size of a resultant up to which its discriminant is formed: its degrees in the unknown, twice,
 #: and in the parameter, times the bits of its coefficients. A few seconds at the most.
 LARGEST = 400_000
+
+#: Halvings of the range until an interval around exact roots is narrow enough.
+HALVINGS = 30
 
 #: Highest degree of a discriminant or resultant in the parameter whose roots are trusted.
 ROOTS = 12
@@ -60,6 +66,17 @@ def critical_values(
         None where the region's equations are no polynomials in few unknowns and the
         parameter, or too large, so that nothing is proved.
     """
+    if equations.factors:
+        values: set[float] = set()
+        for one in equations.factors:
+            # equilibria with different factors meet where one has both
+            others = [e for other in equations.factors for e in other.chosen]
+            apart = [e for e in dict.fromkeys(others) if e not in one.chosen]
+            found = critical_values(one, lower, upper, [*edges, *apart])
+            if found is None:
+                return None
+            values |= set(found)
+        return sorted(values)
     left = equations.elimination
     if equations.impossible:
         return []
@@ -156,6 +173,8 @@ def _isolated(
         found = _meetings(equations, condition, lower, upper)
         if found is None and condition is determinant:
             found = _double_roots(equations, lower, upper)
+        elif found is None and condition is not None:
+            found = _on_edge(equations, condition, lower, upper)
         if found is None:
             return None
         values |= set(found)
@@ -189,6 +208,12 @@ def _meetings(
         return _values([condition], p, lower, upper)
     values: set[float] = set()
     for system in systems:
+        if len(system) == 1:
+            # in the parameter alone, with roots that nearly meet
+            if not system[0]:
+                return None
+            values |= set(_exact_roots([_polynomial(system[0], [p]).as_expr()], p, lower, upper))
+            continue
         solved = solve_polynomials(system, {len(system) - 1: (lower, upper)})
         if not solved.complete:
             return None
@@ -200,11 +225,12 @@ def _meetings(
 
 @lru_cache(maxsize=64)
 def _double_roots(equations: RegionEquations, lower: float, upper: float) -> list[float] | None:
-    """Values at which two equilibria in two unknowns meet, by exact elimination.
+    """Values at which two equilibria in at most two unknowns meet, by exact elimination.
 
     Where the determinant nearly vanishes along branches that run to infinity, folds are not
-    isolated there. Two equilibria that meet are a double root of the resultant R of both rates:
-    they are among the real roots of its discriminant, its leading coefficient and its content.
+    isolated there. Two equilibria that meet are a double root of the resultant R of both rates,
+    or of the only one: they are among the real roots of its discriminant, its leading
+    coefficient and its content.
 
     Returns
     -------
@@ -215,25 +241,18 @@ def _double_roots(equations: RegionEquations, lower: float, upper: float) -> lis
     unknowns = equations.elimination.unknowns
     p = real(equations.field.parameter)
     terms = terms_of(equations.elimination.remaining, [*unknowns, p])
-    if len(unknowns) != 2 or terms is None:
+    if len(unknowns) > 2 or terms is None:
         return None
-    symbols = [*unknowns, p]
-    first, second = (
-        sp.Poly({e: sp.Rational(c.numerator, c.denominator) for e, c in one.items()}, *symbols)
-        .clear_denoms(convert=True)[1]
-        .as_expr()
-        for one in terms
-    )
+    rates = [_polynomial(one, [*unknowns, p]).as_expr() for one in terms]
     smallest: tuple[int, list[sp.Poly]] | None = None
-    for kept, gone in (unknowns, unknowns[::-1]):
-        resultant = sp.Poly(sp.resultant(first, second, gone), kept, p)
+    for kept, *gone in dict.fromkeys((tuple(unknowns), tuple(unknowns[::-1]))):
+        resultant = sp.Poly(sp.resultant(*rates, *gone) if gone else rates[0], kept, p)
         if resultant.is_zero:
             return None
         factors = resultant.factor_list()[1]
         if any(power > 1 and factor.degree(kept) > 0 for factor, power in factors):
             continue
-        bits = max(abs(int(c)).bit_length() for c in resultant.primitive()[1].coeffs())
-        size = resultant.degree(kept) ** 2 * max(resultant.degree(p), 1) * bits
+        size = resultant.degree(kept) ** 2 * max(resultant.degree(p), 1) * _bits(resultant)
         conditions = [factor for factor, _ in factors if factor.degree(kept) == 0]
         whole = sp.Mul(*(factor.as_expr() for factor, _ in factors if factor.degree(kept) > 0))
         if size <= LARGEST and (smallest is None or size < smallest[0]):
@@ -247,19 +266,114 @@ def _double_roots(equations: RegionEquations, lower: float, upper: float) -> lis
     return _exact_roots(conditions, p, lower, upper)
 
 
+@lru_cache(maxsize=512)
+def _on_edge(
+    equations: RegionEquations, edge: sp.Expr, lower: float, upper: float
+) -> list[float] | None:
+    """Values at which an equilibrium is on an edge, by exact elimination.
+
+    Returns
+    -------
+    list of float or None
+        None for more than two unknowns, or a function that is not linear in one of two.
+    """
+    unknowns = equations.elimination.unknowns
+    p = real(equations.field.parameter)
+    terms = terms_of([edge, *equations.elimination.remaining], [*unknowns, p])
+    if terms is None or len(unknowns) > 2:
+        return None
+    edge, *rates = (_polynomial(one, [*unknowns, p]).as_expr() for one in terms)
+    (along, *others) = [x for x in unknowns if edge.has(x)]
+    if others or (len(unknowns) > 1 and sp.degree(edge, along) > 1):
+        return None
+    conditions = [sp.resultant(rate, edge, along) for rate in rates]
+    for other in unknowns:
+        if other != along:
+            conditions = [sp.resultant(*conditions, other)]
+    found = sp.Poly(conditions[0], p)
+    if found.is_zero or found.degree() ** 2 * _bits(found) > LARGEST:
+        return None
+    return _exact_roots([found.as_expr()], p, lower, upper)
+
+
+def _bits(polynomial: sp.Poly) -> int:
+    """Length of the largest coefficient of a polynomial with integer ones, but for a factor."""
+    return max(abs(int(c)).bit_length() for c in polynomial.primitive()[1].coeffs())
+
+
+def _polynomial(terms: Terms, symbols: Sequence[sp.Symbol]) -> sp.Poly:
+    """The polynomial with integer coefficients, up to a factor."""
+    rational = {e: sp.Rational(c.numerator, c.denominator) for e, c in terms.items()}
+    polynomial: sp.Poly = sp.Poly(rational, *symbols).clear_denoms(convert=True)[1]
+    return polynomial
+
+
 def _exact_roots(
     conditions: Sequence[sp.Expr], p: sp.Symbol, lower: float, upper: float
 ) -> list[float]:
-    """Ends of the intervals that isolate the real roots, in a range, of exact polynomials."""
-    low, high = sp.Rational(lower), sp.Rational(upper)
+    """Ends of intervals that hold the real roots, in a range, of exact polynomials.
+
+    Subdivision of Bernstein coefficients in integers: an interval in which they change sign
+    nowhere has no root (Descartes' rule; Lane & Riesenfeld 1981). Intervals that touch are one:
+    between neighbouring ones there is a value without a root.
+    """
     values: set[float] = set()
     for condition in conditions:
         polynomial = sp.Poly(condition, p)
         if polynomial.degree() > 0:
-            for factor, _ in polynomial.factor_list()[1]:
-                for (a, b), _ in factor.intervals(inf=low, sup=high):
-                    values |= {float(a), float(b)}
+            powers = [Fraction(int(c.p), int(c.q)) for c in reversed(polynomial.all_coeffs())]
+            for a, b in _root_intervals(powers, Fraction(lower), Fraction(upper)):
+                values |= {a, b}
     return sorted(values)
+
+
+def _root_intervals(
+    powers: Sequence[Fraction], lower: Fraction, upper: Fraction
+) -> list[tuple[float, float]]:
+    """Intervals of a dyadic subdivision that may hold roots, from below, none touching."""
+    degree = len(powers) - 1
+    # over the unit interval: Horner's scheme in lower + t (upper − lower)
+    shifted = [Fraction(0)]
+    for power in reversed(powers):
+        moved = [lower * c for c in shifted] + [Fraction(0)]
+        for k, c in enumerate(shifted):
+            moved[k + 1] += (upper - lower) * c
+        moved[0] += power
+        shifted = moved
+    shifted = shifted[: degree + 1]
+    bernstein = [
+        sum(Fraction(math.comb(j, i), math.comb(degree, i)) * shifted[i] for i in range(j + 1))
+        for j in range(degree + 1)
+    ]
+    common = math.lcm(*(c.denominator for c in bernstein))
+    waiting = [(0, 0, [int(c * common) for c in bernstein])]
+    found: list[list[Fraction]] = []
+    while waiting:
+        level, number, coefficients = waiting.pop()
+        signs = [c > 0 for c in coefficients if c]
+        changes = any(one != other for one, other in pairwise(signs))
+        if not changes and coefficients[0] and coefficients[-1]:
+            continue
+        if level == HALVINGS or not changes:
+            ends = [Fraction(number, 2**level), Fraction(number + 1, 2**level)]
+            if not changes:
+                # a root at an end alone
+                ends = [e for e, c in zip(ends, coefficients[::degree], strict=True) if not c]
+            if found and ends[0] <= found[-1][-1]:
+                found[-1][-1] = max(found[-1][-1], ends[-1])
+            else:
+                found.append([ends[0], ends[-1]])
+            continue
+        left, rest = [coefficients[0] << degree], coefficients
+        right = [coefficients[-1] << degree]
+        for k in range(1, degree + 1):
+            rest = [a + b for a, b in pairwise(rest)]
+            left.append(rest[0] << (degree - k))
+            right.append(rest[-1] << (degree - k))
+        waiting.append((level + 1, 2 * number + 1, right[::-1]))
+        waiting.append((level + 1, 2 * number, left))
+    wide = upper - lower
+    return [(float(lower + a * wide), float(lower + b * wide)) for a, b in found]
 
 
 def _at_infinity(rates: list[Terms], ranges: dict[int, tuple[float, float]]) -> list[list[Terms]]:

@@ -12,14 +12,27 @@ from fastslow.continuation.location import Located, branch_point, fold, turning_
 from fastslow.diagrams.brackets import Search
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.normal_forms import first_lyapunov, fold_form, forms_at
-from fastslow.diagrams.row_tests import ROUNDING, RowTests, pair_sums, product_of_pair, resolved
+from fastslow.diagrams.row_tests import (
+    ROUNDING,
+    RowTests,
+    divided,
+    pair_sums,
+    product_of_pair,
+    resolved,
+)
 from fastslow.diagrams.walking import Piece, Window
+from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.unexplained import unexplained_rows, unstable_range
 
 Array = NDArray[np.float64]
 
 #: How often a bracket of a Hopf point is narrowed before Newton's method for it is tried,
 #: which costs as much as dozens of evaluations where there are many states.
 NARROWED_FIRST = 3
+
+#: How often the steps are divided whose special points do not explain how many eigenvalues are
+#: unstable: neutral saddles may hide a Hopf point among them.
+DIVISIONS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +62,38 @@ def special_points(
         The finite ones of its rows.
     """
     piece, tests = resolved(field, piece, window)
+    found = _between_rows(field, piece, window, tests, marks)
+    for _ in range(DIVISIONS):
+        finer = piece
+        # from the last step on, so that the rows before it keep their numbers
+        for first, last in reversed(_unexplained(tests.eigenvalues, found)):
+            finer = divided(field, finer, window, first, last)
+        if len(finer.u) == len(piece.u):
+            break
+        piece, tests = resolved(field, finer, window)
+        found = _between_rows(field, piece, window, tests, marks)
+    return found, piece, tests.eigenvalues
+
+
+def _unexplained(
+    eigenvalues: NDArray[np.complex128], found: Sequence[Detected]
+) -> list[tuple[int, int]]:
+    """Pairs of rows between which the number of unstable eigenvalues changes unexplained."""
+    low, high = unstable_range(eigenvalues)
+    known = [d for d in found if POINT_TYPES[d.code].changes_stability]
+    # a row for every point, at which the number is undecided
+    places = [d.row + 1 for d in known]
+    row_of = np.insert(np.arange(len(low)), places, -1)
+    points = np.flatnonzero(row_of < 0).tolist()
+    steps = {k: [POINT_TYPES[d.code].unstable] for k, d in zip(points, known, strict=True)}
+    rows = unexplained_rows(np.insert(low, places, 0), np.insert(high, places, high.max()), steps)
+    return [(int(row_of[since]), int(row_of[row])) for since, row in rows]
+
+
+def _between_rows(
+    field: FrozenField, piece: Piece, window: Window, tests: RowTests, marks: Sequence[float]
+) -> list[Detected]:
+    """All special points between the rows of a piece, in order along it."""
     found = [
         *_folds(field, piece, window, tests),
         *_branch_points(field, piece, window, tests),
@@ -64,8 +109,7 @@ def special_points(
         if d.code != "LP"
         or all(np.abs((d.located.u - c) / window.scale).max() > 1e-4 for c in crossings)
     ]
-    found = sorted(found, key=lambda d: (d.row, _ahead(d.located.u, piece, d.row, window)))
-    return found, piece, tests.eigenvalues
+    return sorted(found, key=lambda d: (d.row, _ahead(d.located.u, piece, d.row, window)))
 
 
 def _folds(field: FrozenField, piece: Piece, window: Window, tests: RowTests) -> Iterator[Detected]:
@@ -80,7 +124,9 @@ def _folds(field: FrozenField, piece: Piece, window: Window, tests: RowTests) ->
         located = search.solve(bracket, lambda u: fold(curve, u, window.scale))
         if located is not None:
             jacobian = curve(located.u)[1][:, : field.n]
-            coefficient = fold_form(forms_at(field, piece.region, located.u), jacobian)
+            coefficient = fold_form(
+                forms_at(field, piece.region, located.u), jacobian, window.scale[:-1]
+            )
             yield Detected(bracket.row, "LP", located, coefficient=coefficient)
 
 

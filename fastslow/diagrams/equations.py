@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -13,12 +15,15 @@ import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.continuation.loops import loop
+from fastslow.continuation.ordering import in_order
 from fastslow.continuation.polynomial_systems import FARTHEST, Terms, solve_polynomials
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.modes import Sides
+from fastslow.model.rational import exact
 from fastslow.model.structure import real
 from fastslow.results.angles import apart
 from fastslow.symbolic.elimination import Elimination, eliminate
+from fastslow.symbolic.lowering import lower_degrees
 
 Array = NDArray[np.float64]
 
@@ -31,31 +36,45 @@ COST = 1.6e8
 #: Starts that are tried in any case.
 FEWEST = 10
 
+#: Residual of a rate at an equilibrium, relative to the size of its terms.
+RESIDUAL = 1e-9
+
+#: Where rounding of the state changes a rate by more than this part of its natural size, the state
+#: is on a pole.
+POLE = 1e-2
+
+#: Relative to its unit, what rounding in the rates may move the state of an equilibrium by.
+UNCERTAIN = 1e-3
+
+#: A condition on the parameter holds below this part of its terms: rounding of a value.
+VANISHING = 1e-14
+
+#: Batches of starts, as long as each of them finds more.
+BATCHES = 100
+
+#: For every so many equilibria one more batch must find nothing until the search ends.
+FEW = 10
+
+#: The search ends beyond this number of equilibria.
+MANY = 500
+
+#: States nearer to each other than this part of their size are one, as a double root may be off.
+SAME = 1e-8
+
 #: Stands for the weight of the field below in a sliding field.
 SHARE = "(alpha)"
 
 #: Degree up to which the roots of a univariate polynomial are trusted to be complete.
 DEGREE = 60
 
+#: Newton's method moves a solution that is proved by less, in units of its size.
+MOVED = 1e-6
+
 #: Unknowns up to which the roots of a polynomial system are isolated.
 UNKNOWNS = 3
 
-
-def exact(expression: sp.Expr) -> sp.Expr:
-    """With rational numbers in place of floats, so that polynomials divide without remainder.
-
-    Examples
-    --------
-    >>> exact(sp.Float(0.25) * sp.Symbol("x"))
-    x/4
-    """
-    return expression.xreplace({f: _rational(f) for f in expression.atoms(sp.Float)})
-
-
-@lru_cache(maxsize=4096)
-def _rational(number: sp.Float) -> sp.Expr:
-    """A float as the rational number it is written as; searched for once."""
-    return sp.nsimplify(number, rational=True)
+#: Choices of a factor of every rate, up to which each is solved by itself.
+CHOICES = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +139,27 @@ class RegionEquations:
         return tuple(sp.Poly(e, *left.unknowns) for e in left.remaining)
 
     @cached_property
+    def factors(self) -> tuple[FactorEquations, ...]:
+        """The equations for each choice of a factor of every rate, where states are factors.
+
+        A rate x g(x, …) vanishes where x or g does. With several unknowns each choice is
+        solved by itself: of lower degree, and regular where two equilibria meet at x = 0.
+        Empty where there is one choice, or no finite number of solutions for one of them.
+        """
+        if len(self.elimination.unknowns) < 2 or self.impossible:
+            return ()
+        states = tuple(map(real, self.equations))
+        choices = [state_factors(e, states) for e in self.equations.values()]
+        if math.prod(map(len, choices)) > CHOICES:
+            return ()
+        found = tuple(
+            FactorEquations(self.field, self.region, chosen, lowered)
+            for chosen in product(*choices)
+            for lowered in lower_degrees(chosen, states)
+        )
+        return found if len(found) > 1 and all(map(_finite, found)) else ()
+
+    @cached_property
     def _coefficients(self) -> list[list[tuple[tuple[int, ...], Any]]]:
         """Exponents in every equation of the system, and their coefficients over the parameter."""
         assert self.system is not None
@@ -153,30 +193,43 @@ class RegionEquations:
             return list(left.remaining)
         return None
 
-    def solutions(self, value: float) -> tuple[list[Array], bool]:
+    def solutions(
+        self, value: float, bounds: Mapping[str, float] | None = None
+    ) -> tuple[list[Array], bool]:
         """Isolated equilibria of the region's rates at a value, and whether these are all.
 
-        Admissible or not.
+        Admissible or not; those in which the modulus of no state exceeds its bound.
         """
-        left = self.elimination
-        if not left.unknowns:
+        if not self.factors:
+            found, complete = self._known(value, bounds or {})
+        else:
+            found, complete = [], True
+            for equations in self.factors:
+                states, sure = equations._known(value, bounds or {})
+                found += [s for s in states if not any(self.same(s, o, value) for o in found)]
+                complete &= sure
+            found = [found[k] for k in in_order(found, self.unit(value))]
+        return (found, True) if complete else (self._searched(value, found), False)
+
+    def _known(self, value: float, bounds: Mapping[str, float]) -> tuple[list[Array], bool]:
+        """What is found without a search, and whether these are all."""
+        if not self.elimination.unknowns:
             return self._holding(value, self._whole(value)), True
         if self._conditions is not None or self.impossible:
             return [], True
-        if self.system is not None:
-            found, complete = self._isolated(value)
-            if complete:
-                return found, True
-            return self._searched(value, found), False
-        return self._searched(value), False
+        return self._isolated(value, bounds) if self.system is not None else ([], False)
 
-    def _isolated(self, value: float) -> tuple[list[Array], bool]:
+    def _isolated(self, value: float, bounds: Mapping[str, float]) -> tuple[list[Array], bool]:
         """All solutions of the system, and whether none is missing or undecided."""
+        names = [str(x) for x in self.elimination.unknowns]
         try:
             terms = [{e: c(value) for e, c in q} for q in self._coefficients]
         except (ArithmeticError, ValueError, TypeError):
             return [], False
-        solved = solve_polynomials([{e: c for e, c in q.items() if c} for q in terms])
+        solved = solve_polynomials(
+            [{e: c for e, c in q.items() if c} for q in terms],
+            bounds={m: bounds[name] for m, name in enumerate(names) if name in bounds},
+        )
         states: list[Array] = []
         complete = solved.complete
         middles = solved.clusters.mean(axis=1)
@@ -185,24 +238,40 @@ class RegionEquations:
         for sure, roots in ((True, solved.simple), (False, middles)):
             for root in roots:
                 whole = self._whole(value, *root)
-                fresh = [s for s in (self.corrected(w, value) for w in whole) if s is not None]
+                corrected = (self.corrected(w, value, proved=sure) for w in whole)
+                fresh = [s for s in corrected if s is not None]
                 # what is no equilibrium here is a zero of a denominator, or a two-fold
                 complete &= bool(fresh) or (sure and not self._regular(value, whole))
                 states += [s for s in fresh if not any(self.same(s, o, value) for o in states)]
         return states, complete
 
     def _regular(self, value: float, states: Sequence[Array]) -> bool:
-        """Whether the rates are finite at states and an equilibrium should be there."""
-        return any(
-            np.isfinite(self.field.curve(self.region, np.append(s, value))[1]).all() for s in states
-        )
+        """Whether the rates are finite at states and an equilibrium should be there.
+
+        A zero of the numerators on a pole is none of the rates: rounding of the state makes them.
+        """
+        natural = self._size(value, self.unit(value))
+        slopes = [self.field.curve(self.region, np.append(s, value))[1] for s in states]
+        with np.errstate(all="ignore"):
+            terms = [np.abs(a[:, :-1]) @ np.abs(s) for a, s in zip(slopes, states, strict=True)]
+        eps = np.finfo(float).eps
+        return any(np.isfinite(t).all() and (eps * t <= POLE * natural).all() for t in terms)
 
     def continuum(self, value: float) -> bool:
         """Whether the region's equilibria at this value form a continuum."""
         if self._conditions is None or self.impossible:
             return False
+        return all(self._vanishes(e, value) for e in self._conditions)
+
+    def _vanishes(self, condition: sp.Expr, value: float) -> bool:
+        """Whether a condition on the parameter alone holds, up to rounding in its terms.
+
+        They are those at the parameter's natural unit where its value is below that.
+        """
         p = real(self.field.parameter)
-        return all(abs(float(e.subs(p, value))) < 1e-14 for e in self._conditions)
+        largest = max(abs(value), self._parameter_unit(0.0))
+        terms = sum(abs(float(e.subs(p, largest))) for e in sp.Add.make_args(sp.expand(condition)))
+        return abs(float(condition.subs(p, value))) <= VANISHING * terms
 
     def continua(self) -> list[float]:
         """Parameter values at which the equilibria of the region form a continuum."""
@@ -240,9 +309,8 @@ class RegionEquations:
 
     def _holding(self, value: float, states: list[Array]) -> list[Array]:
         """Those states at which equations without unknowns hold too."""
-        p = real(self.field.parameter)
-        rest = [float(e.subs(p, value)) for e in self.elimination.remaining]
-        return self._polished(value, states) if all(abs(r) < 1e-14 for r in rest) else []
+        holds = all(self._vanishes(e, value) for e in self.elimination.remaining)
+        return self._polished(value, states) if holds else []
 
     def _polished(self, value: float, states: Sequence[Array]) -> list[Array]:
         """Newton's last digits at fixed parameter; what does not converge was no root."""
@@ -258,6 +326,10 @@ class RegionEquations:
         """Natural unit of each state where the parameter has a value."""
         return self.field.units_at(abs(value))[: self.field.n]
 
+    def _parameter_unit(self, value: float) -> float:
+        """Size of the parameter, its natural unit where it is zero."""
+        return abs(value) or float(self.field.units[self.field.n])
+
     def _size(self, value: float, unit: Array) -> Array:
         """Size of each rate where the states have their units."""
         rates, slopes = self.field.curve(self.region, np.append(unit, value))
@@ -269,11 +341,15 @@ class RegionEquations:
         """Whether two states are equal, but for what a double root may be off."""
         return same(one, other, self.unit(value), self.field.periods)
 
-    def corrected(self, state: Array, value: float) -> Array | None:
-        """The equilibrium near a state at a parameter value, None without convergence."""
+    def corrected(self, state: Array, value: float, *, proved: bool = False) -> Array | None:
+        """The equilibrium near a state at a parameter value, None without convergence.
+
+        Next to one that is proved the rates need not be small beside their slopes: near a pole
+        the terms of both cancel.
+        """
         unit = self.unit(value)
         target = np.append(np.zeros(len(state)), 1.0)
-        scale = np.append(np.maximum(unit, np.abs(state)), max(1.0, abs(value)))
+        scale = np.append(np.maximum(unit, np.abs(state)), self._parameter_unit(value))
         u = np.append(state, value)
         found = self.field.refined(self.region, u, scale, normal=target, point=value * target)
         # at a double root Newton's last corrections stay near the root of the rounding
@@ -283,20 +359,35 @@ class RegionEquations:
         rates, slopes = self.field.curve(self.region, found.u)
         # not of the unit where a state is far below it: a slope that is large because another
         # state is far away would forgive any residual
-        terms = self._size(value, unit) + np.abs(slopes[:, :-1]) @ np.abs(solved)
-        small = np.abs(rates) <= 1e-9 * terms
+        natural, terms = self._size(value, unit), np.abs(slopes[:, :-1]) @ np.abs(solved)
+        small = np.abs(rates) <= RESIDUAL * (natural + terms)
+        if np.any(np.abs(rates) > RESIDUAL * natural):
+            # steep slopes forgive a residual only where they determine the state
+            small &= _determined(slopes[:, :-1], terms, scale[:-1])
         near = np.abs(solved - state) < 1e6 * scale[:-1]
         within = np.abs(solved) <= FARTHEST * np.maximum(unit, np.abs(state))
         there = abs(found.u[-1] - value) <= 1e-12 * scale[-1]
-        return solved if there and small.all() and near.all() and within.all() else None
+        here = bool(np.all(np.abs(solved - state) <= MOVED * scale[:-1]))
+        on_pole = np.any(np.finfo(float).eps * terms > POLE * natural)
+        good = small.all()
+        if proved:
+            good = not on_pole and (good or here)
+        return solved if there and good and near.all() and within.all() else None
 
     def _searched(self, value: float, known: Sequence[Array] = ()) -> list[Array]:
-        """Newton's method from many states, a fixed sequence spread over several scales."""
+        """Newton's method from many states, until no more equilibria are found or it takes long.
+
+        A fixed sequence, spread over several scales in natural units, then in units of what was
+        found. As long as that finds more, half of the next starts have each component from
+        another equilibrium: many equilibria are often nearly products of few values.
+        """
         field, n, unit = self.field, self.field.n, self.unit(value)
         count = starts_tried(n)
         generator = np.random.default_rng(20231)
-        distinct = [np.asarray(k) for k in known]
-        for _ in range(2):
+        distinct = np.reshape([np.asarray(k) for k in known], (-1, n))
+        quiet = 0
+        for batch in range(max(2, min(BATCHES, int(COST / n**3) // count))):
+            before = len(distinct)
             spread = 10.0 ** generator.uniform(-2, 1.5, (count, 1))
             # the size of each state by itself, too
             spread = np.where(
@@ -305,20 +396,50 @@ class RegionEquations:
                 10.0 ** generator.uniform(-3, 3, (count, n)),
             )
             starts = np.vstack([np.zeros(n), unit * generator.standard_normal((count, n)) * spread])
+            if batch > 1:
+                rows = generator.integers(0, before, (count // 2, n))
+                nearby = 1.0 + 0.1 * generator.standard_normal(rows.shape)
+                starts[1::2] = nearby * distinct[rows, np.arange(n)]
             states, converged = loop("newton_from")(
                 field.compiled.address, self.region, field.values, starts, value, unit,
                 field.compiled.size, 100,
             )  # fmt: skip
             for state in field.wrapped(states[converged]):
-                if np.all(np.abs(state) <= FARTHEST * unit) and not any(
-                    _near(state, o, unit, 1e-5, field.periods) for o in distinct
+                if np.all(np.abs(state) <= FARTHEST * unit) and not self._among(
+                    state, distinct, unit, 1e-5
                 ):
-                    distinct.append(state)
-            distinct = self._polished(value, distinct)
+                    polished = self.corrected(state, value)
+                    polished = None if polished is None else field.wrapped(polished)
+                    if polished is not None and not self._among(
+                        polished, distinct, self.unit(value), SAME
+                    ):
+                        distinct = np.vstack([distinct, polished])
+            quiet = quiet + 1 if batch and len(distinct) == before else 0
+            if quiet > len(distinct) / FEW or len(distinct) > MANY:
+                break
             # once more in units of what was found
-            sizes = np.abs(distinct).max(axis=0) if distinct else unit
+            sizes = np.abs(distinct).max(axis=0, initial=0.0)
             unit = np.where(sizes > 0, sizes, unit)
-        return sorted(distinct, key=lambda s: tuple(s))
+        return [distinct[k] for k in in_order(distinct, unit)]
+
+    def _among(self, state: Array, states: Array, unit: Array, within: float) -> bool:
+        """Whether a state is one of several."""
+        return bool(_near(state, states, unit, within, self.field.periods).any())
+
+
+def _determined(slopes: Array, terms: Array, scale: Array) -> bool:
+    """Whether rounding in the terms of the rates leaves the solution of Newton's equations sure.
+
+    The bound is |J⁻¹| |J| |x| times the rounding unit (Skeel 1979). Where a factor such as
+    exp(100) multiplies a difference that rounding makes zero, the slopes of all rates are
+    parallel to rounding, and the other states are free.
+    """
+    matrix = slopes * scale / np.maximum(terms, np.finfo(float).tiny)[:, None]
+    try:
+        inverse = np.linalg.inv(matrix)
+    except np.linalg.LinAlgError:
+        return False
+    return bool(np.abs(inverse).sum(axis=1).max() * np.finfo(float).eps < UNCERTAIN)
 
 
 def _multiple_root(terms: Terms, near: float) -> float:
@@ -376,6 +497,51 @@ def terms_of(expressions: Sequence[sp.Expr], symbols: Sequence[sp.Symbol]) -> li
         polynomial = sp.Poly(expression, *symbols)
         found.append({e: _fraction(c) for e, c in polynomial.terms() if c != 0})
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class FactorEquations(RegionEquations):
+    """The equations of a region for one factor of each rate.
+
+    Parameters
+    ----------
+    chosen : tuple of Expr
+        The factor of the rate of each state.
+    lowered : tuple of Expr
+        Equations of lower degree that imply them.
+    """
+
+    chosen: tuple[sp.Expr, ...]
+    lowered: tuple[sp.Expr, ...]
+
+    @cached_property
+    def equations(self) -> dict[str, sp.Expr]:
+        return dict(zip(self.field.model.states, self.lowered, strict=True))
+
+    @cached_property
+    def factors(self) -> tuple[FactorEquations, ...]:
+        return ()
+
+
+def _finite(equations: RegionEquations) -> bool:
+    """Whether finitely many solutions can be isolated."""
+    left = equations.elimination
+    return equations.impossible or not left.unknowns or equations.system is not None
+
+
+def state_factors(rate: sp.Expr, states: Sequence[sp.Symbol]) -> list[sp.Expr]:
+    """States that are factors of a rate, and the factor without them.
+
+    Examples
+    --------
+    >>> x, y = sp.symbols("x y")
+    >>> state_factors(x * (1 - x) - 2 * x * y, (x, y))
+    [x, -x - 2*y + 1]
+    """
+    bases = [f.as_base_exp() for f in sp.Mul.make_args(sp.factor_terms(rate))]
+    found = [b for b, e in bases if b in states and e.is_positive]
+    rest = sp.Mul(*(b**e for b, e in bases if b not in found))
+    return [*found, rest] if rest.has(*states) or not found else found
 
 
 @dataclass(frozen=True, eq=False)
@@ -441,20 +607,25 @@ class SlidingEquations(RegionEquations):
                 return eliminate(dict(zip(states, crossed, strict=True)), states)
         return None
 
+    @cached_property
+    def factors(self) -> tuple[FactorEquations, ...]:
+        return ()
+
     @property
     def bounds(self) -> list[sp.Expr]:
         functions = super().bounds
         del functions[self._sides.interface]
         return [*functions, *self._drifts]
 
-    def corrected(self, state: Array, value: float) -> Array | None:
+    def corrected(self, state: Array, value: float, *, proved: bool = False) -> Array | None:
         """As for a region; None at a two-fold, where the sliding field is 0/0."""
-        solved = super().corrected(state, value)
+        solved = super().corrected(state, value, proved=proved)
         if solved is None:
             return None
         u = np.append(solved, value)
         _, _, h, slopes = self.field.at(self.region, u)
-        size = np.abs(slopes) @ np.maximum(np.abs(u), 1.0)
+        unit = np.append(self.unit(value), self._parameter_unit(value))
+        size = np.abs(slopes) @ np.maximum(np.abs(u), unit)
         return None if np.all(np.abs(h[-2:]) <= 1e-9 * size[-2:]) else solved
 
 
@@ -462,31 +633,40 @@ def real_roots(coefficients: Array) -> list[float]:
     """Real roots of a polynomial, highest coefficient first, double ones once or twice.
 
     A root counts as real when its imaginary part is within the error that
-    rounding makes at a double root; Newton decides afterwards.
+    rounding makes at a double root, relative to the largest root; Newton decides afterwards.
 
     Examples
     --------
     >>> [round(r, 12) for r in real_roots(np.array([1.0, 0.0, -4.0]))]
     [-2.0, 2.0]
     """
-    size = np.abs(coefficients).max(initial=0.0)
-    if size == 0:
+    leading = np.flatnonzero(coefficients)
+    if len(leading) == 0:
         return []
-    start = int(np.argmax(np.abs(coefficients) > 1e-15 * size))
-    roots = np.roots(coefficients[start:])
-    scale = np.maximum(1.0, np.abs(roots))
-    return sorted(float(r) for r in roots.real[np.abs(roots.imag) < 1e-6 * scale])
+    shares = coefficients[leading[0] :] / coefficients[leading[0]]
+    powers = np.arange(len(shares))
+    # Fujiwara's bound: in this unit no root is beyond two, and no coefficient beyond one
+    bounds = np.abs(shares[1:]) ** (1.0 / powers[1:])
+    unit = float(bounds.max(initial=0.0)) or 1.0
+    roots = np.roots(shares / unit**powers)
+    real = roots.real[np.abs(roots.imag) < 1e-6 * np.maximum(1.0, np.abs(roots))]
+    return sorted(float(unit * r) for r in real)
 
 
-def _near(one: Array, other: Array, unit: Array, within: float, periods: ArrayLike) -> bool:
-    """Whether two states agree modulo periods, relative to each component or to its unit."""
-    gap = np.abs(apart(one, other, periods))
-    return bool(np.all(gap <= within * np.maximum(unit, np.abs(one))))
+def _near(
+    one: Array, others: Array, unit: Array, within: float, periods: ArrayLike
+) -> NDArray[np.bool_]:
+    """Whether states, shape (..., n), agree with one modulo periods.
+
+    Relative to each component of the one, or to its unit.
+    """
+    gap = np.abs(apart(one, others, periods))
+    return np.asarray(np.all(gap <= within * np.maximum(unit, np.abs(one)), axis=-1))
 
 
 def same(one: Array, other: Array, unit: ArrayLike = 1.0, periods: ArrayLike = 0.0) -> bool:
     """Whether two states are equal modulo periods, but for what a double root may be off."""
-    return _near(one, other, np.asarray(unit), 1e-8, periods)
+    return bool(_near(one, other, np.asarray(unit), SAME, periods))
 
 
 @lru_cache(maxsize=64)

@@ -9,7 +9,7 @@ where everything is affine.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from itertools import pairwise, product
 from typing import Any
@@ -17,19 +17,27 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
-from scipy.optimize import brentq, linprog
+from scipy.ndimage import label
+from scipy.optimize import brentq, linprog, minimize
 
-from fastslow.diagrams.equations import exact, real_roots, region_equations
+from fastslow.continuation.ordering import in_order
+from fastslow.diagrams.equations import real_roots, region_equations
 from fastslow.diagrams.fields import IDLE, FrozenField
 from fastslow.model.motions import Motion, motions_of
+from fastslow.model.rational import exact
 from fastslow.model.structure import real
+from fastslow.results.angles import apart, nearest_copy, principal
 from fastslow.results.equilibrium_sets import EquilibriumBand, EquilibriumSet
+from fastslow.results.windows import StateWindow
 from fastslow.symbolic.equilibrium_sets import solved_along
 
 Array = NDArray[np.float64]
 
 #: A set followed over values of the parameter.
 Run = list[tuple[float, EquilibriumSet]]
+
+#: The sets at a value of the parameter.
+SetsAt = Callable[[float], list[EquilibriumSet]]
 
 #: Values of the parameter at which a band is computed, besides its ends.
 ROWS = 129
@@ -40,6 +48,12 @@ FEWER = 33
 #: Where ends are searched for in the free state if no polynomial gives them: from minus to
 #: plus this, in the natural unit of the state.
 REACH = 10.0
+
+#: An unbounded interval is judged at a place this many natural units from its end.
+FAR = 1e3
+
+#: Error of an end that is searched for, as a part of the range that is searched.
+XTOL = 1e-15
 
 #: Places in between at which functions that are no polynomials are looked at.
 PLACES = 1001
@@ -52,6 +66,16 @@ EDGE = 1e-6
 
 #: What counts as zero, relative to the size of the terms.
 SMALL = 1e-9
+
+#: Places along each free state, by their number, of the grid on which a set is filled; odd,
+#: so that the first place is one of them.
+FILLED = {2: 81, 3: 31}
+
+#: Half the width of the first of these grids, in units of the states; doubled up to `REACH`.
+FIRST = 1e-3
+
+#: Copies of a set, shifted by whole periods, differ by less than this part of the period.
+COPY = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,8 +164,29 @@ class Family:
         """One of the bounds at a value of the only free state."""
         return float(self.values(value, free)[number])
 
+    def _units(self, value: float) -> Array:
+        """Natural unit of each free state, shape (d,)."""
+        names = self.field.model.states
+        return self.field.units_at(abs(value))[[names.index(c.name) for c in self.free]]
+
     def sets(self, value: float) -> list[EquilibriumSet]:
-        """The sets at a value of the parameter, those of dimension 1 from below to above."""
+        """The sets at a value of the parameter, those of dimension 1 from below to above.
+
+        Of copies that are whole periods apart one, with its middle in the principal range.
+        """
+        periods = self.field.periods
+        found = self._sets(value)
+        if not periods.any():
+            return found
+        kept: list[EquilibriumSet] = []
+        for one in found:
+            moved = _aligned(one, principal(_middle(one), periods), periods)
+            if not any(_copies(moved, other, periods) for other in kept):
+                kept.append(moved)
+        return kept
+
+    def _sets(self, value: float) -> list[EquilibriumSet]:
+        """The sets at a value of the parameter, with copies."""
         if self.dimension == 0:
             if not (self.values(value) >= -SMALL).all():
                 return []
@@ -214,12 +259,15 @@ class Family:
         """Ranges of the states by linear programming, corners by solving for the weights."""
         d = self.dimension
         origin, base = self.values(value, *[0.0] * d), self.state(value, *[0.0] * d)
-        units = np.eye(d)
-        rows = np.array([self.values(value, *unit) - origin for unit in units]).T
-        moves = np.array([self.state(value, *unit) - base for unit in units]).T
+        # one step is the natural unit of a free state
+        units = self._units(value)
+        rows = np.array([self.values(value, *step) - origin for step in np.diag(units)]).T
+        moves = np.array([self.state(value, *step) - base for step in np.diag(units)]).T
         if d == 1:
             ends = _interval(origin, rows[:, 0])
-            return None if ends is None else self._interval(value, *ends)
+            if ends is None:
+                return None
+            return self._interval(value, ends[0] * units[0], ends[1] * units[0])
         size = np.maximum(np.abs(rows).max(axis=1), np.finfo(float).tiny)
         system, right = -rows / size[:, None], origin / size
         lower, upper = base.copy(), base.copy()
@@ -233,7 +281,7 @@ class Family:
                 if found.status == 2:
                     return None
                 into[k] = -sign * np.inf if found.status == 3 else base[k] + move @ found.x
-        corners = list(self._corners(rows, origin))
+        corners = [tuple((units * c).tolist()) for c in self._corners(rows, origin)]
         states = [self.state(value, *free) for free in corners]
         middle = tuple(np.mean(corners, axis=0)) if corners else (0.0,) * d
         return self._made(value, middle, lower, upper, np.array(states or [base]))
@@ -259,17 +307,23 @@ class Family:
                 ends += real_roots(np.atleast_1d(np.array(coefficients(value), dtype=float)))
             ends = [-np.inf, *sorted(set(ends)), np.inf]
         else:
-            k = self.field.model.states.index(self.free[0].name)
-            reach = REACH * float(self.field.units_at(abs(value))[k])
+            # a set with its middle in the principal range ends within a period of zero
+            period = self.field.periods[self.field.model.states.index(self.free[0].name)]
+            reach = float(period or REACH * self._units(value)[0])
             grid = np.linspace(-reach, reach, PLACES)
-            for number, row in enumerate(self.values(value, grid)):
+            table = self.values(value, grid)
+            if (table >= 0).all():
+                return [(-np.inf, np.inf)]
+            for number, row in enumerate(table):
                 for i in np.flatnonzero(row[1:] * row[:-1] < 0):
                     bound = partial(self._bound, value, number)
-                    ends.append(float(brentq(bound, grid[i], grid[i + 1])))
+                    fine = XTOL * reach
+                    ends.append(float(brentq(bound, grid[i], grid[i + 1], xtol=fine)))
             ends = sorted(set(ends))
         inside = []
+        far = FAR * float(self._units(value)[0])
         for low, high in pairwise(ends):
-            place = 0.5 * (max(low, min(high, 0.0) - 1e3) + min(high, max(low, 0.0) + 1e3))
+            place = 0.5 * (max(low, min(high, 0.0) - far) + min(high, max(low, 0.0) + far))
             if (self.values(value, place) >= 0).all():
                 inside.append((low, high))
         joined: list[tuple[float, float]] = []
@@ -309,11 +363,11 @@ class Family:
     def _searched(self, value: float) -> list[EquilibriumSet]:
         """Sets of several dimensions: from where all weights vanish to the faces of the cube.
 
-        The ranges are those of the places reached on a grid on the faces.
+        The ranges are those of the places reached on a grid on the faces. Where the states
+        are no functions of the weights all the way, the set is filled on a grid instead.
         """
         d = self.dimension
-        names = self.field.model.states
-        units = self.field.units_at(abs(value))[[names.index(c.name) for c in self.free]]
+        units = self._units(value)
         line = np.linspace(-1.0, 1.0, 9)
         grid = np.array(list(product(line, repeat=d))) * REACH * units
         middles, found = self._newton(value, grid, np.zeros_like(grid))
@@ -324,8 +378,11 @@ class Family:
                 distinct.append(middle)
         cube = np.array(list(product(np.linspace(-1.0, 1.0, 9 if d == 2 else 5), repeat=d)))
         cube = cube[np.abs(cube).max(axis=1) == 1.0]
-        sets = []
-        for middle in sorted(distinct, key=tuple):
+        sets: list[EquilibriumSet] = []
+        filled: list[_Filled] = []
+        for middle in (distinct[k] for k in in_order(np.reshape(distinct, (-1, d)), units)):
+            if any(one.holds(middle) for one in filled):
+                continue
             if not (self.values(value, *middle) >= 0).all():
                 continue
             places, alive = np.tile(middle, (len(cube), 1)), np.ones(len(cube), dtype=bool)
@@ -335,6 +392,10 @@ class Family:
                 alive &= near
                 places = np.where(alive[:, None], further, places)
                 reached.append(places)
+            if not alive.all() and d in FILLED:
+                filled.append(self._filled(value, middle, units))
+                sets.append(self._polished(value, filled[-1]))
+                continue
             states = np.array([self.state(value, *free) for free in np.concatenate(reached)])
             corner = alive & np.asarray(np.abs(cube).min(axis=1) == 1.0)
             corners = np.array([self.state(value, *free) for free in places[corner]])
@@ -349,6 +410,72 @@ class Family:
             )
         return sets
 
+    def _filled(self, value: float, middle: Array, units: Array) -> _Filled:
+        """The places of a grid around a place that are connected to it within the bounds."""
+        count = FILLED[self.dimension]
+        half, most = FIRST * units, REACH * units
+        while True:
+            axes = [np.linspace(m - h, m + h, count) for m, h in zip(middle, half, strict=True)]
+            places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+            flat = places.reshape(-1, self.dimension)
+            inside = (self.values(value, *flat.T) >= 0).all(axis=0).reshape(places.shape[:-1])
+            parts = label(inside)[0]
+            own = parts == parts[(count // 2,) * self.dimension]
+            ends = [bool(own.take([0, -1], axis=k).any()) for k in range(self.dimension)]
+            touched = np.array(ends, dtype=bool)
+            if not (touched & (half < most)).any():
+                return _Filled(places, own, touched)
+            half = np.where(touched, np.minimum(2.0 * half, most), half)
+
+    def _polished(self, value: float, filled: _Filled) -> EquilibriumSet:
+        """The set whose places of a grid are given, its ranges and corners solved for."""
+        inside, cell = filled.places[filled.own], filled.cell
+        given = self._states(value, *inside.T)
+        states = np.stack(np.broadcast_arrays(*given, inside[:, 0])[:-1], axis=-1)
+        lower, upper = states.min(axis=0), states.max(axis=0)
+        free = [c.name for c in self.free]
+        for k, name in enumerate(self.field.model.states):
+            if name in free and filled.touched[free.index(name)]:
+                lower[k], upper[k] = -np.inf, np.inf
+                continue
+            lower[k] = self._least(value, k, 1.0, inside[np.argmin(states[:, k])], cell)
+            upper[k] = self._least(value, k, -1.0, inside[np.argmax(states[:, k])], cell)
+        weights = np.stack(np.broadcast_arrays(*self._weights(value, *inside.T)[0]), axis=-1)
+        targets = np.array(list(product((-1.0, 1.0), repeat=self.dimension)))
+        starts = np.array([inside[np.argmin(np.abs(weights - t).max(axis=1))] for t in targets])
+        corners, near = self._newton(value, starts, targets)
+        near = np.logical_and(near, (np.abs(corners - starts) <= 4.0 * cell).all(axis=1))
+        middle = inside[len(inside) // 2]
+        chosen = corners[near] if near.any() else middle[None]
+        return self._made(
+            value,
+            tuple(middle.tolist()),
+            lower,
+            upper,
+            np.array([self.state(value, *place) for place in chosen]),
+        )
+
+    def _least(self, value: float, k: int, sign: float, start: Array, cell: Array) -> float:
+        """The end of the range of a state in a set, from the place of a grid next to it."""
+
+        def height(steps: Array) -> float:
+            return sign * float(self.state(value, *(start + steps * cell))[k])
+
+        def bounds(steps: Array) -> Array:
+            return self.values(value, *(start + steps * cell))
+
+        with np.errstate(all="ignore"):
+            found = minimize(
+                height,
+                np.zeros(len(start)),
+                method="SLSQP",
+                constraints={"type": "ineq", "fun": bounds},
+                options={"ftol": 1e-14},
+            )
+            near = np.abs(found.x).max() <= 4.0 and (bounds(found.x) >= -SMALL).all()
+        still = height(np.zeros(len(start)))
+        return sign * (min(height(found.x), still) if near else still)
+
     def contains(self, u: Array, unit: Array | float) -> bool:
         """Whether a point (states, parameter) is in the set, its edges included.
 
@@ -362,6 +489,55 @@ class Family:
         if not np.all(np.abs(state - u[:-1]) <= 10 * near):
             return False
         return bool((self.values(value, *free) >= -EDGE).all())
+
+
+@dataclass(frozen=True, eq=False)
+class _Filled:
+    """Places of a grid, shape (N, …, d), which of them are in a set, and where it goes on."""
+
+    places: Array
+    own: NDArray[np.bool_]
+    touched: NDArray[np.bool_]
+
+    @property
+    def cell(self) -> Array:
+        """Distance between neighbouring places, shape (d,)."""
+        flat = self.places.reshape(-1, self.places.shape[-1])
+        return np.asarray(np.ptp(flat, axis=0) / (self.own.shape[0] - 1))
+
+    def holds(self, place: Array) -> bool:
+        """Whether a place is nearest to one of the set."""
+        first = self.places[(0,) * self.own.ndim]
+        part = np.rint((place - first) / self.cell)
+        if not ((part >= 0) & (part < self.own.shape[0])).all():
+            return False
+        return bool(self.own[tuple(part.astype(int))])
+
+
+def _middle(one: EquilibriumSet) -> Array:
+    """The middle of the ranges, zero of those without both ends."""
+    ends = np.isfinite(one.lower) & np.isfinite(one.upper)
+    return np.where(ends, 0.5 * np.where(ends, one.lower, 0.0), 0.0) + np.where(
+        ends, 0.5 * np.where(ends, one.upper, 0.0), 0.0
+    )
+
+
+def _aligned(one: EquilibriumSet, target: Array, periods: Array) -> EquilibriumSet:
+    """The copy of a set whose middle is nearest to a place; ranges without ends stay."""
+    middle = _middle(one)
+    by = nearest_copy(middle, target, periods) - middle
+    if not by.any():
+        return one
+    return replace(one, lower=one.lower + by, upper=one.upper + by, corners=one.corners + by)
+
+
+def _copies(one: EquilibriumSet, other: EquilibriumSet, periods: Array) -> bool:
+    """Whether two sets are whole periods apart, or none."""
+    if not np.array_equal(np.isfinite(one.lower), np.isfinite(other.lower)):
+        return False
+    away = apart(_middle(one), _middle(other), periods)
+    size = np.where(periods > 0, periods, np.abs(_middle(one)) + np.abs(_middle(other)))
+    return bool((np.abs(away) <= COPY * size).all())
 
 
 def _interval(origin: Array, slope: Array) -> tuple[float, float] | None:
@@ -437,17 +613,20 @@ def sets_of(field: FrozenField, value: float) -> list[EquilibriumSet]:
 def all_known(field: FrozenField) -> bool:
     """Whether no equilibria along several interfaces at once are left out.
 
-    Those of equations that stay implicit, and sets with no way to their ranges, are not
-    looked for; sets that are not exact may not be all.
+    Those of equations that stay implicit, sets with no way to their ranges, and those where
+    no sliding motion is derived are not looked for; sets that are not exact may not be all.
     """
-    return not _implicit(field) and all(f.exact for f in families_of(field))
+    return not _left_out(field) and all(f.exact for f in families_of(field))
 
 
 @lru_cache(maxsize=64)
-def _implicit(field: FrozenField) -> bool:
-    """Whether the equations of a motion along several interfaces stay implicit."""
+def _left_out(field: FrozenField) -> bool:
+    """Whether motions along several interfaces stay implicit, or are not derived."""
     numbers = _numbers(field)
-    for motion in motions_of(field.model).sliding:
+    motions = motions_of(field.model)
+    if motions.undecided:
+        return True
+    for motion in motions.sliding:
         if len(motion.slides) > 1:
             heights = [exact(h).subs(numbers) for h in _heights(field, motion)]
             rates = [exact(r).subs(numbers) for r in motion.rates]
@@ -488,32 +667,48 @@ def in_a_set(field: FrozenField, u: Array, unit: Array | float) -> bool:
     return any(family.contains(u, unit) for family in families_of(field))
 
 
-def bands_of(field: FrozenField, lower: float, upper: float) -> tuple[EquilibriumBand, ...]:
+def bands_of(
+    field: FrozenField, lower: float, upper: float, window: StateWindow
+) -> tuple[EquilibriumBand, ...]:
     """The bands that the sets of equilibria make over a range of the parameter.
 
-    Sets of several dimensions that are searched for are too slow to follow: none of those.
+    A band ends where its set leaves the window. Sets of several dimensions that are
+    searched for are too slow to follow: none of those.
     """
     followed = (f for f in families_of(field) if f.exact or f.dimension < 2)
-    return tuple(b for family in followed for b in _bands(family, lower, upper))
+    return tuple(b for family in followed for b in _bands(family, lower, upper, window))
 
 
-def _bands(family: Family, lower: float, upper: float) -> list[EquilibriumBand]:
+def _bands(
+    family: Family, lower: float, upper: float, window: StateWindow
+) -> list[EquilibriumBand]:
+    def sets_at(value: float) -> list[EquilibriumSet]:
+        return [one for one in family.sets(value) if window.meets(one.lower, one.upper)]
+
+    def after(run: Run, one: EquilibriumSet) -> EquilibriumSet | None:
+        """The copy of a set that goes on with a run, None where it does not."""
+        last = run[-1][1]
+        copy = _aligned(one, _middle(last), family.field.periods)
+        return copy if _meet(last, copy) else None
+
     count = ROWS if family.dimension < 2 else FEWER
     grid = [float(value) for value in np.linspace(lower, upper, count)]
-    rows = [(value, family.sets(value)) for value in grid]
+    rows = [(value, sets_at(value)) for value in grid]
     table = rows[:1]
     for last, now in pairwise(rows):
         if len(last[1]) != len(now[1]):
-            table += _change(family, last, now)
+            table += _change(sets_at, last, now)
         table.append(now)
     done: list[Run] = []
     growing: list[Run] = []
     for value, sets in table:
         following: list[Run] = []
         for one in sets:
-            before = [run for run in growing if _meet(run[-1][1], one)]
-            alone = len(before) == 1 and sum(_meet(before[0][-1][1], s) for s in sets) == 1
-            following.append([*before[0], (value, one)] if alone else [(value, one)])
+            met = [(run, copy) for run in growing if (copy := after(run, one)) is not None]
+            if len(met) == 1 and sum(after(met[0][0], s) is not None for s in sets) == 1:
+                following.append([*met[0][0], (value, met[0][1])])
+            else:
+                following.append([(value, one)])
         kept = {id(run[-2][1]) for run in following if len(run) > 1}
         done += [run for run in growing if id(run[-1][1]) not in kept]
         growing = following
@@ -530,7 +725,7 @@ def _meet(one: EquilibriumSet, other: EquilibriumSet) -> bool:
 
 
 def _change(
-    family: Family,
+    sets_at: SetsAt,
     before: tuple[float, list[EquilibriumSet]],
     after: tuple[float, list[EquilibriumSet]],
 ) -> list[tuple[float, list[EquilibriumSet]]]:
@@ -540,7 +735,7 @@ def _change(
         middle = 0.5 * (before[0] + after[0])
         if not before[0] < middle < after[0]:
             break
-        now = middle, family.sets(middle)
+        now = middle, sets_at(middle)
         if len(now[1]) == len(before[1]):
             before = now
         else:
@@ -549,14 +744,14 @@ def _change(
     parts = [(k / ROUND) ** 2 for k in range(ROUND - 1, 0, -1)]
     left = [before[0] - part * (before[0] - first) for part in parts]
     right = [after[0] + part * (last - after[0]) for part in reversed(parts)]
-    rows = [(value, family.sets(value)) for value in (*left, *right)]
+    rows = [(value, sets_at(value)) for value in (*left, *right)]
     count = len(left)
     return [*rows[:count], before, after, *rows[count:]]
 
 
 def _band(family: Family, run: Run) -> EquilibriumBand:
     def solver(value: float, near: Array) -> EquilibriumSet | None:
-        found = family.sets(value)
+        found = [_aligned(one, near, family.field.periods) for one in family.sets(value)]
         if not found:
             return None
         middles = [np.nan_to_num(0.5 * (s.lower + s.upper)) for s in found]

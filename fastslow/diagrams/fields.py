@@ -12,7 +12,7 @@ import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.compiled.fields import CompiledField, compile_field, parameter_array
-from fastslow.continuation.location import Located, with_condition
+from fastslow.continuation.location import REACH, Located, with_condition
 from fastslow.continuation.loops import loop
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ModelError
@@ -35,6 +35,9 @@ CLOSURE = 1e-9
 
 #: A state below this part of its natural unit may be zero but for rounding.
 DOUBTFUL = 1e-8
+
+#: An equation whose terms are all below this part of the largest is empty but for rounding.
+EMPTY = 1e-14
 
 #: A component of a state below this many times its rounding error counts as zero.
 NOISE = 100.0
@@ -263,7 +266,7 @@ class FrozenField:
     ) -> tuple[Array, Array]:
         branching, jacobians = loop("survey")(
             self.compiled.address, region, self.values, np.ascontiguousarray(points),
-            np.ascontiguousarray(tangents), scale, self.compiled.size,
+            np.ascontiguousarray(tangents), scale, REACH, self.compiled.size,
         )  # fmt: skip
         return branching, jacobians
 
@@ -407,7 +410,9 @@ class FrozenField:
         if not np.isfinite(slopes).all():
             return np.zeros(len(u)), False
         scale = 1.0 / np.sqrt(weight)
-        _, singular, right = np.linalg.svd(slopes * scale)
-        rows = np.abs(slopes * scale).max(initial=0.0)
-        single = bool(singular[-1] > 1e-9 * max(rows, np.finfo(float).tiny))
-        return right[-1] * scale, single
+        matrix = slopes * scale / scale[: self.n, None]
+        # equations of different time scales or units are regular together
+        sizes = np.abs(matrix).max(axis=1, initial=0.0)
+        least = max(EMPTY * sizes.max(initial=0.0), np.finfo(float).tiny)
+        _, singular, right = np.linalg.svd(matrix / np.maximum(sizes, least)[:, None])
+        return right[-1] * scale, bool(singular[-1] > 1e-9)

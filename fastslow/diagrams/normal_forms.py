@@ -26,6 +26,10 @@ Vector = NDArray[Any]  # real or complex
 #: A column below this part of the rows of a singular matrix is zero but for rounding.
 SINGULAR = 1e-13
 
+#: Null vectors of length one with a smaller product are at right angles: the eigenvalue zero
+#: is double. Next to such a point the eigenvalues have half the digits, and the product has.
+DOUBLE = 1e-7
+
 
 @dataclass(frozen=True, eq=False)
 class Multilinear:
@@ -137,26 +141,29 @@ def forms_at(field: FrozenField, region: int, u: Array) -> Multilinear:
     return Multilinear(n, terms)
 
 
-def fold_form(forms: Multilinear, jacobian: Array) -> float:
+def fold_form(forms: Multilinear, jacobian: Array, unit: Array | float = 1.0) -> float:
     """Quadratic coefficient a = ½⟨p, B(q, q)⟩ of a fold, |q| = 1, ⟨p, q⟩ = 1.
 
     Kuznetsov (2004), equation 5.26. Its sign depends on the direction of q,
-    which is taken with its largest component positive.
+    which is taken with its largest component positive. ``unit`` is the size of every state.
     """
-    p, q = null_vectors(jacobian)
+    p, q = null_vectors(jacobian, unit)
     overlap = float(p @ q)
     # at a Bogdanov-Takens point the two are at right angles
     return float(0.5 * (p @ forms.form(q, q)).real / overlap) if overlap else np.nan
 
 
-def cusp_form(forms: Multilinear, jacobian: Array) -> float:
+def cusp_form(forms: Multilinear, jacobian: Array, unit: Array | float = 1.0) -> float:
     """Cubic coefficient c of a cusp, y' = β₁ + β₂ y + c y³, |q| = 1, ⟨p, q⟩ = 1.
 
     c = ⟨p, C(q, q, q) + 3 B(q, h)⟩ / 6 with J h = −B(q, q) + ⟨p, B(q, q)⟩ q,
-    ⟨p, h⟩ = 0 (Kuznetsov 2004, section 8.7.1).
+    ⟨p, h⟩ = 0 (Kuznetsov 2004, section 8.7.1). NaN where the eigenvalue zero is double.
     """
-    p, q = null_vectors(jacobian)
-    p = p / (p @ q)
+    p, q = null_vectors(jacobian, unit)
+    overlap = float(p @ q)
+    if abs(overlap) <= DOUBLE * np.linalg.norm(p * unit) * np.linalg.norm(q / unit):
+        return np.nan
+    p = p / overlap
     n = len(q)
     bent = forms.form(q, q)
     bordered = np.block([[jacobian, q[:, None]], [p[None, :], np.zeros((1, 1))]])
@@ -166,10 +173,11 @@ def cusp_form(forms: Multilinear, jacobian: Array) -> float:
     return float((p @ cubic).real / 6.0)
 
 
-def null_vectors(jacobian: Array) -> tuple[Array, Array]:
+def null_vectors(jacobian: Array, unit: Array | float = 1.0) -> tuple[Array, Array]:
     """Left and right null vectors of length one, the right one's largest component positive.
 
-    The matrix is balanced first, so that the units of the states do not cost digits.
+    The matrix is balanced first, so that the units of the states do not cost digits. An entry
+    that is rounding is told from others with the size of every state as its ``unit``.
 
     Examples
     --------
@@ -177,8 +185,9 @@ def null_vectors(jacobian: Array) -> tuple[Array, Array]:
     >>> [abs(round(c, 12)) for c in q.tolist()]
     [1.0, 0.0]
     """
-    matrix = np.array(jacobian, dtype=float)
-    rows, columns = np.ones(len(matrix)), np.ones(len(matrix))
+    columns = np.array(np.broadcast_to(unit, len(jacobian)), dtype=float)
+    rows = 1.0 / columns
+    matrix = rows[:, None] * np.asarray(jacobian, dtype=float) * columns
     for _ in range(3):
         size = np.abs(matrix).max(axis=1)
         size[size == 0] = 1.0

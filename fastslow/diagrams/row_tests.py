@@ -23,7 +23,8 @@ Complex = NDArray[np.complex128]
 #: Rounding of an eigenvalue computed by LAPACK, in units of n times the largest modulus.
 ROUNDING = 4.0 * float(np.finfo(float).eps)
 
-#: A tangent's share of the parameter below which a segment is vertical to rounding.
+#: A tangent's share of the parameter, times the distance from zero in units of the states, below
+#: which a segment is vertical to rounding.
 VERTICAL = 1e-10
 
 #: A matrix with rows of length one is singular to rounding nearer to the singular ones than this.
@@ -161,8 +162,10 @@ def tests_at(field: FrozenField, piece: Piece, window: Window) -> RowTests:
     """The tests at every row of a piece."""
     branching, eigenvalues = field.survey(piece.region, piece.u, piece.tangents, window.scale)
     turning = piece.tangents[:, -1] / window.scale[-1]
+    # far away a branch bends over lengths in proportion to its distance
+    far = np.maximum(1.0, np.abs(piece.u[:, :-1] / window.scale[:-1]).max(axis=1, initial=0.0))
     return RowTests(
-        np.where(np.abs(turning) < VERTICAL, 0.0, turning),
+        np.where(far * np.abs(turning) < VERTICAL, 0.0, turning),
         np.where(np.abs(branching) < SINGULAR, 0.0, branching),
         pair_sums(eigenvalues),
         eigenvalues,
@@ -186,21 +189,15 @@ def resolved(field: FrozenField, piece: Piece, window: Window) -> tuple[Piece, R
         change = int(low[last]) - int(low[first])
         if added >= ADDED or _explains(tests, slice(first, last + 1), change):
             continue
-        chords = np.linalg.norm(np.diff(piece.u[first : last + 1], axis=0) / window.scale, axis=1)
-        before = first + int(np.argmax(chords))
-        extra = _middle(field, piece, before, window) if chords.max() > SHORTEST else None
+        place, extra = _middle(field, piece, window, first, last)
         if extra is None:
             continue
-        place, added = before + 1, added + 1
+        added += 1
         new = tests_at(field, extra, window)
         tests = tests.inserted(place, new)
         ends = unstable_range(new.eigenvalues)
         low, high = np.insert(low, place, ends[0]), np.insert(high, place, ends[1])
-        piece = replace(
-            piece,
-            u=np.insert(piece.u, place, extra.u, axis=0),
-            tangents=np.insert(piece.tangents, place, extra.tangents, axis=0),
-        )
+        piece = _inserted(piece, place, extra)
         # the pairs that wait lie after this one
         waiting = [(a + 1, b + 1) for a, b in waiting]
         if low[place] == high[place]:
@@ -221,16 +218,39 @@ def _explains(tests: RowTests, rows: slice, change: int) -> bool:
     return change in possible
 
 
-def _middle(field: FrozenField, piece: Piece, before: int, window: Window) -> Piece | None:
-    """A row in the middle of a step, if one is found there."""
+def divided(field: FrozenField, piece: Piece, window: Window, first: int, last: int) -> Piece:
+    """With a row in the middle of the longest step between two rows, if one is found there."""
+    place, extra = _middle(field, piece, window, first, last)
+    return piece if extra is None else _inserted(piece, place, extra)
+
+
+def _inserted(piece: Piece, place: int, extra: Piece) -> Piece:
+    return replace(
+        piece,
+        u=np.insert(piece.u, place, extra.u, axis=0),
+        tangents=np.insert(piece.tangents, place, extra.tangents, axis=0),
+    )
+
+
+def _middle(
+    field: FrozenField, piece: Piece, window: Window, first: int, last: int
+) -> tuple[int, Piece | None]:
+    """A row in the middle of the longest step between two, and the row before which it comes.
+
+    None where the step is too short or no point of the curve is found.
+    """
+    chords = np.linalg.norm(np.diff(piece.u[first : last + 1], axis=0) / window.scale, axis=1)
+    before = first + int(np.argmax(chords))
+    if not chords.max() > SHORTEST:
+        return before + 1, None
     a, b = piece.u[before], piece.u[before + 1]
     guess, chord = 0.5 * (a + b), (b - a) * window.weight
     found = beside(field, piece.region, guess, chord, guess, window)
     if not found.converged:
-        return None
+        return before + 1, None
     tangent, single = field.tangent(piece.region, found.u, window.weight)
     if not single:
         tangent = piece.tangents[before]
     elif tangent @ chord < 0:
         tangent = -tangent
-    return Piece(piece.region, found.u[None], tangent[None])
+    return before + 1, Piece(piece.region, found.u[None], tangent[None])

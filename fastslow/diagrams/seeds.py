@@ -223,8 +223,8 @@ class Seeds:
             solved = equations.corrected(state, value)
             if solved is None:
                 continue
-            size = max(float(np.abs(state).max()), float(np.abs(solved).max()), 1e-300)
-            moved = float(np.abs(apart(solved, state, self._field.periods)).max()) / size
+            size = np.maximum(np.maximum(np.abs(state), np.abs(solved)), self._natural(value))
+            moved = float((np.abs(apart(solved, state, self._field.periods)) / size).max())
             if moved > NEAR and not far:
                 continue
             u = np.append(solved, value)
@@ -234,12 +234,16 @@ class Seeds:
                 best = (*rank, point)
         return [] if best is None else [best[2]]
 
+    def _natural(self, value: float) -> Array:
+        """Natural unit of each state at a value of the parameter."""
+        return self._field.units_at(abs(value))[: self._field.n]
+
     def _beside(self, point: SpecialPoint, state: Array, value: float) -> list[Equilibrium]:
         """Equilibria just off a special point, one on each branch through it."""
-        unit = np.maximum(np.abs(state), ROUNDING * np.abs(state).max(initial=0.0))
+        unit = np.maximum(np.abs(state), self._natural(value))
         if point.source is not None:
-            unit = np.maximum(unit, point.source.unit)
-        scale = np.append(np.where(unit > 0, unit, 1.0), self._over[1] - self._over[0])
+            unit = np.maximum(np.abs(state), point.source.unit)
+        scale = np.append(unit, self._over[1] - self._over[0])
         u = np.append(state, value)
         found: list[Equilibrium] = []
         for along in (point.tangent, point.switch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from fastslow.errors import ModelError
 from fastslow.model.model import Model
 from fastslow.results.points import Equilibria, Equilibrium
 from fastslow.results.windows import state_window
+from fastslow.symbolic.conserved import conserved_quantities
 from fastslow.symbolic.symmetries import free_directions
 
 Array = NDArray[np.float64]
@@ -72,7 +74,8 @@ def equilibria(
         For a name that is no parameter, or in the window no state.
     ModelError
         For a slow quantity without value, or where a shift of the states leaves every
-        rate as it is, so that no equilibrium is isolated.
+        rate as it is or a combination of them never changes, so that no equilibrium is
+        isolated.
     ArgumentError
         For a range in the window that is none.
 
@@ -91,7 +94,7 @@ def equilibria(
     """
     require_frozen(model, "solve for the equilibria of")
     given = model.with_parameters(values, **named)
-    if free := free_directions(model):
+    if free := (*free_directions(model), *conserved_quantities(model)):
         raise ModelError(f"the equilibria are not isolated; {free[0]}")
     name = next(iter(given.parameters), IDLE)
     value = given.parameters[name] if given.parameters else 0.0
@@ -110,19 +113,23 @@ def solve_at(
     still: FrozenField | None = None,
     *,
     with_sets: bool = True,
+    bounds: Mapping[str, float] | None = None,
 ) -> Equilibria:
     """Equilibria of every region at a value of the field's parameter, and pseudo-equilibria.
 
     A virtual pseudo-equilibrium, where the flow crosses, is listed with the sliding motion.
     Sets of equilibria are those of the field over its parameter, or of ``still``, in which
     nothing varies; without ``with_sets`` what is in them is left out, and they are not listed.
+    With bounds on the modulus of states the list need not have what exceeds them.
     """
     along = field if still is None else still
     complete = True
     solved: list[tuple[int, bool, list[Array]]] = []
     for number, equations in enumerate(region_equations(field)):
         whole = equations.continuum(value)
-        states, sure = (equations.edges(value), True) if whole else equations.solutions(value)
+        states, sure = (
+            (equations.edges(value), True) if whole else equations.solutions(value, bounds)
+        )
         complete &= sure
         solved.append((number, whole, states))
     known = [(number, np.append(s, value)) for number, _, states in solved for s in states]
@@ -139,7 +146,8 @@ def solve_at(
             if (admissible and not in_a_set(along, u, unit[:-1])) or (wanted and not admissible):
                 found.append(point_at(field, number, u, admissible, continuum=whole))
     sets = sets_of(along, value) if with_sets else []
-    found += [corner for one in sets for corner in one.equilibria]
+    corners = [corner for one in sets for corner in one.equilibria]
+    found += [replace(corner, state=field.wrapped(corner.state)) for corner in corners]
     complete &= all(one.exact for one in sets) and all_known(along)
     distinct = _distinct(found, unit[:-1], field.periods)
     return Equilibria(distinct, "complete" if complete else "found", sets)

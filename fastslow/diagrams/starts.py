@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from itertools import pairwise, product
 
@@ -17,7 +17,7 @@ from fastslow.diagrams.solving import solve_at
 from fastslow.diagrams.windows import Sides, edges_left, edges_of, known, size_of, within
 from fastslow.results.branches import Branch
 from fastslow.results.points import Equilibrium
-from fastslow.results.windows import ROUNDING, StateWindow, state_window, typical
+from fastslow.results.windows import ON_EDGE, ROUNDING, StateWindow, state_window, typical
 
 Array = NDArray[np.float64]
 
@@ -77,19 +77,35 @@ class Starts:
 
     def at(self, value: float, admissible: bool) -> list[Equilibrium]:
         """Equilibria in the window."""
-        points = self._asked_at(value, admissible)
         unit = self.scale[:-1]
+        if self._bounds and not self._sure.get(value, False):
+            # what runs to infinity beside a pole need not be decided
+            self._solve(value, self._bounds)
+        points = self._asked_at(value, admissible)
         return [e for e in points if self.window.contains(self.window.shifted(e.state), unit)]
 
     def _asked_at(self, value: float, admissible: bool) -> list[Equilibrium]:
         """Equilibria within the bounds that were asked for."""
         if value not in self._found:
-            solved = solve_at(self._field, value, virtual=True, with_sets=False)
-            self._sure[value] = solved.coverage == "complete"
+            self._solve(value, None)
+        return [e for e in self._found[value] if e.admissible == admissible]
+
+    def _solve(self, value: float, bounds: Mapping[str, float] | None) -> None:
+        """Solve for the equilibria at a value, all or those within bounds."""
+        solved = solve_at(self._field, value, virtual=True, with_sets=False, bounds=bounds)
+        sure = solved.coverage == "complete"
+        if bounds is None or sure:
+            self._sure[value] = sure
             # no branch runs through what is in a set of equilibria
             single = [e for e in solved if not e.continuum and e.region in self._field.regions]
             self._found[value] = within(self._field, self._asked, single)
-        return [e for e in self._found[value] if e.admissible == admissible]
+
+    @cached_property
+    def _bounds(self) -> dict[str, float]:
+        """The largest modulus in the window of every state that has one."""
+        window = self.window
+        ends = {n: max(abs(low), abs(high)) for n in window.states for low, high in [window[n]]}
+        return {n: (1.0 + ON_EDGE) * end for n, end in ends.items() if 0 < end < np.inf}
 
     @cached_property
     def outside(self) -> tuple[StateWindow, list[tuple[Equilibrium, float]]]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import instance, mapping, takes
 from fastslow.continuation.location import newton
+from fastslow.continuation.ordering import in_order
 from fastslow.diagrams.equations import DEGREE, STARTS, real_roots
 from fastslow.diagrams.fields import require_frozen
 from fastslow.diagrams.modes import Mode, modes_of
@@ -234,12 +235,8 @@ class Contact:
         polynomial = sp.Poly(equation, symbol)
         if polynomial.is_zero or polynomial.degree() > DEGREE:
             return None
-        coefficients = polynomial.all_coeffs()
-        shares = np.abs([float(c / coefficients[0]) for c in coefficients])
-        # Fujiwara's bound: in this unit no root is beyond two, and no coefficient beyond one
-        unit = max((float(s) ** (1.0 / k) for k, s in enumerate(shares) if k), default=1.0) or 1.0
-        scaled = [float(c / coefficients[0]) / unit**k for k, c in enumerate(coefficients)]
-        return [unit * r for r in real_roots(np.array(scaled))]
+        first = polynomial.LC()
+        return real_roots(np.array([float(c / first) for c in polynomial.all_coeffs()]))
 
     def _searched(self) -> list[Array]:
         """From many states, a fixed sequence spread over several scales."""
@@ -263,7 +260,7 @@ class Contact:
             apart = (float(gap.max()) for gap in gaps)
             if min(apart, default=1.0) > 1e-6:
                 kept.append(state)
-        return sorted(kept, key=lambda s: tuple(s))
+        return [kept[k] for k in in_order(np.reshape(kept, (-1, 2)), self.units)]
 
     def _values(self, state: Array) -> Array:
         return np.array(self._function(*state), dtype=float)

@@ -41,7 +41,8 @@ from fastslow.results.diagrams import SEARCHED, Diagram
 from fastslow.results.outcome import Outcome, with_ends
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.windows import LEFT, state_window
-from fastslow.symbolic.symmetries import FreeDirection, free_directions
+from fastslow.symbolic.conserved import conserved_quantities
+from fastslow.symbolic.symmetries import free_directions
 
 Array = NDArray[np.float64]
 
@@ -150,7 +151,11 @@ def continue_equilibria(
     continuation = continuation or Continuation()
     asked = state_window(model.states, window, model.periodic)
     if from_points is None and (free := free_directions(model)):
-        return _without_branches(field, name, (lower, upper), continuation, free[0])
+        why = Outcome("free direction", f"no branch of equilibria is traced; {free[0]}.", False)
+        return _without_branches(field, name, (lower, upper), continuation, why)
+    if from_points is None and (same := conserved_quantities(model)):
+        why = Outcome("conserved quantity", f"no branch of equilibria is traced; {same[0]}.", False)
+        return _without_branches(field, name, (lower, upper), continuation, why)
     starts = (
         starts_of(field, lower, upper, continuation.starts, asked)
         if from_points is None
@@ -201,7 +206,7 @@ def continue_equilibria(
         {quantity: str(law) for quantity, law in model.path.items()},
         asdict(continuation),
         starts.window,
-        bands_of(field, lower, upper) if from_points is None else (),
+        bands_of(field, lower, upper, asked) if from_points is None else (),
         dict(model.periodic),
     )
 
@@ -234,7 +239,7 @@ def _without_branches(
     name: str,
     over: tuple[float, float],
     continuation: Continuation,
-    direction: FreeDirection,
+    outcome: Outcome,
 ) -> Diagram:
     """The diagram of a model in which no equilibrium is isolated, and its outcome."""
     corrector = _corrector(field)
@@ -250,7 +255,7 @@ def _without_branches(
         _interface_values(field),
         _text(field.model),
         corrector,
-        Outcome("free direction", f"no branch of equilibria is traced; {direction}.", False),
+        outcome,
         {quantity: str(law) for quantity, law in field.model.path.items()},
         asdict(continuation),
     )
@@ -282,8 +287,8 @@ def _field(model: Model, name: str) -> FrozenField:
 
 @lru_cache(maxsize=64)
 def _text(model: Model) -> str:
-    """The equations in words, written once."""
-    return repr(model)
+    """The equations as they were written, printed once."""
+    return model.equations
 
 
 def _traced(
@@ -451,7 +456,8 @@ def _holds(field: FrozenField, branch: Branch, rows: Array, u: Array, window: Wi
         near = rows[k] + part * (rows[k + 1] - rows[k])
         normal = chord / np.sqrt(length) / scale
         region = field.regions.index(str(branch.region[k]))
-        found = beside(field, region, u, normal, near, window)
+        # in units of the point, in which Newton's last corrections far away are rounding
+        found = field.refined(region, near, scale, normal=normal, point=u)
         if found.converged and np.abs((found.u - u) / scale).max() < 1e-6:
             return True
     return False

@@ -21,6 +21,10 @@ Array = NDArray[np.float64]
 #: How far inside the range, in parts of it, an end is looked for where there is none at its edge.
 SHORT_OF_RANGE = (0.0, 1e-9, 1e-6, 1e-3)
 
+#: A last step that ends nowhere is taken again in steps so many times shorter, so often in turn,
+#: with so many rows before the usual steps are taken again.
+FINER, FINEST, CHUNK = 16.0, 3, 64
+
 #: Pieces (regions in order) that one branch may have.
 PIECES = 1000
 
@@ -114,19 +118,15 @@ def walk(
     pieces: list[Piece] = []
     joins: list[int] = []
     first = Piece(region, start[None], tangent[None])
-    low, high = np.array(window.states.lower), np.array(window.states.upper)
-    middle, periods = window.states.middle(), field.periods
+    periods = field.periods
     step = continuation.step
     while len(pieces) < PIECES:
         signs = field.signs[region] if bounded else np.zeros(field.compiled.m)
-        u, tangents, status, step = loops.loop("trace")(
-            field.compiled.address, region, field.values, start, tangent, signs,
-            window.weight, window.lower, window.upper, low, high, middle, periods,
-            max(step, 10 * continuation.smallest_step), continuation.smallest_step,
-            continuation.largest_step, continuation.largest_turn, continuation.tolerance,
-            continuation.iterations, continuation.points, not joins,
-        )  # fmt: skip
-        back = _returned(region, u, tangents, first, window, periods) if joins else None
+        u, tangents, status, step, again = _traced(
+            field, region, start, tangent, signs, window, continuation, step, closing=not joins
+        )
+        joined = bool(joins) or again
+        back = _returned(region, u, tangents, first, window, periods) if joined else None
         if back is not None:
             pieces.append(back)
             return Walk(tuple(pieces), tuple(joins), _closed(), closed=True)
@@ -178,6 +178,62 @@ def walk(
         if home:
             return Walk(tuple(pieces), tuple(joins), _closed(), closed=True)
     return Walk(tuple(pieces), tuple(joins), _full(field, start, continuation))
+
+
+def _traced(
+    field: FrozenField,
+    region: int,
+    start: Array,
+    tangent: Array,
+    signs: Array,
+    window: Window,
+    continuation: Continuation,
+    step: float,
+    *,
+    closing: bool,
+) -> tuple[Array, Array, int, float, bool]:
+    """Rows in one region, their tangents, what ended them, the step, and whether it was divided.
+
+    Where the last step left the range, and no equilibrium is found at the end of the range, the
+    step may have missed a turn of the branch: it is taken again in shorter ones.
+    """
+    low, high = np.array(window.states.lower), np.array(window.states.upper)
+    rows: list[Array] = []
+    tangents: list[Array] = []
+    finer = 0
+    while True:
+        largest = continuation.largest_step / FINER**finer
+        left = continuation.points - sum(map(len, rows))
+        u, along, status, step = loops.loop("trace")(
+            field.compiled.address, region, field.values, start, tangent, signs,
+            window.weight, window.lower, window.upper, low, high, window.states.middle(),
+            field.periods, max(step, 10 * continuation.smallest_step),
+            continuation.smallest_step, largest, continuation.largest_turn,
+            continuation.tolerance, continuation.iterations,
+            min(left, CHUNK) if finer else left, closing and not rows,
+        )  # fmt: skip
+        missed = False
+        if status == loops.RANGE:
+            end, _, ended = _cut(field, region, u.copy(), along.copy(), window, status)
+            missed = ended == loops.RANGE and not _at_end(end[-1], window)
+        if missed and finer < FINEST and len(u) > 1:
+            finer += 1
+            step = continuation.largest_step / FINER**finer
+            kept = len(u) - 2
+        elif status == loops.FULL and finer and len(u) < left:
+            finer, kept = 0, len(u) - 1
+        else:
+            break
+        rows.append(u[:kept])
+        tangents.append(along[:kept])
+        start, tangent = u[kept], along[kept]
+    whole = np.concatenate([*rows, u]), np.concatenate([*tangents, along])
+    return *whole, status, step, bool(rows)
+
+
+def _at_end(u: Array, window: Window) -> bool:
+    """Whether a row is an end of the range, to which its parameter was set."""
+    return bool(u[-1] in (window.lower, window.upper))
 
 
 def _returned(
@@ -387,6 +443,7 @@ def _cut_at_range(
             end = found.u
             end[-1] = target
             if np.abs((end - before) / window.scale).max() < 1e-13:
+                u[-2, -1] = target
                 break
             tangent = field.tangent(region, end, window.weight)[0]
             u[-1], tangents[-1] = end, _oriented(tangent, tangents[-1], window)
@@ -441,8 +498,7 @@ def _outcome(
     continuation: Continuation,
 ) -> Outcome:
     where = _where(field, u)
-    near = 1e-12 * max(abs(window.lower), abs(window.upper), window.upper - window.lower)
-    if status == loops.RANGE and min(u[-1] - window.lower, window.upper - u[-1]) > near:
+    if status == loops.RANGE and not _at_end(u, window):
         return Outcome(
             "edge of domain",
             f"followed to {where}; no equilibrium was found at the end of the range itself, where "

@@ -11,6 +11,7 @@ import sympy as sp
 
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.model import Model
+from fastslow.model.rational import exact
 from fastslow.model.structure import TIME, real
 
 #: Operations up to which a quotient is cancelled, so that exact zeros stay exact.
@@ -229,8 +230,11 @@ class _Derivation:
         """The rates f₀ + Σ bᵢ sᵢ with the weights that keep every hᵢ, by Cramer's rule."""
         count = len(along)
         sides = list(product((1, -1), repeat=count))
-        heights = [self.functions[j] for j in along]
-        values = [(*self.regions[k].rates, *self.regions[k].laws) for k in corners]
+        # sums of decimal numbers vanish to rounding only, those of what they are written as exactly
+        heights = [exact(self.functions[j]) for j in along]
+        values = [
+            [exact(e) for e in (*self.regions[k].rates, *self.regions[k].laws)] for k in corners
+        ]
         parts: dict[tuple[int, ...], list[sp.Expr]] = {}
         for used in product((0, 1), repeat=count):
             factors = [prod(s for s, u in zip(side, used, strict=True) if u) for side in sides]
@@ -244,9 +248,9 @@ class _Derivation:
         n = len(self.names)
         base, laws = parts[(0,) * count][:n], self.regions[corners[0]].laws
         jumps = [parts[unit][:n] for unit in units]
-        a = sp.Matrix([self._drift(j, base, laws) for j in along])
+        a = sp.Matrix([exact(self._drift(j, base, laws)) for j in along])
         matrix = sp.Matrix(
-            [[drift(self.functions[j].subs(TIME, 0), self.names, b) for b in jumps] for j in along]
+            [[drift(h.subs(TIME, 0), self.names, b) for b in jumps] for h in heights]
         )
         whole = _determinant(matrix)
         if _vanishes(whole, heights):

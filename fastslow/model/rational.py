@@ -37,6 +37,23 @@ INDEX = 4
 PARTS = 1500
 
 
+def exact(expression: sp.Expr) -> sp.Expr:
+    """With rational numbers in place of floats, so that polynomials divide without remainder.
+
+    Examples
+    --------
+    >>> exact(sp.Float(0.25) * sp.Symbol("x"))
+    x/4
+    """
+    return expression.xreplace({f: _rational(f) for f in expression.atoms(sp.Float)})
+
+
+@functools.lru_cache(maxsize=MEMORY)
+def _rational(number: sp.Float) -> sp.Expr:
+    """A float as the rational number it is written as; searched for once."""
+    return sp.nsimplify(number, rational=True)
+
+
 @dataclass(frozen=True)
 class Quotient:
     """Numerator and denominator without a common factor.

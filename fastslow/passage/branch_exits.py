@@ -7,9 +7,12 @@ import math
 import numpy as np
 
 from fastslow.errors import ArgumentError
-from fastslow.model.invariance import factor_states
+from fastslow.model.invariance import factor_states, states_together
 from fastslow.model.model import Model
-from fastslow.passage.hopf_delays import MEMORY, Sheet, places, require_entry
+from fastslow.passage.critical_modes import CriticalMode, critical_mode
+from fastslow.passage.entry_exits import MEMORY, entry_exit, places
+from fastslow.passage.exchanges import passage_in_words
+from fastslow.passage.growth_rates import Sheet
 from fastslow.passage.sites import Site, WrongWay, drift, require_code, site_of
 from fastslow.results.delays import BranchPointExit
 from fastslow.results.diagrams import Diagram
@@ -54,60 +57,103 @@ def branch_exit(
     """
     require_code(point, "BP", "the exit from an invariant branch")
     speed = drift(rate)
+    way = 1 if speed > 0 else -1
+    mode, reason, memory = invariant_mode(diagram, point, way, model=model, rate=speed)
+    floor = "the smallest number, 1e-300," if memory == UNDERFLOW else "rounding"
+    found = entry_exit(
+        mode,
+        entry=entry,
+        rate=speed,
+        gain=gain,
+        memory=memory,
+        remembered=f"the exit at the distance of the entry{reason}",
+        lost=f"{floor} decides: the distance falls by exp(−{{decay}}), below it and below noise, "
+        "and the exit comes at another place than this",
+    )
+    return BranchPointExit(**found)
+
+
+def invariant_mode(
+    diagram: Diagram,
+    point: SpecialPoint,
+    way: int,
+    *,
+    model: Model | None = None,
+    alone: bool = True,
+    rate: float = math.nan,
+) -> tuple[CriticalMode, str, float]:
+    """The mode in which an invariant branch loses stability at a branch point.
+
+    Parameters
+    ----------
+    diagram : Diagram
+    point : SpecialPoint
+    way : int
+        Of the drift, +1 where the parameter rises.
+    model : Model, optional
+    alone : bool
+        Whether nothing else moves in the rates: a branch that does not move with this
+        parameter may move with another quantity.
+    rate : float
+        Of the drift, for what is said where no branch is invariant.
+
+    Returns
+    -------
+    mode : CriticalMode
+    reason : str
+        Why the branch is invariant.
+    memory : float
+        The decay that is remembered.
+
+    Raises
+    ------
+    ArgumentError
+        Where no stable branch ends there in this direction, or it is not invariant.
+    """
+    require_code(point, "BP", "the exit from an invariant branch")
     name = diagram.parameter
-    here, way = point[name], 1 if speed > 0 else -1
     site = site_of(point, name, model)
-    sheets = []
-    for branch, row in places(diagram, point):
-        values = branch.eigenvalues[row]
-        critical = complex(values[np.argmin(np.abs(values))])
-        before, behind = (Sheet(diagram, branch, row, w, critical) for w in (-way, way))
-        if len(before.rows) > 1 and before.first_growth() <= 0:
-            sheets.append((before, behind))
-    if not sheets:
-        raise WrongWay(
-            f"rate = {speed:g}: no sheet before {point.label} is stable in this direction; "
-            f"expected rate {'<' if speed > 0 else '>'} 0"
-        )
-    invariant = [(*pair, kept) for pair in sheets if (kept := _invariance(site, pair[0]))]
+    modes = stable_modes(diagram, point, way, model=model)
+    invariant = [(mode, *kept) for mode in modes if (kept := _invariance(site, mode.before, alone))]
     if not invariant:
         raise ArgumentError(
             f"the sheet before {point.label} is not invariant while {name} drifts: its states "
             "move along it, and no state that leaves it has a rate of which it is a factor. The "
-            "drift itself pushes the trajectory off it; no integral from entry to exit holds"
+            "drift itself pushes the trajectory off it: no integral from entry to exit holds, and "
+            + passage_in_words(modes[0], site, rate)
         )
-    before, behind, (reason, memory) = invariant[0]
-    require_entry(before, point, entry)
-    decay = -before.integral(entry) / abs(speed)
-    exit_at = behind.where(abs(speed) * (decay + math.log(gain)))
-    words = f"the exit at the distance of the entry; {reason}"
-    if math.isnan(exit_at):
-        words = "none: the branch ends or turns before growth has made up for the decay"
-    elif decay > memory:
-        floor = "the smallest number, 1e-300," if memory == UNDERFLOW else "rounding"
-        words = (
-            f"{floor} decides: the distance falls by exp(−{decay:.0f}), below it and below noise, "
-            "and the exit comes at another place than this"
-        )
-    elif diagram.corrector is None:
-        words += "; eigenvalues interpolated, as the diagram was read from a file"
-    return BranchPointExit(
-        point=point,
-        parameter=name,
-        rate=speed,
-        delay=abs(exit_at - here),
-        validity=words,
-        entry=float(entry),
-        decay=decay,
-        gain=float(gain),
-        forgotten=decay > memory,
-    )
+    return invariant[0]
 
 
-def _invariance(site: Site, before: Sheet) -> tuple[str, float] | None:
+def stable_modes(
+    diagram: Diagram, point: SpecialPoint, way: int, *, model: Model | None = None
+) -> list[CriticalMode]:
+    """The critical mode of every branch through a branch point that is stable before it.
+
+    Raises
+    ------
+    WrongWay
+        If there is none.
+    """
+    modes = []
+    for branch, row in places(diagram, point):
+        values = branch.eigenvalues[row]
+        critical = complex(values[np.argmin(np.abs(values))])
+        mode = critical_mode(diagram, point, (branch, row), way, critical, model=model)
+        if len(mode.before.rows) > 1 and mode.before.first_growth() <= 0:
+            modes.append(mode)
+    if not modes:
+        raise WrongWay(
+            f"rate {'>' if way > 0 else '<'} 0: no sheet before {point.label} is stable in this "
+            f"direction; expected rate {'<' if way > 0 else '>'} 0"
+        )
+    return modes
+
+
+def _invariance(site: Site, before: Sheet, alone: bool) -> tuple[str, float] | None:
     """Why a sheet is invariant while the parameter drifts, and which decay is remembered.
 
-    None where it is not.
+    None where it is not. States that stay zero by their own rates do so whatever else moves.
     """
     states = before.branch.state[before.rows]
     every = np.concatenate([branch.state for branch in before.diagram.branches])
@@ -115,10 +161,17 @@ def _invariance(site: Site, before: Sheet) -> tuple[str, float] | None:
     names = site.point.states
     jacobian, _ = site.slopes(site.region(str(before.branch.region[before.rows[1]])))
     small = ZERO * np.abs(np.linalg.eigvals(jacobian)).max()
-    for name in factor_states(site.field.model):
-        k = names.index(name)
-        if np.abs(states[:, k]).max() <= CONSTANT * size[k] and abs(jacobian[k, k]) <= small:
-            return f"{name} = 0 stays, as the rate of {name} has it as a factor", UNDERFLOW
-    if (np.ptp(states, axis=0) <= CONSTANT * size).all():
-        return f"the sheet does not move with {before.diagram.parameter}", MEMORY
+    model = site.field.model
+    zero = [n for k, n in enumerate(names) if np.abs(states[:, k]).max() <= CONSTANT * size[k]]
+    for together in (*((n,) for n in factor_states(model)), *states_together(model)):
+        if not set(together) <= set(zero):
+            continue
+        k = [names.index(n) for n in together]
+        if np.abs(np.linalg.eigvals(jacobian[np.ix_(k, k)])).min() <= small:
+            reason = f"; {together[0]} = 0 stays, as the rate of {together[0]} has it as a factor"
+            if len(together) > 1:
+                reason = f"; {' = '.join(together)} = 0 stays, by the rates of these states"
+            return reason, UNDERFLOW
+    if alone and (np.ptp(states, axis=0) <= CONSTANT * size).all():
+        return f"; the sheet does not move with {before.diagram.parameter}", MEMORY
     return None

@@ -11,10 +11,19 @@ from fastslow.passage.cycle_ends import CycleEnd
 from fastslow.results.points import SpecialPoint
 from fastslow.results.transitions import Bursting, Phase, Transition
 
+#: Kinds of transition that a relaxation oscillation consists of.
+LEAVING = ("jump", "gap crossing", "grazing", "Hopf")
+
+#: A rhythm repeats at least once.
+TWICE = 2
+
+#: Of a start or end that nothing explains.
+UNKNOWN = "unclassified"
+
 
 @dataclass(frozen=True, eq=False)
 class Burst:
-    """A complete spiking phase, with what starts and what ends it."""
+    """A complete oscillating phase, with what starts and what ends it."""
 
     phase: Phase
     start: Transition
@@ -22,13 +31,16 @@ class Burst:
 
 
 def bursting_of(bursts: Sequence[Burst], transitions: Sequence[Transition]) -> Bursting | None:
-    """Name a rhythm after the bifurcations that start and end its spiking phases.
+    """Name a rhythm after the bifurcations that start and end its oscillating phases.
+
+    The start is the special point at which the branch is left, the end is that of the cycle;
+    where one of them is not known the burst is unclassified.
 
     Bursts on a cycle are named as by E. M. Izhikevich, International Journal of
-    Bifurcation and Chaos 10(6), 1171-1266, 2000: start/end. Where the spikes are
+    Bifurcation and Chaos 10(6), 1171-1266, 2000: start/end. Where it is
     the oscillation in which a trajectory settles on the next sheet (point-point
     bursting there), the names of the two leavings take their place, and without
-    spikes the rhythm is a relaxation oscillation.
+    oscillations the rhythm is a relaxation oscillation.
 
     Parameters
     ----------
@@ -40,25 +52,27 @@ def bursting_of(bursts: Sequence[Burst], transitions: Sequence[Transition]) -> B
     Returns
     -------
     Bursting or None
-        None where there is no rhythm: nothing is left twice.
+        None where there is no rhythm: no two oscillating phases on a cycle, each from a stable
+        branch to one, and no two branches that are left in turn.
     """
     cycles = [b for b in bursts if b.end is not None]
     if cycles:
-        return _on_cycles(cycles)
-    between = [t for t in transitions if t.kind in ("jump", "transit", "grazing", "Hopf")]
+        return _on_cycles(cycles) if len(cycles) >= TWICE else None
+    between = [t for t in transitions if t.kind in LEAVING]
     between = [t for t in between if t.from_sheet != t.to_sheet and t.to_sheet]
     if len({t.from_sheet for t in between}) < 2:
         return None
     leavings = list(dict.fromkeys(_start(t) for t in between[-2:]))
     pair = "/".join(leavings * 2 if len(leavings) == 1 else leavings)
-    counts = [b.phase.spikes for b in bursts]
+    counts = [b.phase.oscillations for b in bursts]
     specials = [t.special for t in between[-2:]]
     mirrored = _mirrored(specials[0], specials[1])
     symmetric = "symmetric " if mirrored else ""
     evidence = [f"{_at(t)}, from {t.from_sheet} to {t.to_sheet}" for t in between[-2:]]
-    if mirrored:
+    gaps = all(t.kind == "gap crossing" for t in between)
+    if mirrored and not gaps:
         evidence.append("both points have the same eigenvalues and normal form: a symmetric pair")
-    if all(t.kind == "transit" for t in between):
+    if gaps:
         evidence.append("the equilibria change steeply at the gap, without a bifurcation")
         name = "fast-slow oscillation across the gap, without bifurcation"
         if counts:
@@ -83,35 +97,43 @@ def _on_cycles(bursts: Sequence[Burst]) -> Bursting:
     evidence: list[str] = []
     for b in steady:
         assert b.end is not None
-        name = f"{_start(b.start)}/{b.end.name}"
+        name = _named(_start(b.start), b.end.name)
         if name not in names:
             names.append(name)
             evidence.append(f"starts: {_at(b.start)}")
             end = "" if b.end.special is None else f"at {b.end.special.label}, "
             evidence.append(f"ends: {end}{b.end.evidence}")
-    counts = [b.phase.spikes for b in steady]
+    counts = [b.phase.oscillations for b in steady]
     low, high = min(counts), max(counts)
-    evidence.append(f"{low if low == high else f'{low} to {high}'} spikes in a burst")
+    evidence.append(f"{low if low == high else f'{low} to {high}'} oscillations in a burst")
     specials = list({id(b.start.special): b.start.special for b in steady}.values())
     symmetric = len(names) == 1 and len(specials) == 2 and _mirrored(*specials)
     name = ("symmetric " if symmetric else "") + " + ".join(names)
-    return Bursting(f"{name} bursting", tuple(evidence))
+    return Bursting(name, tuple(evidence))
+
+
+def _named(start: str, end: str) -> str:
+    """The class of a burst; none where one of the two bifurcations is not known."""
+    if UNKNOWN not in (start, end):
+        return f"{start}/{end} bursting"
+    known = [f"starts: {start}"] * (start != UNKNOWN) + [f"ends: {end}"] * (end != UNKNOWN)
+    return f"unclassified bursting ({', '.join(known) or 'start and end not known'})"
 
 
 def _start(t: Transition) -> str:
     """What a leaving is called in a name."""
     point = t.special
-    if t.kind == "transit":
-        return "gap"
+    if t.kind == "gap crossing":
+        return "gap crossing"
     if point is None:
-        return "grazing" if t.kind == "grazing" else "unexplained"
+        return "grazing" if t.kind == "grazing" else UNKNOWN
     if point.code == "LP":
         return "fold"
     if point.code == "HB":
         return "subHopf" if point.criticality == "subcritical" else "Hopf"
     if point.code == "BP":
         return "branch point"
-    return point.subtype or "boundary equilibrium"
+    return UNKNOWN if t.kind == UNKNOWN else point.subtype or "boundary equilibrium"
 
 
 def _at(t: Transition) -> str:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
-from fastslow.arguments import finite, formula, instance, mapping, positive, takes
+from fastslow.arguments import finite, formula, instance, positive, takes
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.passage.boundary_delays import boundary_delay, gap_transit
 from fastslow.passage.branch_exits import branch_exit
 from fastslow.passage.fold_delays import fold_delay
 from fastslow.passage.hopf_delays import hopf_exit
+from fastslow.passage.sites import level_argument, rate_argument
 from fastslow.results.delays import (
     BoundaryDelay,
     BranchPointExit,
@@ -20,14 +23,15 @@ from fastslow.results.delays import (
     HopfExit,
 )
 from fastslow.results.diagrams import Diagram
+from fastslow.results.drifts import Drift
 from fastslow.results.point_types import POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint
 
 
 @takes(
     point=instance(SpecialPoint),
-    rate=finite,
-    level=mapping,
+    rate=rate_argument,
+    level=level_argument,
     parameter=formula,
     model=instance(Model),
     diagram=instance(Diagram),
@@ -36,9 +40,9 @@ from fastslow.results.points import SpecialPoint
 )
 def predict_delay(
     point: SpecialPoint,
-    rate: float,
+    rate: float | Drift,
     *,
-    level: Mapping[Any, float] | None = None,
+    level: Mapping[Any, float] | str | None = None,
     parameter: object = None,
     model: Model | None = None,
     diagram: Diagram | None = None,
@@ -59,10 +63,12 @@ def predict_delay(
     ----------
     point : SpecialPoint
         Code LP, BE, HB or BP.
-    rate : float
-        Of the parameter, with its sign.
-    level : mapping, optional
-        One state and its value at which the jump counts as done; not used for a gap.
+    rate : float or Drift
+        Of the parameter, with its sign; as a `Drift` with its change in time and its feedback
+        from the states, as that of a slow state has it.
+    level : mapping or "turn", optional
+        One state and its value at which the jump counts as done, or ``"turn"``: that the
+        parameter itself turns round, as in a relaxation oscillation. Not used for a gap.
     parameter : str or Symbol, optional
         What drifts, by default the parameter of the point's diagram.
     model : Model, optional
@@ -115,9 +121,16 @@ def predict_delay(
                 f"level= goes with a fold (LP) or boundary equilibrium (BE), not {point.label}; "
                 "the distance at the exit is gain="
             )
+        speed = rate.rate if isinstance(rate, Drift) else rate
+        exits: HopfExit | BranchPointExit
         if point.code == "HB":
-            return hopf_exit(diagram, point, entry, rate, gain=gain)
-        return branch_exit(diagram, point, entry, rate, gain=gain, model=model)
+            exits = hopf_exit(diagram, point, entry, speed, gain=gain)
+        else:
+            exits = branch_exit(diagram, point, entry, speed, gain=gain, model=model)
+        if not isinstance(rate, Drift) or rate.constant:
+            return exits
+        words = "; at the rate at the point, the change of the drift left aside: no error is stated"
+        return replace(exits, error=math.nan, validity=exits.validity + words)
     raise ArgumentError(
         "expected a fold (LP), a boundary equilibrium (BE), a Hopf (HB) or branch point (BP), "
         f"received {point.label}, a {point_name(point.code)}"

@@ -13,7 +13,7 @@ from fastslow.results.transitions import Phase
 
 Array = NDArray[np.float64]
 
-#: So many oscillations make a spiking phase.
+#: So many oscillations make an oscillating phase.
 LEAST = 2
 
 #: An oscillation decays when its last rise is below this part of its largest.
@@ -29,11 +29,11 @@ class Excursion:
     old, new : Stay or None
         The stays before and after; None at the start and at the end of the run.
     turns : tuple of float
-        Times of the spikes in between.
+        Times of the maxima in between.
     sizes : tuple of float
         The rise to each of them, in units of the state.
     cycle : bool
-        Whether it is a spiking phase that settles on no sheet.
+        Whether it is an oscillating phase that settles on no sheet.
     """
 
     old: Stay | None
@@ -43,7 +43,7 @@ class Excursion:
     cycle: bool
 
     @property
-    def spiking(self) -> bool:
+    def oscillating(self) -> bool:
         return len(self.turns) >= LEAST
 
     def rows(self, m: Measured) -> tuple[int, int]:
@@ -56,7 +56,7 @@ class Excursion:
 
 @dataclass(frozen=True, eq=False)
 class Oscillation:
-    """Every maximum of the observed state that counts as a spike, and every minimum.
+    """Every maximum of the observed state that is prominent, and every minimum.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def oscillation_of(m: Measured, observed: int) -> Oscillation:
     if m.periods[observed] > 0:
         values = np.sin(2.0 * np.pi * m.scaled[:, observed] / m.periods[observed])
     reach = float(np.ptp(values))
-    # what moves by rounding only has no spikes
+    # what moves by rounding only has no turns
     least = PROMINENT * reach if reach > 1e-9 * float(np.abs(values).max(initial=0.0)) else 0.0
     turns = turns_of(values, least)
     if not len(turns.rows):
@@ -117,13 +117,13 @@ def _excursion(m: Measured, old: Stay | None, new: Stay | None, swing: Oscillati
         settling = False
     # a cycle is counted by its maxima; an oscillation that dies out may begin downwards
     counted = lower if settling and lower.sum() > upper.sum() else upper
-    spiking = counted.sum() >= LEAST
+    oscillating = counted.sum() >= LEAST
     return Excursion(
         old,
         new,
         tuple(swing.times[counted].tolist()),
         tuple(swing.sizes[counted].tolist()),
-        bool(spiking and not settling),
+        bool(oscillating and not settling),
     )
 
 
@@ -139,16 +139,16 @@ def phase_of(m: Measured, e: Excursion, start: float, end: float, sheet: str, aw
     sheet : str
         Where it lands, "" for nowhere.
     away : str
-        The kind where there is no spiking.
+        The kind where it does not oscillate.
     """
     first, _ = e.rows(m)
     if first < len(m.time) and not m.within[first]:
         return Phase(start, end, "outside")
-    if e.spiking and (e.cycle or e.old is not None):
+    if e.oscillating and (e.cycle or e.old is not None):
         return Phase(
             start,
             end,
-            "spiking",
+            "oscillating",
             () if e.cycle else (sheet,),
             len(e.turns),
             "cycle" if e.cycle else "equilibrium",
@@ -156,5 +156,5 @@ def phase_of(m: Measured, e: Excursion, start: float, end: float, sheet: str, aw
             e.sizes,
         )
     if e.old is None or e.new is None:
-        return Phase(start, end, "transient", spikes=len(e.turns))
+        return Phase(start, end, "transient", oscillations=len(e.turns))
     return Phase(start, end, away, (sheet,), len(e.turns))

@@ -13,9 +13,19 @@ from numpy.typing import NDArray
 from fastslow.diagrams.normal_forms import cusp_form, forms_at, null_vectors
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.model import Model
+from fastslow.passage.local_passages import (
+    Event,
+    LocalDrift,
+    Place,
+    bound_of,
+    quasi_static,
+    reached_delay,
+)
 from fastslow.passage.sites import (
+    TURN,
+    Level,
     Site,
-    drift,
+    drift_of,
     level_of,
     named_level,
     require_code,
@@ -23,7 +33,9 @@ from fastslow.passage.sites import (
     wrong_way,
 )
 from fastslow.results.delays import FoldDelay
+from fastslow.results.drifts import Drift
 from fastslow.results.points import SpecialPoint
+from fastslow.results.trajectories import Trajectory
 from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
@@ -40,6 +52,20 @@ MATCHING = -1.0085182549893932
 #: fold rounding, which grows as 1/Y³, is larger than what extrapolation leaves.
 NEAR = 1e-3
 
+#: A level nearer than this (in units of δ) is reached while the drift still carries the passage.
+SLOW_PART = 2.0
+
+#: Places before the fold, in units of δ, up to which its branch is followed for the passage to be
+#: integrated from there: the quasi-static state is forgotten as exp(−4/3 s^(3/2)), from the
+#: last by exp(−40).
+BEFORE = (1.0, 1.5, 2.0, 3.0, 4.0, 5.5, 7.5, 9.65)
+
+#: A turn of the drift is looked for at so many places in every step of a run.
+PARTS = 4
+
+#: Nodes on a step of a run, whose series has order 16.
+NODES = 10
+
 #: A coefficient below this times its terms counts as zero.
 ZERO = 1e-9
 
@@ -51,8 +77,8 @@ class FoldForm:
     Parameters
     ----------
     a, b, c, g : float
-    along, bend : ndarray, shape (n,)
-        The state is x* + y·along + ½ y²·bend.
+    along, bend, lean : ndarray, shape (n,)
+        The state is x* + y·along + ½ y²·bend + μ·lean.
     slowest : float
         Smallest |Re λ| of the other eigenvalues, infinite for one state.
     """
@@ -63,37 +89,43 @@ class FoldForm:
     g: float
     along: Array
     bend: Array
+    lean: Array
     slowest: float
 
 
 def fold_delay(
     point: SpecialPoint,
-    rate: float,
+    rate: float | Drift,
     *,
-    level: Mapping[Any, float] | None = None,
+    level: Mapping[Any, float] | str | None = None,
     parameter: object = None,
     model: Model | None = None,
 ) -> FoldDelay:
     """How far past a fold a drifting parameter is when the trajectory jumps.
 
-    On the centre manifold of the fold y' = a y² + b μ + c y³ + g μ y with μ = rate·t.
-    Its leading part is a Riccati equation whose solution −A'/A, A(s) = Ai(−s), ends
-    at the first zero Ω₀ = 2.33810741 of the Airy function:
+    On the centre manifold of the fold y' = a y² + b μ + c y³ + g μ y with μ' = rate + k y + ….
+    In units of δ = (|ab rate|)^(1/3), with μ as the independent variable, its leading part is
+    a Riccati equation whose solution −A'/A, A(s) = Ai(−s), ends at the first zero
+    Ω₀ = 2.33810741 of the Airy function; the feedback κ = k/(a rate) acts like a part of the
+    cubic term:
 
-        delay = Ω₀ |ab|^(−1/3) |rate|^(2/3) + (c/(3a²)) |rate| ln |rate| + O(rate).
+        delay = Ω₀ |ab|^(−1/3) |rate|^(2/3) + ((c/a² − κ)/3) |rate| ln |rate| + O(rate).
 
-    With a level, of a state whose value tells when the jump is done, the term of
-    order rate is known too, by matching to the jump of the frozen model, which is
-    simulated; the error is then O(rate^(4/3)).
+    With a level, of a state whose value tells when the jump is done, or the turn of
+    the slow quantity, the term of order rate is known too, by matching to the jump of the frozen
+    model, which is simulated, the drift integrated along it. A rate that changes
+    by the time (c₁) or by the parameter (c₂) adds (2/5) Ω₀² (c₁/rate + c₂) |rate|/δ². The
+    terms left out are O(rate^(4/3)); ``error`` bounds them, from the same passage integrated
+    numerically.
 
     Parameters
     ----------
     point : SpecialPoint
         A fold, code LP.
-    rate : float
+    rate : float or Drift
         Of the parameter, with its sign.
-    level : mapping, optional
-        One state and its value, e.g. ``{"x": 1.0}``.
+    level : mapping or "turn", optional
+        One state and its value, e.g. ``{"x": 1.0}``, or that the parameter turns round.
     parameter : str or Symbol, optional
         What drifts, by default the parameter of the point's diagram.
     model : Model, optional
@@ -126,61 +158,113 @@ def fold_delay(
     (1.94690271, -0.11111111, '1.9582e-04')
     """
     require_code(point, "LP", "the delay of a fold")
-    speed = drift(rate)
     site = site_of(point, parameter, model)
-    height = level_of(site, level)
+    drift = drift_of(site, rate)
+    height = level_of(site, level, drift)
     form = fold_form_of(site)
-    if form.a * form.b * speed < 0:
-        raise wrong_way(site, speed)
-    d, product = form.c / form.a**2, abs(form.a * form.b)
+    if form.a * form.b * drift.rate < 0:
+        raise wrong_way(site, drift.rate)
+    speed, product = abs(drift.rate), abs(form.a * form.b)
+    feedback, change = _moved(site, form, drift)
+    # with μ as the independent variable feedback is a part of the cubic and the mixed term
+    kappa = feedback / (form.a * drift.rate)
+    d, g = form.c / form.a**2 - kappa, form.g / (form.a * form.b) - kappa
+    scale = (product * speed) ** (1.0 / 3.0)
     first = OMEGA_0 * product ** (-1.0 / 3.0)
-    scale = (product * abs(speed)) ** (1.0 / 3.0)
-    delay, third, words = first * abs(speed) ** (2.0 / 3.0), math.nan, _UNBOUNDED
-    error = _smallness(form, d, scale)
+    changed = 0.4 * OMEGA_0**2 * change * speed / scale**2
+    delay, third = first * speed ** (2.0 / 3.0) + changed, math.nan
+    words = "leading order, the order of the rate depends on the level of the jump"
     if height is not None:
-        eta = _along(form, *height) / scale
-        if eta <= 2.0:
-            delay = airy_passage(eta) * abs(speed) / scale
-            words = "leading order: the level lies within the slow part of the passage"
+        eta = _end(form, height, kappa) / scale
+        slow = height != TURN and eta <= SLOW_PART
+        jump = math.nan if slow else jump_time(site, form, drift, kappa, height)
+        if slow:
+            words = "to first order: the level lies within the slow part of the passage"
+            terms = (d * scale, g * scale, change / scale)
+            delay = slow_part(eta, terms) * speed / scale
+        elif math.isnan(jump):
+            goal = "a turn" if isinstance(height, str) else _words(site, height)
+            words = f"leading order: no jump of the frozen model to {goal} was found"
         else:
-            jump = jump_time(site, form, height)
             # the inner solution to first order, matched to the jump
-            third = d * math.log(product) / 3.0 - d * MATCHING + jump
-            third -= form.g / (2.0 * form.a * form.b)
-            words = (
-                f"leading order: no jump of the frozen model to {_words(site, height)} was found"
-            )
-            if math.isfinite(jump):
-                delay += abs(speed) * (d / 3.0 * math.log(abs(speed)) + third)
+            third = d * (math.log(product) / 3.0 - MATCHING) + jump - g / 2.0
+            delay += speed * (d / 3.0 * math.log(speed) + third)
+            if height != TURN:
                 # what the level sees of the end of the inner solution
-                delay += (airy_passage(eta) + 1.0 / eta - OMEGA_0) * abs(speed) / scale
-                words, error = "to the order of the rate", error**2
+                delay += (airy_passage(eta) + 1.0 / eta - OMEGA_0) * speed / scale
+            words = "to the order of the rate"
+    passed, time = math.nan, math.nan
+    if height is not None:
+        passed, time = _passed(site, form, drift, height, scale)
+    error, more = bound_of(site, delay, passed, drift)
     return FoldDelay(
         point=point,
         parameter=site.field.parameter,
-        rate=speed,
+        rate=drift.rate,
         delay=delay,
-        validity=f"{words}; relative error of the order of {error:.1g}",
+        validity=words + more,
+        error=error,
+        drift=None if drift.constant else drift,
+        time=time if not drift.constant else math.nan,
         quadratic=form.a,
         slope=form.b,
         cubic=form.c,
         mixed=form.g,
+        feedback=feedback,
         coefficients=(first, d / 3.0, third),
         level=named_level(site, height),
     )
 
 
-def jump_time(site: Site, form: FoldForm, level: tuple[int, float]) -> float:
+def _moved(site: Site, form: FoldForm, drift: Drift) -> tuple[float, float]:
+    """Slope k in μ' = rate + k y + …, and the relative change of the rate in time and by μ."""
+    by_state = np.array([drift.by_state.get(n, 0.0) for n in site.field.model.states])
+    change = drift.change / drift.rate + drift.by_value + float(by_state @ form.lean)
+    return float(by_state @ form.along), change
+
+
+def _end(form: FoldForm, level: Level, kappa: float) -> float:
+    """a·y where the jump is done, on the centre manifold."""
+    if isinstance(level, str):
+        return -1.0 / kappa if kappa < 0.0 else math.inf
+    return _along(form, *level)
+
+
+def _passed(
+    site: Site, form: FoldForm, drift: Drift, level: Level, scale: float
+) -> tuple[float, float]:
+    """The delay and the time of the passage as integrated; nan where that fails."""
+    region, start = site.region(site.point.regions[0]), None
+    for before in BEFORE:
+        mu = -before * drift.rate / scale
+        if start is None:
+            y = -math.copysign(math.sqrt(-form.b * mu / form.a), form.a)
+            guess = y * form.along + 0.5 * y**2 * form.bend + mu * form.lean
+        else:
+            guess = start[:-1]
+        found = quasi_static(site, drift, region, mu, guess)
+        if found is None:
+            break
+        start = found
+    place = None if start is None else Place(region, start, 0.0)
+    return reached_delay(site, drift, place, Event(level), 200.0 / scale)
+
+
+def jump_time(site: Site, form: FoldForm, drift: Drift, kappa: float, level: Level) -> float:
     """Finite part of the time of the jump in the frozen model, from the fold to a level.
 
-    From Y = a y on the unstable side the frozen model needs a time T(Y) that grows
-    as 1/Y + (c/a²) ln Y towards the fold; with those terms taken off, and with the
+    Time counts by w'/rate, so that it is the change of the slow quantity along the jump. From
+    Y = a y on the unstable side the frozen model needs a time T(Y) that grows as
+    1/Y + d ln Y towards the fold, d = c/a² − κ; with those terms taken off, and with the
     exact time of the cubic normal form in their place, it is simulated from two
     small Y and extrapolated. nan where the level is not reached.
     """
-    d = form.c / form.a**2
-    near = NEAR / max(abs(d), 1.0 / form.slowest, _turning(form), 1.0 / _along(form, *level))
+    cubic = form.c / form.a**2
+    end = _end(form, level, kappa)
+    bends = _turning(form, site.unit)
+    near = NEAR / max(abs(cubic), abs(kappa), 1.0 / form.slowest, bends, 1.0 / end)
     model = site.field.model.ramped(site.field.parameter, 0.0, float(site.u[-1]))
+    speed = LocalDrift(site, drift)
     found = []
     for y in (near, 0.5 * near):
         past = y / form.a
@@ -189,17 +273,49 @@ def jump_time(site: Site, form: FoldForm, level: tuple[int, float]) -> float:
             run = simulate(model, state, t=(0.0, 10.0 / y), integration=Integration(rtol=1e-15))
         except ModelError:
             return math.nan
-        number, height = level
-        hits = run.section(site.field.model.states[number], float(site.u[number]) + height)
-        if not len(hits):
+        if isinstance(level, str):
+            done = _turned(run, speed)
+        else:
+            hits = run.section(
+                site.field.model.states[level[0]], float(site.u[level[0]]) + level[1]
+            )
+            done = float(hits.times[0]) if len(hits) else math.nan
+        if math.isnan(done):
             return math.nan
-        found.append(float(hits.times[0]) - 1.0 / y - d * math.log(y / (1.0 + d * y)))
+        gone = done if drift.constant else _gone(run, speed, done)
+        found.append(gone - 1.0 / y - (cubic - kappa) * math.log(y / (1.0 + cubic * y)))
     return 2.0 * found[1] - found[0]
 
 
-def _turning(form: FoldForm) -> float:
-    """How soon the centre manifold bends, by Y."""
-    return float(np.abs(form.bend).max() / (abs(form.a) * np.abs(form.along).max()))
+def _turned(run: Trajectory, speed: LocalDrift) -> float:
+    """When w' of a drift first vanishes along a jump of the frozen model; nan if never."""
+    from scipy.optimize import brentq
+
+    def relative(time: float) -> float:
+        return float(speed.on_a_path(run(np.array([time])).T)[0] / speed.drift.rate)
+
+    parts = np.arange(PARTS) / PARTS
+    times = np.append((run.steps[:, :1] + run.steps[:, 1:2] * parts).ravel(), run.span[1])
+    back = np.flatnonzero(speed.on_a_path(run(times).T) / speed.drift.rate <= 0.0)
+    if not len(back) or back[0] == 0:
+        return math.nan
+    return float(brentq(relative, times[back[0] - 1], times[back[0]], xtol=1e-14 * times[-1]))
+
+
+def _gone(run: Trajectory, speed: LocalDrift, until: float) -> float:
+    """∫ w' dt/rate along a jump of the frozen model, by Gauss' rule on every step."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    edges = np.append(run.step_starts[run.step_starts < until], until)
+    half = 0.5 * np.diff(edges)
+    times = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half[:, None] * nodes
+    rate = speed.on_a_path(run(times.ravel()).T).reshape(times.shape) / speed.drift.rate
+    return float(((rate @ weights) * half).sum())
+
+
+def _turning(form: FoldForm, unit: Array) -> float:
+    """How soon the centre manifold bends, by Y, with each state in its unit."""
+    bend, along = (np.abs(v / unit).max() for v in (form.bend, form.along))
+    return float(bend / (abs(form.a) * along))
 
 
 def _words(site: Site, level: tuple[int, float]) -> str:
@@ -207,22 +323,14 @@ def _words(site: Site, level: tuple[int, float]) -> str:
     return f"{site.field.model.states[number]} = {float(site.u[number]) + height:g}"
 
 
-_UNBOUNDED = "leading order, the order of the rate depends on the level of the jump"
-
-
-def _smallness(form: FoldForm, d: float, scale: float) -> float:
-    """The size of the slow part of the passage, by that at which the normal form holds."""
-    return float(max(max(abs(d), 1.0 / form.slowest) * scale, np.finfo(float).eps))
-
-
 def fold_form_of(site: Site) -> FoldForm:
     """The normal form on the centre manifold of a fold, by projection (Kuznetsov 2004, 5.4)."""
     region = site.region(site.point.regions[0])
     jacobian, slope = site.slopes(region)
-    p, q = null_vectors(jacobian)
+    p, q = null_vectors(jacobian, site.unit)
     label = site.point.label
     overlap = float(p @ q)
-    if abs(overlap) <= ZERO:
+    if abs(overlap) <= ZERO * np.linalg.norm(p * site.unit) * np.linalg.norm(q / site.unit):
         raise ArgumentError(
             f"{label} has a double zero eigenvalue (Bogdanov-Takens), where this law does not hold"
         )
@@ -251,7 +359,7 @@ def fold_form_of(site: Site) -> FoldForm:
     lean = np.linalg.solve(bordered, np.append(-slope + b * q, 0.0))[:-1]
     mixed = float(p @ (site.mixed(region) @ q + forms.form(q, lean).real))
     slowest = float(np.abs(others.real).min(initial=math.inf))
-    return FoldForm(a, b, cusp_form(forms, jacobian), mixed, q, bend, slowest)
+    return FoldForm(a, b, cusp_form(forms, jacobian, site.unit), mixed, q, bend, lean, slowest)
 
 
 def _without_zero(jacobian: Array) -> tuple[NDArray[np.complex128], int]:
@@ -267,6 +375,35 @@ def _along(form: FoldForm, state: int, height: float) -> float:
     if past.size:
         return float(past.min())
     return float(found.max()) if found.size else math.inf
+
+
+def slow_part(eta: float, terms: tuple[float, float, float]) -> float:
+    """The m at which η' = η² + m + c₁ η³ + c₂ m η − c₃ (m η² + m²) reaches η, to first order in c.
+
+    With η₀ = −A'/A and the integrating factor A², A(s) = Ai(−s), the solution is
+    η₀ + A⁻² ∫ A² f dm, so that a value is reached earlier by what this adds, over η₀'.
+
+    Examples
+    --------
+    >>> slow_part(0.5, (0.0, 0.0, 0.0)) == airy_passage(0.5)
+    True
+    """
+    from scipy.integrate import quad
+    from scipy.special import airy
+
+    at = airy_passage(eta)
+    if not any(terms) or at <= -BEFORE[-1]:
+        return at
+
+    def added(m: float) -> float:
+        value, minus_slope, _, _ = airy(-m)
+        slope = -minus_slope
+        cubic, mixed = -(slope**3) / value, -m * value * slope
+        return float(terms[0] * cubic + terms[1] * mixed - terms[2] * m * (slope**2 + m * value**2))
+
+    whole, _ = quad(added, -BEFORE[-1], at, epsabs=1e-14, epsrel=1e-9, limit=200)
+    value = float(airy(-at)[0])
+    return float(at - whole / (value**2 * (eta**2 + at)))
 
 
 def airy_passage(eta: float) -> float:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import finite, formula, instance, takes
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.passage.agreement import require_one_model
 from fastslow.passage.bursting import Burst, bursting_of
-from fastslow.passage.cycle_ends import cycle_end, ending
+from fastslow.passage.cycle_ends import cycle_end, ending, slowly
 from fastslow.passage.excursions import (
     Excursion,
     excursions_of,
     oscillation_of,
     phase_of,
 )
+from fastslow.passage.frozen_cycles import FrozenEnd
 from fastslow.passage.predictions import with_laws
 from fastslow.passage.sheets import courses_of
 from fastslow.passage.slow_quantities import SlowQuantity, slow_quantity
@@ -22,6 +26,7 @@ from fastslow.passage.spikes import refined, turns_of
 from fastslow.passage.stays import Measured, Stay, measured, stays_of
 from fastslow.passage.sticking import along_edges, bands_at, with_sticking
 from fastslow.passage.transitions import Passage, leaving, passages_within, steep_parts
+from fastslow.results.angles import apart as apart_of
 from fastslow.results.diagrams import Diagram
 from fastslow.results.moments import Moment
 from fastslow.results.outcome import Outcome
@@ -31,11 +36,21 @@ from fastslow.results.transitions import Phase, Transition
 
 Array = NDArray[np.float64]
 
+#: A quantity that varies by less than this part of its size is held.
+HELD = 1e-9
+
 #: A turn of the slow quantity by less than this part of its range is none.
 WIGGLE = 0.02
 
 #: A sheet stands still that changes by less than this part of the extent over the slow range.
 FLAT = 1e-9
+
+#: A lag accounts for a deviation, and a constant drift for the change in that time, of which
+#: no more than this part is left.
+REST = 0.5
+
+#: A drift leaves a state behind by its relaxation time; by so many it has not settled yet.
+LONG = 2.0
 
 #: The slow quantity stands still where it drifts slower than this part of its mean speed.
 STILL = 1e-3
@@ -55,7 +70,7 @@ def overlay(
     equilibrium count as one here, so that a persistent equilibrium is followed
     across; past a Hopf point the branch is still followed while the state stays
     near it (the delay), past a fold the fold. What happens between two such stays
-    is a jump, or with two oscillations or more a spiking phase.
+    is a jump, or with two oscillations or more an oscillating phase.
 
     Parameters
     ----------
@@ -67,7 +82,7 @@ def overlay(
     radius : float
         What counts as near, with each state in units of its extent.
     observed : str or Symbol, optional
-        The state whose maxima count as spikes, by default the first that is not
+        The state whose maxima are counted, by default the first that is not
         periodic; of a periodic one those of its sine.
 
     Returns
@@ -79,9 +94,9 @@ def overlay(
     UnknownNameError
         If the diagram's parameter is no slow quantity of the run, or a state is missing.
     ArgumentError
-        If the other parameters of the two differ, the run leaves the path along
-        which the model was frozen, the run has no samples, or the radius is not
-        between 0 and 1.
+        If the two are of different models, their other parameters differ, the run
+        leaves the path along which the model was frozen, the run has no samples, or
+        the radius is not between 0 and 1.
 
     Examples
     --------
@@ -95,6 +110,7 @@ def overlay(
     relaxation oscillation (symmetric fold/fold)
     """
     state_number = _checked(diagram, run, radius, observed)
+    compared = require_one_model(diagram, run)
     slow = slow_quantity(diagram, run)
     sheets, courses = courses_of(diagram)
     m = measured(slow, courses, diagram.over, radius)
@@ -104,9 +120,10 @@ def overlay(
     phases: list[Phase] = []
     transitions: list[Transition] = []
     bursts: list[Burst] = []
+    ends: dict[tuple[str, str], FrozenEnd | None] = {}
     excursions = {id(e.old): e for e in excursions_of(m, stays, swing)}
     if id(None) in excursions:
-        phases.append(_between(p, excursions[id(None)], transitions, bursts))
+        phases.append(_between(p, excursions[id(None)], transitions, bursts, ends))
     followed = p.followed.copy()
     for stay in stays:
         transitions += sorted(
@@ -115,15 +132,16 @@ def overlay(
         start = phases[-1].end if phases else float(m.time[0])
         after = excursions.get(id(stay))
         before = len(transitions)
-        nxt = None if after is None else _between(p, after, transitions, bursts)
+        nxt = None if after is None else _between(p, after, transitions, bursts, ends)
         labels = [sheets[k].label for k in p.followed[stay.start : stay.stop]]
         end = float(m.time[-1]) if nxt is None else nxt.start
-        phases.append(Phase(start, end, "quiescent", tuple(dict.fromkeys(labels))))
+        phases.append(Phase(start, end, "quasi-static", tuple(dict.fromkeys(labels))))
         if nxt is not None:
             phases.append(nxt)
             _hand_over(p, after, transitions[before:], followed)
-    distance, lag, relaxation = _distances(p, followed)
-    rests = bands_at(diagram, run, m.slow)
+    held = _held(diagram, run)
+    distance, lag, relaxation = _distances(p, followed, _jumping(p, phases))
+    rests = bands_at(diagram, run, m.slow, m.extent)
     band, away = along_edges(diagram, run, m.slow, rests, m.extent, radius)
     band[(rests < 0) & (followed >= 0)] = -1
     followed[rests >= 0], lag[rests >= 0] = -1, np.nan
@@ -142,10 +160,10 @@ def overlay(
         lag,
         relaxation,
         with_sticking([q for q in phases if q.end > q.start], diagram, run, rests, band),
-        tuple(with_laws(p, transitions)),
+        tuple(with_laws(p, transitions) if held is None else map(_elsewhere, transitions)),
         bursting_of(bursts, transitions),
         _turning(p),
-        _outcome(diagram, run, slow),
+        _outcome(diagram, run, slow, compared),
         band,
     )
 
@@ -193,7 +211,13 @@ def _followed(m: Measured, stays: list[Stay]) -> NDArray[np.intp]:
     return followed
 
 
-def _between(p: Passage, e: Excursion, transitions: list[Transition], bursts: list[Burst]) -> Phase:
+def _between(
+    p: Passage,
+    e: Excursion,
+    transitions: list[Transition],
+    bursts: list[Burst],
+    ends: dict[tuple[str, str], FrozenEnd | None],
+) -> Phase:
     """The phase of an excursion; its transitions and bursts are added to the lists."""
     time = p.m.time
     sheet = "" if e.new is None else p.sheets[p.followed[e.new.start]].label
@@ -210,16 +234,18 @@ def _between(p: Passage, e: Excursion, transitions: list[Transition], bursts: li
     if e.new is not None:
         end = p.landed(e.new, begin).time
     away = "jump"
-    if first is not None and first.kind == "transit":
-        away = "transit"
+    if first is not None and first.kind == "gap crossing":
+        away = "gap crossing"
     elif first is not None and first.from_sheet == first.to_sheet:
         away = "excursion"
     phase = phase_of(p.m, e, begin, end, sheet, away)
     closing = None
     if e.cycle and e.new is not None and not outside:
-        closing = cycle_end(p, e)
+        closing = cycle_end(p, e, ends)
         transitions.append(ending(p, e, closing))
-    if first is not None and e.new is not None and phase.kind == "spiking":
+    complete = first is not None and e.new is not None and phase.kind == "oscillating"
+    if complete and slowly(p, e):
+        assert first is not None
         bursts.append(Burst(phase, first, closing))
     return phase
 
@@ -236,8 +262,29 @@ def _hand_over(
     followed[rows] = np.where(old, p.followed[start - 1], p.followed[e.new.start])
 
 
-def _distances(p: Passage, followed: NDArray[np.intp]) -> tuple[Array, Array, Array]:
-    """Distance from the followed (else the nearest stable) sheet, lag, and relaxation time."""
+def _elsewhere(t: Transition) -> Transition:
+    """A transition without its delay, where another slow quantity has moved the special point."""
+    return replace(t, delay=float("nan"))
+
+
+def _jumping(p: Passage, phases: list[Phase]) -> NDArray[np.bool_]:
+    """Which samples are on the way from one sheet to another, shape (N,)."""
+    away = np.zeros(len(p.m.time), dtype=bool)
+    for phase in phases:
+        if phase.kind != "quasi-static":
+            away |= (p.m.time > phase.start) & (p.m.time < phase.end)
+    return away
+
+
+def _distances(
+    p: Passage, followed: NDArray[np.intp], away: NDArray[np.bool_]
+) -> tuple[Array, Array, Array]:
+    """Distance from the followed (else the nearest stable) sheet, lag, and relaxation time.
+
+    The lag solves X(w(t − lag)) ≈ x(t) to first order. There is none in a jump, where the sheet
+    at the earlier time is not much nearer (the state oscillates about it, the slow quantity
+    turns), or where the drift cannot have caused it: after a jump, before the state has relaxed.
+    """
     m = p.m
     apart = np.array([m.apart(k) for k in range(len(m.courses))]).reshape(-1, len(m.time))
     nearest = np.where(m.present.T, apart, np.inf)
@@ -248,17 +295,26 @@ def _distances(p: Passage, followed: NDArray[np.intp]) -> tuple[Array, Array, Ar
         on = np.isin(followed, course.sheets)
         distance[on] = apart[number, on]
         slow = m.slow[on]
-        slope = course.slope(slow) / m.extent
+        # a velocity is that of the drifting sheet itself, at whatever lag
+        moves = np.where(m.velocities, 0.0, 1.0)
+        slope = moves * course.slope(slow) / m.extent
+        deviation = moves * m.deviation(number, on)
         steep = (slope**2).sum(axis=1)
         rate = -course.relaxation(slow)
         with np.errstate(divide="ignore", invalid="ignore"):
-            ahead = (m.deviation(number, on) * slope).sum(axis=1) / steep
+            ahead = (deviation * slope).sum(axis=1) / steep
             behind = -ahead / p.drift[on]
             relaxation[on] = np.where(rate > 0, 1.0 / rate, np.nan)
-        moving = np.abs(p.drift[on]) > STILL * mean
-        lag[on] = np.where(
-            moving & np.isfinite(behind) & (np.sqrt(steep) * m.span > FLAT), behind, np.nan
-        )
+        exists = (np.abs(p.drift[on]) > STILL * mean) & (np.sqrt(steep) * m.span > FLAT)
+        exists &= (np.abs(behind) * rate < LONG) & ~away[on]
+        earlier = m.time[on] - np.where(exists, behind, 0.0)
+        step = p.drift[on] * np.where(exists, behind, 0.0)
+        inside = (earlier >= m.time[0]) & (earlier <= m.time[-1])
+        before = np.where(inside, np.interp(earlier, m.time, m.slow), slow - step)
+        exists &= np.abs(before - slow + step) <= REST * np.abs(step)
+        rest = moves * apart_of(m.scaled[on], course.state(before) / m.extent, m.periods)
+        exists &= np.linalg.norm(rest, axis=1) <= REST * np.linalg.norm(deviation, axis=1)
+        lag[on] = np.where(exists, behind, np.nan)
     return distance, lag, relaxation
 
 
@@ -271,24 +327,54 @@ def _turning(p: Passage) -> tuple[Moment, ...]:
     return tuple(p.moment(float(t)) for t in refined(time, slow, turns.rows))
 
 
-def _outcome(diagram: Diagram, run: Trajectory, slow: SlowQuantity) -> Outcome:
-    """What the diagram does not cover of a run."""
+def _held(diagram: Diagram, run: Trajectory) -> str | None:
+    """A slow quantity of the run that the diagram holds at one value."""
+    for name, value in diagram.parameters.items():
+        if name in run.columns and np.abs(run[name] - value).max() > HELD * np.abs(run[name]).max():
+            return name
+    return None
+
+
+def _outcome(diagram: Diagram, run: Trajectory, slow: SlowQuantity, compared: bool) -> Outcome:
+    """What the diagram does not cover of a run, and what else the overlay cannot tell."""
     name, (low, high) = diagram.parameter, diagram.over
     values = slow.table
-    if values.min() < low or values.max() > high:
+    held = _held(diagram, run)
+    if held is not None:
+        return Outcome(
+            "another slow quantity",
+            f"the diagram holds {held} = {diagram.parameters[held]:.6g}, in the run it goes from "
+            f"{run[held].min():.6g} to {run[held].max():.6g}: its special points are not where the "
+            "run meets them, and no delays are given.",
+            False,
+        )
+    outside = (values < low) | (values > high)
+    if outside.any():
+        weight = np.diff(run.t)
+        total = float(weight.sum()) or 1.0
+        share = float(weight[outside[:-1]].sum()) / total
         return Outcome(
             "outside the diagram",
             f"{name} runs from {values.min():.6g} to {values.max():.6g}, the diagram from "
-            f"{low:.6g} to {high:.6g}: what lies outside is not measured; continue it over "
-            "the whole range.",
+            f"{low:.6g} to {high:.6g}: what lies outside, {share:.1%} of the time, is not "
+            "measured; continue it over the whole range.",
             False,
         )
-    for held, value in diagram.parameters.items():
-        if held in run.columns and np.abs(run[held] - value).max() > 1e-9 * max(abs(value), 1.0):
-            return Outcome(
-                "another slow quantity",
-                f"the diagram holds {held} = {value:.6g}, in the run it goes from "
-                f"{run[held].min():.6g} to {run[held].max():.6g}.",
-                False,
-            )
+    if not run.outcome:
+        return Outcome(
+            "cut short", f"the run ended early, what follows is not known: {run.outcome}", False
+        )
+    if not np.ptp(values) > HELD * np.abs(values).max():
+        return Outcome(
+            "at rest",
+            f"{name} stays at {values[0]:.6g} all along: nothing is passed, and there are no lags.",
+            False,
+        )
+    if not compared:
+        return Outcome(
+            "not compared",
+            "that the diagram and the run are of one model could not be checked: their equations "
+            "are not both known, or written in different ways.",
+            False,
+        )
     return MEASURED

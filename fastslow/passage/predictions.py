@@ -2,77 +2,83 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
 from fastslow.errors import ArgumentError
 from fastslow.passage.delay_laws import predict_delay
-from fastslow.passage.hopf_delays import hopf_exit
+from fastslow.passage.drifts import drift_at
+from fastslow.passage.run_exits import Known, exit_law
+from fastslow.passage.settling import with_memory
+from fastslow.passage.sites import TURN
 from fastslow.passage.transitions import Passage
-from fastslow.results.delays import Delay, HopfExit
+from fastslow.results.delays import Delay
+from fastslow.results.drifts import Drift
 from fastslow.results.points import SpecialPoint
-from fastslow.results.transitions import Transition
+from fastslow.results.transitions import OSCILLATING, Transition
 
 #: Kinds of transition that a law is known for.
-LAWFUL = ("jump", "transit", "crossing", "Hopf")
+LAWFUL = ("jump", "gap crossing", "crossing", "Hopf")
 
 
 def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
     """The same transitions, each with what its law predicts for its own rate of drift."""
     # a periodic run passes the same points at the same rates over and over
     known: dict[tuple[object, ...], Delay | None] = {}
+    modes: dict[tuple[str, int], Known | None] = {}
     found = []
     for t in transitions:
         point = t.special
-        if t.kind not in LAWFUL or point is None or not t.slope > 0:
+        exits = point is not None and point.code in ("HB", "BP") and t.from_sheet != OSCILLATING
+        if not (t.kind in LAWFUL or exits) or point is None or not t.slope > 0:
             found.append(t)
             continue
-        left = next(sheet for sheet in p.sheets if sheet.label == t.from_sheet)
-        rate = p.outward(left, point) * t.slope
-        where: float | dict[str, float] | None = None
-        if t.kind == "Hopf":
-            where = _entry(p, t, transitions)
-        elif t.kind == "jump":
-            where = _level(p, t)
-        key = (point.label, t.kind, f"{rate:.6g}", _rounded(where))
+        if exits:
+            found.append(replace(t, law=exit_law(p, t, point, modes)))
+            continue
+        passed = _passing(p, point, t.time)
+        drift = None if passed is None else drift_at(p.slow, point, passed)
+        where: str | dict[str, float] | None = None
+        if t.kind == "jump":
+            where = TURN if t.turned else _level(p, t)
+        key = (point.label, t.kind, _rounded(drift), _rounded(where))
         if key not in known:
-            known[key] = _law(p, point, rate, where)
-        found.append(replace(t, law=known[key]))
+            known[key] = None if drift is None else _law(p, point, drift, where)
+        law = known[key]
+        if law is not None and drift is not None and passed is not None:
+            law = with_memory(p, t, transitions, law, drift, passed)
+        found.append(replace(t, law=law))
     return found
 
 
+def _passing(p: Passage, point: SpecialPoint, until: float) -> float | None:
+    """When the slow quantity last passed a special point before a time."""
+    value, time = point[p.diagram.parameter], p.m.time
+    row = int(np.searchsorted(time, until, side="right"))
+    passed = np.flatnonzero(np.diff(p.m.slow[:row] > value))
+    if not len(passed):
+        return None
+    before = int(passed[-1])
+    rising = p.m.slow[before] <= value
+    return p.first(float(time[before]), float(time[before + 1]), lambda w, _: (w > value) == rising)
+
+
 def _law(
-    p: Passage, point: SpecialPoint, rate: float, where: float | dict[str, float] | None
+    p: Passage, point: SpecialPoint, drift: Drift, where: str | dict[str, float] | None
 ) -> Delay | None:
     try:
-        if isinstance(where, float):
-            return _as_integrated(p, hopf_exit(p.diagram, point, where, rate))
-        return predict_delay(point, rate, level=where)
+        return predict_delay(point, drift, level=where)
     except ArgumentError:
         # a law that does not hold there, or a diagram without its model
         return None
 
 
-def _as_integrated(p: Passage, law: HopfExit) -> HopfExit:
-    """The law, which says so where the tolerance of the run forgets the entry."""
-    rtol = float(p.slow.run.settings.get("rtol", 0.0))
-    if law.forgotten or not rtol > 0.0 or law.decay <= -math.log(rtol):
-        return law
-    words = (
-        f"the tolerance decides: the amplitude falls by exp(−{law.decay:.0f}), below rtol = "
-        f"{rtol:g} of the run, and the exit comes at another place than this"
-    )
-    return replace(law, validity=words, forgotten=True)
-
-
-def _rounded(where: float | dict[str, float] | None) -> str:
-    if where is None:
-        return ""
-    if isinstance(where, float):
-        return f"{where:.6g}"
-    return " ".join(f"{name} {value:.6g}" for name, value in where.items())
+def _rounded(what: str | dict[str, float] | Drift | None) -> str:
+    if isinstance(what, dict):
+        return " ".join(f"{name} {value:.6g}" for name, value in what.items())
+    # a law in time differs by the period, its first terms do not
+    return str(replace(what, law="") if isinstance(what, Drift) else what)
 
 
 def _level(p: Passage, t: Transition) -> dict[str, float]:
@@ -80,12 +86,3 @@ def _level(p: Passage, t: Transition) -> dict[str, float]:
     way = (t.state - t.leave.state) / p.m.extent
     number = int(np.argmax(np.abs(way)))
     return {p.diagram.states[number]: float(t.state[number])}
-
-
-def _entry(p: Passage, t: Transition, others: list[Transition]) -> float:
-    """The slow quantity where the motion came to the sheet, or last turned back on it."""
-    landed = [o.land.time for o in others if o.land is not None and o.land.time < t.time]
-    rows = np.flatnonzero((p.m.time >= max(landed, default=-np.inf)) & (p.m.time <= t.leave.time))
-    drift = np.sign(np.diff(p.m.slow[rows]))
-    turned = np.flatnonzero(drift != drift[-1]) if len(drift) else drift
-    return float(p.m.slow[rows[int(turned[-1]) + 1 if len(turned) else 0]])

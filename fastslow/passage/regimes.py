@@ -1,8 +1,9 @@
-"""Regimes of a gap over two parameters."""
+"""Regimes of a gap: of the motions that runs settle on, and over two parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,16 +21,354 @@ from fastslow.arguments import (
 )
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
+from fastslow.results.ensembles import Ensemble
 from fastslow.results.formulas import evaluated, names_in
+from fastslow.results.lyapunov import LyapunovExponent
+from fastslow.results.outcome import Outcome
 from fastslow.results.refined_maps import RefinedMap
+from fastslow.results.regimes import (
+    CHAOTIC,
+    NOT_SETTLED,
+    REGIMES,
+    Regimes,
+    RegimeSet,
+    coexisting,
+    ending_of,
+)
 from fastslow.results.slow_loads import NO_GAP
-from fastslow.simulation.arguments import initial_state
 from fastslow.simulation.ensembles import simulate_many
+from fastslow.simulation.many_arguments import starts_and_parameters
+from fastslow.simulation.separations import FINE, Exponents, exponents
 from fastslow.simulation.settings import DEFAULT, Integration, integration_settings
+from fastslow.simulation.trajectories import simulate
 from fastslow.sweeps.refinement import refined_map
 
 Floats = NDArray[np.float64]
 Parameters = Mapping[Any, Any] | Callable[[Floats, Floats], Mapping[Any, Any]]
+
+
+#: Periods after which the motion is looked at again where it has not settled; the exponent
+#: is measured from the first of them on.
+LONGER = (64, 256, 1024)
+
+#: Intervals in a period of a measurement of exponents, at most: where separations shrink by
+#: more than rounding within one, the sign is the same whatever the number.
+FINEST = 32
+
+#: Part of a measurement of exponents that is left out at its beginning.
+DISCARDED = 0.25
+
+
+@takes(
+    model=instance(Model),
+    period=positive,
+    periods=positive,
+    longest=positive,
+    gap=text,
+    integration=integration_settings,
+)
+def classify_regime(
+    model: Model,
+    states: ArrayLike | Mapping[Any, ArrayLike],
+    *,
+    periods: float = 64,
+    longest: float = LONGER[-1],
+    period: float | None = None,
+    gap: str | None = None,
+    integration: Integration = DEFAULT,
+    threads: int | None = None,
+) -> RegimeSet:
+    """Find the regimes of the motions that runs from several states settle on.
+
+    Each run is continued until its states repeat at the ends of periods, or its largest
+    Lyapunov exponent, as decided by `fastslow.lyapunov_exponent`, is positive, or is negative
+    while all periods of the second half are of one kind, or the longest run is reached: it is
+    then named by the kind of all periods, or ``"not settled"`` where they differ. Motions
+    that repeat are told apart by their states; all chaotic ones count as one, and so do
+    those that have not settled.
+
+    Parameters
+    ----------
+    model : Model
+        With a gap and a period.
+    states : array_like, shape (m, n) or (n,), or mapping
+        Initial states; by name, each a number or of shape (m,).
+    periods : float
+        Length of the runs at first, in periods of the forcing. Its second half is looked
+        at period by period.
+    longest : float
+        Length beyond which no run is continued.
+    period, gap, integration, threads
+        As in `simulate_many`.
+
+    Returns
+    -------
+    RegimeSet
+
+    Raises
+    ------
+    ArgumentError
+        For a model without a gap or a period, wrong states, or a run that ends early.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> gear = fs.systems.harmonic_gear_from_physical(D=0.5).with_parameters(omega=1.3)
+    >>> found = classify_regime(gear, [[0, 0], [0.5, 0]])
+    >>> found.label, {kind: round(share, 1) for kind, share in found.fractions.items()}
+    ('chaotic', {'unilateral upper': 0.7, 'bilateral': 0.3})
+    """
+    starts, _ = starts_and_parameters(model, states, None)
+    found = _settled(model, starts, {}, periods, longest, period, gap, integration, threads)
+    if found.failures:
+        row, outcome = next(iter(found.failures.items()))
+        raise ArgumentError(f"the run from state {row} ended early: {outcome}")
+    if NO_GAP in found.labels:
+        raise ArgumentError(
+            "this model has no gap: no three regions between two parallel interfaces; name the "
+            "region inside as gap="
+        )
+    motions: list[Regimes] = []
+    places: list[Floats] = []
+    index = np.zeros(len(starts), dtype=np.int64)
+    for row in range(len(starts)):
+        motion, place = found.motion(row), found.places(row, integration)
+        same = [
+            k
+            for k, (known, other) in enumerate(zip(motions, places, strict=True))
+            if known.label == motion.label and _meet(place, other, found.scale(row))
+        ]
+        if not same:
+            motions.append(motion)
+            places.append(place)
+        index[row] = same[0] if same else len(motions) - 1
+    return RegimeSet(tuple(motions), starts, index, dict(model.parameters), model.equations)
+
+
+def _meet(one: Floats, other: Floats, scale: Floats) -> bool:
+    """Whether two motions that repeat go through a common state, or neither repeats."""
+    if not len(one) or not len(other):
+        return len(one) == len(other)
+    apart = np.abs(one[:, None] - other[None]) / scale
+    return bool((apart.max(axis=2) < MEETING).any())
+
+
+#: States of motions that differ by less, in units of their range, are of the same one.
+MEETING = 1e-4
+
+
+class _Settled:
+    """What each of many runs settles on.
+
+    Parameters
+    ----------
+    labels : list of str
+    runs : dict
+        For each run the ensemble that settled it, its row there, and how many periods long.
+    exponents : dict
+        For some runs the exponents that were measured last, and the row there.
+    failures : dict
+        Runs that ended early, and why.
+    """
+
+    def __init__(self, model: Model, count: int) -> None:
+        self.model = model
+        self.labels = [NOT_SETTLED] * count
+        self.runs: dict[int, tuple[Ensemble, int, float]] = {}
+        self.exponents: dict[int, tuple[Exponents, int, Integration]] = {}
+        self.failures: dict[int, Outcome] = {}
+
+    def scale(self, row: int) -> Floats:
+        """The range of each state of a run."""
+        many, i, _ = self.runs[row]
+        ranges = many.maximum[i] - many.minimum[i]
+        return np.where(ranges > 0, ranges, 1.0)
+
+    def places(self, row: int, integration: Integration) -> Floats:
+        """The states at the ends of periods of a motion that repeats, shape (multiple, n)."""
+        many, i, _ = self.runs[row]
+        multiple = int(many.multiples[i])
+        if not multiple:
+            return np.empty((0, many.final.shape[1]))
+        here = self.model.with_parameters({name: v[i] for name, v in many.parameters.items()})
+        first = float(many.span[i, 1])
+        length = self._period(row)
+        run = simulate(
+            here,
+            many.final[i],
+            t=(first, first + multiple * length),
+            period=length,
+            integration=integration,
+        )
+        return np.asarray(run(first + length * np.arange(multiple)).T)
+
+    def _period(self, row: int) -> float:
+        many, i, length = self.runs[row]
+        return float((many.span[i, 1] - many.span[i, 0]) / length)
+
+    def _exponent(self, row: int) -> LyapunovExponent | None:
+        if row not in self.exponents:
+            return None
+        many, i, _ = self.runs[row]
+        measured, k, integration = self.exponents[row]
+        here = self.model.with_parameters({name: v[i] for name, v in many.parameters.items()})
+        unsettled = Outcome("not periodic", "the states do not repeat.", False)
+        return measured.of(k, here, self._period(row), integration, unsettled)
+
+    def motion(self, row: int) -> Regimes:
+        """What a run settles on, as a result."""
+        many, i, _ = self.runs[row]
+        touched = many.touched[i][many.touched[i] > 0]
+        kinds = tuple(REGIMES[bits] for bits in touched)
+        length = self._period(row)
+        last = float(many.span[i, 1])
+        multiple = int(many.multiples[i])
+        exponent = self._exponent(row)
+        outcome = ending_of(multiple, float(many.changes[i]), len(kinds))
+        if exponent is not None and not multiple:
+            text = f"The largest Lyapunov exponent is {exponent.words}."
+            if exponent.chaotic:
+                outcome = Outcome("chaotic", text, True)
+            elif self.labels[row] != NOT_SETTLED and exponent.value < 0:
+                told = (
+                    f"The motion is approached, by {many.changes[i]:.2g} of its ranges in a period."
+                )
+                outcome = Outcome("settled", f"{told} {text}", True)
+            else:
+                outcome = replace(outcome, message=f"{outcome.message} {text}")
+        return Regimes(
+            self.labels[row],
+            kinds,
+            length,
+            (last - len(kinds) * length, last),
+            multiple or None,
+            float(many.changes[i]),
+            outcome,
+            exponent,
+        )
+
+
+def regimes_at(
+    model: Model,
+    states: Floats,
+    parameters: Mapping[str, Floats],
+    *,
+    periods: float = 3,
+    longest: float = LONGER[1],
+    period: float | None = None,
+    gap: str | None = None,
+    integration: Integration = DEFAULT,
+    threads: int | None = None,
+) -> list[str | Outcome]:
+    """The regimes that runs at many parameter sets settle on, as `classify_regime` finds them.
+
+    Parameters
+    ----------
+    model : Model
+    states : ndarray, shape (m, n) or (n,)
+    parameters : mapping
+        Parameter to its values, shape (m,).
+    periods, longest, period, gap, integration, threads
+        As in `regime_map`.
+
+    Returns
+    -------
+    list of str or Outcome
+        Labels; where a run ended early, why.
+    """
+    starts, swept = starts_and_parameters(model, states, parameters)
+    found = _settled(model, starts, swept, periods, longest, period, gap, integration, threads)
+    return [found.failures.get(row, label) for row, label in enumerate(found.labels)]
+
+
+def _settled(
+    model: Model,
+    starts: Floats,
+    swept: Mapping[str, Floats],
+    periods: float,
+    longest: float,
+    period: float | None,
+    gap: str | None,
+    integration: Integration,
+    threads: int | None,
+) -> _Settled:
+    """Continue runs until they repeat or are found to be chaotic."""
+    found = _Settled(model, len(starts))
+    waiting = np.arange(len(starts))
+    lengths = [periods, *(float(n) for n in LONGER if periods < n <= longest)]
+    for length in lengths:
+        if not len(waiting):
+            break
+        many = simulate_many(
+            model,
+            starts[waiting],
+            parameters={name: values[waiting] for name, values in swept.items()},
+            periods=length,
+            period=period,
+            gap=gap,
+            integration=integration,
+            threads=threads,
+        )
+        open_ = []
+        for i, row in enumerate(waiting.tolist()):
+            found.runs[row] = (many, i, length)
+            found.labels[row] = str(many.regime[i]) or NO_GAP
+            if not many.success[i]:
+                found.failures[row] = many.outcomes[i]
+            elif many.regime[i] and not many.multiples[i]:
+                found.labels[row] = NOT_SETTLED
+                open_.append(i)
+        rows = np.array(open_, dtype=np.intp)
+        waiting = waiting[rows]
+        if not len(rows) or length < min(LONGER[0], longest):
+            continue
+        last = length == lengths[-1]
+        decided = _measured(found, model, many, rows, waiting, length, integration, threads, last)
+        waiting = waiting[~decided]
+    return found
+
+
+def _measured(
+    found: _Settled,
+    model: Model,
+    many: Ensemble,
+    rows: NDArray[np.intp],
+    waiting: NDArray[np.intp],
+    length: float,
+    integration: Integration,
+    threads: int | None,
+    last: bool,
+) -> NDArray[np.bool_]:
+    """Measure the exponents of runs that do not repeat, on from their ends.
+
+    Returns whether each of them has a label now, shape (m,).
+    """
+    periods = (many.span[rows, 1] - many.span[rows, 0]) / length
+    count = max(10, int(length))
+    begin = many.span[rows, 1]
+    first = begin + np.ceil(DISCARDED * count) * periods
+    fine = replace(integration, rtol=min(integration.rtol, FINE.rtol))
+    measured = exponents(
+        model,
+        many.final[rows],
+        {name: values[rows] for name, values in many.parameters.items()},
+        np.stack([begin, first, first + count * periods], axis=1),
+        fine,
+        threads,
+        count,
+        FINEST * count,
+    )
+    decided = np.zeros(len(rows), dtype=bool)
+    for k, row in enumerate(waiting.tolist()):
+        found.exponents[row] = (measured, k, fine)
+        sign, regime = measured.sign(k), str(many.regime[rows[k]])
+        if sign > 0:
+            found.labels[row] = CHAOTIC
+        elif sign < 0 or last:
+            # still approached, or too slow to tell: named where all periods are of one kind
+            found.labels[row] = regime
+        decided[k] = found.labels[row] != NOT_SETTLED
+    return decided
 
 
 @takes(
@@ -41,6 +380,7 @@ Parameters = Mapping[Any, Any] | Callable[[Floats, Floats], Mapping[Any, Any]]
     gap=text,
     period=positive,
     periods=positive,
+    longest=positive,
     progress=flag,
 )
 def regime_map(
@@ -54,6 +394,7 @@ def regime_map(
     guard: int = 1,
     tol: float | None = None,
     periods: float = 3,
+    longest: float = LONGER[1],
     period: float | None = None,
     gap: str | None = None,
     integration: Integration = DEFAULT,
@@ -62,9 +403,12 @@ def regime_map(
 ) -> RefinedMap:
     """How the sides of a gap are touched, over two parameters, with refined boundaries.
 
-    The label of each point is the `Trajectory.regime` of a run from the same
-    initial state: what its last period shows. ``"no gap"`` is where there is no
-    gap, and ``"failed"`` where the run could not go on.
+    The label of each point is the regime that a run settles on, as `classify_regime`
+    finds it: runs whose states do not repeat over the second half of ``periods`` are made
+    longer, and their largest Lyapunov exponent is measured. ``"chaotic"`` is where it is
+    positive, ``"not settled"`` where the periods of the longest run differ and it does not
+    repeat, ``"coexisting: a + b"`` where runs from several states settle on regimes a and b,
+    ``"no gap"`` where there is no gap, and ``"failed"`` where a run could not go on.
 
     Parameters
     ----------
@@ -73,16 +417,17 @@ def regime_map(
     over : mapping
         Two names, each with its range: parameters of the model, or names that
         ``parameters`` turns into them.
-    state : sequence of float, shape (n,), or mapping
-        Initial states of every run.
+    state : sequence of float, shape (n,) or (k, n), or mapping
+        Initial states of every run, or those of k runs at every point.
     parameters : mapping or callable, optional
         What the axes mean: parameter to an expression in the names of the axes
         and the other parameters, ``{"C": "B*ratio"}``; or a function of two
         arrays that returns the values of parameters.
     cells, levels, guard, tol
         As in `refined_map`; all new points of a level are simulated together.
-    periods : float
-        Length of every run in periods of the forcing.
+    periods, longest : float
+        Length of every run in periods of the forcing: at first, and beyond which no run is
+        continued.
     period, gap, integration, threads
         As in `simulate_many`.
     progress : bool
@@ -113,26 +458,31 @@ def regime_map(
     >>> found.at(D=0.05, ratio=1.05), found.at(D=0.29, ratio=1.05), found.at(D=0.1, ratio=0.96)
     ('bilateral', 'unilateral upper', 'meshed upper')
     """
-    begin = initial_state(model, state)
+    begin, _ = starts_and_parameters(model, state, None)
     values_at = _values(model, [str(name) for name in over], parameters)
 
     def labels(first: Floats, second: Floats) -> list[Any]:
-        many = simulate_many(
-            model,
-            begin,
-            parameters=values_at(first, second),
-            periods=periods,
-            period=period,
-            gap=gap,
-            integration=integration,
-            threads=threads,
-        )
-        words = [str(word) or NO_GAP for word in many.regime]
-        if many.success.all():
-            return words
-        return [
-            word if outcome else outcome for word, outcome in zip(words, many.outcomes, strict=True)
+        count = len(first)
+        values = {n: np.broadcast_to(v, count) for n, v in values_at(first, second).items()}
+        found = [
+            regimes_at(
+                model,
+                start,
+                values,
+                periods=periods,
+                longest=longest,
+                period=period,
+                gap=gap,
+                integration=integration,
+                threads=threads,
+            )
+            for start in begin
         ]
+        words: list[Any] = []
+        for point in zip(*found, strict=True):
+            failed = [word for word in point if isinstance(word, Outcome)]
+            words.append(failed[0] if failed else coexisting(point))
+        return words
 
     found = refined_map(
         labels, over, cells=cells, levels=levels, guard=guard, tol=tol, progress=progress

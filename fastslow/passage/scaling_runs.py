@@ -25,11 +25,12 @@ from fastslow.model.model import Model
 from fastslow.passage.boundary_delays import approach_of
 from fastslow.passage.delay_laws import predict_delay
 from fastslow.passage.scaling_fits import fitted
-from fastslow.passage.sites import Site, WrongWay, site_of
+from fastslow.passage.sites import Site, WrongWay, same_point, site_of
 from fastslow.results.branches import Branch
 from fastslow.results.delay_scalings import DelayScaling
 from fastslow.results.delays import BoundaryDelay, FoldDelay, GapTransit
 from fastslow.results.diagrams import Diagram
+from fastslow.results.drifts import Drift
 from fastslow.results.outcome import Outcome
 from fastslow.results.point_types import POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint
@@ -46,6 +47,9 @@ PRECISE = Integration(rtol=1e-13)
 
 #: A run starts where this many relaxation times of its sheet, integrated, lie before the point.
 FORGOTTEN = 40.0
+
+#: A point found again over a shorter range differs by less than this part of its size.
+AGAIN = 1e-7
 
 #: A run ends at this multiple of the predicted delay.
 REACH = 4.0
@@ -179,6 +183,7 @@ def _event(law: Law) -> str:
         return f"{law.interfaces[1]} = 0"
     if law.level is None or (isinstance(law, BoundaryDelay) and law.subtype == "persistence"):
         return f"{law.point.interface} = 0"
+    assert isinstance(law.level, dict)
     ((state, value),) = law.level.items()
     return f"{state} = {value:g}"
 
@@ -196,7 +201,7 @@ def _starts(site: Site, laws: list[Law], start: float | None) -> list[tuple[floa
     ends = sorted((here - 1.02 * way * max(far), here + 0.05 * way * max(far)))
     model = site.field.model
     diagram = continue_equilibria(model, name, (ends[0], ends[1]))
-    branch, rows = _stable_rows(site, diagram.branches, way)
+    branch, rows = _stable_rows(site, diagram.branches, way, ends[1] - ends[0])
     found = []
     for law, distance in zip(laws, far, strict=True):
         value = here - way * distance
@@ -237,18 +242,20 @@ def _distance(site: Site, law: Law) -> float:
         # |λ| = 2 √(|ab| |μ|) next to the fold
         pull = math.sqrt(abs(law.quadratic * law.slope))
         return float((0.75 * FORGOTTEN * speed / pull) ** (2.0 / 3.0))
-    return FORGOTTEN * speed / abs(approach_of(site, law.rate).stable)
+    return FORGOTTEN * speed / abs(approach_of(site, Drift(law.rate)).stable)
 
 
 def _stable_rows(
-    site: Site, branches: tuple[Branch, ...], way: float
+    site: Site, branches: tuple[Branch, ...], way: float, length: float
 ) -> tuple[Branch, NDArray[np.intp]]:
-    """The branch through the point, and its rows along the stable sheet before it."""
-    here, name = site.u, site.field.parameter
+    """The branch through the point, and its rows along the stable sheet before it.
+
+    ``length`` is that of the range over which the branches were traced.
+    """
+    name = site.field.parameter
     for branch in branches:
         for other, row in zip(branch.special, branch.special_rows, strict=True):
-            apart = np.abs(np.append(other.state, other[name]) - here)
-            if other.code != site.point.code or np.any(apart > 1e-7 * (1.0 + np.abs(here))):
+            if not same_point(site.point, other, name, length, AGAIN):
                 continue
             second = row + POINT_TYPES[other.code].two_rows
             for begin, step in ((row, -1), (second, 1)):
@@ -303,6 +310,7 @@ def _hits(run: Trajectory, law: Law, passed: float) -> Section:
     elif law.level is None or (isinstance(law, BoundaryDelay) and law.subtype == "persistence"):
         found = run.section(interface=law.point.interface)
     else:
+        assert isinstance(law.level, dict)
         ((state, value),) = law.level.items()
         found = run.section(state, value, since=min(passed, run.span[1]))
     return found

@@ -55,6 +55,11 @@ class Course:
         real = np.where(np.isinf(eigenvalues.real), -np.inf, eigenvalues.real)
         return np.maximum(real.max(axis=1), -1e300)
 
+    @cached_property
+    def _softest(self) -> Array:
+        size = np.abs(self.branch.eigenvalues[self._rows])
+        return np.where(np.isfinite(size), size, np.inf).min(axis=1)
+
     @property
     def range(self) -> tuple[float, float]:
         return float(self._ordered[0]), float(self._ordered[-1])
@@ -101,6 +106,10 @@ class Course:
     def relaxation(self, slow: Array) -> Array:
         """Largest real part of the eigenvalues at values of the parameter, shape (N,)."""
         return np.interp(slow, self._ordered, self._leading)
+
+    def stiffness(self, slow: Array) -> Array:
+        """Least modulus of the eigenvalues at values of the parameter, shape (N,)."""
+        return np.interp(slow, self._ordered, self._softest)
 
     def _between(self, slow: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Rows on both sides of values inside the range."""

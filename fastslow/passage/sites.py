@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,15 +11,27 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite
+from fastslow.arguments import either, finite, instance, refusal
 from fastslow.diagrams.fields import FrozenField
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import real
+from fastslow.results.drifts import Drift
 from fastslow.results.point_types import point_name
 from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
+
+
+#: Special points of one diagram that differ by this part of their size are the same.
+SAME = 1e-9
+
+
+#: A level that is no state's: where the slow quantity itself turns round.
+TURN = "turn"
+
+#: Where a jump counts as done: one state by its number and its height above the point, or a turn.
+Level = tuple[int, float] | str
 
 
 class WrongWay(ArgumentError):
@@ -47,6 +58,13 @@ class Site:
     @property
     def n(self) -> int:
         return self.field.n
+
+    @property
+    def unit(self) -> Array:
+        """Size of each state on the point's branch, or its natural unit, shape (n,)."""
+        if self.point.source is not None:
+            return np.asarray(self.point.source.unit)
+        return self.field.units_at(abs(float(self.u[-1])))[: self.n]
 
     def region(self, name: str) -> int:
         return self.field.regions.index(name)
@@ -130,6 +148,13 @@ def _field(model: Model, name: str, values: tuple[tuple[str, float], ...]) -> Fr
     return FrozenField(model.with_parameters(dict(values)).freed(name), name)
 
 
+def frozen_field(model: Model, parameter: str, values: Mapping[str, float]) -> FrozenField:
+    """The fast subsystem of a model over one of its slow quantities, at values of the others."""
+    fast = _frozen(model) if model.forcing or model.slow_states else model
+    known = {n: values[n] for n in (*fast.parameters, *fast.free) if n in values}
+    return _field(fast, parameter, tuple(sorted(known.items())))
+
+
 def require_code(point: SpecialPoint, code: str, law: str) -> None:
     """Raise unless a special point is of a code."""
     if point.code != code:
@@ -141,22 +166,52 @@ def require_code(point: SpecialPoint, code: str, law: str) -> None:
 
 def drift(rate: Any) -> float:
     """A rate of drift that is finite and not zero."""
-    try:
-        value = float(rate)
-    except (TypeError, ValueError):
-        value = math.nan
-    if not math.isfinite(value) or value == 0.0:
-        raise ArgumentError(f"rate = {rate!r}; expected a finite rate of drift other than zero")
+    return Drift(rate).rate
+
+
+def drift_of(site: Site, rate: float | Drift) -> Drift:
+    """A rate or a drift as a drift, of the states of a site.
+
+    Raises
+    ------
+    ArgumentError
+        For a rate that is zero or not finite.
+    UnknownNameError
+        For a state that the model has not.
+    """
+    drift = rate if isinstance(rate, Drift) else Drift(rate)
+    states = site.field.model.states
+    for name in drift.by_state:
+        if name not in states:
+            raise unknown_name("state of the drift", name, states)
+    return drift
+
+
+def level_argument(name: str, value: Any) -> Any:
+    """A level as an argument: a mapping of one state, or ``"turn"``."""
+    if not (isinstance(value, Mapping) or (isinstance(value, str) and value == TURN)):
+        raise refusal(name, value, "a mapping of one state to its value, or 'turn'")
     return value
 
 
-def level_of(site: Site, level: Any) -> tuple[int, float] | None:
-    """The state of a level, by its number, and how far it is from the special point."""
+#: A rate of drift as an argument.
+rate_argument = either(instance(Drift), finite)
+
+
+def level_of(site: Site, level: Any, drift: Drift) -> Level | None:
+    """The state of a level, by its number, and how far it is from the special point; or a turn."""
     if level is None:
         return None
+    if level == TURN:
+        if drift.constant:
+            raise ArgumentError(
+                "level = 'turn': a constant drift does not turn; give rate=fs.Drift(...), with its "
+                "feedback from the states or its change in time"
+            )
+        return TURN
     if not isinstance(level, Mapping) or len(level) != 1:
         raise ArgumentError(
-            f"level = {level!r}; expected one state and its value, as in {{'x': 1}}"
+            f"level = {level!r}; expected one state and its value, as in {{'x': 1}}, or 'turn'"
         )
     ((name, value),) = level.items()
     states = site.field.model.states
@@ -167,10 +222,10 @@ def level_of(site: Site, level: Any) -> tuple[int, float] | None:
     return number, value - float(site.u[number])
 
 
-def named_level(site: Site, level: tuple[int, float] | None) -> dict[str, float] | None:
+def named_level(site: Site, level: Level | None) -> dict[str, float] | str | None:
     """A level as it was given."""
-    if level is None:
-        return None
+    if level is None or isinstance(level, str):
+        return level
     number, height = level
     return {site.field.model.states[number]: float(site.u[number]) + height}
 
@@ -182,4 +237,32 @@ def wrong_way(site: Site, rate: float) -> WrongWay:
     return WrongWay(
         f"rate = {rate:g}: with {name} {way} no stable sheet ends at {site.point.label}; "
         f"expected {other}"
+    )
+
+
+def same_point(
+    one: SpecialPoint, other: SpecialPoint, parameter: str, length: float, within: float = SAME
+) -> bool:
+    """Whether two special points are one, up to rounding, in any units.
+
+    Parameters
+    ----------
+    one, other : SpecialPoint
+    parameter : str
+        The one that varies.
+    length : float
+        Of the range over which it does.
+    within : float
+        How much they may differ, relative to the size of a state and to the length.
+    """
+    if (one.code, one.states) != (other.code, other.states):
+        return False
+    unit = np.maximum(np.abs(one.state), np.abs(other.state))
+    for point in (one, other):
+        if point.source is not None:
+            unit = np.maximum(unit, point.source.unit)
+    apart = abs(one[parameter] - other[parameter])
+    return bool(
+        np.all(np.abs(one.state - other.state) <= within * unit)
+        and apart <= within * max(abs(one[parameter]), length)
     )

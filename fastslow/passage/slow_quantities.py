@@ -58,6 +58,11 @@ class SlowQuantity:
     def dense(self) -> bool:
         return self.run.series is not None and len(self.run.steps) > 0
 
+    @property
+    def responds(self) -> bool:
+        """Whether it is a slow state, which the fast states drive back."""
+        return any(name in self.run.states for name in (self.laws or [self.name]))
+
     def at(self, times: Array) -> tuple[Array, Array]:
         """The parameter (N,) and the fast states (N, n) at times inside the run.
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.passage.extents import extents_of
 from fastslow.passage.sheets import Course
 from fastslow.passage.slow_quantities import SlowQuantity
 from fastslow.results.angles import apart, nearest_copy, periods_of
@@ -17,20 +19,15 @@ Mask = NDArray[np.bool_]
 #: A new sheet is followed once this part of the way to it from the old one is done.
 WAY = 2.0 / 3.0
 
-#: A state's extent is between these parts of what the branches span.
-LEAST, MOST = 1e-3, 20.0
-
-#: A range below this part of a state's size is rounding.
-FLAT = 1e-9
-
-#: Rounding of a rate that is a constant times a state: implicit steps correct derivatives.
-SAME = 1e-10
-
 #: Points that a course is drawn by when distances from it are measured.
 POINTS = 257
 
 #: A sheet is followed by what stays beside it for this many of its relaxation times.
 SETTLED = 0.5
+
+#: A landing overshoots where the sheet is left again within so many of its relaxation times,
+#: and met again within as many more.
+OVERSHOOT = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +55,8 @@ class Measured:
         What counts as near.
     periods : ndarray, shape (n,)
         Scaled period of each state, 0 where it has none.
+    velocities : ndarray of bool, shape (n,)
+        Whether a state is the time derivative of another, up to a factor.
     """
 
     time: Array
@@ -72,6 +71,7 @@ class Measured:
     span: float
     radius: float
     periods: Array
+    velocities: Mask
 
     def apart(self, course: int) -> Array:
         """Distance from a course at the same value of the slow quantity, shape (N,)."""
@@ -123,27 +123,14 @@ def measured(
     run = slow.run
     state = np.column_stack([run[name] for name in slow.states])
     within = (slow.table >= over[0]) & (slow.table <= over[1])
-    extent = np.ptp(state, axis=0)
     shape = (len(slow.table), len(courses), state.shape[1])
     places, present = np.empty(shape), np.empty(shape[:2], dtype=bool)
     for k, course in enumerate(courses):
         present[:, k] = course.present(slow.table) & within
         places[:, k] = course.state(slow.table)
-        if present[:, k].any():
-            extent = np.maximum(extent, np.ptp(places[present[:, k], k], axis=0))
-    fastest = float(np.median([c.fastest() for c in courses] or [0.0]))
-    size = np.abs(state).max(axis=0)
-    # what moves by rounding only has no extent
-    extent = np.where(extent > FLAT * size, extent, np.where(size > 0, size, 1.0))
-    # by time: where a state grows without bound most samples are at the end
-    even = np.searchsorted(run.t, np.linspace(run.t[0], run.t[-1], POINTS))
-    usual = state[np.minimum(even, len(state) - 1)]
-    typical = np.median(np.abs(usual - np.median(usual, axis=0)), axis=0)
-    extent = _bounded(extent, typical, courses)
+    met = [places[present[:, k], k] for k in range(len(courses))]
+    extent, velocities = extents_of(slow, courses, state, met)
     periods = periods_of(slow.states, run.periods)
-    extent = np.where(periods > 0, np.minimum(extent, periods), extent)
-    for rate, of, factor in _velocities(slow):
-        extent[rate] = max(extent[rate], extent[of] * fastest / factor)
     span = max(float(np.ptp(slow.table)), 1e-3 * (over[1] - over[0]))
     curves = tuple(_resampled(course.curve() / np.append(extent, span)) for course in courses)
     return Measured(
@@ -159,47 +146,8 @@ def measured(
         span,
         radius,
         periods / extent,
+        velocities,
     )
-
-
-def _bounded(extent: Array, typical: Array, courses: tuple[Course, ...]) -> Array:
-    """Extents within reach of what the branches span, where they span anything.
-
-    A run that hardly moves, or that grows without bound, is no measure for its own distances.
-    """
-    if not courses:
-        return extent
-    rows = np.concatenate([c.curve()[:, :-1] for c in courses])
-    span = np.ptp(rows, axis=0)
-    low, high = LEAST * span, MOST * span
-    # a state that is constant along the branches but for rounding bounds nothing
-    spans = (span > FLAT * np.abs(rows).max(axis=0)) & (span > FLAT * typical)
-    return np.where(spans, np.clip(extent, low, high), extent)
-
-
-def _velocities(slow: SlowQuantity) -> list[tuple[int, int, float]]:
-    """Triples (i, j, |c|) where c times fast state i is the time derivative of fast state j.
-
-    A sheet that drifts carries a velocity with it, which is no distance from the sheet:
-    it is small beside the velocities of the fast motion.
-    """
-    if not slow.dense:
-        return []
-    series = slow.run.series
-    assert series is not None
-    rows = [slow.run.columns.index(name) for name in slow.states]
-    found = []
-    for j, of in enumerate(rows):
-        for i, rate in enumerate(rows):
-            value, slope = series[:, rate, 0], series[:, of, 1]
-            if i == j or not len(series):
-                continue
-            largest = int(np.argmax(np.abs(value)))
-            factor = slope[largest] / value[largest] if value[largest] != 0 else 0.0
-            apart = np.abs(slope - factor * value).max()
-            if factor != 0 and apart <= SAME * np.abs(slope).max():
-                found.append((i, j, abs(float(factor))))
-    return found
 
 
 def _resampled(curve: Array) -> Array:
@@ -252,14 +200,39 @@ def stays_of(m: Measured) -> list[Stay]:
             ]
         following = [(s, v) for s, v in following if _settles(m, v.course, s, v.stop)]
         if not following:
-            return stays
+            return _landed(m, stays)
         first = min(s for s, _ in following)
         tied = [v.course for s, v in following if s == first]
         course = tied[0] if len(tied) == 1 else _nearest(m, first, tied)
         here = _left(m, course, first, beside[course])
         stays.append(Stay(course, first, here))
         if here >= len(m.time):
-            return stays
+            return _landed(m, stays)
+
+
+def _landed(m: Measured, stays: list[Stay]) -> list[Stay]:
+    """Stays, less those in which the state only swings through a sheet before it settles there."""
+    followed = [s for s, after in pairwise(stays) if not _overshoots(m, s, after)]
+    return [*followed, *stays[-1:]]
+
+
+def _overshoots(m: Measured, stay: Stay, after: Stay) -> bool:
+    """Whether a short stay and the next are one landing, on a sheet that is stable all along."""
+    between = Stay(stay.course, stay.start, after.start + 1)
+    return (
+        after.course == stay.course
+        and bool(m.present[between.start : between.stop, between.course].all())
+        and _relaxed(m, stay) < OVERSHOOT
+        and _relaxed(m, between) < 2.0 * OVERSHOOT
+    )
+
+
+def _relaxed(m: Measured, stay: Stay) -> float:
+    """How many relaxation times of a course a stay lasts."""
+    rows = slice(stay.start, stay.stop)
+    rate = -m.courses[stay.course].relaxation(m.slow[rows])
+    steps = np.minimum(0.5 * (rate[1:] + rate[:-1]) * np.diff(m.time[rows]), 1e12)
+    return float(steps.sum())
 
 
 def _visits(course: int, near: Mask) -> list[Stay]:
@@ -273,9 +246,7 @@ def _settles(m: Measured, course: int, start: int, stop: int) -> bool:
         return False
     if stop == len(m.time) and len(m.time) > 2:
         return True
-    rate = -m.courses[course].relaxation(m.slow[start:stop])
-    gained = np.minimum(0.5 * (rate[1:] + rate[:-1]) * np.diff(m.time[start:stop]), 1e12)
-    return bool(gained.sum() >= SETTLED)
+    return _relaxed(m, Stay(course, start, stop)) >= SETTLED
 
 
 def _nearest(m: Measured, row: int, tied: list[int]) -> int:

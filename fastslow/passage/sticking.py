@@ -17,11 +17,12 @@ from fastslow.results.transitions import Phase
 Array = NDArray[np.float64]
 
 #: How far a state may be outside a band that is interpolated between its rows, relative to
-#: the state: where it slides along the same interfaces it is in the set or has just left it.
+#: the state or its extent: where it slides along the same interfaces it is in the set or has
+#: just left it.
 NEAR = 1e-6
 
 
-def bands_at(diagram: Diagram, run: Trajectory, slow: Array) -> NDArray[np.intp]:
+def bands_at(diagram: Diagram, run: Trajectory, slow: Array, extent: Array) -> NDArray[np.intp]:
     """The band of the diagram in which a run rests at each of its samples, −1 for none.
 
     The run slides along the band's interfaces, and its states are within the band's ranges.
@@ -32,6 +33,8 @@ def bands_at(diagram: Diagram, run: Trajectory, slow: Array) -> NDArray[np.intp]
     run : Trajectory
     slow : ndarray, shape (N,)
         The diagram's parameter at the samples.
+    extent : ndarray, shape (n,)
+        Of every state.
     """
     found = np.full(len(slow), -1, dtype=np.intp)
     if not diagram.bands:
@@ -40,7 +43,7 @@ def bands_at(diagram: Diagram, run: Trajectory, slow: Array) -> NDArray[np.intp]
     state = np.column_stack([run[name] for name in diagram.states])
     for number, band in enumerate(diagram.bands):
         lower, upper = band.bounds(slow)
-        near = NEAR * np.maximum(1.0, np.abs(state))
+        near = NEAR * np.maximum(extent, np.abs(state))
         with np.errstate(invalid="ignore"):
             inside = ((state >= lower - near) & (state <= upper + near)).all(axis=1)
         found[(regions == band.region) & inside & (found < 0)] = number
@@ -93,7 +96,7 @@ def with_sticking(
         resting, slipping = rests == number, (band == number) & (rests < 0)
         for rows, kind, name in (
             (resting, "sticking", one.name),
-            (slipping, "quiescent", one.edge),
+            (slipping, "quasi-static", one.edge),
         ):
             for start, stop in runs_of(rows):
                 begin, end = float(run.t[start]), float(run.t[min(stop, len(run.t) - 1)])

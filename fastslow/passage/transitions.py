@@ -11,17 +11,25 @@ from numpy.typing import NDArray
 from fastslow.passage.excursions import Excursion
 from fastslow.passage.sheets import Course, ends_of, over_a_gap
 from fastslow.passage.slow_quantities import SlowQuantity
+from fastslow.passage.spikes import refined
 from fastslow.passage.stays import WAY, Measured, Stay, way_done
 from fastslow.results.crossings import Crossing, regions_at
 from fastslow.results.diagrams import Diagram
 from fastslow.results.moments import Moment
 from fastslow.results.points import SpecialPoint
-from fastslow.results.transitions import SPIKING, StableSheet, Transition
+from fastslow.results.transitions import OSCILLATING, StableSheet, Transition
 
 Array = NDArray[np.float64]
 
 #: A sheet left at no more than this part of the slow range before its end was left because of it.
 BEFORE = 0.05
+
+#: A state goes away from a sheet that comes back between samples by less than this part of the
+#: radius.
+RETURN = 1e-3
+
+#: A turn between samples is bracketed 16 times closer so often before a parabola is put through it.
+CLOSER = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +153,39 @@ class Passage:
             if (beyond > 0).any():
                 found.append((int(np.argmax(beyond > 0)), point))
         return min(found, key=lambda f: f[0])[1] if found else None
+
+    def extreme_past(self, sheet: StableSheet, point: SpecialPoint, until: float) -> Moment | None:
+        """Where the slow quantity turns round past the end of a sheet, if before a time."""
+        where, outward = point[self.diagram.parameter], self.outward(sheet, point)
+        stop = int(np.searchsorted(self.m.time, until, side="right"))
+        past = outward * (self.m.slow[:stop] - where)
+        within = np.flatnonzero(past <= 0.0)
+        # the last passage of the end, or one that is undone before landing
+        rows = np.arange(within[-1] + 1 if len(within) else 0, stop)
+        if not len(rows) and len(within):
+            gone = np.flatnonzero(past > 0.0)
+            if not len(gone):
+                return None
+            start = within[within < gone[-1]]
+            rows = np.arange(start[-1] + 1 if len(start) else 0, gone[-1] + 1)
+        if not len(rows):
+            return None
+        row = int(rows[np.argmax(past[rows])])
+        if row in (0, stop - 1):
+            return None
+        time = self._turn(row, outward)
+        return self.moment(time) if time < until else None
+
+    def _turn(self, row: int, outward: float) -> float:
+        """When the slow quantity is farthest out, near a sample at which it is among samples."""
+        times = self.m.time[[row - 1, row, row + 1]]
+        value = self.slow.at(times)[0]
+        for _ in range(CLOSER if self.slow.dense else 0):
+            times = np.linspace(times[0], times[-1], 33)
+            value = self.slow.at(times)[0]
+            best = int(np.clip(np.argmax(outward * value), 1, len(times) - 2))
+            times, value = times[best - 1 : best + 2], value[best - 1 : best + 2]
+        return float(refined(times, value, np.array([1]))[0])
 
     def delay(self, sheet: StableSheet, point: SpecialPoint | None, value: float) -> float:
         if point is None:
@@ -275,29 +316,64 @@ def leaving(p: Passage, excursion: Excursion) -> Transition:
     left = p.sheets[p.followed[old.stop - 1]]
     leave = p.left(old, None if new is None else new.course)
     stop = len(p.m.time) if new is None else new.start + 1
-    special = p.passed(left, slice(last, stop))
+    special = p.passed(left, slice(last, stop)) or _passed_before(p, left, old)
     land = None if new is None else p.landed(new, leave.time)
     entered = None if new is None else p.sheets[p.followed[new.start]]
     here = leave
     if new is not None and not excursion.cycle and new.course != old.course:
         here = p.two_thirds(old, new) or leave
-    to_sheet = SPIKING if excursion.cycle else "" if entered is None else entered.label
+        if land is not None and land.time < here.time:
+            land = here
+    to_sheet = OSCILLATING if excursion.cycle else "" if entered is None else entered.label
+    passed = special is not None
     if special is None and to_sheet != left.label:
         special = _just_before(p, left, leave.value)
     steepness = _steepness(p, course, old, slice(max(old.stop - 2, 0), stop))
     kind, note = _kind(p, excursion, left, entered, special, steepness)
-    if kind == "transit":
+    if kind == "gap crossing":
         leave, land = _across(p, left, entered, here.time) or (leave, land)
+    extreme = None
+    if kind == "jump" and special is not None and passed:
+        extreme = p.extreme_past(left, special, here.time if land is None else land.time)
+        # a load that turned before the jump did not turn because of it
+        if extreme is not None and not p.slow.responds and extreme.time < leave.time:
+            extreme = None
+        here = extreme or here
+    notes = [note]
     if excursion.turns and not excursion.cycle:
         count = len(excursion.turns)
-        note = f"{count} oscillation{'s' if count > 1 else ''} on landing"
-    value = here.value
+        notes.append(f"{count} oscillation{'s' if count > 1 else ''} on landing")
+    delay = p.delay(left, special, here.value)
+    if special is not None and delay < 0.0:
+        candidate = "" if passed else ", which is not passed: a candidate"
+        notes.insert(0, f"left {-delay:.3g} before {special.label}{candidate}")
+        delay = float("nan")
+    note = "; ".join(filter(None, notes))
     return Transition(
-        here.time, value, here.state, left.label, to_sheet, special,
-        p.delay(left, special, value), kind, leave, None if excursion.cycle else land,
+        here.time, here.value, here.state, left.label, to_sheet, special,
+        delay, kind, leave, None if excursion.cycle else land,
         p.slope(special, here.time),
-        steepness, note,
+        steepness, note, turned=extreme is not None,
     )  # fmt: skip
+
+
+def _passed_before(p: Passage, left: StableSheet, stay: Stay) -> SpecialPoint | None:
+    """The end of a sheet that was passed during a stay, after which the state only went away.
+
+    The slow quantity has turned round and is back over the sheet where that is left.
+    """
+    rows = np.arange(stay.start, stay.stop)
+    past = np.zeros(len(rows), dtype=bool)
+    for point in ends_of(p.diagram, left):
+        beyond = p.outward(left, point) * (p.m.slow[rows] - point[p.diagram.parameter])
+        past |= beyond > 0.0
+    if not past.any():
+        return None
+    since = stay.start + int(np.flatnonzero(past)[-1])
+    away = np.diff(p.m.apart(stay.course)[since : stay.stop])
+    if (away < -RETURN * p.m.radius).any():
+        return None
+    return p.passed(left, slice(since, since + 1))
 
 
 def _just_before(p: Passage, left: StableSheet, value: float) -> SpecialPoint | None:
@@ -314,7 +390,8 @@ def _just_before(p: Passage, left: StableSheet, value: float) -> SpecialPoint | 
 def _steepness(p: Passage, course: Course, stay: Stay, rows: slice) -> float:
     """Largest predicted lag behind a course where it is stable, in units of the extent."""
     slow = p.m.slow[rows]
-    rate = -course.relaxation(slow)
+    # the lag solves J y = dX/dw dw/dt: before a Hopf point Re λ vanishes, and λ does not
+    rate = course.stiffness(slow)
     usable = p.m.present[rows, stay.course] & (rate > 0)
     if not usable.any():
         return float("nan")
@@ -337,22 +414,48 @@ def _kind(
     if special is not None:
         if special.code == "LP" or special.subtype == "non-smooth fold":
             return "jump", ""
-        if special.code == "HB":
-            return "Hopf", ""
+        if special.code in ("HB", "BP"):
+            return ("Hopf" if special.code == "HB" else "branch point"), ""
         if special.code == "BE" and back:
             return "excursion", "past the end of the sheet and back"
         if special.code == "BE" and entered is not None:
             if over_a_gap(p.diagram, left, entered):
-                return "transit", ""
+                return "gap crossing", ""
             if entered.region in special.regions:
                 return "crossing", ""
-        return "change", ""
+        return "unclassified", ""
     touch = _touch(p, excursion)
     if touch is not None:
         return "grazing", f"touches {touch.interface} at t = {touch.time:.6g}"
     if back:
         return ("steep" if steepness >= 0.5 * p.m.radius else "excursion"), ""
-    return "change", ""
+    if _lost(p, excursion):
+        return "rate-induced", _still_stable(p, excursion)
+    return "loss of tracking", ""
+
+
+def _lost(p: Passage, excursion: Excursion) -> bool:
+    """Whether a stable sheet was lost because it drifted away too fast.
+
+    It exists and is stable all the time, the state falls behind it and not ahead, and comes to
+    another sheet or grows without bound.
+    """
+    old, (_, stop) = excursion.old, excursion.rows(p.m)
+    assert old is not None
+    if excursion.cycle or (excursion.new is None and p.slow.run.outcome):
+        return False
+    rows = slice(old.stop - 1, min(stop + 1, len(p.m.time)))
+    return bool(p.m.present[rows, old.course].all()) and _behind(p, old.course, old.stop - 1)
+
+
+def _still_stable(p: Passage, excursion: Excursion) -> str:
+    start, stop = excursion.rows(p.m)
+    rows = slice(max(start - 1, 0), min(stop + 1, len(p.m.time)))
+    low, high = float(p.m.slow[rows].min()), float(p.m.slow[rows].max())
+    return (
+        f"the equilibrium stays stable from {p.diagram.parameter} = {low:.6g} to {high:.6g}, and "
+        "the state falls behind it"
+    )
 
 
 def _touch(p: Passage, excursion: Excursion) -> Crossing | None:

@@ -26,6 +26,8 @@ FILLS: dict[Any, str] = {
     "meshed upper": "#F1F1F1",
     "meshed lower": "#B5DDCE",
     "free": "#FFFFFF",
+    "chaotic": "#B09671",
+    "not settled": "#8179B0",
     "no gap": "#A8A8A8",
     FAILED: "#6E6E6E",
 }

@@ -73,7 +73,7 @@ def draw_heads(line: Line2D, rows: Sequence[int]) -> tuple[Annotation, ...]:
         head.set_in_layout(False)
         drawn.append(head)
     if places.shape[1] == 3 and drawn:
-        at_draw(ax, lambda: _turn(ax, drawn, places[ends]))
+        at_draw(ax, lambda _: _turn(ax, drawn, places[ends]))
     return tuple(drawn)
 
 

@@ -18,6 +18,9 @@ from fastslow.plot.style import root
 
 Points = NDArray[np.float64]
 
+#: A step of the layout, which measures texts with the renderer given.
+Step = Callable[[RendererBase], None]
+
 #: Distance of the points that stand for a curve, in points (1/72 inch).
 STEP = 1.5
 
@@ -35,7 +38,7 @@ class Settler(Artist):
     names of regions) is so placed anew when limits, size or resolution have changed.
     """
 
-    def __init__(self, step: Callable[[], None]) -> None:
+    def __init__(self, step: Step) -> None:
         super().__init__()
         self.step = step
         self.seen: tuple[Any, ...] = ()
@@ -52,11 +55,15 @@ class Settler(Artist):
         now = (*frame, *limits, root(ax).dpi, len(ax.lines), len(ax.collections))
         if now != self.seen:
             self.seen = now
-            self.step()
+            self.step(renderer)
 
 
-def at_draw(ax: Axes, step: Callable[[], None]) -> None:
-    """Run a step of the layout whenever the axes are drawn in another way than before."""
+def at_draw(ax: Axes, step: Step) -> None:
+    """Run a step of the layout whenever the axes are drawn in another way than before.
+
+    The step receives the renderer: a text measures itself with the one that drew it last,
+    whose resolution may be another.
+    """
     ax.add_artist(Settler(step))
 
 
@@ -188,6 +195,6 @@ def overlaid(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Points:
     return np.asarray(over + 1e3 * met + 1e4 * ~inside, dtype=float)
 
 
-def box_of(artist: Artist, pad: float = 1.0) -> Points:
+def box_of(artist: Artist, renderer: RendererBase, pad: float = 1.0) -> Points:
     """Extent of an artist in pixels with some air, shape (4,)."""
-    return np.asarray(artist.get_window_extent().padded(pad).extents)
+    return np.asarray(artist.get_window_extent(renderer).padded(pad).extents)

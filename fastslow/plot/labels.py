@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox, IdentityTransform
@@ -91,7 +92,7 @@ def place(
     leaders.set_in_layout(False)
     if tags:
         ax.add_artist(leaders)
-    at_draw(ax, lambda: _place(ax, tags, taken, bands, leaders))
+    at_draw(ax, lambda renderer: _place(ax, tags, taken, bands, leaders, renderer))
 
 
 def _place(
@@ -100,13 +101,15 @@ def _place(
     taken: Sequence[Artist],
     bands: Sequence[Bands],
     leaders: Line2D,
+    renderer: RendererBase,
 ) -> None:
     for drawn in bands:
         fit_bands(ax, drawn)
     ink, scale = covered(ax), root(ax).dpi / 72.0
     whole = ax.get_window_extent()
     frame = whole.padded(-AIR * scale)
-    boxes = _others(ax, [*tags, *(name for drawn in bands for name in drawn.names)], taken)
+    own = [*tags, *(name for drawn in bands for name in drawn.names)]
+    boxes = _others(ax, own, taken, renderer)
     anchors = _anchors(ax, tags)
     reach = np.repeat(REACH, len(TURNS))
     turns = np.tile(TURNS, len(REACH))
@@ -119,13 +122,13 @@ def _place(
         if not shown:
             continue
         label.set_position((0.0, 0.0))
-        centred = box_of(label)
+        centred = box_of(label, renderer)
         places = centred + np.tile(scale * offsets, 2)
         cost = overlaid(places, ink, boxes, frame) + 0.5 * reach
         middles = 0.5 * (places[:, :2] + places[:, 2:])
         gaps = np.hypot(*np.moveaxis(anchors - middles[:, None], 2, 0))
-        own = np.hypot(*(anchor - middles).T)
-        nearer = (gaps < 0.999 * own[:, None]).sum(axis=1)
+        away = np.hypot(*(anchor - middles).T)
+        nearer = (gaps < 0.999 * away[:, None]).sum(axis=1)
         cost += np.where(reach > FAR, 6.0, 20.0 * nearer)
         best = int(np.argmin(cost))
         label.set_position((float(offsets[best, 0]), float(offsets[best, 1])))
@@ -139,19 +142,21 @@ def _place(
     for drawn in bands:
         for name, span in zip(drawn.names, drawn.spans, strict=True):
             if name.get_visible():
-                boxes = _move(ax, name, span, drawn.vertical, frame, ink, boxes)
+                boxes = _move(ax, name, span, drawn.vertical, frame, ink, boxes, renderer)
 
 
 def _nearest_in(box: Points, point: Points) -> Points:
     return np.clip(point, box[:2], box[2:])
 
 
-def _others(ax: Axes, own: Sequence[Artist], taken: Sequence[Artist]) -> Points:
+def _others(
+    ax: Axes, own: Sequence[Artist], taken: Sequence[Artist], renderer: RendererBase
+) -> Points:
     """Boxes of the texts and legends already there, shape (M, 4)."""
     texts = [t for t in ax.texts if t.get_visible() and t.get_text() and t not in own]
     legend: Any = ax.get_legend()
     met = dict.fromkeys([*texts, *([legend] if legend is not None else []), *taken])
-    return np.array([box_of(artist) for artist in met]).reshape(-1, 4)
+    return np.array([box_of(artist, renderer) for artist in met]).reshape(-1, 4)
 
 
 def _anchors(ax: Axes, tags: Sequence[Annotation]) -> Points:
@@ -172,6 +177,7 @@ def _move(
     frame: Bbox,
     ink: Points,
     boxes: Points,
+    renderer: RendererBase,
 ) -> Points:
     """Move the name of a region to a free place in its band, at an edge of the axes if it can."""
     low, high = sorted(ax.get_xlim() if vertical else ax.get_ylim())
@@ -185,7 +191,7 @@ def _move(
         for side in SIDES:
             at = (inside, side) if vertical else (side, inside)
             name.set_position(at)
-            box = box_of(name)[None]
+            box = box_of(name, renderer)[None]
             cost = float(overlaid(box + air, ink, boxes, frame)[0])
             if cost < best[0]:
                 best = cost, at, box

@@ -103,7 +103,7 @@ def legend_inside(ax: Axes, handles: Sequence[Artist], top: float = 1.0) -> Lege
         return None
     legend = _inside(ax, handles, columns, top)
     _choose(ax, legend, top)
-    at_draw(ax, lambda: _choose(ax, legend, top))
+    at_draw(ax, lambda _: _choose(ax, legend, top))
     return legend
 
 

@@ -178,7 +178,7 @@ def time_series(
     bands = _bands(ax, run, (None, shown[1]), interfaces, label)
     drawn = MotionDrawing(ax, "t", shown[1].text, lines, dots, (), bands, *strip, shown=shown)
     if phases:
-        at_draw(ax, lambda: fit_words(*strip))
+        at_draw(ax, lambda renderer: fit_words(*strip, renderer))
     note_early_end(ax, early_end(run))
     # a legend stays below the strip
     top = 1.0 - strip_height(ax) if phases else 1.0

@@ -74,7 +74,7 @@ def panel(
     """Draw time series, phase portrait and overlay as one figure, 170 mm wide.
 
     A strip above the time series shows the phases of the motion: the sheet that is
-    followed, spikes, jumps. In a figure of a column's width the three stand one
+    followed, oscillations, jumps. In a figure of a column's width the three stand one
     below the other.
 
     Parameters

@@ -24,9 +24,17 @@ from fastslow.plot.marks import draw_crossings, draw_transitions, draw_turning
 from fastslow.plot.motions import draw_motion
 from fastslow.plot.quantities import Array, Quantity, along_overlay, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
-from fastslow.plot.style import MOTION, axes_for, note_early_end, spatial
+from fastslow.plot.style import MOTION, axes_for, note, spatial
 from fastslow.results.outcome import early_end
 from fastslow.results.overlays import Overlay
+
+#: What a figure says of an overlay that does not tell all, by the code of its outcome.
+CAVEATS = {
+    "outside the diagram": "the run goes beyond the diagram",
+    "another slow quantity": "the diagram holds another slow quantity fixed",
+    "at rest": "the slow quantity is at rest",
+    "not compared": "diagram and run were not compared",
+}
 
 #: Shares of the slow quantity's travel over a period at which an arrow head sits: uneven, so that
 #: the way up and the way down of a harmonic load do not meet.
@@ -233,7 +241,7 @@ def draw_passage(
     lines = draw_motion(ax, lay.time, (across, up), shown, lay.run, color, style)
     dots = draw_crossings(ax, lay, shown) if crossings else None
     changes = draw_transitions(ax, lay, shown)
-    note_early_end(ax, early_end(lay.run))
+    note(ax, _caveat(lay))
     turns = draw_turning(ax, lay, shown) if turning else None
     # after the trajectory, so that the bands take its limits in
     below = draw_branches(
@@ -243,8 +251,8 @@ def draw_passage(
         if line.get_label() == "stable":
             # wide enough to be seen beneath a trajectory that follows it
             line.set_linewidth(2.2)
-        elif any(phase.kind == "spiking" for phase in lay.phases):
-            # spikes would cover it
+        elif any(phase.kind == "oscillating" for phase in lay.phases):
+            # oscillations would cover it
             line.set_zorder(3.5)
     drawn = len(points(lines[-1]))
     # a line in parts has other points than the samples
@@ -254,6 +262,14 @@ def draw_passage(
     return OverlayDrawing(
         ax, text, below, lines, dots, changes, turns, heads, None, shown[0].text, shown
     )
+
+
+def _caveat(lay: Overlay) -> str:
+    """What the figure of an overlay says of what it does not tell."""
+    ended = early_end(lay.run)
+    if ended:
+        return f"run ended early: {ended}"
+    return "" if lay.outcome else CAVEATS.get(lay.outcome.code, lay.outcome.code)
 
 
 def _heads(lay: Overlay, values: Array, drawn: Array) -> list[int]:
@@ -271,7 +287,7 @@ def _heads(lay: Overlay, values: Array, drawn: Array) -> list[int]:
     rows = np.searchsorted(travel, np.array(ARROWS) * travel[-1]).tolist() if travel[-1] else []
     earlier = len(lay.time) - len(drawn)
     for t in lay.transitions:
-        if t.land is None or t.kind in ("crossing", "end of spiking"):
+        if t.land is None or t.kind in ("crossing", "end of oscillation"):
             continue
         start, stop = np.searchsorted(lay.time, (t.leave.time, t.land.time)) - earlier
         inside = values[earlier:][max(start, 0) : max(stop, 0)]

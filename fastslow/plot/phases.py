@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
@@ -33,8 +34,8 @@ def draw_phases(
     tuple of Rectangle
         One for each phase.
     tuple of Text
-        What each is called: the sheets that a quiescent phase follows, the number of
-        spikes. `fit_words` hides those without room.
+        What each is called: the sheets that a quasi-static phase follows, the number of
+        oscillations. `fit_words` hides those without room.
     """
     height = strip_height(ax)
     low, high = ax.get_ylim()
@@ -78,19 +79,20 @@ def strip_height(ax: Axes) -> float:
     return min(HEIGHT / whole, 0.5)
 
 
-def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text]) -> None:
+def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text], renderer: RendererBase) -> None:
     """Hide the words that are wider than their boxes, in axes with their final places."""
     # without labels there are no words
     for box, word in zip(boxes, words, strict=False):
         # a hidden text has no extent, and an earlier draw may have hidden it
         word.set_visible(True)
-        word.set_visible(word.get_window_extent().width <= box.get_window_extent().width)
+        width = word.get_window_extent(renderer).width
+        word.set_visible(width <= box.get_window_extent().width)
 
 
 def _text(phase: Phase) -> str:
-    if phase.kind == "quiescent":
+    if phase.kind == "quasi-static":
         # along the edge of a band of equilibria
         return " ".join("edge" if name.startswith("edge of ") else name for name in phase.sheets)
-    if phase.kind == "spiking":
-        return f"{phase.spikes} spikes"
+    if phase.kind == "oscillating":
+        return f"{phase.oscillations} oscillations"
     return phase.kind if phase.kind in ("outside", "sticking") else ""

@@ -55,21 +55,24 @@ HOPF_CURVES: dict[str, dict[str, Any]] = {
 TRANSITIONS: dict[str, tuple[str, str, str]] = {
     "jump": ("*", VERMILION, "jump at a fold"),
     "Hopf": ("P", GREEN, "leaves past Hopf"),
+    "branch point": ("^", GREEN, "leaves past BP"),
     "crossing": ("D", ORANGE, "passage of BE"),
-    "transit": (">", PURPLE, "transit of the gap"),
+    "gap crossing": (">", PURPLE, "gap crossing"),
     "steep": ("X", BLACK, "steep slope"),
+    "rate-induced": ("o", VERMILION, "rate-induced tipping"),
     "grazing": ("h", ORANGE, "grazing"),
-    "end of spiking": ("v", VERMILION, "end of spiking"),
+    "end of oscillation": ("v", VERMILION, "end of oscillation"),
     "excursion": ("p", GREY, "excursion"),
-    "change": ("s", GREY, "other change"),
+    "loss of tracking": ("s", GREY, "loss of tracking"),
+    "unclassified": ("d", GREY, "unclassified transition"),
 }
 
 #: Look of a phase of the motion by kind.
 PHASES: dict[str, dict[str, Any]] = {
-    "quiescent": {"facecolor": "#C2DBEB"},
-    "spiking": {"facecolor": "#EBBC72"},
+    "quasi-static": {"facecolor": "#C2DBEB"},
+    "oscillating": {"facecolor": "#EBBC72"},
     "jump": {"facecolor": VERMILION},
-    "transit": {"facecolor": PURPLE},
+    "gap crossing": {"facecolor": PURPLE},
     "excursion": {"facecolor": ORANGE},
     "transient": {"facecolor": "#EBEBEB"},
     "sticking": {"facecolor": "#727272"},
@@ -258,9 +261,22 @@ def note_early_end(ax: Axes, why: str) -> None:
     >>> ax.texts[0].get_text()
     'run ended early: too many steps'
     """
-    if why:
+    note(ax, f"run ended early: {why}" if why else "")
+
+
+def note(ax: Axes, words: str) -> None:
+    """Write what a reader of a figure must know below the upper edge of axes, if anything.
+
+    Examples
+    --------
+    >>> ax = axes_for(None, 85)
+    >>> note(ax, "outside the diagram")
+    >>> ax.texts[0].get_text()
+    'outside the diagram'
+    """
+    if words:
         ax.annotate(
-            f"run ended early: {why}",
+            words,
             (0.02, 0.98),
             xycoords="axes fraction",
             ha="left",

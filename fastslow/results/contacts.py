@@ -100,23 +100,6 @@ def contacts_of(run: Trajectory, period: float | None, window: tuple[float, floa
     )
 
 
-def regime_of(run: Trajectory) -> str | None:
-    """How the sides of a gap are touched; see `Trajectory.regime`."""
-    if run.gap is None or run.period is None:
-        return None
-    begin = run.span[1] - run.period
-    seen = {s.region for s in run.segments if s.end > begin}
-    lower, inside, upper = run.gap
-    # sliding along an interface is rest against that side
-    below, above = (any(side in name.split("|") for name in seen) for side in (lower, upper))
-    if below and above:
-        return "bilateral"
-    if below or above:
-        side = "upper" if above else "lower"
-        return f"unilateral {side}" if inside in seen else f"meshed {side}"
-    return "free" if inside in seen else None
-
-
 def _counts(run: Trajectory, window: tuple[float, float]) -> NDArray[np.int64]:
     """Crossings in [since, until), or up to the end of the run, shape (n_interfaces, 2)."""
     begin, end = window

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+from fastslow.results.drifts import Drift
 from fastslow.results.points import SpecialPoint
 from fastslow.results.result import Result
 
@@ -19,12 +21,19 @@ class Delay(Result, ABC):
     parameter : str
         The parameter that drifts.
     rate : float
-        Its constant rate, in its unit by time.
+        Its rate where it passes the point, in its unit by time.
     delay : float
         How far past the point, along the drift, in units of the parameter; nan
         where the law has no answer, and ``validity`` says why.
     validity : str
         How good the prediction is, and what it leaves out.
+    error : float
+        Bound on the difference between ``delay`` and what the model does under this
+        drift, in units of the parameter; nan where none can be stated.
+    drift : Drift, optional
+        How the parameter drifts, where that is more than its rate.
+    time : float
+        Time from the special point to there; by default at the rate alone.
     """
 
     point: SpecialPoint
@@ -32,6 +41,13 @@ class Delay(Result, ABC):
     rate: float
     delay: float
     validity: str
+    error: float = math.nan
+    drift: Drift | None = None
+    time: float = math.nan
+
+    def __post_init__(self) -> None:
+        if math.isnan(self.time) and (self.drift is None or self.drift.constant):
+            object.__setattr__(self, "time", self.delay / abs(self.rate))
 
     @property
     def value(self) -> float:
@@ -39,9 +55,9 @@ class Delay(Result, ABC):
         return self.point[self.parameter] + (self.delay if self.rate > 0 else -self.delay)
 
     @property
-    def time(self) -> float:
-        """Time from the special point to there."""
-        return self.delay / abs(self.rate)
+    def bound(self) -> str:
+        """The error as it is written after the delay; "" where none is stated."""
+        return f" ± {self.error:.2g}" if math.isfinite(self.error) else ""
 
     @property
     @abstractmethod
@@ -52,8 +68,8 @@ class Delay(Result, ABC):
         name = self.parameter
         return (
             f"{type(self).__name__}: {self.law}, {name} at {self.point.label} drifting by "
-            f"{self.rate:.3g}\n  delay {self.delay:.6g}, to {name} = {self.value:.6g}, "
-            f"in t = {self.time:.6g}\n  {self.validity}"
+            f"{self.rate:.3g}\n  delay {self.delay:.6g}{self.bound}, to {name} = "
+            f"{self.value:.6g}, in t = {self.time:.6g}\n  {self.validity}"
         )
 
 
@@ -67,11 +83,14 @@ class FoldDelay(Delay):
     ----------
     quadratic, slope, cubic, mixed : float
         a, b, c and g of the motion along the null vector of length one.
+    feedback : float
+        k in μ' = rate + k y + …, from the drift.
     coefficients : tuple of float
-        α = Ω₀ |ab|^(−1/3), β = c/(3a²), and γ, which depends on the level (nan without one).
-    level : mapping, optional
-        The state and its value at which the jump counts as done; without it a
-        jump to infinity of the quadratic normal form.
+        α = Ω₀ |ab|^(−1/3), β = (c/a² − κ)/3 with κ = k/(a rate), and γ, which depends on the
+        level (nan without one).
+    level : mapping or "turn", optional
+        The state and its value at which the jump counts as done, or that the slow quantity
+        turns round; without it a jump to infinity of the quadratic normal form.
     """
 
     quadratic: float
@@ -79,7 +98,8 @@ class FoldDelay(Delay):
     cubic: float
     mixed: float
     coefficients: tuple[float, float, float]
-    level: dict[str, float] | None = None
+    feedback: float = 0.0
+    level: dict[str, float] | str | None = None
 
     @property
     def leading(self) -> float:
@@ -103,14 +123,15 @@ class BoundaryDelay(Delay):
         Largest real part of the eigenvalues before the interface.
     unstable : float
         Largest real part of the eigenvalues behind it.
-    level : mapping, optional
-        The state and its value at which the jump counts as done.
+    level : mapping or "turn", optional
+        The state and its value at which the jump counts as done, or that the slow quantity
+        turns round.
     """
 
     lag: float
     stable: float
     unstable: float
-    level: dict[str, float] | None = None
+    level: dict[str, float] | str | None = None
 
     @property
     def subtype(self) -> str:
@@ -128,7 +149,8 @@ class BoundaryDelay(Delay):
 class GapTransit(Delay):
     """Crossing of a region whose equilibria form a continuum, such as the gap of a backlash.
 
-    ``delay`` is that at the far interface.
+    ``delay`` is that at the far interface, solved for the motion in the region at this
+    drift; `asymptotic` is its limit for slow drift, in closed form.
 
     Parameters
     ----------
@@ -142,6 +164,8 @@ class GapTransit(Delay):
         τ, the time by which the other motions in the region hold the crossing up.
     interfaces : tuple of str
         The near one and the far one.
+    lag_time : float
+        Time from the special point to the near interface; by default at the rate alone.
     """
 
     lag: float
@@ -149,6 +173,12 @@ class GapTransit(Delay):
     slope: float
     relaxation: float
     interfaces: tuple[str, str]
+    lag_time: float = math.nan
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if math.isnan(self.lag_time) and (self.drift is None or self.drift.constant):
+            object.__setattr__(self, "lag_time", self.lag / abs(self.rate))
 
     @property
     def transit(self) -> float:
@@ -158,17 +188,17 @@ class GapTransit(Delay):
     @property
     def transit_time(self) -> float:
         """Time between the two interfaces."""
-        return self.transit / abs(self.rate)
+        return self.time - self.lag_time
 
     @property
     def asymptotic(self) -> float:
-        """The law for slow drift, √(2 length |rate/b|) + τ |rate|."""
+        """The slow limit of the delay, √(2 length |rate/b|) + τ |rate|."""
         speed = abs(self.rate)
         return float((2.0 * self.length * speed / abs(self.slope)) ** 0.5 + self.relaxation * speed)
 
     @property
     def law(self) -> str:
-        return "gap, √(2 length |rate/b|) + τ |rate|"
+        return f"gap crossing (slow limit √(2 length |rate/b|) + τ |rate| = {self.asymptotic:.6g})"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -187,12 +217,16 @@ class HopfExit(Delay):
     forgotten : bool
         Whether the decay is below what is remembered, so that rounding, noise or the
         tolerance decides the exit.
+    buffer : float
+        The parameter beyond which the buffer point lets no trajectory stay, where it is
+        below the exit that the entry alone would give; else nan.
     """
 
     entry: float
     decay: float
     gain: float = 1.0
     forgotten: bool = False
+    buffer: float = math.nan
 
     @property
     def law(self) -> str:

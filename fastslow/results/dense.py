@@ -77,7 +77,7 @@ def refined_table(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.floa
     reach = np.ptp(run.series[:, :, 0], axis=0)
     reach = np.where(reach > 0, reach, np.abs(bend).max(axis=0) + np.finfo(float).tiny)
     pieces = np.sqrt((bend / (8 * FLATNESS * reach)).max(axis=1))
-    least = np.where(run.steps[:, 3] == 2, LEAST_POINTS, 1)
+    least = np.where(run.steps[:, 3] >= 2, LEAST_POINTS, 1)
     pieces = np.clip(np.nan_to_num(np.ceil(pieces), nan=1.0), least, MOST_POINTS).astype(int)
     row = np.repeat(np.arange(len(length)), pieces)
     first = np.repeat(np.cumsum(pieces) - pieces, pieces)

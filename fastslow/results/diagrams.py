@@ -60,7 +60,7 @@ class Diagram(Table, Result):
     interface_values : mapping
         For every interface that is a plain value of one state, (state, value).
     equations : str
-        The model as text.
+        The equations as they were written, as text.
     corrector : callable, optional
         Solves for an equilibrium read between rows; not kept in a file.
     outcome : Outcome

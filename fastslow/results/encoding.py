@@ -42,7 +42,7 @@ _SEQUENCES: dict[str, Callable[..., Any]] = {
     "Tangencies": Tangencies,
 }
 
-_NUMBERS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
+_NUMBERS = {"nan": math.nan, "-nan": -math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
 class BrokenError(Exception):
@@ -85,7 +85,7 @@ def encoded(value: Any, path: str, arrays: dict[str, Array]) -> Any:
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, float):
-        return value if math.isfinite(value) else {"float": repr(value)}
+        return value if math.isfinite(value) else {"float": _name(value)}
     if isinstance(value, complex):
         return {"complex": [encoded(v, path, arrays) for v in (value.real, value.imag)]}
     if isinstance(value, np.ndarray):
@@ -115,6 +115,15 @@ def _array(value: Array, path: str, arrays: dict[str, Array]) -> Any:
             return node
     arrays[path] = value
     return {"array": path, "dtype": value.dtype.str, "shape": list(value.shape)}
+
+
+def _name(value: float) -> str:
+    """The key in `_NUMBERS` of a float that is not finite; ``repr`` forgets the sign of NaN."""
+    return next(n for n, v in _NUMBERS.items() if _bits(v) == _bits(value) or n == repr(value))
+
+
+def _bits(value: float) -> bytes:
+    return np.float64(value).tobytes()
 
 
 def _small(node: dict[str, Any]) -> Array:

@@ -75,7 +75,8 @@ def outcome_of(
         return Outcome(
             "not decided",
             f"at {time}, after {modes[mode]}, the flow reaches several discontinuities at once, "
-            f"where no sliding motion is defined: {reasons}.",
+            f"where no sliding motion is defined: {reasons}; write the rates as a sum of terms "
+            "with one sign each, smooth one of the signs, or start off the intersection.",
             False,
         )
     if code == 6:

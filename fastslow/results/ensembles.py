@@ -13,20 +13,9 @@ from numpy.typing import NDArray
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.endings import outcome_of
 from fastslow.results.outcome import Outcome
+from fastslow.results.regimes import REGIMES
 from fastslow.results.result import Result
 from fastslow.results.tables import Table
-
-#: The regimes by which sides of a gap were touched: lower, inside, upper as bits 1, 2, 4.
-REGIMES = (
-    "",
-    "meshed lower",
-    "free",
-    "unilateral lower",
-    "meshed upper",
-    "bilateral",
-    "unilateral upper",
-    "bilateral",
-)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,7 +49,7 @@ class Ensemble(Table, Result):
     hits : ndarray of int, shape (m, n_interfaces, 2)
         How often each interface was crossed, upwards (index 0) and downwards (index 1).
     regime : ndarray of str, shape (m,)
-        How the sides of a gap were touched in the last period, as in
+        How the sides of a gap were touched, period by period, as in
         `Trajectory.regime`; empty for models without a gap or a period.
     n_steps : ndarray of int, shape (m,)
     codes, last_mode : ndarray of int, shape (m,)
@@ -79,6 +68,19 @@ class Ensemble(Table, Result):
         How they were simulated.
     undecided : tuple of (str, str)
         Intersections of discontinuities along which no sliding is derived, and why.
+    notes : tuple of str
+        In how many trajectories a tolerance, or the smallest number, decides when a state
+        leaves zero, and which.
+    touched : ndarray of int, shape (m, k)
+        Which sides of a gap were touched in each whole period of the second half of a
+        run, the last one last: lower 1, inside 2, upper 4, added up; 0 where the run has
+        fewer periods.
+    multiples : ndarray of int, shape (m,)
+        After how many periods the states repeat at the end of a run with a gap, 0 where
+        they do not.
+    changes : ndarray, shape (m,)
+        By how much they change over so many periods, else over one, in units of their
+        ranges.
 
     Examples
     --------
@@ -118,6 +120,10 @@ class Ensemble(Table, Result):
     equations: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict)
     undecided: tuple[tuple[str, str], ...] = ()
+    notes: tuple[str, ...] = ()
+    touched: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
+    multiples: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    changes: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
     _row = "trajectory"
 
@@ -131,6 +137,16 @@ class Ensemble(Table, Result):
     def success(self) -> NDArray[np.bool_]:
         """Whether each trajectory reached the end of time, shape (m,)."""
         return self.codes == 0
+
+    @property
+    def fractions(self) -> dict[str, NDArray[np.float64]]:
+        """The fraction of the periods of each regime, over the second half of each run, (m,)."""
+        counted = np.maximum(np.count_nonzero(self.touched, axis=1), 1)
+        found: dict[str, NDArray[np.float64]] = {}
+        for bits in np.unique(self.touched[self.touched > 0]):
+            share = np.count_nonzero(self.touched == bits, axis=1) / counted
+            found[REGIMES[bits]] = found.get(REGIMES[bits], 0.0) + share
+        return found
 
     @cached_property
     def outcomes(self) -> tuple[Outcome, ...]:
@@ -213,32 +229,5 @@ class Ensemble(Table, Result):
         if done < count:
             worst = int(np.flatnonzero(~self.success)[0])
             lines.append(f"  trajectory {worst}: {self.outcomes[worst]}")
+        lines += [f"  {note}" for note in self.notes]
         return "\n".join(lines)
-
-
-def regimes(
-    seen: NDArray[np.float64],
-    end: NDArray[np.float64],
-    period: NDArray[np.float64],
-    modes: tuple[str, ...],
-    gap: tuple[str, str, str],
-) -> NDArray[np.str_]:
-    """The regime of each trajectory from the times at which each mode was last left.
-
-    Parameters
-    ----------
-    seen : ndarray, shape (m, n_modes)
-        Minus infinity for a mode never entered.
-    end, period : ndarray, shape (m,)
-    modes : tuple of str
-        Regions and sliding motions; sliding along an edge of the gap touches its side.
-    gap : tuple of str
-        Regions below, inside and above the gap.
-    """
-    lower, inside, upper = gap
-    bits = np.zeros(len(modes), dtype=np.int64)
-    for column, mode in enumerate(modes):
-        sides = mode.split("|")
-        bits[column] = (lower in sides) + 2 * (mode == inside) + 4 * (upper in sides)
-    touched = np.where(seen > (end - period)[:, None], bits, 0)
-    return np.array(REGIMES)[np.bitwise_or.reduce(touched, axis=1)]

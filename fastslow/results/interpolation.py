@@ -31,6 +31,6 @@ def hermite(
         cubic = (
             x0 + part * m0 + part**2 * (3 * chord - 2 * m0 - m1) + part**3 * (m0 + m1 - 2 * chord)
         )
-    bound = 3.0 * np.abs(chord) + 1e-12
-    mild = np.all((np.abs(m0) <= bound) & (np.abs(m1) <= bound), axis=1, keepdims=True)
+    bound = 3.0 * np.abs(chord) + 1e-12 * np.maximum(np.abs(x0), np.abs(x1))
+    mild = (np.abs(m0) <= bound) & (np.abs(m1) <= bound)
     return np.where(mild, cubic, straight)

@@ -25,6 +25,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+#: A row is at a value of the parameter if it is off it by this part of the parameter's size.
+AT = 1e-12
+
+#: Rows at one value between which a state moves by this part of its size are a continuum.
+MOVED = 1e-9
+
+
 @dataclass(frozen=True, eq=False)
 class Pieces:
     """Runs of rows over which the parameter does not turn; each begins where the last ends.
@@ -100,7 +107,7 @@ def passages(
     branch: Branch, where: float, constants: Mapping[str, float], corrector: Corrector | None
 ) -> list[Equilibrium]:
     """The equilibria of a branch at a parameter value, in order along it."""
-    near = 1e-12 * max(1.0, abs(where))
+    near = AT * float(np.abs(branch.parameter).max(initial=0.0))
     level, passed = branch.pieces.around(where, near)
     runs = [(begin, begin, end) for begin, end in level]
     if branch.closed and len(runs) > 1 and runs[0][1] == 0 and runs[-1][2] == len(branch) - 1:
@@ -109,11 +116,21 @@ def passages(
         runs[0] = (0, last[1], runs[0][2])
     found: list[tuple[int, Equilibrium]] = []
     for place, begin, end in runs:
-        vertical = bool(np.abs(branch.state[end] - branch.state[begin]).max() > 1e-9)
+        moved = np.abs(branch.state[end] - branch.state[begin])
+        vertical = bool(np.any(moved > MOVED * _unit(branch)))
         for row in (begin, end) if vertical else (begin,):
             found.append((place, stored(branch, row, constants, vertical)))
     found += [(row, between(branch, row, where, constants, corrector)) for row in passed]
     return [point for _, point in sorted(found, key=lambda entry: entry[0])]
+
+
+def _unit(branch: Branch) -> Array:
+    """Size of each state on a branch; where it is zero but for rounding, its natural unit."""
+    unit = np.abs(branch.state).max(axis=0, initial=0.0)
+    for point in branch.special[:1]:
+        if point.source is not None:
+            unit = np.maximum(unit, point.source.unit)
+    return unit
 
 
 def wrapped(branch: Branch, state: Array) -> Array:

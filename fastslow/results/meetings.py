@@ -23,6 +23,9 @@ ALONG = 5
 #: A curve of which more than this part of the steps run along another one is that curve.
 MOST = 0.9
 
+#: Rows by which curves that run along each other are told apart.
+SAMPLED = 25
+
 #: Sine of the angle from which straight lines meet where the curves do.
 WIDE = 0.2
 
@@ -70,10 +73,13 @@ def intersections(one: Curve, other: Curve, names: tuple[str, str]) -> Array:
     i, j = _overlapping(lines[0], lines[1])
     along = _along(lines, [tuple(s / scale for s in pair) for pair in slopes], i, j)
     if along.size and along.mean() > MOST:
-        raise ArgumentError(
-            f"the curves run along each other in the plane of {names[0]} and {names[1]}: they are "
-            "one curve, traced twice; expected another curve"
-        )
+        plane = f"the curves run along each other in the plane of {names[0]} and {names[1]}: they "
+        apart_in = _differing(one, other)
+        if apart_in:
+            raise ArgumentError(
+                f"{plane}differ in {', '.join(apart_in)} alone; expected columns that differ"
+            )
+        raise ArgumentError(f"{plane}are one curve, traced twice; expected another curve")
     apart = ~along[i]
     i, j = i[apart], j[apart]
     part, meet = _met(lines[0], lines[1], i, j)
@@ -90,6 +96,33 @@ def intersections(one: Curve, other: Curve, names: tuple[str, str]) -> Array:
         if all(np.abs(point - known).max() > ON for known in distinct):
             distinct.append(point)
     return np.array(distinct).reshape(-1, 2) * scale
+
+
+def _differing(one: Curve, other: Curve) -> list[str]:
+    """Columns in which curves that are over each other in a plane differ, none for one curve.
+
+    Rows of one curve are on the other one if they are nearer to a step of it than the step is
+    long, in units of the extents.
+    """
+    names = [name for name in one.point_names if name in other.point_names]
+    first, second = (
+        c.points[:, [c.point_names.index(name) for name in names]] for c in (one, other)
+    )
+    unit = np.ptp(np.concatenate([first, second]), axis=0)
+    unit[unit == 0] = 1.0
+    rows = first[np.linspace(0, len(first) - 1, SAMPLED).astype(int)] / unit
+    begin, chord = second[:-1] / unit, np.diff(second / unit, axis=0)
+    length = np.linalg.norm(chord, axis=1)
+    gap = rows[:, None] - begin
+    part = (gap * chord).sum(axis=2) / np.maximum(length**2, 1e-300)
+    gap -= np.clip(part, 0.0, 1.0)[..., None] * chord
+    distance = np.linalg.norm(gap, axis=2)
+    nearest = np.argmin(distance, axis=1)
+    each = np.arange(len(rows))
+    if np.mean(distance[each, nearest] > length[nearest]) <= 0.5:
+        return []
+    apart = np.median(np.abs(gap[each, nearest]), axis=0) > ON
+    return [name for name, differs in zip(names, apart, strict=True) if differs]
 
 
 def step_slopes(curve: Curve) -> tuple[Array, Array]:

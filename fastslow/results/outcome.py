@@ -29,6 +29,8 @@ class Outcome:
         One sentence: what happened and, where something can be done, what to try.
     success : bool
         Whether the computation reached what it was asked for.
+    notes : tuple of str
+        What of the message warns of a doubtful result, such as states whose noise decides.
 
     Examples
     --------
@@ -39,12 +41,27 @@ class Outcome:
     code: str
     message: str
     success: bool
+    notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return self.message
 
     def __bool__(self) -> bool:
         return self.success
+
+
+def with_notes(outcome: Outcome, notes: Sequence[str]) -> Outcome:
+    """The outcome with sentences of warning that it does not have yet.
+
+    Examples
+    --------
+    >>> done = Outcome("end of time", "reached t = 1.", True)
+    >>> print(with_notes(done, ["x fell below its atol."]))
+    reached t = 1. x fell below its atol.
+    """
+    new = tuple(note for note in notes if note not in outcome.notes)
+    message = " ".join([outcome.message, *new])
+    return replace(outcome, message=message, notes=(*outcome.notes, *new))
 
 
 def stopped_early(run: Trajectory) -> str:

@@ -139,7 +139,7 @@ def rows_of(lay: Overlay, wanted: slice) -> Overlay:
 
 
 def _clipped(phases: tuple[Phase, ...], begin: float, end: float) -> list[Phase]:
-    """Phases as far as they lie between two times; the spikes stay those of the whole phase."""
+    """Phases as far as they lie between two times; counts stay those of the whole phase."""
     return [
         replace(phase, start=max(phase.start, begin), end=min(phase.end, end))
         for phase in phases

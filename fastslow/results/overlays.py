@@ -27,6 +27,9 @@ from fastslow.results.transitions import Bursting, Phase, StableSheet, Transitio
 MEASURED = Outcome("measured", "the diagram covers the whole run.", True)
 
 
+#: The median lag is given where at least this fraction of the samples have one.
+LAGGING = 0.5
+
 #: Transitions that a summary lists; all are in ``transitions``.
 SHOWN = 12
 
@@ -58,7 +61,7 @@ class Overlay(Table, Result):
         All stable sheets of the diagram.
     followed : ndarray of int, shape (N,)
         Index into ``sheets``; −1 where none is followed: before the first and after the last
-        sheet, while spiking on a cycle, and outside the diagram's range.
+        sheet, while oscillating on a cycle, and outside the diagram's range.
     distance : ndarray, shape (N,)
         From the followed sheet (past a Hopf point its unstable continuation, past a fold the
         fold); where none is followed from the nearest stable one, infinite without any.
@@ -71,7 +74,7 @@ class Overlay(Table, Result):
     phases : tuple of Phase
         All of the run, in time.
     transitions : tuple of Transition
-        Every leaving of a sheet and end of spiking, in time.
+        Every leaving of a sheet and end of an oscillation, in time.
     bursting : Bursting or None
         What the rhythm is called; None without one.
     turning : tuple of Moment
@@ -324,7 +327,7 @@ class Overlay(Table, Result):
         )
         if not self.outcome:
             yield f"  {self.outcome}"
-        if not self.run.outcome:
+        if not self.run.outcome and self.outcome.code != "cut short":
             yield f"  the run ended early: {self.run.outcome}"
         if not self.sheets and not self.diagram.bands:
             yield "  the diagram has no stable sheet"
@@ -333,7 +336,7 @@ class Overlay(Table, Result):
         for label, share in self.shares().items():
             yield f"  on {label or 'no sheet'}: {share:.1%} of the time{self._behind(label)}"
         yield from self._sticking()
-        yield from self._spiking()
+        yield from self._oscillating()
         if self.bursting is not None:
             yield f"  {self.bursting}"
             yield from (f"    {sentence}" for sentence in self.bursting.evidence)
@@ -348,13 +351,13 @@ class Overlay(Table, Result):
         yield from lost
 
     def _behind(self, label: str) -> str:
-        """How far the motion is behind a sheet, in words."""
+        """The median lag behind a sheet, where most samples on it have one."""
         numbers = [k for k, sheet in enumerate(self.sheets) if sheet.label == label]
-        lags = self.lag[np.isin(self.followed, numbers) & np.isfinite(self.lag)]
-        if not len(lags):
+        lags = self.lag[np.isin(self.followed, numbers)]
+        known = lags[np.isfinite(lags)]
+        if not len(known) or len(known) < LAGGING * len(lags):
             return ""
-        middle = float(np.median(lags))
-        return f", typically {abs(middle):.3g} {'behind' if middle >= 0 else 'ahead'} in time"
+        return f", median lag {float(np.median(known)):.3g}"
 
     def _sticking(self) -> Iterator[str]:
         """How often the run rests in each band."""
@@ -364,18 +367,18 @@ class Overlay(Table, Result):
             count = len(lengths)
             yield f"  in {name}: {count} time{'' if count == 1 else 's'}, {_range(lengths)} long"
 
-    def _spiking(self) -> Iterator[str]:
-        """Spiking phases that are alike, in one line each."""
+    def _oscillating(self) -> Iterator[str]:
+        """Oscillating phases that are alike, in one line each."""
         groups: dict[tuple[str, tuple[str, ...]], list[Phase]] = {}
         for phase in self.phases:
-            if phase.kind == "spiking":
+            if phase.kind == "oscillating":
                 groups.setdefault((phase.attractor, phase.sheets), []).append(phase)
         for (attractor, sheets), met in groups.items():
-            counts, lengths = [p.spikes for p in met], [p.duration for p in met]
+            counts, lengths = [p.oscillations for p in met], [p.duration for p in met]
             what = "on a cycle" if attractor == "cycle" else f"settling on {sheets[0]}"
             yield (
-                f"  {len(met)} spiking phase{'' if len(met) == 1 else 's'} {what}: "
-                f"{_range(counts)} spikes, {_range(lengths)} long"
+                f"  {len(met)} oscillating phase{'' if len(met) == 1 else 's'} {what}: "
+                f"{_range(counts)} oscillations, {_range(lengths)} long"
             )
 
     def __repr__(self) -> str:

@@ -293,8 +293,10 @@ class SpecialPoint(_Point):
     normal_form : mapping
         Coefficients on the center manifold of a codimension-two point, for eigenvectors
         of length one (Kuznetsov 2004, sections 8.3 to 8.7): a and b of BT, l2 of GH, s,
-        theta and E of ZH, p11, p12, p21, p22, theta and delta of HH; empty where a
-        resonance leaves none.
+        theta and E of ZH, p11, p12, p21, p22, theta and delta of HH; without those that
+        ``degeneracy`` says are undefined.
+    degeneracy : str
+        Which coefficients of the normal form are undefined, and why.
     switch : ndarray, shape (n + 1,), optional
         At a branch point the unit tangent of the other branch.
     accuracy : float, optional
@@ -325,6 +327,7 @@ class SpecialPoint(_Point):
     frequency: float | None = None
     lyapunov: float | None = None
     normal_form: Mapping[str, float] = field(default_factory=dict)
+    degeneracy: str = ""
     switch: NDArray[np.float64] | None = field(default=None, repr=False)
     accuracy: float | None = None
     admissible: bool = True
@@ -356,7 +359,8 @@ class SpecialPoint(_Point):
     def description(self) -> str:
         """What it is and where, in words."""
         on = f" on {self.interface}" if self.interface else ""
-        return f"{self.kind}{on}; {self._values()}"
+        degenerate = f"; degenerate: {self.degeneracy}" if self.degeneracy else ""
+        return f"{self.kind}{on}; {self._values()}{degenerate}"
 
     def __repr__(self) -> str:
         return f"SpecialPoint({self.label}: {self.description})"

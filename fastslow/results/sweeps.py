@@ -56,7 +56,11 @@ class SweepPass(Result):
         way = "up" if self.direction > 0 else "down"
         failed = sum(not outcome for outcome in self.outcomes)
         text = f"pass {way}: {len(self.x)} points at {len(self.values)} values"
-        return text + (f", {failed} of them failed" if failed else "")
+        text += f", {failed} of them failed" if failed else ""
+        noted = [outcome.notes[0] for outcome in self.outcomes if outcome.notes]
+        if noted:
+            text += f"; noise may decide at {len(noted)} of them, first: {noted[0]}"
+        return text
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -17,7 +17,6 @@ from fastslow.results.contacts import (
     Contacts,
     contacts_of,
     count_hits,
-    regime_of,
     residence_in,
 )
 from fastslow.results.crossings import Crossings, Segment, crossings_of, regions_at, segments_of
@@ -26,7 +25,8 @@ from fastslow.results.markup import trajectory_html
 from fastslow.results.moments import Moment, in_blocks, is_dense, sample
 from fastslow.results.outcome import Outcome
 from fastslow.results.recurrence import Recurrence
-from fastslow.results.result import Result
+from fastslow.results.regimes import SAME, Regimes, regimes_of
+from fastslow.results.result import LIVE, Result
 from fastslow.results.run_parts import samples_of
 from fastslow.results.run_queries import Queries
 from fastslow.results.sections import window_of
@@ -81,6 +81,8 @@ class Trajectory(Queries, Recurrence, Table, Result):
     periods : mapping
         The period of every state that has one. Columns go on beyond it without a
         jump; distances are taken modulo the period.
+    model : Model, optional
+        What was simulated; not kept in a file.
 
     Examples
     --------
@@ -114,6 +116,7 @@ class Trajectory(Queries, Recurrence, Table, Result):
     equations: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict)
     periods: Mapping[str, float] = field(default_factory=dict)
+    model: Any = field(default=None, repr=False, metadata=LIVE)
 
     _row = "t"
     _places = ("t",)
@@ -221,13 +224,54 @@ class Trajectory(Queries, Recurrence, Table, Result):
 
     @cached_property
     def regime(self) -> str | None:
-        """How the sides of a gap are touched in the last period of the run.
+        """How the sides of a gap are touched in the second half of the run, period by period.
 
-        ``"bilateral"``, ``"unilateral upper"``, ``"unilateral lower"``,
-        ``"meshed upper"``, ``"meshed lower"`` or ``"free"``; None for models
-        without gap or period. Sliding along an edge touches it; rounding decides grazes.
+        ``"bilateral"``, ``"unilateral upper"``, ``"unilateral lower"``, ``"meshed upper"``,
+        ``"meshed lower"`` or ``"free"`` where all whole periods are so, or where the motion
+        repeats after several that are so together; else ``"not settled"``. None for models
+        without gap or period. A run of fewer than four periods is named by its last one
+        alone. Sliding along an edge touches it; rounding decides grazes. `regimes` gives the
+        fractions of the periods, `fastslow.classify_regime` tells chaos from a transient.
         """
-        return regime_of(self)
+        return None if self._regimes is None else self._regimes.label
+
+    @cached_property
+    def _regimes(self) -> Regimes | None:
+        known = self.gap is not None and self.period is not None
+        return regimes_of(self, None, None, None, SAME) if known else None
+
+    @takes(period=positive, since=finite, until=finite, tol=positive)
+    def regimes(
+        self,
+        period: float | None = None,
+        *,
+        since: float | None = None,
+        until: float | None = None,
+        tol: float = SAME,
+    ) -> Regimes:
+        """The regime in each of many periods, their fractions, and whether the states repeat.
+
+        Parameters
+        ----------
+        period : float, optional
+            By default that of the forcing.
+        since, until : float, optional
+            The part of the run; by default its second half. Whole periods are counted
+            back from its end.
+        tol : float
+            Largest difference that counts as a repeat, in units of each state's range; at
+            least a thousand tolerances of the integration.
+
+        Returns
+        -------
+        Regimes
+
+        Raises
+        ------
+        ArgumentError
+            Without a gap or a period, or for times outside the run.
+        """
+        return regimes_of(self, period, since, until, tol)
 
     @property
     def residence(self) -> dict[str, float]:
@@ -297,7 +341,8 @@ class Trajectory(Queries, Recurrence, Table, Result):
         lines = [
             f"Trajectory of {', '.join(self.columns)} for t from {low:.6g} to {high:.6g}",
             f"  {len(self.steps)} steps, {len(self.crossing_table)} crossings, "
-            f"{len(self.segments)} segments" + (f", regime {self.regime}" if self.regime else ""),
+            f"{len(self.segments)} segments"
+            + (f", regime {self._regimes.words}" if self._regimes else ""),
             f"  {self.method}",
             f"  {self.outcome}",
         ]

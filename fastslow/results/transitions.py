@@ -13,28 +13,31 @@ from fastslow.results.moments import Moment
 from fastslow.results.points import SpecialPoint
 
 #: Stands for a sheet where the fast motion follows none.
-SPIKING = "spiking"
+OSCILLATING = "oscillating"
 
 #: Every kind of transition, and what happens there.
 KINDS = {
     "jump": "leaves at a fold, smooth or not",
     "Hopf": "leaves at a Hopf point",
+    "branch point": "leaves at a branch point",
     "crossing": "goes on across a boundary equilibrium",
-    "transit": "crosses a gap, over a continuum of equilibria",
+    "gap crossing": "crosses a gap, over a continuum of equilibria",
     "steep": "falls behind a steep slope without bifurcation",
+    "rate-induced": "loses a sheet that stays stable, as it drifts too fast to be followed",
     "grazing": "leaves where it touches an interface",
-    "end of spiking": "the fast oscillation ends",
+    "end of oscillation": "the fast oscillation ends",
     "excursion": "leaves a sheet that has not ended and comes back",
-    "change": "leaves for another reason",
+    "loss of tracking": "leaves a sheet that has not ended, without a bifurcation nearby",
+    "unclassified": "leaves near a special point that does not explain it",
 }
 
 
 #: Every kind of phase.
 PHASES = (
-    "quiescent",
-    "spiking",
+    "quasi-static",
+    "oscillating",
     "jump",
-    "transit",
+    "gap crossing",
     "excursion",
     "transient",
     "outside",
@@ -67,19 +70,19 @@ class StableSheet:
 
 @dataclass(frozen=True, eq=False)
 class Transition:
-    """A leaving of the followed sheet, or the end of a spiking phase, up to the next sheet.
+    """A leaving of the followed sheet, or the end of an oscillating phase, up to the next sheet.
 
     Parameters
     ----------
     time, value : float
         When it happened, and the slow quantity then: between two sheets where two
         thirds of the way from the old one to the new one are done; at the passage of
-        a boundary equilibrium where the interface is crossed; at the start of spiking
-        where the old sheet is left; at its end the last spike.
+        a boundary equilibrium where the interface is crossed; at the start of an oscillation
+        where the old sheet is left; at its end the last maximum.
     state : ndarray, shape (n,)
         The state at that time.
     from_sheet, to_sheet : str
-        Labels of the sheets, or ``"spiking"``; to_sheet is "" where the run ends before
+        Labels of the sheets, or ``"oscillating"``; to_sheet is "" where the run ends before
         it comes to another sheet.
     special : SpecialPoint or None
         The special point responsible: the end of the old sheet that was passed.
@@ -87,8 +90,9 @@ class Transition:
         How far past the special point, away from the old sheet, the slow
         quantity is at ``value``, in its own units; nan without a special point.
     kind : str
-        ``"jump"``, ``"Hopf"``, ``"crossing"``, ``"transit"``, ``"steep"``, ``"grazing"``,
-        ``"end of spiking"``, ``"excursion"`` or ``"change"``.
+        ``"jump"``, ``"Hopf"``, ``"branch point"``, ``"crossing"``, ``"gap crossing"``, ``"steep"``,
+        ``"rate-induced"``, ``"grazing"``, ``"end of oscillation"``, ``"excursion"``,
+        ``"loss of tracking"`` or ``"unclassified"``.
     leave : Moment
         Where the old sheet is farther away than the radius of the overlay; across a gap
         the crossing of its first interface.
@@ -98,10 +102,13 @@ class Transition:
     slope : float
         |dw/dt| of the slow quantity w where it passes the special point (at ``time`` without one).
     steepness : float
-        Largest predicted lag of the motion behind the old sheet, |dX/dw| |dw/dt| / |Re λ|,
+        Largest predicted lag of the motion behind the old sheet, |dX/dw| |dw/dt| / |λ|,
         in units of each state's extent: well below 1 a sheet is followed.
     note : str
         Further evidence in words.
+    turned : bool
+        Whether the slow quantity turns round past the special point during the jump;
+        ``time`` and ``delay`` are then those of its extreme.
     law : Delay, optional
         What the law of delay predicts for a drift at ``slope``: for a jump at the same
         state as here, for a transit between the same interfaces.
@@ -121,6 +128,7 @@ class Transition:
     steepness: float = float("nan")
     note: str = ""
     law: Delay | None = None
+    turned: bool = False
 
     @property
     def predicted(self) -> float:
@@ -142,38 +150,41 @@ class Transition:
     def describe(self, name: str) -> str:
         """In one line, with the slow quantity's name."""
         change = f"t = {self.time:.6g}, {name} = {self.value:.6g}: "
-        if self.to_sheet == self.from_sheet:
-            change += f"{self.from_sheet} left and met again, "
+        if self.to_sheet == self.from_sheet and self.kind == "excursion":
+            parts = [f"excursion from {self.from_sheet}"]
+        elif self.to_sheet == self.from_sheet:
+            parts = [f"{self.from_sheet} left and reached again, {self.kind}"]
         else:
-            change += f"{self.from_sheet} → {self.to_sheet or 'end of run'}, "
-        parts = [self.kind]
+            parts = [f"{self.from_sheet} → {self.to_sheet or 'end of run'}, {self.kind}"]
         if self.special is not None:
             words = self.special.subtype or self.special.criticality
             label = self.special.label + (f" ({words})" if words else "")
             parts[0] += f" at {label}, {name} = {self.special[name]:.6g}"
             if np.isfinite(self.delay):
-                law = f" (law: {self.predicted:.3g})" if self._compared() else ""
-                parts.append(f"delay {self.delay:.3g}{law}")
-        elif self.kind not in ("steep", "end of spiking"):
-            parts.append("no special point ends the sheet left")
+                turned = f", where {name} turns round" if self.turned else ""
+                law = ""
+                if self.law is not None and self._compared():
+                    law = f" (predicted {self.predicted:.3g}{self.law.bound})"
+                parts.append(f"delay {self.delay:.3g}{turned}{law}")
+        elif self.kind not in ("steep", "end of oscillation"):
+            parts.append("no bifurcation nearby")
         if self.kind == "steep":
             parts.append(
-                f"no bifurcation: the predicted lag |dX/d{name}| |d{name}/dt| / |Re λ| grows to "
+                f"no bifurcation: the predicted lag |dX/d{name}| |d{name}/dt| / |λ| grows to "
                 f"{self.steepness:.2g} of the state's extent"
             )
-        if self.kind == "transit" and self.land is not None:
-            parts.append(
-                f"not a bifurcation: {self.duration:.4g} long, {self.width:.4g} wide in {name}, "
-                f"where |d{name}/dt| = {self.slope:.4g}"
-            )
+        if self.kind == "gap crossing" and self.land is not None:
+            time = width = ""
             if isinstance(self.law, GapTransit):
-                parts[-1] += (
-                    f" (law: {self.law.transit_time:.4g} long, {self.law.transit:.4g} wide; "
-                    f"slowly {self.law.asymptotic:.4g})"
-                )
+                time = f" (predicted {self.law.transit_time:.4g})"
+                width = f" (predicted {self.law.transit:.4g}; slow limit {self.law.asymptotic:.4g})"
+            parts.append(
+                f"no bifurcation: duration {self.duration:.4g}{time}, "
+                f"Δ{name} = {self.width:.4g}{width}, where |d{name}/dt| = {self.slope:.4g}"
+            )
         elif self.land is not None and self.land.time > self.time:
             parts.append(f"lands at {name} = {self.land.value:.6g}, t = {self.land.time:.6g}")
-        if self.note and self.kind != "end of spiking":
+        if self.note and self.kind != "end of oscillation":
             parts.append(self.note)
         return change + "; ".join(parts)
 
@@ -205,29 +216,31 @@ class Phase:
     ----------
     start, end : float
     kind : str
-        ``"quiescent"`` (follows a sheet), ``"spiking"`` (two oscillations or more away from
-        the sheets), ``"jump"`` (from one sheet to the next), ``"transit"`` (the same across a
+        ``"quasi-static"`` (follows a sheet), ``"oscillating"`` (two oscillations or more away from
+        the sheets), ``"jump"`` (from one sheet to the next), ``"gap crossing"`` (the same across a
         gap), ``"excursion"`` (from a sheet and back to it), ``"transient"`` (at the start or
         the end of the run, near no sheet), ``"outside"`` (the diagram does not go so far) or
         ``"sticking"`` (rests in a band of equilibria).
     sheets : tuple of str
-        Labels of the sheets followed, in order; for spiking that settles on a sheet, that one.
-    spikes : int
+        Labels of the sheets followed, in order; for an oscillation that settles on a sheet,
+        that one.
+    oscillations : int
         Maxima of the observed state.
     attractor : str
-        Of a spiking phase ``"cycle"``, or ``"equilibrium"`` where the oscillation decays on to a
-        stable sheet that was there all the time; else "".
+        Of an oscillating phase ``"cycle"``, or ``"equilibrium"`` where the oscillation decays
+        on to a stable sheet that was there all the time; else "".
     intervals : tuple of float
-        Times between successive spikes.
+        Times between successive maxima.
     sizes : tuple of float
-        Of a spiking phase, the rise of the observed state to each spike, in its own units.
+        Of an oscillating phase, the rise of the observed state to each maximum, in its own
+        units.
     """
 
     start: float
     end: float
     kind: str
     sheets: tuple[str, ...] = ()
-    spikes: int = 0
+    oscillations: int = 0
     attractor: str = ""
     intervals: tuple[float, ...] = ()
     sizes: tuple[float, ...] = ()
@@ -239,12 +252,12 @@ class Phase:
 
 @dataclass(frozen=True)
 class Bursting:
-    """What a rhythm of quiescent and spiking phases (or of jumps) is called, and why.
+    """What a rhythm of quasi-static and oscillating phases (or of jumps) is called, and why.
 
     Parameters
     ----------
     name : str
-        Such as ``"fold/Hopf bursting"``: the bifurcation that starts the spiking before the
+        Such as ``"fold/Hopf bursting"``: the bifurcation that starts the oscillation before the
         stroke, that which ends it after (Izhikevich 2000).
     evidence : tuple of str
         Sentences that the name rests on.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -82,40 +83,73 @@ def unexplained_changes(branch: Branch, number: int = 0) -> tuple[UnexplainedCha
     Hopf point by two, at a neutral saddle it stays, and from one region to another it
     may change by any number.
     """
-    low, high = unstable_range(branch.eigenvalues)
-    n = branch.eigenvalues.shape[-1]
     steps: dict[int, list[int | None]] = {}
     for point, row in zip(branch.special, branch.special_rows, strict=True):
         known = POINT_TYPES.get(point.code)
         if known is None or known.changes_stability:
             steps.setdefault(row, []).append(known.unstable if known else None)
     jumps = set((np.flatnonzero(branch.region[1:] != branch.region[:-1]) + 1).tolist())
+    low, high = unstable_range(branch.eigenvalues)
+    return tuple(
+        UnexplainedChange(
+            number,
+            (since, row),
+            branch.parameter_name,
+            (float(branch.parameter[since]), float(branch.parameter[row])),
+            int(low[since]),
+            int(low[row]),
+        )
+        for since, row in unexplained_rows(low, high, steps, jumps)
+    )
+
+
+def unexplained_rows(
+    low: NDArray[np.intp],
+    high: NDArray[np.intp],
+    steps: Mapping[int, Sequence[int | None]],
+    jumps: Collection[int] = (),
+) -> list[tuple[int, int]]:
+    """Rows between which the number of unstable eigenvalues changes without an explanation.
+
+    Parameters
+    ----------
+    low, high : ndarray of int, shape (N,)
+        The least and largest number at every row.
+    steps : dict of int to list
+        By how much it changes at the special points at some rows, None for any number. The
+        number at these rows themselves is undecided.
+    jumps : collection of int
+        Rows before which it may change by any number, as another region begins there.
+
+    Returns
+    -------
+    list of (int, int)
+        The last row at which the number was certain, and the one at which it is another.
+
+    Examples
+    --------
+    >>> low = np.array([0, 0, 0, 2, 2])
+    >>> unexplained_rows(low, low, {2: [2]}), unexplained_rows(low, low, {2: [1]})
+    ([], [(1, 3)])
+    """
+    most = int(high.max(initial=0))
     found = []
     # the numbers that are possible at the row, and the last row at which there was only one
-    possible = set(range(n + 1))
+    possible = set(range(most + 1))
     since = 0
-    for row in range(len(branch)):
-        changes = steps.get(row, [])
+    for row in range(len(low)):
+        changes = steps.get(row, ())
         if None in changes or row in jumps:
-            possible = set(range(n + 1))
+            possible = set(range(most + 1))
         for step in changes:
             if step is not None:
                 possible |= {p + s for p in possible for s in (-step, step)}
         here = set(range(int(low[row]), int(high[row]) + 1))
         if not changes:
             if not possible & here:
-                found.append(
-                    UnexplainedChange(
-                        number,
-                        (since, row),
-                        branch.parameter_name,
-                        (float(branch.parameter[since]), float(branch.parameter[row])),
-                        int(low[since]),
-                        int(low[row]),
-                    )
-                )
+                found.append((since, row))
                 possible = here
             possible &= here
             if len(here) == 1:
                 since = row
-    return tuple(found)
+    return found

@@ -93,8 +93,14 @@ class StateWindow:
         return np.asarray(inside.all(axis=-1))
 
     def meets(self, lower: Array, upper: Array) -> bool:
-        """Whether a box of states has a part in the window."""
-        return bool(np.all((upper >= np.array(self.lower)) & (lower <= np.array(self.upper))))
+        """Whether a box of states, or a copy of it by whole periods, has a part in the window."""
+        low, high = np.array(self.lower), np.array(self.upper)
+        turning = (self._periods > 0) & np.isfinite(low) & np.isfinite(upper)
+        period = np.where(turning, self._periods, 1.0)
+        # the first copy that is not below the window
+        first = np.where(turning, low, 0.0) / period - np.where(turning, upper, 0.0) / period
+        move = np.where(turning, period * np.ceil(first - ON_EDGE), 0.0)
+        return bool(np.all((upper + move >= low) & (lower + move <= high)))
 
     def around(self, points: Array, known: NDArray[np.bool_] | None = None) -> StateWindow:
         """The window with defaults in place of the bounds that were not asked for.

@@ -13,6 +13,7 @@ from fastslow.simulation.implicit_steps import (
     IMPLICIT,
     LONGEST_WAIT,
     PAYS,
+    RADAU,
     WAIT,
     long_step,
     settled,
@@ -163,7 +164,7 @@ def drive(
     t, late, stop = inputs[0], carried[LATE], span[1]
     whole = stop - span[0]
     work, W, b, d, stack, gradient, noise, on, hit, rests, side, offsets = room[:12]
-    right, poly, matrices, vectors, memory, scales = room[12:]
+    right, poly, matrices, vectors, memory, scales, rigid = room[12:]
     memory[:] = 0.0
     n_rows = kept + n_interfaces
     for i in range(n_rows):
@@ -285,6 +286,7 @@ def drive(
         if n_fast > 0 and calm <= 0 and (in_a_row > 0 or settled(W, layout, longest, tol, scales)):
             if in_a_row == 0:
                 wanted = 1.25 * longest
+                rigid[0] = 0.0
             taken, growth = long_step(
                 address,
                 layout,
@@ -305,6 +307,7 @@ def drive(
                 work,
                 matrices,
                 vectors,
+                rigid,
                 on,
                 rests,
                 noise,
@@ -388,7 +391,8 @@ def drive(
                 if n_steps == steps.shape[0]:
                     steps = grown(steps)
                 steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, taken, mode
-                steps[n_steps, 3] = IMPLICIT if long else memory[0]
+                kind = RADAU if rigid[0] > 0.0 else IMPLICIT
+                steps[n_steps, 3] = kind if long else memory[0]
             else:
                 seen[mode] = t
                 if t > since:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,17 @@ from fastslow.compiled.generic import load_loop
 from fastslow.compiled.lane_steps import CompiledSteps, compile_steps
 from fastslow.compiled.series import CompiledSeries
 from fastslow.model.model import Model
-from fastslow.results.ensembles import Ensemble, regimes
+from fastslow.results.angles import periods_of as turns_of
+from fastslow.results.ensembles import Ensemble
 from fastslow.results.named import Named
+from fastslow.results.regimes import (
+    ERRORS,
+    SAME,
+    bits_of,
+    labels_of,
+    periods_at_the_end,
+    repeats,
+)
 from fastslow.simulation.grouping import alike
 from fastslow.simulation.lanes import pool_for
 from fastslow.simulation.many_arguments import (
@@ -25,6 +35,7 @@ from fastslow.simulation.many_arguments import (
     threads_of,
     times_of,
 )
+from fastslow.simulation.remembering import notes_on_noise
 from fastslow.simulation.rooms import MODE, STEPS, beginnings
 from fastslow.simulation.settings import (
     DEFAULT,
@@ -41,6 +52,8 @@ from fastslow.simulation.trajectories import (
     once_a_model,
     series_of,
     sizes_of,
+    together_of,
+    vanishing_of,
 )
 
 Floats = NDArray[np.float64]
@@ -192,6 +205,11 @@ def simulate_many(
     ends = np.empty((count, 1 + n))
     codes = np.empty((count, 3), dtype=np.int64)
     regime = np.zeros(count, dtype="U16")
+    windows = periods_at_the_end(spans[:, 1] - spans[:, 0], own)
+    looked = int(windows.max()) if any(between is not None for between in gaps) else 0
+    touched = np.zeros((count, looked), dtype=np.int64)
+    multiples, changes = np.zeros(count, dtype=np.int64), np.full(count, np.nan)
+    turns = turns_of((*model.states, *model.slow_states), dict(model.periodic))
     sampled = np.empty((count, columns if times.size else 0, times.shape[1]))
     with _bar(count, progress) as bar:
         for (one, chosen, compiled, lanes), between in zip(groups, gaps, strict=True):
@@ -207,17 +225,33 @@ def simulate_many(
                 times if len(times) == 1 else times[chosen],
                 columns if times.size else 0,
                 bar.update,
+                _Ends(own[chosen], windows[chosen], bits_of(compiled.modes, between))
+                if between is not None and not np.isnan(own[chosen]).any()
+                else None,
             )
-            extremes[chosen], ends[chosen], codes[chosen], sampled[chosen] = run[0], *run[3:]
+            extremes[chosen], ends[chosen], codes[chosen], sampled[chosen] = run[0], *run[3:6]
             for j, name in enumerate(one.interfaces):
                 hits[chosen, interfaces.index(name)] = run[1][:, j]
             # the mode is -1 before any was chosen
             names = [*map(modes.index, compiled.modes), -1]
             codes[chosen, 1] = np.array(names)[codes[chosen, 1]]
-            if between is not None:
-                regime[chosen] = regimes(
-                    run[2], ends[chosen, 0], own[chosen], compiled.modes, between
-                )
+            if run[6] is not None:
+                last, visited = run[6]
+                touched[chosen, looked - last.shape[1] :] = last
+                ranges = np.ptp(run[0], axis=1)
+                for k in np.unique(windows[chosen]):
+                    rows = np.flatnonzero((windows[chosen] == k) & (codes[chosen, 0] == 0))
+                    of = chosen[rows]
+                    if not len(of):
+                        continue
+                    kept = visited[rows, -1 - k :]
+                    widths = np.fmax(ranges[rows], np.ptp(kept, axis=1))
+                    scale = np.where(widths > 0, widths, 1.0)
+                    found, moved = repeats(kept, scale, turns, max(SAME, ERRORS * resolved.rtol))
+                    short = np.diff(spans[of], axis=1)[:, 0] < (k - 1e-9) * own[of]
+                    multiples[of] = np.where(short, 0, found)
+                    changes[of] = np.where(short, np.nan, moved)
+                    regime[of] = labels_of(touched[of, looked - k :], multiples[of])
     return Ensemble(
         (*model.states, *model.slow_states),
         tuple(model.forcing),
@@ -243,7 +277,78 @@ def simulate_many(
         model.equations,
         resolved.recorded(),
         tuple(dict.fromkeys(u for *_, compiled, _ in groups for u in compiled.undecided)),
+        notes_on_noise(
+            (*model.states, *model.slow_states),
+            resolved,
+            (*vanishing_of(model), *(name for some in together_of(model) for name in some)),
+            starts,
+            extremes,
+            ends[:, 1:],
+        ),
+        touched,
+        multiples,
+        changes,
     )
+
+
+def arrivals(
+    model: Model,
+    starts: Floats,
+    swept: Mapping[str, Floats],
+    spans: Floats,
+    resolved: Resolved,
+    threads: int,
+    times: Floats | None = None,
+) -> tuple[Floats, NDArray[np.int64], Floats]:
+    """Where trajectories of different spans arrive, and what they are at some times.
+
+    Parameters
+    ----------
+    model : Model
+    starts : ndarray, shape (m, n)
+    swept : mapping
+        Parameter to its values, shape (m,).
+    spans : ndarray, shape (m, 2)
+    resolved : Resolved
+    threads : int
+    times : ndarray, shape (m, k), optional
+        Increasing, within the spans.
+
+    Returns
+    -------
+    ends : ndarray, shape (m, n)
+    codes : ndarray of int, shape (m,)
+        How each ended, 0 where it reached the end of its span.
+    samples : ndarray, shape (m, n, k)
+        NaN after the end of a trajectory.
+    """
+    count, n = starts.shape
+    ends, codes = np.empty((count, n)), np.empty(count, dtype=np.int64)
+    grid = np.empty((count, 0)) if times is None else times
+    samples = np.empty((count, n, grid.shape[1]))
+    for one, chosen in alike(model, swept, count):
+        compiled = series_of(one, resolved.order)
+        run = _run(
+            compiled,
+            steps_of(one, resolved.order),
+            resolved,
+            error_rules(one, resolved, compiled),
+            threads,
+            sizes_of(model, compiled, resolved.implicit),
+            (
+                _parameter_table(compiled, one, swept, chosen),
+                starts[chosen],
+                spans[chosen],
+                spans[chosen, 1],
+            ),
+            grid[chosen],
+            n if grid.shape[1] else 0,
+            lambda _: None,
+        )
+        ends[chosen], codes[chosen] = run[3][:, 1:], run[4][:, 0]
+        if grid.shape[1]:
+            samples[chosen] = run[5]
+    return ends, codes, samples
 
 
 def _parameter_table(
@@ -254,6 +359,96 @@ def _parameter_table(
     for column, name in enumerate(compiled.parameters):
         table[:, column] = swept[name][chosen] if name in swept else model.parameters[name]
     return table
+
+
+@dataclass(frozen=True, eq=False)
+class _Ends:
+    """The periods at the end of runs that are looked at one by one.
+
+    Parameters
+    ----------
+    period, windows : ndarray, shape (m,)
+        Their length and number.
+    bits : ndarray of int, shape (n_modes,)
+        The sides of a gap that each mode touches.
+    """
+
+    period: Floats
+    windows: NDArray[np.int64]
+    bits: NDArray[np.int64]
+
+
+class _Kept:
+    """What runs do in their last periods, gathered at stops at the ends of them.
+
+    A run goes on after a stop as if there were none, but for the end of a step.
+    """
+
+    def __init__(self, ending: _Ends, spans: Floats, starts: Floats, n_regions: int) -> None:
+        self.ending, self.spans, self.n_regions = ending, spans, n_regions
+        most = int(ending.windows.max())
+        self.touched = np.zeros((len(spans), most), dtype=np.int64)
+        self.states = np.repeat(starts[:, None], most + 1, axis=1)
+        self.failed = np.zeros(len(spans), dtype=np.int64)
+
+    def stops(self, chunk: tuple[int, int]) -> int:
+        """How often the runs of a chunk stop: before the first of the periods, and after each."""
+        return int(self.ending.windows[slice(*chunk)].max()) + 1
+
+    def _edge(self, chunk: tuple[int, int], left: NDArray[np.int64]) -> Floats:
+        """When so many periods are left of each run, at its begin at the earliest."""
+        rows = slice(*chunk)
+        edge = self.spans[rows, 1] - left * self.ending.period[rows]
+        return np.asarray(np.maximum(edge, self.spans[rows, 0]))
+
+    def before(
+        self,
+        stop: int,
+        chunk: tuple[int, int],
+        stops: Floats,
+        counted: NDArray[np.int64],
+        codes: NDArray[np.int64],
+    ) -> None:
+        """Set where the runs of a chunk stop next."""
+        rows = slice(*chunk)
+        most = self.ending.windows[rows]
+        left = np.minimum(self.stops(chunk) - 1 - stop, most)
+        # a period that begins with the run needs no stop before it
+        left = np.where(self._edge(chunk, left) > self.spans[rows, 0], left, most - 1)
+        stops[rows, 1] = self._edge(chunk, left)
+        if stop > 0:
+            self.failed[rows] = codes[rows]
+            # what has ended goes no further
+            stops[rows, 1] = np.where(codes[rows] != 0, -np.inf, stops[rows, 1])
+            # a sliding motion is chosen anew, as at the begin of a run
+            sliding = counted[rows, MODE] >= self.n_regions
+            counted[rows, MODE] = np.where(sliding & (codes[rows] == 0), -1, counted[rows, MODE])
+
+    def after(
+        self,
+        stop: int,
+        chunk: tuple[int, int],
+        places: Floats,
+        seen: Floats,
+        codes: NDArray[np.int64],
+    ) -> None:
+        """Note which sides were touched since the stop before, and the states."""
+        rows = slice(*chunk)
+        if stop > 0:
+            codes[rows] = np.where(self.failed[rows] != 0, self.failed[rows], codes[rows])
+        left = self.stops(chunk) - 1 - stop
+        most = self.ending.windows[rows]
+        width = self.touched.shape[1]
+        begun = self._edge(chunk, np.minimum(left, most)) > self.spans[rows, 0]
+        now = places[rows, 1 : 1 + self.states.shape[2]]
+        self.states[rows, width - left] = np.where(
+            begun[:, None], now, self.states[rows, width - left]
+        )
+        if stop > 0:
+            begin = self._edge(chunk, np.full(len(most), left + 1))
+            inside = seen[rows] > begin[:, None]
+            sides = np.bitwise_or.reduce(np.where(inside, self.ending.bits, 0), axis=1)
+            self.touched[rows, width - 1 - left] = np.where(left < most, sides, 0)
 
 
 def _run(
@@ -267,8 +462,12 @@ def _run(
     times: Floats,
     n_columns: int,
     report: Callable[[int], object],
+    ending: _Ends | None = None,
 ) -> tuple[Any, ...]:
-    """Extremes, hits, times seen, ends, codes and samples of trajectories with one series."""
+    """Extremes, hits, times seen, ends, codes, samples and last periods of trajectories.
+
+    All have one series.
+    """
     values, starts, spans, since = rows
     count, n = starts.shape
     counted = (since <= spans[:, 0])[:, None]
@@ -283,7 +482,18 @@ def _run(
     layout = layout_of(compiled)
     many = _many_loop()
 
+    stops = spans.copy()
+    kept = _Kept(ending, spans, starts, lanes.regions) if ending is not None else None
+
     def follow(chunk: tuple[int, int]) -> None:
+        for stop in range(1 if kept is None else kept.stops(chunk)):
+            if kept is not None:
+                kept.before(stop, chunk, stops, whole, codes)
+            advance(chunk)
+            if kept is not None:
+                kept.after(stop, chunk, places, seen, codes)
+
+    def advance(chunk: tuple[int, int]) -> None:
         many(
             chunk,
             compiled.address,
@@ -296,7 +506,7 @@ def _run(
             rules,
             resolved.limits,
             values,
-            spans,
+            stops,
             since,
             times,
             samples,
@@ -328,7 +538,8 @@ def _run(
             pool.shutdown(cancel_futures=True)
     extremes[np.isinf(extremes)] = np.nan
     endings = np.column_stack([codes, whole[:, MODE], whole[:, STEPS]])
-    return extremes, hits, seen, places[:, : 1 + n], endings, samples
+    last = None if kept is None else (kept.touched, kept.states)
+    return extremes, hits, seen, places[:, : 1 + n], endings, samples, last
 
 
 def _bar(count: int, shown: bool) -> Any:

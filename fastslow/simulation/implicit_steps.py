@@ -25,7 +25,8 @@ from fastslow.compiled.series import SHORT
 from fastslow.simulation.events import find_event
 from fastslow.simulation.matrices import factorise_in_place, forgotten_in, solve_in_place
 from fastslow.simulation.polynomials import EPSILON
-from fastslow.simulation.scales import NOW, REACHED
+from fastslow.simulation.radau import STAGES, accept, late_radau
+from fastslow.simulation.scales import NOW, REACHED, ratio_of
 
 #: Taylor coefficients that are matched at the beginning and at the end of a step.
 P, Q = 2, SHORT
@@ -42,8 +43,8 @@ DAMPING = 6
 #: Steps of the series after a crossing before the first is tried; failures double it.
 WAIT, LONGEST_WAIT = 4, 64
 
-#: What marks such a step in the table of a run's steps.
-IMPLICIT = 2
+#: What marks such a step in the table of a run's steps, and one of Radau.
+IMPLICIT, RADAU = 2, 3
 
 #: How much at least a motion of the fast states decays within a step of the series for an
 #: implicit one to forget it.
@@ -52,6 +53,10 @@ CONTRACTION = 0.01
 #: How far at most a motion that does not decay so fast goes within an implicit step, |lambda| h:
 #: those are followed, and not damped.
 RESOLVED = 0.5
+
+#: A step so much longer than that of the series is one of Radau: the middle coefficients at its
+#: ends would be rounding, magnified.
+RIGID = 300.0
 
 #: Corrections this much smaller than what is allowed may be rounding, and are the last.
 ROUNDED = 1e-2
@@ -120,6 +125,7 @@ def long_step(
     work,
     matrices,
     vectors,
+    carried,
     on,
     rests,
     noise,
@@ -147,6 +153,8 @@ def long_step(
     matrices : float64 array, shape (2 + Q, n_states, n_states + 1)
     vectors : float64 array, shape (6, 1 + n_states + n_forcing or 1 + order, the larger)
         Work space.
+    carried : float64 array
+        See `radau_step`; the first number is 0 at the beginning of a phase.
 
     Returns
     -------
@@ -164,36 +172,100 @@ def long_step(
             return 0.0, 1.0
         if h < remaining:
             h = (inputs[0] + h) - inputs[0]
-        error = implicit_step(
-            address,
-            layout,
-            n_fast,
-            mode,
-            inputs,
-            parameters,
-            tol,
-            scales,
-            CONTRACTION / longest,
-            h,
-            W,
-            right,
-            poly,
-            matrices,
-            vectors,
-        )
+        error, power = -1.0, -1.0 / (P + Q)
+        rigid = carried[0] > 0.0 or h > RIGID * longest
+        if not rigid:
+            error = implicit_step(
+                address,
+                layout,
+                n_fast,
+                mode,
+                inputs,
+                parameters,
+                tol,
+                scales,
+                CONTRACTION / longest,
+                h,
+                W,
+                right,
+                poly,
+                matrices,
+                vectors,
+            )
+        if rigid or (error < 0.0 and CONTRACTION * h > RESOLVED * longest):
+            found = by_radau(
+                address,
+                layout,
+                n_fast,
+                mode,
+                inputs,
+                parameters,
+                tol,
+                scales,
+                CONTRACTION / longest,
+                h,
+                right,
+                poly,
+                carried,
+            )
+            if rigid or found <= 1.0:
+                rigid, error, power = True, found, -1.0 / (STAGES + 1)
+        error = abs(error)
         if error <= 1.0:
             s, j, _, _, _ = find_event(
                 address, layout, signs, mode, inputs, parameters, poly, h, on, rests, noise, b,
                 stack, gradient,
             )  # fmt: skip
             if j < 0:
+                if rigid:
+                    accept(address, layout, mode, inputs, parameters, h, poly, right, carried)
                 keep_forcing(address, layout, mode, inputs, parameters, tol, scales, h, poly, work)
-                return h, min(4.0, 0.8 * max(error, 1e-9) ** (-1.0 / (P + Q)))
+                return h, min(4.0, 0.8 * max(error, 1e-9) ** power)
             # the series goes through events; end a little before this one
             h *= 0.9 * s
         else:
-            h *= max(0.2, 0.8 * error ** (-1.0 / (P + Q))) if error < np.inf else 0.25
+            h *= max(0.2, 0.8 * error**power) if error < np.inf else 0.25
     return 0.0, 1.0
+
+
+@part
+def by_radau(
+    address,
+    layout,
+    n_fast,
+    mode,
+    inputs,
+    parameters,
+    tol,
+    scales,
+    rate,
+    h,
+    right,
+    poly,
+    carried,
+):
+    """Call `late_radau`."""
+    n_states, n_forcing, n_interfaces, n_modes, order = layout
+    return late_radau(
+        address,
+        n_states,
+        n_forcing,
+        n_interfaces,
+        n_modes,
+        order,
+        n_fast,
+        mode,
+        inputs.ctypes,
+        parameters.ctypes,
+        tol,
+        scales.ctypes,
+        rate,
+        h,
+        right.ctypes,
+        poly.ctypes,
+        poly.shape[0],
+        carried.ctypes,
+    )
 
 
 @part
@@ -236,8 +308,8 @@ def implicit_step(
 ):
     """One implicit step, its polynomials put into ``poly``; returns its error in units of ``tol``.
 
-    Infinite where the equation is not solved, or where the fast states do not
-    contract at the given rate: an implicit method would damp what grows.
+    Infinite where the equation is not solved, and negative where it is not tried, because the
+    fast states do not contract at the given rate: an implicit method would damp what grows.
     """
     n, n_forcing, n_interfaces, n_modes, order = layout
     columns = order + 1
@@ -269,7 +341,7 @@ def implicit_step(
     unresolved = forgotten_in(jacobian, n_fast, rate) * h
     if unresolved > RESOLVED:
         # as an error of this order, so that the next attempt is as short as it must be
-        return (unresolved / RESOLVED) ** (P + Q)
+        return -((unresolved / RESOLVED) ** (P + Q))
     if not unresolved >= 0.0 or not factorise_in_place(slopes, n):
         return np.inf
     # a state is known no better than rounding of the others lets it be
@@ -332,14 +404,6 @@ def implicit_step(
 def allowed_of(tol, before, after, reached, least):
     """The error that is allowed in a state, by its smaller value at both ends of a step."""
     return max(tol * max(reached, min(abs(after), abs(before))), least)
-
-
-@part
-def ratio_of(error, allowed):
-    """An error in units of what is allowed; nothing is allowed in what is and stays zero."""
-    if error == 0.0:
-        return 0.0
-    return abs(error) / allowed if allowed > 0.0 else np.inf
 
 
 @part

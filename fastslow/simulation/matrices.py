@@ -108,7 +108,7 @@ def solve_in_place(factors, right, solution, n):
     for i in range(n):
         solution[i] = right[i]
     for k in range(n):
-        pivot = int(factors[k, n])
+        pivot = int(factors[k, n].real)
         solution[k], solution[pivot] = solution[pivot], solution[k]
     for i in range(n):
         for j in range(i):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 import sympy as sp
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
-from fastslow.results.outcome import Outcome
+from fastslow.results.outcome import Outcome, with_notes
 from fastslow.simulation.scales import SMALLEST
 from fastslow.simulation.settings import Resolved
 
@@ -26,6 +25,7 @@ def with_noise(
     model: Model,
     resolved: Resolved,
     vanishing: tuple[str, ...],
+    together: tuple[tuple[str, ...], ...],
     steps: Floats,
     columns: dict[str, Floats],
     modes: tuple[str, ...],
@@ -38,7 +38,10 @@ def with_noise(
     model : Model
     resolved : Resolved
     vanishing : tuple of str
-        States that their rates have as a factor: only of those it is known what they leave.
+        States that their rates have as a factor: only of those, and of those that vanish
+        together, it is known what they leave.
+    together : tuple of tuple of str
+        See `states_together`.
     steps : ndarray, shape (N, 4)
         Time, length and mode of every step, and at last of the end.
     columns : dict
@@ -46,7 +49,7 @@ def with_noise(
     modes : tuple of str
     """
     found = []
-    for name in vanishing:
+    for name in (*vanishing, *dict.fromkeys(n for some in together for n in some)):
         absolute = resolved.atol[name] or 0.0
         size = np.abs(columns[name])
         below = np.flatnonzero(size < max(absolute, SMALLEST))
@@ -59,14 +62,25 @@ def with_noise(
                 f"{name} fell below its atol = {absolute:g} at {time} and was left from there: the "
                 "tolerance decides when; give atol=0."
             )
-        elif size[0] >= SMALLEST and any(_grows(model, name, columns, steps, modes, below)):
+        elif (
+            name in vanishing
+            and size[0] >= SMALLEST
+            and any(_grows(model, name, columns, steps, modes, below))
+        ):
             found.append(
                 f"{name} fell below {SMALLEST:g}, the smallest number kept, at {time}: what it "
                 "would grow to afterwards is lost; take its logarithm for a state."
             )
-    if not found:
-        return outcome
-    return replace(outcome, message=" ".join([outcome.message, *found]))
+    for some in together:
+        sizes = np.abs([columns[name] for name in some]).max(axis=0)
+        gone = np.flatnonzero(sizes < SMALLEST)
+        if len(gone) and sizes[0] >= SMALLEST:
+            found.append(
+                f"{' and '.join(some)} fell below {SMALLEST:g}, the smallest number kept, at "
+                f"t = {steps[gone[0], 0]:.6g}: what they might grow to afterwards is lost; take "
+                "their logarithms for states."
+            )
+    return with_notes(outcome, found)
 
 
 def _grows(
@@ -89,3 +103,48 @@ def _grows(
             growth = sp.lambdify(symbols, rate, "numpy")
             given = [steps[rows, 0], *(values[rows] for values in columns.values())]
             yield bool(np.any(np.asarray(growth(*given)) > 0))
+
+
+def notes_on_noise(
+    names: tuple[str, ...],
+    resolved: Resolved,
+    vanishing: tuple[str, ...],
+    start: Floats,
+    extremes: Floats,
+    final: Floats,
+) -> tuple[str, ...]:
+    """Sentences on the trajectories of an ensemble in which noise may decide, as `with_noise`.
+
+    Parameters
+    ----------
+    names : tuple of str
+    resolved : Resolved
+    vanishing : tuple of str
+        States that their rates have as a factor, or that vanish together.
+    start, final : ndarray, shape (m, n)
+    extremes : ndarray, shape (m, 2, n)
+        Smallest and largest values.
+    """
+    found = []
+    for i, name in enumerate(names):
+        if name not in vanishing:
+            continue
+        absolute = resolved.atol[name] or 0.0
+        low, high = extremes[:, 0, i], extremes[:, 1, i]
+        least = np.where(low > 0.0, low, np.where(high < 0.0, -high, 0.0))
+        first, last = np.abs(start[:, i]), np.abs(final[:, i])
+        least = np.fmin(np.fmin(least, first), last)
+        left = int(np.count_nonzero((least < absolute) & (last > LEFT * absolute)))
+        if absolute > SMALLEST and left:
+            found.append(
+                f"{name} fell below its atol = {absolute:g} in {left} of {len(start)} and was left "
+                "from there: the tolerance decides when; give atol=0."
+            )
+        lost = int(np.count_nonzero((first >= SMALLEST) & (last < SMALLEST)))
+        if absolute <= SMALLEST and lost:
+            found.append(
+                f"{name} fell below {SMALLEST:g}, the smallest number kept, in {lost} of "
+                f"{len(start)}: what it might grow to afterwards is lost; take its logarithm for "
+                "a state."
+            )
+    return tuple(found)

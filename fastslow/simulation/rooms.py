@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fastslow.compiled.parts import part
 from fastslow.simulation.collocation import memory_size
 from fastslow.simulation.implicit_steps import WAIT, Q
+from fastslow.simulation.radau import carried_size
 from fastslow.simulation.scales import FIXED
 
 #: Numbers carried from step to step: by how much the time is late, the usual length of a
@@ -81,6 +82,7 @@ def room_for(
         np.empty((6, max(1 + n_states + n_forcing, columns))),
         np.zeros(memory_size(n_states, order)),
         np.zeros((2, n_states + n_forcing + n_interfaces)),
+        np.zeros(carried_size(n_states)),
     )
 
 

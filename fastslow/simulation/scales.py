@@ -163,3 +163,11 @@ def flush(rules, inputs, n_states):
     for i in range(n_states):
         if abs(inputs[1 + i]) < SMALLEST and rules[LASTING, i] == 0.0 and rules[FIXED, i] == 0.0:
             inputs[1 + i] = 0.0
+
+
+@part
+def ratio_of(error, allowed):
+    """An error in units of what is allowed; nothing is allowed in what is and stays zero."""
+    if error == 0.0:
+        return 0.0
+    return abs(error) / allowed if allowed > 0.0 else np.inf

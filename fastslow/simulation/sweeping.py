@@ -25,7 +25,7 @@ from fastslow.arguments import (
 )
 from fastslow.errors import ArgumentError, FastSlowError, unknown_name
 from fastslow.model.model import Model
-from fastslow.results.outcome import Outcome
+from fastslow.results.outcome import Outcome, with_notes
 from fastslow.results.sweeps import Sweep, SweepPass
 from fastslow.results.trajectories import Trajectory
 from fastslow.simulation.arguments import initial_state
@@ -266,6 +266,7 @@ def _at_value(
     try:
         here = model.with_parameters({settings.parameter: value})
         first = 0.0
+        notes: tuple[str, ...] = ()
         if settings.settle:
             settled = simulate(
                 here,
@@ -278,6 +279,7 @@ def _at_value(
             if not settled.outcome:
                 return nothing, settled.outcome, None
             begin, first = settled.end[1:], settled.span[1]
+            notes = settled.outcome.notes
         run = simulate(
             here,
             begin,
@@ -286,9 +288,10 @@ def _at_value(
             period=settings.period,
             integration=settings.integration,
         )
-        if not run.outcome:
-            return nothing, run.outcome, None
-        return _points(run, settings), run.outcome, run.end[1:]
+        outcome = with_notes(run.outcome, notes)
+        if not outcome:
+            return nothing, outcome, None
+        return _points(run, settings), outcome, run.end[1:]
     except FastSlowError as error:
         return nothing, Outcome("error", str(error), False), None
 

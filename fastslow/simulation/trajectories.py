@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import finite, flag, instance, positive, takes, text
 from fastslow.compiled.generic import load_loop
 from fastslow.compiled.series import CompiledSeries, compile_series
-from fastslow.model.invariance import factor_states
+from fastslow.model.invariance import factor_states, states_together
 from fastslow.model.model import Model
 from fastslow.results.endings import outcome_of
 from fastslow.results.trajectories import Trajectory
@@ -26,7 +26,8 @@ from fastslow.simulation.arguments import (
     sample_times,
     time_span,
 )
-from fastslow.simulation.implicit_steps import DEGREE, IMPLICIT, SETTLED_ORDER
+from fastslow.simulation.implicit_steps import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
+from fastslow.simulation.radau import RADAU_ORDER
 from fastslow.simulation.remembering import with_noise
 from fastslow.simulation.rooms import MODE, SAMPLES, STEPS, beginnings, room_for
 from fastslow.simulation.scales import FORGETTING, rules_of
@@ -71,6 +72,7 @@ SOURCES = (
     "fastslow.simulation.matrices",
     "fastslow.simulation.modes",
     "fastslow.simulation.polynomials",
+    "fastslow.simulation.radau",
     "fastslow.simulation.rooms",
     "fastslow.simulation.scales",
     "fastslow.simulation.implicit_steps",
@@ -108,6 +110,7 @@ def once_a_model(
 
 gap_of = once_a_model(gap_regions)
 vanishing_of = once_a_model(factor_states)
+together_of = once_a_model(states_together)
 series_of = once_a_model(compile_series)
 period_of = once_a_model(Model.period)
 
@@ -162,7 +165,8 @@ def simulate(
         steps themselves are refined enough to plot.
     dense : bool
         Whether the series is kept, for evaluation at any time. Without it the
-        memory does not grow with the number of steps by more than 24 bytes each.
+        memory does not grow with the number of steps by more than 24 bytes each, and
+        whether noise decided when a state left zero is judged by samples and the end.
     gap : str, optional
         The region that counts as the gap for `Trajectory.regime`.
 
@@ -242,12 +246,22 @@ def simulate(
         compiled.undecided,
     )
     series = _kept(store, len(steps), kept, compiled.order + 1) if dense else None
-    vanishing = vanishing_of(model)
-    if vanishing and series is not None and len(steps):
-        ends = np.vstack([series[:, :, 0], place[1 : 1 + kept]])
+    vanishing, together = vanishing_of(model), together_of(model)
+    if vanishing or together:
+        if series is not None:
+            table, known = steps, series[:, :, 0]
+        else:
+            # what there is: the beginning, samples and the end
+            table = np.zeros((1 + reached, 4))
+            table[:, 0], table[:, 2] = [span[0], *times[:reached]], mode
+            known = np.full((1 + reached, kept), np.nan)
+            known[0, : compiled.n_states], known[1:] = begin, sampled[:, :reached].T
+        ends = np.vstack([known, place[1 : 1 + kept]])
         columns = dict(zip((*names, *model.forcing), ends.T, strict=True))
-        whole = np.vstack([steps, [end[0], 0.0, steps[-1, 2], 0.0]])
-        outcome = with_noise(outcome, model, resolved, vanishing, whole, columns, compiled.modes)
+        whole = np.vstack([table, [end[0], 0.0, mode, 0.0]])
+        outcome = with_noise(
+            outcome, model, resolved, vanishing, together, whole, columns, compiled.modes
+        )
     return Trajectory(
         names,
         tuple(model.forcing),
@@ -268,6 +282,7 @@ def simulate(
         equations=model.equations,
         settings=resolved.recorded(),
         periods=dict(model.periodic),
+        model=model,
     )
 
 
@@ -296,11 +311,15 @@ def _kept(store: NDArray[np.float64], *shape: int) -> NDArray[np.float64]:
 def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
     """How a run was stepped, in words."""
     words = [compiled.method]
-    collocated, implicit = (int(np.count_nonzero(steps[:, 3] == k)) for k in (1, IMPLICIT))
+    collocated, implicit, stiff = (
+        int(np.count_nonzero(steps[:, 3] == k)) for k in (1, IMPLICIT, RADAU)
+    )
     if collocated and not compiled.values_only:
         words.append(f"{collocated} steps by collocation where it is singular")
     if implicit:
         words.append(f"{implicit} implicit steps of order {SETTLED_ORDER} through settled phases")
+    if stiff:
+        words.append(f"{stiff} steps of Radau IIA of order {RADAU_ORDER} through stiff phases")
     return ", ".join(words)
 
 
@@ -325,7 +344,7 @@ def error_rules(model: Model, resolved: Resolved, compiled: CompiledSeries) -> N
     """In what sizes the errors of a run are measured, from its tolerances."""
     names = (*model.states, *model.slow_states)
     fixed, lasting = np.zeros(len(names)), np.zeros(len(names))
-    vanishing = vanishing_of(model)
+    vanishing = {*vanishing_of(model), *(n for some in together_of(model) for n in some)}
     for i, name in enumerate(names):
         given = resolved.atol[name]
         if given is not None:

@@ -10,11 +10,17 @@ import contextlib
 import functools
 import itertools
 import math
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
 
 import sympy as sp
+from sympy.polys.domains import QQ
+from sympy.polys.rings import PolyElement, PolyRing
 
 from fastslow.model.polynomials import PastBudgetError
 from fastslow.model.rational import quotient
+
+Entry = TypeVar("Entry", bound=Any)
 
 #: Longest sum, in terms, that is factored or cancelled.
 TERMS = 200
@@ -286,13 +292,45 @@ def determinant(matrix: sp.MatrixBase) -> sp.Expr:
     >>> determinant(sp.Matrix([[1, 2], [3, 4]]))
     -2
     """
-    if matrix.rows == 0:
-        return sp.S.One
-    total = sp.S.Zero
-    for k, entry in enumerate(matrix.row(0)):
-        if entry != 0:
-            total += (-1) ** k * entry * determinant(matrix.minor_submatrix(0, k))
-    return spread(total)
+    every = tuple(range(matrix.rows))
+    rows = [list(matrix.row(k)) for k in every]
+    return sp.sympify(_Minors(rows, sp.S.Zero, sp.S.One, spread).minor(every, every))
+
+
+class _Minors(Generic[Entry]):
+    """Determinants of rows and columns of a matrix, each formed once."""
+
+    def __init__(
+        self,
+        entries: list[list[Entry]],
+        zero: Entry,
+        one: Entry,
+        expanded: Callable[[Entry], Entry],
+    ) -> None:
+        self._entries, self._zero, self._expanded = entries, zero, expanded
+        self._known: dict[tuple[tuple[int, ...], tuple[int, ...]], Entry] = {((), ()): one}
+
+    def minor(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> Entry:
+        """By the first row; SymPy's own determinants simplify without bound."""
+        if (rows, columns) not in self._known:
+            total = self._zero
+            for k, column in enumerate(columns):
+                entry = self._entries[rows[0]][column]
+                if entry != 0:
+                    rest = self.minor(rows[1:], (*columns[:k], *columns[k + 1 :]))
+                    total = total + entry * rest if k % 2 == 0 else total - entry * rest
+            self._known[rows, columns] = self._expanded(total)
+        return self._known[rows, columns]
+
+    def characteristic(self, size: int) -> list[Entry]:
+        """1, a1, …, an of the characteristic polynomial."""
+        found = []
+        for k in range(size + 1):
+            total = self._zero
+            for rows in itertools.combinations(range(size), k):
+                total = total + self.minor(rows, rows)
+            found.append(self._expanded(-total if k % 2 else total))
+        return found
 
 
 def adjugate(matrix: sp.MatrixBase) -> sp.MatrixBase:
@@ -320,15 +358,11 @@ def characteristic_coefficients(matrix: sp.MatrixBase) -> tuple[sp.Expr, ...]:
     (1, -5, -2)
     """
     size = matrix.rows
-    return tuple(
-        spread(
-            (-1) ** k
-            * sp.Add(
-                *(
-                    determinant(matrix.extract(list(rows), list(rows)))
-                    for rows in itertools.combinations(range(size), k)
-                )
-            )
-        )
-        for k in range(size + 1)
-    )
+    symbols = sorted(matrix.free_symbols, key=str)
+    if symbols and all(e.is_polynomial(*symbols) and not e.atoms(sp.Float) for e in matrix):
+        ring = PolyRing(symbols, QQ)
+        entries = [[ring.from_expr(sp.expand(e)) for e in matrix.row(k)] for k in range(size)]
+        in_ring: _Minors[PolyElement] = _Minors(entries, ring.zero, ring.one, lambda e: e)
+        return tuple(e.as_expr() for e in in_ring.characteristic(size))
+    entries = [list(matrix.row(k)) for k in range(size)]
+    return tuple(_Minors(entries, sp.S.Zero, sp.S.One, spread).characteristic(size))

@@ -175,7 +175,8 @@ def _places(function: sp.Expr, own: Setting) -> list[_Place]:
         signs = own.signs.without(parameter)
         others = own.candidates.without(parameter)
         result = []
-        for family in families({**own.rates, parameter.name: function}, names, signs, others):
+        equations = {**own.rates, parameter.name: function}
+        for family in families(equations, names, signs, others, populations=False):
             result += _solutions(family, names, own, others)
         result = [p for p in result if not _contradicts(p, own.signs)]
         if result and not any(p.left for p in result):
@@ -254,7 +255,7 @@ def _form(
         clarke = None
     sign = own.signs.sign(test)
     inside = [tidy(e.xreplace(place)) for e in own.inside]
-    inside = [e for e in inside if e != 0]
+    inside = [e for e in inside if e != 0 and not _among(e, left)]
     admissible = conjunction((own.real(found.radicands), own.holds(inside)), own.signs)
     zeros = [*own.rates.values(), outward]
     if continuous:

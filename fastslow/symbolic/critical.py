@@ -18,7 +18,7 @@ from fastslow.symbolic.inequalities import conjunction, general, implied, nonneg
 from fastslow.symbolic.location import Located, locate, neat, parameters_where
 from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.solution_families import Family
-from fastslow.symbolic.stability import Stability
+from fastslow.symbolic.stability import HopfTest, Stability
 from fastslow.symbolic.verification import OPEN, all_vanish, checked
 
 
@@ -39,6 +39,8 @@ class Setting:
         Parameters to solve for, slow quantities first.
     geometry : tuple of Symbol
         Parameters of the interfaces, whose signs are never set aside.
+    written : tuple of sympy.Expr
+        As ``inside``, in the form in which the interfaces are written.
     """
 
     region: str
@@ -48,6 +50,7 @@ class Setting:
     signs: Signs
     candidates: Candidates
     geometry: tuple[sp.Symbol, ...]
+    written: tuple[sp.Expr, ...]
 
     def holds(self, expressions: Iterable[sp.Expr]) -> Boolean:
         """When all expressions are positive, without assumptions that only decide it."""
@@ -188,30 +191,21 @@ def cusps(family: Family, setting: Setting) -> list[CriticalPoint]:
 def hopf_points(family: Family, stability: Stability, setting: Setting) -> list[CriticalPoint]:
     """Where a pair of eigenvalues of a family is imaginary.
 
-    Up to four states the sign of the squared frequency is part of the
-    condition, so that a neutral saddle is never called Hopf.
+    The sign of the squared frequency is part of the condition, so that a neutral
+    saddle is never called Hopf.
 
     Parameters
     ----------
     family : Family
     stability : Stability
-        Of the region's Jacobian in states.
+        Along the family, in states: a pair belongs to one of its blocks.
     setting : Setting
     """
-    test = stability.hopf_test
-    if test is None:
-        return []
-    found = locate(family, test, setting.signs, setting.candidates)
-    points = [critical_point("HB", family, f, test, setting, stability) for f in found]
+    points = []
+    for one in stability.hopf_tests:
+        found = locate(family, one.test, setting.signs, setting.candidates)
+        points += [critical_point("HB", family, f, one.test, setting, one) for f in found]
     return [p for p in points if p.exists != sp.false and _defined(p)]
-
-
-def frequency_squared(stability: Stability) -> sp.Expr | None:
-    """ω² of the imaginary pair where the Hopf test vanishes, up to four states."""
-    a = stability.coefficients
-    if stability.dimension in (2, 3):
-        return a[2]
-    return a[3] / a[1] if stability.dimension == 4 else None
 
 
 def critical_point(
@@ -220,7 +214,7 @@ def critical_point(
     located: Located,
     condition: sp.Expr,
     setting: Setting,
-    stability: Stability | None = None,
+    hopf: HopfTest | None = None,
 ) -> CriticalPoint:
     """Give a located place as a point: its state, when it exists and is admissible, verified.
 
@@ -232,7 +226,7 @@ def critical_point(
     condition : sympy.Expr
         What vanishes there besides the rates.
     setting : Setting
-    stability : Stability, optional
+    hopf : HopfTest, optional
         Given for a Hopf point.
     """
     state = state_at(family, setting, located.place)
@@ -243,11 +237,9 @@ def critical_point(
     place = {**parameters, **{real(n): e for n, e in state.items()}}
     exists = setting.real(located.radicands)
     frequency = None
-    if stability is not None:
-        square = frequency_squared(stability)
-        if square is not None:
-            frequency = neat(tidy(_put(family.reduced(square), place)))
-            exists = sp.And(exists, setting.holds([frequency]))
+    if hopf is not None:
+        frequency = neat(tidy(_put(family.reduced(hopf.frequency_squared), place)))
+        exists = sp.And(exists, setting.holds([frequency]))
     inside = [tidy(_put(e, place)) for e in setting.inside]
     admissible = conjunction((exists, setting.holds(inside)), setting.signs)
     zeros = (*setting.rates.values(), condition)

@@ -17,6 +17,7 @@ from fastslow.results.named import Named
 from fastslow.symbolic.assumptions import read_signs
 from fastslow.symbolic.boundaries import BoundaryForm, boundary_forms
 from fastslow.symbolic.candidates import Candidates
+from fastslow.symbolic.conserved import ConservedQuantity, conserved_quantities
 from fastslow.symbolic.critical import Setting
 from fastslow.symbolic.equilibrium_sets import (
     EDGE,
@@ -50,6 +51,8 @@ class Derivation:
         Sets of equilibria within discontinuities, such as a sticking band.
     free_directions : tuple of FreeDirection
         Shifts of the states that leave every rate as it is, with the reduction without them.
+    conserved_quantities : tuple of ConservedQuantity
+        Linear combinations of the states that never change, with the reduction by them.
     """
 
     states: tuple[str, ...]
@@ -59,6 +62,7 @@ class Derivation:
     boundary_equilibria: tuple[BoundaryForm, ...]
     equilibrium_sets: tuple[EquilibriumSetForm, ...] = ()
     free_directions: tuple[FreeDirection, ...] = ()
+    conserved_quantities: tuple[ConservedQuantity, ...] = ()
 
     def __getitem__(self, region: object) -> RegionForms:
         return self.regions[region]
@@ -187,6 +191,7 @@ def derive(model: Model, assume: Any = None, *, parameter: Any = None) -> Deriva
         found,
         sets,
         free_directions(model),
+        conserved_quantities(model),
     )
 
 
@@ -236,20 +241,22 @@ def _settings(
     moving = {real(n) for n in (*model.states, *model.free)}
     used = set().union(set(), *(h.free_symbols for h in functions.values()))
     geometry = tuple(sorted(used - moving, key=lambda s: s.name))
-    return {
-        name: Setting(
+    settings = {}
+    for name, region in model.regions.items():
+        written = [region.signs[i] * functions[i] for i in functions]
+        forms = dict(zip(map(sp.expand, written), written, strict=True))
+        inside = tuple(needed(tuple(forms), signs))
+        settings[name] = Setting(
             name,
             model.states,
             Named("state", {s: _exact(region.rates[s]) for s in model.states}),
-            tuple(
-                needed(tuple(sp.expand(region.signs[i] * functions[i]) for i in functions), signs)
-            ),
+            inside,
             signs,
             candidates,
             geometry,
+            tuple(forms[e] for e in inside),
         )
-        for name, region in model.regions.items()
-    }
+    return settings
 
 
 def _pairs(model: Model, interface: str) -> list[tuple[str, str]]:

@@ -12,6 +12,7 @@ import sympy as sp
 from sympy.logic.boolalg import Boolean
 
 from fastslow.symbolic.algebra import light, longer, spread, tidy, undefined
+from fastslow.symbolic.conditions import simplified
 from fastslow.symbolic.signs import Signs, parts
 
 #: A radical with more terms under it is left as it is.
@@ -248,7 +249,7 @@ def conjunction(conditions: Iterable[Boolean], signs: Signs) -> Boolean:
     for j, one in enumerate(each):
         if not any(k != j and _tighter(other, one, signs) for k, other in enumerate(each)):
             kept.append(one)
-    return sp.And(*kept)
+    return simplified(sp.And(*kept))
 
 
 def _tighter(one: Boolean, other: Boolean, signs: Signs) -> bool:

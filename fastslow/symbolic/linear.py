@@ -16,6 +16,9 @@ SPARSE = 8
 #: A determinant that may have more terms than this is not formed.
 DENSE = 400
 
+#: Entries in a row, on average, up to which a system is sparse.
+ENTRIES = 3
+
 NOTE = "linear system with a determinant past the budget, solved numerically"
 
 
@@ -54,7 +57,9 @@ def cramer(
     if terms <= SPARSE:
         return None
     if terms > DENSE:
-        return NOTE
+        # with few entries in each row elimination finds its way
+        entries = sum(1 for e in matrix if e != 0)
+        return None if entries <= ENTRIES * matrix.rows else NOTE
     below = determinant(matrix)
     if below == 0:
         return None

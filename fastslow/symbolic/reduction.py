@@ -11,11 +11,17 @@ from fastslow.arguments import mapping, takes
 from fastslow.errors import ArgumentError
 from fastslow.model.structure import read_expression, real
 from fastslow.results.named import Named
+from fastslow.symbolic.algebra import tidy
 from fastslow.symbolic.reading import read_formula
 
 
-@takes(rates=mapping, combinations=mapping)
-def reduce_states(rates: Mapping[Any, Any], combinations: Mapping[Any, Any]) -> Named[sp.Expr]:
+@takes(rates=mapping, combinations=mapping, conserved=mapping)
+def reduce_states(
+    rates: Mapping[Any, Any],
+    combinations: Mapping[Any, Any],
+    *,
+    conserved: Mapping[Any, Any] | None = None,
+) -> Named[sp.Expr]:
     """Rates of linear combinations of states, where these need no other state.
 
     Parameters
@@ -24,6 +30,9 @@ def reduce_states(rates: Mapping[Any, Any], combinations: Mapping[Any, Any]) -> 
         State to its rate.
     combinations : mapping
         New state to a linear combination of the old ones.
+    conserved : mapping, optional
+        New parameter to a linear combination of the old states whose rate is zero; the
+        parameter is its value.
 
     Returns
     -------
@@ -33,41 +42,57 @@ def reduce_states(rates: Mapping[Any, Any], combinations: Mapping[Any, Any]) -> 
     Raises
     ------
     ArgumentError
-        If a combination is not linear, they are dependent, or their rates need another state.
+        If a combination is not linear, they are dependent, or their rates need another state,
+        and if what is given as conserved is not.
 
     Examples
     --------
     >>> a, b, u, k = sp.symbols("a b u k")
     >>> reduce_states({a: -k * (a - b), b: k * (a - b)}, {u: a - b})
     {u: -2*k*u}
+    >>> reduce_states({a: -k * a, b: k * a}, {b: b}, conserved={"N": a + b})
+    {b: N*k - b*k}
     """
     known = {str(s): real(str(s)) for s in rates}
     inside = {str(s): _real(e) for s, e in rates.items()}
     new = {real(str(s)): _real(e) for s, e in combinations.items()}
+    totals = {real(str(s)): _real(e) for s, e in (conserved or {}).items()}
     states = list(known.values())
-    matrix = sp.Matrix([[e.diff(s) for s in states] for e in new.values()])
+    for symbol in totals:
+        if symbol in new or symbol in states:
+            raise ArgumentError(f"{symbol} is a state; expected a new name for what is conserved")
+    every = {**new, **totals}
+    matrix = sp.Matrix([[e.diff(s) for s in states] for e in every.values()])
     if matrix.free_symbols & set(states):
         raise ArgumentError("expected combinations that are linear in the states")
+    for symbol, expression in totals.items():
+        rate = tidy(sum((expression.diff(s) * inside[s.name] for s in states), sp.S.Zero))
+        if rate != 0:
+            raise ArgumentError(f"{symbol} = {expression} is not conserved; its rate is {rate}")
     _, pivots = matrix.rref()
-    if len(pivots) < len(new):
+    if len(pivots) < len(every):
         raise ArgumentError("the combinations depend on one another")
     kept = [states[k] for k in pivots]
-    rest = [e.subs(dict.fromkeys(kept, 0), simultaneous=True) for e in new.values()]
-    block = matrix.extract(list(range(len(new))), list(pivots))
-    solution = block.inv() * sp.Matrix([n - r for n, r in zip(new, rest, strict=True)])
+    rest = [e.subs(dict.fromkeys(kept, 0), simultaneous=True) for e in every.values()]
+    block = matrix.extract(list(range(len(every))), list(pivots))
+    # a new state may have the name of an old one
+    aside = {s: sp.Dummy(s.name, real=True) for s in every}
+    values = [aside[s] - r for s, r in zip(every, rest, strict=True)]
+    solution = block.inv() * sp.Matrix(values)
     place = {s: sp.expand(e) for s, e in zip(kept, solution, strict=True)}
+    back = {d: s for s, d in aside.items()}
     reduced = {}
     for symbol, expression in new.items():
         rate = sum((expression.diff(s) * inside[s.name] for s in states), sp.S.Zero)
         rate = _arguments_expanded(rate.subs(place, simultaneous=True))
         rate = sp.expand(rate)
-        others = sorted((rate.free_symbols & set(states)) - set(new), key=lambda s: s.name)
+        others = sorted(rate.free_symbols & set(states), key=lambda s: s.name)
         if others:
             raise ArgumentError(
                 f"the rate of {symbol} = {expression} needs {', '.join(map(str, others))} as well; "
                 "add a combination that gives it"
             )
-        reduced[symbol.name] = rate
+        reduced[symbol.name] = rate.xreplace(back)
     return Named("state", reduced)
 
 

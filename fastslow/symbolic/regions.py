@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -10,7 +11,7 @@ from sympy.logic.boolalg import Boolean
 from fastslow.model.structure import real
 from fastslow.results.named import Named
 from fastslow.results.point_types import point_name
-from fastslow.symbolic.algebra import tidy
+from fastslow.symbolic.algebra import irrational, longer, spread, tidy
 from fastslow.symbolic.boundaries import BoundaryForm
 from fastslow.symbolic.candidates import settled
 from fastslow.symbolic.critical import (
@@ -37,12 +38,19 @@ from fastslow.symbolic.solution_families import Family, families
 from fastslow.symbolic.stability import (
     EIGENVALUE,
     Stability,
+    expressions_of_matrix,
     jacobian,
     stability_of_matrix,
     stability_of_tests,
 )
 from fastslow.symbolic.univariate import Root, roots
 from fastslow.symbolic.verification import OPEN, checked, weakest
+
+#: Routh-Hurwitz expressions of more parts, with an explicit state put in, are formed again.
+LONG = 600
+
+#: In more symbols it takes longer to form them from quotients.
+FEW = 3
 
 
 @dataclass(frozen=True)
@@ -140,16 +148,17 @@ def derive_region(setting: Setting, boundary: tuple[BoundaryForm, ...]) -> Regio
     points: list[CriticalPoint] = []
     reasons: list[str] = []
     for family in isolated_ones:
-        inner = _stability_along(family, whole, setting)
+        along = _blocks_along(family, whole, matrix)
+        inner = _stability_along(family, along, setting)
         forms += _equilibria(family, inner, setting)
         # the other root of the same equation is no other family
         others = [f for f in isolated_ones if f.elimination is not family.elimination]
-        points += folds(family, others, whole, setting) + cusps(family, setting)
+        points += folds(family, others, along, setting) + cusps(family, setting)
         reason = _no_hopf(inner)
         if reason:
             reasons.append(reason)
         else:
-            points += hopf_points(family, whole, setting)
+            points += hopf_points(family, along, setting)
     points = list(dict.fromkeys(points))
     no_hopf = reasons[0] if reasons and len(reasons) == len(isolated_ones) else ""
     if not isolated_ones:
@@ -188,11 +197,44 @@ def _notes(found: list[Family], points: list[CriticalPoint], whole: Stability) -
 def region_conditions(setting: Setting) -> tuple[Boolean, ...]:
     """Give the region's inequalities without those that follow from the others."""
     order = [*map(real, setting.states), *setting.candidates]
-    return tuple(isolated(e, setting.signs, order) for e in setting.inside)
+    found = []
+    for expression, written in zip(setting.inside, setting.written, strict=True):
+        condition = isolated(expression, setting.signs, order)
+        # what is not solved for a symbol keeps the form in which it is written
+        as_it_is = condition.is_Relational and condition.rhs == 0
+        shorter = written.count_ops() < expression.count_ops()
+        found.append(above_zero(written) if as_it_is and shorter else condition)
+    return tuple(found)
 
 
 def _continuous(family: Family) -> bool:
     return len(family.elimination.unknowns) > len(family.equations)
+
+
+def _blocks_along(family: Family, whole: Stability, matrix: sp.ImmutableDenseMatrix) -> Stability:
+    """Give the stability of a family in states, by the blocks of the Jacobian there.
+
+    Entries that vanish all along the family may make it reducible.
+    """
+    if len(family.elimination.unknowns) == matrix.rows or matrix.rows == 1:
+        return whole
+    if not family.elimination.unknowns and _past(family, whole):
+        # shorter where the state is put in before the determinants are formed
+        there = matrix.applyfunc(family.reduced)
+    else:
+        there = matrix.applyfunc(lambda e: sp.S.Zero if e == 0 or family.reduced(e) == 0 else e)
+    if there == matrix:
+        return whole
+    blocks, tests = expressions_of_matrix(there)
+    return Stability(blocks, tests, (None,) * len(tests))
+
+
+def _past(family: Family, whole: Stability) -> bool:
+    """Whether a test is too long to be cancelled at an equilibrium in few parameters."""
+    place = {real(n): e for n, e in family.elimination.solved.items()}
+    tests = [e.xreplace(place) for e in whole.routh_hurwitz]
+    used = set().union(*(e.free_symbols for e in tests))
+    return len(used) <= FEW and any(longer(e, LONG) for e in tests)
 
 
 def _stability_along(family: Family, whole: Stability, setting: Setting) -> Stability:
@@ -214,8 +256,8 @@ def _stability_along(family: Family, whole: Stability, setting: Setting) -> Stab
         return positive(expression, setting.signs, setting.candidates)
 
     tests = tuple(family.reduced(e) for e in whole.routh_hurwitz)
-    coefficients = tuple(family.reduced(a) for a in whole.coefficients)
-    return stability_of_tests(coefficients, tests, sign, condition)
+    blocks = tuple(tuple(map(family.reduced, b)) for b in whole.blocks)
+    return stability_of_tests(blocks, tests, sign, condition)
 
 
 def _open(inside: list[sp.Expr], signs: Signs) -> list[sp.Expr]:
@@ -224,17 +266,21 @@ def _open(inside: list[sp.Expr], signs: Signs) -> list[sp.Expr]:
 
 def _no_hopf(stability: Stability) -> str:
     """Why no pair of eigenvalues of a family can be imaginary inside the region."""
-    test = stability.hopf_test
-    if test is None:
+    if stability.dimension == 1:
         return "one state has one real eigenvalue"
-    sign = stability.signs[stability.routh_hurwitz.index(test)]
-    if sign in (1, -1):
-        if stability.dimension == 2:
-            return f"the trace is {stability.trace}, never zero in the region"
-        return f"the Hurwitz determinant {test} is never zero in the region"
-    if stability.signs[stability.dimension - 1] == -1 and stability.dimension == 2:
-        return f"the determinant {stability.determinant} is negative in the region"
-    return ""
+    reasons = []
+    for one in stability.hopf_tests:
+        coefficients = stability.routh_hurwitz[one.position :]
+        side = stability.signs[one.position]
+        if side in (1, -1) and one.size == 2:
+            reasons.append(f"the trace is {spread(-one.test)}, never zero in the region")
+        elif side in (1, -1):
+            reasons.append(f"the Hurwitz determinant {one.test} is never zero in the region")
+        elif one.size == 2 and stability.signs[one.position + 1] == -1:
+            reasons.append(f"the determinant {coefficients[1]} is negative in the region")
+        else:
+            return ""
+    return "; ".join(reasons) or "every eigenvalue is real"
 
 
 def _equilibria(family: Family, inner: Stability, setting: Setting) -> list[EquilibriumForm]:
@@ -272,7 +318,7 @@ def _form(family: Family, root: Root | None, inner: Stability, setting: Setting)
         inside = [family.reduced(e) for e in setting.inside]
         order = [*family.elimination.unknowns, *setting.candidates]
         exists = sp.And(*(nonnegative(e, signs, order) for e in family.radicands))
-        admissible = sp.And(exists, *(isolated(e, signs, order) for e in inside))
+        admissible = conjunction((exists, *(_inside(e, signs, order) for e in inside)), signs)
         curve_at = {s: e for s, e in curve.items() if e is not None}
         equations = () if curve_at else family.equations
         unknowns = family.elimination.unknowns
@@ -299,6 +345,11 @@ def _form(family: Family, root: Root | None, inner: Stability, setting: Setting)
     )
 
 
+def _inside(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean:
+    """When an expression along a curve is positive, by its factors where it has no radicals."""
+    return (isolated if irrational(expression) else positive)(expression, signs, order)
+
+
 def _at(
     inner: Stability, place: dict[sp.Symbol, sp.Expr], setting: Setting, inside: list[sp.Expr]
 ) -> Stability:
@@ -307,7 +358,7 @@ def _at(
     tests = tuple(tidy(e.subs(place)) for e in inner.routh_hurwitz)
     settled = {e: s for e, s in zip(tests, inner.signs, strict=True) if s is not None}
     return stability_of_tests(
-        tuple(tidy(a.subs(place)) for a in inner.coefficients),
+        tuple(tuple(tidy(a.subs(place)) for a in b) for b in inner.blocks),
         tests,
         lambda e: settled[e] if e in settled else known.sign(e),
         lambda e: positive(e, setting.signs, setting.candidates),

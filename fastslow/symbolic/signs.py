@@ -241,11 +241,20 @@ def term_bound(expression: sp.Expr, known: Mapping[sp.Symbol, int]) -> int | Non
     elif expression.is_Pow:
         found = _power_bound(expression.base, expression.exp, known)
     elif isinstance(expression, sp.exp):
-        found = 2 if expression.args[0].is_real else None
+        found = 2 if _real(expression.args[0]) else None
     else:
         place = {s: k * sp.Symbol(s.name, positive=True) for s, k in known.items()}
         found = _assumed(expression.xreplace(place))
     return _assumed(expression) if found is None and expression.is_number else found
+
+
+def _real(expression: sp.Expr) -> bool:
+    """Whether an expression is real wherever it is defined."""
+    if expression.is_real:
+        return True
+    symbols = expression.free_symbols
+    rational = expression.is_rational_function(*symbols) and not expression.has(sp.I)
+    return bool(rational and all(s.is_real for s in symbols))
 
 
 def _sum_bound(terms: Iterable[sp.Expr], known: Mapping[sp.Symbol, int]) -> int | None:

@@ -12,6 +12,7 @@ import sympy as sp
 from fastslow.model.structure import real
 from fastslow.results.named import Named
 from fastslow.symbolic.algebra import (
+    factors,
     generators,
     growth,
     irrational,
@@ -24,8 +25,10 @@ from fastslow.symbolic.algebra import (
     undefined,
 )
 from fastslow.symbolic.candidates import Candidates, chosen
+from fastslow.symbolic.decimals import without_scale
 from fastslow.symbolic.elimination import Elimination, Nonzero, eliminate
 from fastslow.symbolic.linear import cramer
+from fastslow.symbolic.lowering import lower_degrees
 from fastslow.symbolic.naming import WIDTH
 from fastslow.symbolic.signs import Signs
 from fastslow.symbolic.univariate import DEGREE, Root, factors_in, roots
@@ -52,7 +55,7 @@ OPEN = "not solved in closed form:"
 PAST = f"{OPEN} rates past the budget of expansion"
 
 #: More branches of one set of equations than this are not split any further.
-BRANCHES = 24
+BRANCHES = 32
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,7 @@ class Family:
         solved = {real(n): e for n, e in self.elimination.solved.items()}
         inside = expression.xreplace(solved)
         if self.parameter is not None and self.curve is not None:
-            inside = inside.subs(self.parameter, self.curve)
+            inside = inside.xreplace({self.parameter: self.curve})
         return tidy(inside)
 
 
@@ -115,6 +118,8 @@ def families(
     states: Sequence[str],
     signs: Signs,
     candidates: Iterable[sp.Symbol],
+    *,
+    populations: bool = True,
 ) -> list[Family]:
     """All families of solutions of rate = 0.
 
@@ -127,6 +132,9 @@ def families(
         Used to tell which coefficients may be divided by.
     candidates : Candidates or iterable of Symbol
         Parameters that a family may be solved for, best first.
+    populations : bool
+        Whether rates x g(x, …) are taken apart first. With further equations, one of which
+        may imply g = 0, that would list places of a continuum.
 
     Returns
     -------
@@ -142,6 +150,9 @@ def families(
     unknowns = tuple(real(n) for n in states)
     if any(_past(rates[n]) for n in states):
         return _by_factors(rates, states, signs, candidates)
+    growths = _growth_rates(rates, states) if populations else None
+    if growths is not None:
+        return _of_populations(growths, states, signs, candidates)
     direct = cramer(rates, states)
     if isinstance(direct, tuple):
         values, below = direct
@@ -157,6 +168,58 @@ def families(
         if not poles or _keeps(elimination, poles)
         for family in _solved(elimination, signs, candidates)
     ]
+
+
+def _growth_rates(
+    rates: Mapping[str, sp.Expr], states: Sequence[str]
+) -> dict[str, list[sp.Expr]] | None:
+    """Each rate as it is, or as its own state and what this is multiplied by.
+
+    None where no rate is such a product, and past the budget of branches.
+    """
+    unknowns = tuple(real(n) for n in states)
+    choices = {}
+    for name in states:
+        found = _factors_as_written(rates[name], unknowns)
+        own = real(name)
+        rest = [f for f in found if f != own]
+        kolmogorov = own in found and len(rest) == 1 and rest[0] not in unknowns
+        choices[name] = [own, rest[0]] if kolmogorov else [rates[name]]
+    count = math.prod(map(len, choices.values()))
+    return choices if 1 < count <= BRANCHES else None
+
+
+def _of_populations(
+    growths: Mapping[str, list[sp.Expr]],
+    states: Sequence[str],
+    signs: Signs,
+    candidates: Candidates,
+) -> list[Family]:
+    """Families of rates x g(x, …): one for each choice of states that are absent."""
+    found: list[Family] = []
+    for picked in itertools.product(*growths.values()):
+        absent = {real(n): sp.S.Zero for n, e in zip(states, picked, strict=True) if e == real(n)}
+        left = {
+            n: sp.sympify(e.xreplace(absent))
+            for n, e in zip(states, picked, strict=True)
+            if real(n) not in absent
+        }
+        open_ones = {real(n) for n in left}
+        empty = [e for n, e in left.items() if len(growths[n]) > 1]
+        if any(undefined(e) for e in left.values()) or not all(
+            e.free_symbols & open_ones for e in empty
+        ):
+            continue
+        known = {s.name: e for s, e in absent.items()}
+        if not left:
+            nothing = Elimination((), (), Named("solved state", known))
+            found.append(Family(_ordered(nothing, states)))
+            continue
+        for family in families(left, list(left), signs, candidates):
+            solved = Named("solved state", {**known, **dict(family.elimination.solved)})
+            whole = replace(family.elimination, solved=solved)
+            found.append(replace(family, elimination=_ordered(whole, states)))
+    return found
 
 
 def _past(rate: sp.Expr) -> bool:
@@ -241,7 +304,8 @@ def split(rates: Mapping[str, sp.Expr], states: Sequence[str], signs: Signs) -> 
         if pieces is None or len(done) + len(waiting) > BRANCHES:
             done.append(current)
             continue
-        waiting = [_again(current, equations, signs) for equations in pieces] + waiting
+        again = [_again(current, equations, signs) for equations in pieces]
+        waiting = [e for e in again if not any(r.is_nonzero for r in e.remaining)] + waiting
     return [_ordered(e, states) for e in _generic(done, signs)]
 
 
@@ -261,7 +325,10 @@ def _pieces(current: Elimination) -> list[tuple[sp.Expr, ...]] | None:
         multiple = tidy(numerator(equation) / found[0])
         if multiple.free_symbols & set(current.unknowns):
             return [(*rest[0], found[0], *rest[1])]
-    return None
+    if min(len(current.remaining), len(current.unknowns)) < 2:
+        return None
+    lowered = lower_degrees(current.remaining, current.unknowns, rounds=1)
+    return None if lowered == [current.remaining] else lowered
 
 
 def _again(current: Elimination, equations: tuple[sp.Expr, ...], signs: Signs) -> Elimination:
@@ -325,7 +392,7 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
     bound = [e for e in elimination.remaining if e.free_symbols & set(unknowns)]
     slim = Elimination(tuple(bound), unknowns, elimination.solved, elimination.divisors)
     note = ""
-    divided = [d for d in elimination.divisors if not signs.nonzero(d)]
+    divided = list(dict.fromkeys(f for d in elimination.divisors for f in _open(d, signs)))
     if divided:
         note = "found where " + ", ".join(f"{_short(d)} ≠ 0" for d in divided)
     if not slim.is_univariate:
@@ -385,12 +452,22 @@ def _linear(
     whole = Elimination(
         (), (), Named("solved state", {**solved, unknown.name: value}), slim.divisors
     )
-    if not signs.nonzero(slope):
-        note = _and(note, f"found where {_short(slope)} ≠ 0")
+    for factor in _open(slope, signs):
+        note = _and(note, f"found where {_short(factor)} ≠ 0")
     return Family(whole, condition=tuple(free), note=note)
 
 
+def _open(divisor: sp.Expr, signs: Signs) -> list[sp.Expr]:
+    """Factors of a divisor that may vanish, without their numbers."""
+    if signs.nonzero(divisor):
+        return []
+    if longer(divisor, PARTS):
+        return [divisor]
+    return [f for f, power in factors(divisor)[1] if power > 0 and not signs.nonzero(f)]
+
+
 def _short(expression: sp.Expr) -> str:
+    expression = without_scale(expression)
     long = longer(expression, PARTS) or len(str(expression)) > WIDTH // 2
     return "(a long expression)" if long else str(expression)
 

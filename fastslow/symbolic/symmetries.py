@@ -19,7 +19,7 @@ from fastslow.symbolic.reduction import reduce_states
 #: States up to which free directions are looked for.
 STATES = 24
 
-#: States at which the derivatives are evaluated.
+#: States, at least, at which rows are evaluated; with all rows twice as many as columns.
 POINTS = 3
 
 #: Singular values below this, relative to the largest, count as zero.
@@ -141,42 +141,72 @@ def _shifts(
     functions: Sequence[sp.Expr], states: Sequence[sp.Symbol], values: Mapping[sp.Symbol, float]
 ) -> list[list[sp.Expr]]:
     """Constant vectors that every function is constant along."""
-    slopes = list(dict.fromkeys(tuple(f.diff(s) for s in states) for f in functions))
-    slopes = [row for row in slopes if any(e != 0 for e in row)]
-    if not slopes:
+    slopes = [[f.diff(s) for s in states] for f in functions]
+    return constant_null_space(slopes, states, values)
+
+
+def constant_null_space(
+    rows: Sequence[Sequence[sp.Expr]],
+    states: Sequence[sp.Symbol],
+    values: Mapping[sp.Symbol, float],
+) -> list[list[sp.Expr]]:
+    """Vectors without states in them that are orthogonal to every row at every state.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of sympy.Expr
+        Each with as many entries as there are states.
+    states : sequence of Symbol
+    values : mapping
+        Parameter to its value, for a first look with numbers.
+
+    Examples
+    --------
+    >>> x, y, k = map(real, "xyk")
+    >>> constant_null_space([[k * x * y, -x * y]], [x, y], {k: 2})
+    [[1, k]]
+    """
+    distinct = list(dict.fromkeys(map(tuple, rows)))
+    distinct = [row for row in distinct if any(e != 0 for e in row)]
+    if not distinct:
         return []
-    numbers = _numbers(slopes, states, values)
+    numbers = _numbers(distinct, states, values)
     _, sizes, right = np.linalg.svd(numbers)
     rank = int(np.sum(sizes > NULL * sizes[0]))
     null = right[rank:]
     if not len(null):
         return []
-    # only the states that move are looked at symbolically
+    # only the columns that take part are looked at symbolically
     moving = [k for k in range(len(states)) if np.abs(null[:, k]).max() > 1e-9]
-    rows = [[sp.nsimplify(row[k], rational=True) for k in moving] for row in _few(slopes, moving)]
-    matrix = sp.Matrix([part for row in rows for part in _by_monomials(row, states)])
+    few = [[sp.nsimplify(row[k], rational=True) for k in moving] for row in _few(distinct, moving)]
+    matrix = sp.Matrix([part for row in few for part in _by_kernels(row, states)])
     found = []
     for vector in matrix.nullspace(simplify=tidy):
         scale = next(e for e in vector if e != 0)
-        shift = [sp.S.Zero] * len(states)
+        constant = [sp.S.Zero] * len(states)
         for k, entry in zip(moving, vector, strict=True):
-            shift[k] = tidy(entry / scale)
-        along = [tidy(sum(e * c for e, c in zip(row, shift, strict=True))) for row in slopes]
-        if not any(e.free_symbols & set(states) for e in shift) and not any(along):
-            found.append(shift)
+            constant[k] = tidy(entry / scale)
+        along = [tidy(sum(e * c for e, c in zip(r, constant, strict=True))) for r in distinct]
+        if not any(e.free_symbols & set(states) for e in constant) and not any(along):
+            found.append(constant)
     return found
 
 
-def _by_monomials(row: Sequence[sp.Expr], states: Sequence[sp.Symbol]) -> list[list[sp.Expr]]:
-    """A row of polynomials in the states as one of coefficients for each monomial.
+def _by_kernels(row: Sequence[sp.Expr], states: Sequence[sp.Symbol]) -> list[list[sp.Expr]]:
+    """A row as one of coefficients for each function of the states in it.
 
     What is constant in the states vanishes with the row where it does with all of them.
     """
-    if not all(e.is_polynomial(*states) for e in row):
-        return [list(row)]
-    polys = [sp.Poly(e, *states) for e in row]
-    monomials = sorted({m for p in polys for m in p.monoms()})
-    return [[p.coeff_monomial(m) for p in polys] for m in monomials]
+    found: dict[sp.Expr, list[sp.Expr]] = {}
+    for k, entry in enumerate(row):
+        for term in sp.Add.make_args(sp.expand(entry, power_exp=False, log=False)):
+            inside = set(states) & term.free_symbols
+            coefficient, kernel = term.as_independent(*inside, as_Add=False)
+            if not inside:
+                coefficient, kernel = term, sp.S.One
+            line = found.setdefault(kernel, [sp.S.Zero] * len(row))
+            line[k] += coefficient
+    return list(found.values())
 
 
 def _few(slopes: Sequence[Sequence[sp.Expr]], columns: Sequence[int]) -> list[Sequence[sp.Expr]]:
@@ -194,7 +224,7 @@ def _numbers(
     symbols = sorted(set().union(*(e.free_symbols for r in slopes for e in r)), key=str)
     function = sp.lambdify(symbols, [list(r) for r in slopes], "numpy")
     rows = []
-    for k in range(POINTS):
+    for k in range(max(POINTS, -(-2 * len(states) // len(slopes)))):
         # quotients of primes, in the states' and free parameters' own order
         place = [
             values.get(s, float(sp.prime(3 * k + 2 * j + 5)) / float(sp.prime(j + 4)))

@@ -9,6 +9,7 @@ import sympy as sp
 
 from fastslow.model.structure import real
 from fastslow.results.point_types import point_name
+from fastslow.symbolic.decimals import readable
 from fastslow.symbolic.equilibrium_sets import EDGE
 from fastslow.symbolic.forms import Continuum, CriticalPoint, EquilibriumForm
 from fastslow.symbolic.naming import WIDTH, named, text
@@ -54,6 +55,9 @@ def _blocks(law: Derivation) -> list[Block]:
         moved = [rf"{_tex(real(n))} + c \, {_tex(e)}" for n, e in free.shift.items()]
         kept = [rf"{_tex(real(n))} = {_tex(e)}" for n, e in free.combinations.items()]
         blocks.append(("Free direction", [r",\quad ".join(moved), r",\quad ".join(kept)]))
+    if law.conserved_quantities:
+        each = [rf"{_tex(real(q.total))} = {_tex(q.expression)}" for q in law.conserved_quantities]
+        blocks.append(("Conserved", [r",\quad ".join(each)]))
     for region in law.regions.values():
         blocks.append((f"Region {region.name}", _region(region, taken)))
     for one in law.equilibrium_sets:
@@ -120,7 +124,8 @@ def _set(
 ) -> list[str]:
     """One line, or several where it is long, with names for what it repeats."""
     plain = admissible not in (sp.true, sp.false)
-    formulas = [e for _, e, _ in items] + ([admissible] if plain else [])
+    admissible = readable(admissible)
+    formulas = [readable(e) for _, e, _ in items] + ([admissible] if plain else [])
     size = sum(len(text(e)) for e in formulas)
     defined: list[tuple[sp.Symbol, sp.Basic]] = []
     if size > WIDTH:
@@ -205,6 +210,8 @@ def _comma(conditions: Iterable[sp.Basic]) -> str:
 
 
 def _tex(expression: sp.Basic) -> str:
-    if not isinstance(expression, sp.MatrixBase) and folds(expression):
+    matrix = isinstance(expression, sp.MatrixBase)
+    expression = expression.applyfunc(readable) if matrix else readable(expression)
+    if not matrix and folds(expression):
         return r"\langle\text{a long expression}\rangle"
     return str(sp.latex(expression))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import sympy as sp
@@ -11,6 +11,7 @@ import sympy as sp
 from fastslow.model.structure import real
 from fastslow.results.point_types import point_name
 from fastslow.symbolic.algebra import longer
+from fastslow.symbolic.decimals import SHOWN, readable, rounds, without_scale
 from fastslow.symbolic.equilibrium_sets import EDGE
 from fastslow.symbolic.naming import WIDTH, named, text
 
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 
 #: Longer expressions, in parts of their tree, are not printed; the objects hold them whole.
 PARTS = 600
+
+#: What is said where numbers are rounded.
+ROUNDED = f"Long numbers are printed to {SHOWN} digits; the objects have them exactly."
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,9 @@ def summary(law: Derivation) -> str:
     lines = _wrapped(
         f"Derivation of {', '.join(law.states)}{frozen}; assumed:", assumed.split(", "), "  "
     )
-    for free in law.free_directions:
+    if any(map(rounds, _formulas(law))):
+        lines += _sentence("", ROUNDED, "  ")
+    for free in (*law.free_directions, *law.conserved_quantities[:1]):
         lines += _sentence("", str(free), "  ")
     for region in law.regions.values():
         lines += _region(region, taken)
@@ -72,6 +78,21 @@ def summary(law: Derivation) -> str:
     for form in law.boundary_equilibria:
         lines += entry(_boundary(form), taken, "  ")
     return "\n".join(lines)
+
+
+def _formulas(law: Derivation) -> Iterator[sp.Basic]:
+    """What the entries of a derivation print."""
+    for region in law.regions.values():
+        yield from region.conditions
+        points = (*region.folds, *region.branch_points, *region.cusps, *region.hopf)
+        for form in region.equilibria:
+            yield from (*form.state.values(), *form.equations, form.admissible)
+            yield from (*form.parameter.values(), *form.conditions)
+        for point in points:
+            yield from (*point.state.values(), *point.equations, point.admissible)
+            yield from point.parameters.values()
+    for place in law.boundary_equilibria:
+        yield from (*place.state.values(), *place.parameters.values(), *place.equations)
 
 
 def names_of(law: Derivation) -> set[str]:
@@ -97,6 +118,7 @@ def entry(pieces: Sequence[Piece], taken: set[str], indent: str) -> list[str]:
     >>> entry([Piece("fold: x = ", a + 1), Piece("y = ", a - 1)], {"a"}, "  ")
     ['  fold: x = a + 1, y = a - 1']
     """
+    pieces = [_readable(p) for p in pieces]
     formulas = [p.formula for p in pieces]
     whole = _joined(pieces, [p.shown(f) for p, f in zip(pieces, formulas, strict=True)])
     folded = any(f is not None and folds(f) for f in formulas)
@@ -119,6 +141,13 @@ def entry(pieces: Sequence[Piece], taken: set[str], indent: str) -> list[str]:
         parts = [first, *meaning[1:]]
         lines += _lines(parts, [p.shown(p.formula) for p in parts], indent + "    ")
     return lines
+
+
+def _readable(piece: Piece) -> Piece:
+    if piece.formula is None:
+        return piece
+    zero = piece.after == " = 0" and isinstance(piece.formula, sp.Expr)
+    return replace(piece, formula=(without_scale if zero else readable)(piece.formula))
 
 
 def folds(formula: sp.Basic) -> bool:
@@ -152,7 +181,7 @@ def _wrapped(head: str, words: Sequence[str], indent: str) -> list[str]:
 
 
 def _region(region: RegionForms, taken: set[str]) -> list[str]:
-    where = [Piece("", c).shown(c) for c in region.conditions] or ["everywhere"]
+    where = [Piece("", c).shown(readable(c)) for c in region.conditions] or ["everywhere"]
     lines = _wrapped(f"  {region.name}:", where, "  ")
     for form in region.equilibria:
         lines += entry(_equilibrium(form), taken, "    ")
@@ -177,7 +206,7 @@ def _values(head: str, values: Sequence[tuple[str, sp.Expr]]) -> list[Piece]:
     """Each value after its name, the first after the head."""
     pieces = [Piece(f"{n} = ", e) for n, e in values if e != real(n)]
     if not pieces:
-        return [Piece(head)]
+        return [Piece(head.rstrip(": "))]
     return [Piece(head + pieces[0].before, pieces[0].formula), *pieces[1:]]
 
 
@@ -193,9 +222,19 @@ def _equilibrium(form: EquilibriumForm) -> list[Piece]:
     pieces += _zeros(form.conditions)
     verdict = form.stability.verdict
     if verdict == "depends":
-        first, *rest = form.stability.conditions
-        pieces.append(Piece("depends on ", first, separator="; "))
-        pieces += [Piece("", condition) for condition in rest]
+        short = [c for c in map(readable, form.stability.conditions) if not folds(c)]
+        long = len(form.stability.conditions) - len(short)
+        pieces += [
+            Piece("" if k else "depends on ", c, separator=", " if k else "; ")
+            for k, c in enumerate(short)
+        ]
+        if long:
+            one = "1 long condition" if long == 1 else f"{long} long conditions"
+            pieces.append(
+                Piece(f"and on {one}", separator=" ")
+                if short
+                else Piece(f"depends on {one}", separator="; ")
+            )
     else:
         pieces.append(Piece(verdict, separator="; "))
     if form.note.startswith(EDGE):

@@ -12,8 +12,9 @@ from fastslow.systems.gears import (
     gear_pair,
     gear_scales,
     harmonic_gear,
-    harmonic_gear_physical,
+    harmonic_gear_from_physical,
 )
+from fastslow.systems.geartrain import harmonic_gear_twist, harmonic_gear_two_inertias
 from fastslow.systems.oscillators import bilinear_oscillator, stick_slip
 
 __all__ = [
@@ -24,7 +25,9 @@ __all__ = [
     "gear_pair",
     "gear_scales",
     "harmonic_gear",
-    "harmonic_gear_physical",
+    "harmonic_gear_from_physical",
+    "harmonic_gear_twist",
+    "harmonic_gear_two_inertias",
     "hindmarsh_rose",
     "stick_slip",
     "van_der_pol",

@@ -15,7 +15,8 @@ Scaling = Literal["consistent", "printed"]
 SCALINGS = ("consistent", "printed")
 
 
-def _dead_zone(x: sp.Symbol, D: sp.Expr) -> sp.Expr:
+def dead_zone(x: sp.Expr, D: sp.Expr) -> sp.Expr:
+    """Piecewise linear: x − D for x > D, x + D for x < −D, and 0 between."""
     return sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
 
 
@@ -65,7 +66,7 @@ def harmonic_gear(
     x, v, w, t = sp.symbols("x v w t")
     a, b, c, d, o = sp.symbols("A B C D omega")
     return Model(
-        {x: v, v: w - v - (x**2 + a) * _dead_zone(x, d)},
+        {x: v, v: w - v - (x**2 + a) * dead_zone(x, d)},
         forcing={w: b + c * sp.sin(o * t)},
         parameters={a: A, b: B, c: C, d: D, o: omega},
     )
@@ -166,7 +167,7 @@ def gear_scales(
     omega=finite,
     D=finite,
 )
-def harmonic_gear_physical(
+def harmonic_gear_from_physical(
     scaling: Scaling = "consistent",
     *,
     J_i: float = 6.8e-4,
@@ -240,7 +241,7 @@ def harmonic_gear_physical(
 
     Examples
     --------
-    >>> values = harmonic_gear_physical().parameters
+    >>> values = harmonic_gear_from_physical().parameters
     >>> [f"{name} = {values[name]:.9g}" for name in "ABCD"]
     ['A = 41.6666667', 'B = 2.37197934', 'C = 3.54545564', 'D = 0.298869397']
     """
@@ -296,7 +297,7 @@ def gear_pair(
     x, v, w, t = sp.symbols("x v w t")
     z, m, a, d, o = sp.symbols("zeta Fm Fa D Omega")
     return Model(
-        {x: v, v: w - 2 * z * v - _dead_zone(x, d)},
+        {x: v, v: w - 2 * z * v - dead_zone(x, d)},
         forcing={w: m + a * o**2 * sp.sin(o * t)},
         parameters={z: zeta, m: Fm, a: Fa, d: D, o: Omega},
     )

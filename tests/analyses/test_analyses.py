@@ -191,7 +191,7 @@ def test_wider_gaps_delay_more(gaps):
     delays = [np.nanmax(np.abs(case.lay.delays)) for case in gaps]
     assert delays == sorted(delays)
     assert all(len(case.lay.transitions) == 6 for case in gaps)
-    assert {t.kind for case in gaps for t in case.lay.transitions} == {"transit"}
+    assert {t.kind for case in gaps for t in case.lay.transitions} == {"gap crossing"}
 
 
 def test_the_natural_frequency_falls_with_the_stiffness():

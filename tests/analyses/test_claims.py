@@ -37,9 +37,9 @@ from fastslow.systems.gears import SCALINGS, gear_scales
 
 DOCS = Path(claims_page.__file__).parents[1] / "docs"
 
-#: Verdict and numbers of every claim under each scaling.
+#: Verdict, whether it holds at the source's values, and numbers of every claim by scaling.
 EXPECTED = {
-    (row["claim"], row["scaling"]): (row["verdict"], row["numbers"])
+    (row["claim"], row["scaling"]): (row["verdict"], row["at_paper"], row["numbers"])
     for row in json.loads((Path(__file__).parent / "claims.json").read_text(encoding="utf-8"))
 }
 
@@ -62,9 +62,10 @@ def differences(findings):
     """Verdicts and numbers that are not those expected."""
     found = list(findings.keys() ^ EXPECTED.keys())
     for key in findings.keys() & EXPECTED.keys():
-        verdict, numbers = EXPECTED[key]
+        verdict, at_paper, numbers = EXPECTED[key]
         finding = findings[key]
         found += [(*key, "verdict")] if finding.verdict != verdict else []
+        found += [(*key, "at_paper")] if finding.at_paper != at_paper else []
         found += [(*key, name) for name in finding.numbers.keys() ^ numbers.keys()]
         for name in finding.numbers.keys() & numbers.keys():
             found += [] if same(finding.numbers[name], numbers[name]) else [(*key, name)]
@@ -83,8 +84,13 @@ def test_a_change_of_any_number_is_noticed(findings):
             if changed.words != finding.words:
                 assert differences({**findings, key: changed}) == [(*key, name)]
         doubled = {name: 2 * value + 1 for name, value in finding.numbers.items()}
-        changed = replace(finding, numbers=doubled, verdict="?")
-        assert len(differences({**findings, key: changed})) == len(doubled) + 1
+        other = "holds" if finding.verdict != "holds" else "does not hold"
+        changed = replace(finding, numbers=doubled, verdict=other)
+        assert len(differences({**findings, key: changed})) >= len(doubled) + 1
+        if finding.verdict == "holds conditionally":
+            turned = "no" if finding.at_paper == "in part" else "in part"
+            changed = replace(finding, conditional=turned)
+            assert differences({**findings, key: changed}) == [(*key, "at_paper")]
 
 
 def test_every_number_is_one_of_those_asserted(findings):
@@ -117,7 +123,7 @@ def test_the_overlays_against_the_load_and_the_crossings():
                 if p["C"] < p["B"]:
                     assert (story.count, story.kind) == (0, "")
                     continue
-                assert (story.count, story.kind) == (6, "transit")
+                assert (story.count, story.kind) == (6, "gap crossing")
                 near, far = next(
                     (a, b)
                     for a, b in pairwise(case.run.crossings)
@@ -143,7 +149,7 @@ def test_both_scalings_have_a_verdict():
     numbers = [claim.number for claim in claims]
     plain = [number for number in numbers if number.isdigit()]
     assert plain == [str(k) for k in range(1, 19)]
-    added = ["1b", "3b", "4b", "10b", "10c", "10d", "12b", "13b", "18b"]
+    added = ["1b", "3b", "3c", "4b", "10b", "10c", "10d", "10e", "10f", "12b", "13b", "18b"]
     assert [n for n in numbers if n[-1].isalpha()] == added
     assert numbers[-3:] == ["B2", "B3", "B4"]
     assert "B1" in numbers
@@ -179,7 +185,17 @@ def test_a_claim_whose_scalings_differ_says_both():
         (Finding("consistent", "holds", "yes"), Finding("printed", "does not hold", "no")),
     )
     assert split.verdict == "consistent: holds; printed: does not hold"
-    assert table([split]).splitlines()[3] == "|  |  | printed | **does not hold** | no |"
+    assert table([split]).splitlines()[3] == "|  |  | printed | **does not hold** | no | no |"
+
+
+def test_a_claim_that_holds_conditionally_says_whether_it_holds_at_the_papers_values():
+    with pytest.raises(ValueError, match="at the source's own values"):
+        Finding("either", "holds conditionally", "sometimes")
+    told = Finding("either", "holds conditionally", "sometimes", conditional="in part")
+    page = claims_page.page([Claim("1", "a", "b", (told,))], "")
+    assert "| either | **holds conditionally** | in part | sometimes |" in page
+    assert "**holds conditionally (at the paper's values: in part).**" in page
+    assert "Of the 1 that hold conditionally, 0 hold at none" in page
 
 
 def test_docs_are_written_with_their_figures(tmp_path):
@@ -268,10 +284,13 @@ def test_the_region_of_figure_3_is_that_of_the_criterion():
 def test_the_maps_that_hold_the_cases():
     for plane in case_maps.MAPS:
         for scaling in SCALINGS:
-            share = case_maps.criterion(plane, scaling).share
-            # resonances, which the criterion knows nothing of, begin at ω_o of about a half
-            least = 0.96 if plane.name == "map_frequency_width" else 1.0
-            assert least <= share <= 1.0
+            found = case_maps.criterion(plane, scaling)
+            # the criterion knows nothing of chaos, nor of resonances from ω_o of about a half on
+            settled = np.array([word not in ("chaotic", "not settled") for word in found.found])
+            fast = plane.name == "map_frequency_width"
+            share = found.areas[found.agree].sum() / found.areas[settled].sum()
+            assert (0.98 if fast else 1.0) <= share <= 1.0
+            assert settled.all() or fast
     found = case_maps.simulated(case_maps.MAPS[0], "consistent")
     assert all(found.at(*place) == "bilateral" for place in case_maps.MAPS[0].marks.values())
     found = case_maps.simulated(case_maps.MAPS[2], "consistent")
@@ -279,20 +298,62 @@ def test_the_maps_that_hold_the_cases():
 
 
 def test_where_fast_loads_are_as_stated_ends_there():
-    first, last = resonances.longest("consistent")
-    for omega, stated in (
-        (first - 0.02, False),
-        (first + 1e-3, True),
-        (4.3, True),
-        (last - 1e-3, True),
-        # this end is ragged: which of the motions a run comes to depends on its length
-        (last + 0.04, False),
-    ):
-        regimes = [
-            fs.simulate(cases.gear("consistent", omega, D=D), [0, 0], periods=40).regime
-            for D in cases.WIDTHS
-        ]
-        assert (tuple(regimes) == gap_region.STATED) is stated
+    for start in resonances.STARTS:
+        first, last = resonances.longest("consistent", start)
+        for omega, stated in (
+            (first - 0.01, False),
+            (first + 1e-3, True),
+            (4.3, True),
+        ):
+            widths = np.array(cases.WIDTHS)
+            found = resonances.regimes("consistent", np.full(3, omega), widths, start)
+            assert (tuple(found) == gap_region.STATED) is stated
+        # next to the upper end the motion at D = 0.25 settles slowly, at some frequencies not
+        # within the run
+        found = resonances.regimes("consistent", np.full(3, last - 1e-3), widths, start)
+        for regime, expected in zip(found, gap_region.STATED, strict=True):
+            assert regime in (expected, "not settled")
+    # of a motion that repeats, a plain run says the same
+    found = [
+        fs.simulate(cases.gear("consistent", 4.3, D=D), [0, 0], periods=200).regimes()
+        for D in cases.WIDTHS
+    ]
+    assert all(regimes.settled for regimes in found)
+    assert tuple(regimes.label for regimes in found) == gap_region.STATED
+
+
+def test_chaos_is_counted_nowhere_as_a_regime():
+    """Fault H1: from ω_o = 1.20 on runs had been unilateral by their last period."""
+    omega = resonances.SCANNED["consistent"]
+    for frequency in (0.98, 1.0, 1.2, 1.3, 1.7, 2.0):
+        k = int(np.argmin(np.abs(omega - frequency)))
+        assert resonances.scanned("consistent")[2][k] == "chaotic"
+    assert min(resonances.bands("consistent"))[0] > 3.6
+    assert resonances.bands("printed") == []
+    assert 0.96 <= max(resonances.chaotic_below_one()) <= 1.001
+
+
+def test_thresholds_of_the_mean_torque_are_those_of_the_criterion():
+    """Fault H3: solved for, and compared with the motion in the gap in closed form."""
+    for scaling in SCALINGS:
+        p = cases.gear(scaling, D=cases.GAP, omega=cases.FASTEST).parameters
+        for T_am, (bilateral, any_impact) in zip(
+            cases.TORQUES, load_amplitude.thresholds(scaling), strict=True
+        ):
+            amplitude = p["C"] * T_am / 15.0
+
+            def excess(mean, amplitude=amplitude, p=p):
+                stiff = p["A"] + p["D"] ** 2
+                low = p["B"] * mean / 10.0
+                widest = fs.slow_load_gap(low, amplitude, p["omega"], stiffness=stiff, exact=True)
+                return widest - p["D"]
+
+            mean = brentq(excess, 0.9 * T_am, 0.996 * T_am, xtol=1e-12)
+            assert bilateral == pytest.approx(mean, rel=1e-6)
+            # contact is lost where the load changes sign, or just above
+            assert any_impact == pytest.approx(10 * load_amplitude.ratio(T_am), rel=5e-5)
+        (_, _), (first, second), (third, fourth) = load_amplitude.thresholds(scaling)
+        assert first < second < third < fourth
 
 
 def test_the_flank_is_the_branch_of_the_diagram():
@@ -398,6 +459,79 @@ def test_relaxation_oscillations_begin_a_little_beyond_the_fold():
     least, most = negative_stiffness.onset()
     assert 1 < least < most < 1.03
     assert negative_stiffness.case().run.regime == "bilateral"
+
+
+def test_the_gap_is_no_part_of_what_the_teeth_deflect():
+    for scaling in SCALINGS:
+        found = stiffness.sizes(scaling)
+        for case, teeth in zip(cases.laid_cases("stiffness", scaling), found.teeth, strict=True):
+            p = case.setting.model.parameters
+            # equilibria at both ends of the load, as deep as the contact is without its gap
+            ends = [
+                max(r.real for r in np.roots([1, -0.1, p["A"], -0.1 * p["A"] - load]) if not r.imag)
+                for load in (p["C"] + p["B"], p["C"] - p["B"])
+            ]
+            # and the overshoot of the impact on the lower side, v/√A at most
+            least = sum(ends) - 0.2
+            assert least < teeth < least + impact_swing(case)
+        ratios = found.ratios
+        assert ratios["teeth"] > 5
+        assert ratios["swing"] > 2
+        assert (ratios["twist"] < 1.5) is (scaling == "printed")
+
+
+def impact_swing(case):
+    speed, depth = stiffness.impact(case)
+    p = case.setting.model.parameters
+    assert depth < 1.15 * (speed + 0.02) / math.sqrt(p["A"])
+    return depth
+
+
+def test_a_torque_of_the_input_shaft_would_not_give_equation_5():
+    # J_eq = 0.0239155920, J_o = 0.024, N J_i = 0.068, T_m = 10
+    expected = 0.0239155920 * (10 / 0.024 + 10 / 0.068)
+    assert physical_route.shaft_torque() == pytest.approx(expected, rel=1e-8)
+    assert physical_route.allowed_shift() == 0
+    (finding,) = physical_route.claims()[3].findings
+    assert finding.verdict == "does not hold"
+    for name in ("T_on", "T_cm", "J_ea", "θ_Γ", "T_im"):
+        assert name in finding.words
+
+
+def test_overtones_against_a_quadrature():
+    case = cases.laid_cases("gap_width", "consistent")[2]
+    p, end = case.setting.model.parameters, case.run.span[1]
+    times = np.linspace(end * 2 / 3, end, 200001)
+    x = case.run(times)[0]
+    angle = p["omega"] * times
+    mean = np.trapezoid(x, angle) / (2 * np.pi)
+    parts = [np.trapezoid(x * f(angle), angle) / np.pi for f in (np.cos, np.sin)]
+    first = parts[0] ** 2 + parts[1] ** 2
+    total = np.trapezoid((x - mean) ** 2, angle) / np.pi
+    assert gap_effects.overtones(case) == pytest.approx(math.sqrt(total / first - 1), rel=2e-3)
+    # a gear without clearance is nearly linear: x = w/A − (w/A)³/A, an overtone of C³/(4 A⁴)
+    expected = p["C"] ** 3 / 4 / p["A"] ** 4 / (p["C"] / p["A"])
+    expected = math.hypot(expected, 3 * p["B"] * p["C"] ** 2 / 2 / p["A"] ** 3 / p["C"])
+    assert gap_effects.overtones_without_gap(case) == pytest.approx(expected, rel=0.05)
+
+
+def test_relaxation_begins_nearer_to_the_fold_beyond_the_range_scanned():
+    least, _ = negative_stiffness.onset()
+    assert 1 < negative_stiffness.onset_at(-1.5) < least
+    # the map and the bisection agree inside the range
+    assert negative_stiffness.onset_at(-1.0) == pytest.approx(least, abs=2e-3)
+
+
+def test_the_overlay_in_physical_units_is_the_dimensionless_one_in_its_scales():
+    lay, scales = physical_route.overlay(), gear_scales()
+    assert [t.kind for t in lay.transitions] == ["gap crossing"] * 6
+    p = fs.systems.harmonic_gear_from_physical(omega=1.0).parameters
+    torque = 10 / p["B"]
+    slope = p["omega"] * math.sqrt(p["C"] ** 2 - p["B"] ** 2)
+    for transition in lay.transitions:
+        across = responses.crossing_time(p["D"], slope)
+        assert transition.duration == pytest.approx(across * scales.time, rel=0.03)
+        assert abs(transition.width) == pytest.approx(slope * across * torque, rel=0.1)
 
 
 def test_the_output_speed_from_the_two_inertias():

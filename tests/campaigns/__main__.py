@@ -1,4 +1,8 @@
-"""Run a campaign: ``python -m tests.campaigns NAME [count] [seed]``."""
+"""Run a campaign: ``python -m tests.campaigns NAME [count] [seed]``.
+
+For ``detection`` a third number is the largest number of states, for ``polynomial_systems`` the
+number of states of all systems.
+"""
 
 import sys
 from importlib import import_module
@@ -7,7 +11,10 @@ from importlib import import_module
 #: ``campaign(count, seed)``, which returns a report with ``failures``, and prints as text.
 CAMPAIGNS = {
     "crossings": "crossings of random piecewise-linear systems",
+    "detection": "special points of random block systems of up to 200 states",
+    "overlays": "overlays of known models against SciPy; the counts are numbers of cases",
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",
+    "windows": "branches of random polynomial diagrams with default windows",
 }
 
 

@@ -4,6 +4,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.optimize import brentq, root
 
 import fastslow as fs
 from fastslow.plot.quantities import along_branch, of_diagram
@@ -175,6 +176,105 @@ def test_collapse_of_a_grid():
     assert fold["delta"] == pytest.approx(np.pi / 2, rel=1e-7)
 
 
+# Constants of the grid of Dobson and Chiang, angles in radians: the line as a Thévenin
+# equivalent, the generator, and the load (a motor beside a constant demand).
+LINE_E, LINE_Y, LINE_ANGLE = sp.Rational(5, 2), 8, -sp.pi / 15
+EMF, GENERATOR_Y, GENERATOR_ANGLE, INERTIA, DAMPING, POWER = (
+    1, 5, -sp.pi / 36, sp.Rational(3, 10), sp.Rational(1, 20), 1,
+)  # fmt: skip
+KPW, KPV, KQW, KQV, KQV2, LAG, DEMAND_P, DEMAND_Q = map(
+    sp.Rational, ("0.4", "0.3", "-0.03", "-2.8", "2.1", "8.5", "0.6", "1.3")
+)
+
+
+def voltage_collapse():
+    """Generator, line and dynamic load; the reactive demand Q1 is the parameter.
+
+    I. Dobson, H.-D. Chiang, J. S. Thorp, L. Fekih-Ahmed, A model of voltage collapse in
+    electric power systems, Proc. 27th IEEE CDC (1988); I. Dobson, H.-D. Chiang, Towards a
+    theory of voltage collapse in electric power systems, Systems & Control Letters 13 (1989).
+    """
+    rotor, speed, phase, volts, demand = sp.symbols("delta_m omega delta V Q1")
+    line, between = phase + LINE_ANGLE, phase - rotor
+    active = (
+        -LINE_E * LINE_Y * volts * sp.sin(line)
+        - EMF * GENERATOR_Y * volts * sp.sin(between + GENERATOR_ANGLE)
+        + (LINE_Y * sp.sin(LINE_ANGLE) + GENERATOR_Y * sp.sin(GENERATOR_ANGLE)) * volts**2
+    )
+    reactive = (
+        LINE_E * LINE_Y * volts * sp.cos(line)
+        + EMF * GENERATOR_Y * volts * sp.cos(between + GENERATOR_ANGLE)
+        - (LINE_Y * sp.cos(LINE_ANGLE) + GENERATOR_Y * sp.cos(GENERATOR_ANGLE)) * volts**2
+    )
+    torque = (
+        POWER
+        + EMF * GENERATOR_Y * volts * sp.sin(between - GENERATOR_ANGLE)
+        + EMF**2 * GENERATOR_Y * sp.sin(GENERATOR_ANGLE)
+    )
+    unmet = reactive - DEMAND_Q - demand
+    rates = {
+        rotor: speed,
+        speed: (torque - DAMPING * speed) / INERTIA,
+        phase: (unmet - KQV * volts - KQV2 * volts**2) / KQW,
+        volts: (
+            KPW * KQV2 * volts**2
+            + (KPW * KQV - KQW * KPV) * volts
+            + KQW * (active - DEMAND_P)
+            - KPW * unmet
+        )
+        / (LAG * KQW * KPV),
+    }
+    turn = 2 * sp.pi
+    return fs.Model(rates, parameters={demand: 10}, periodic={rotor: turn, phase: turn})
+
+
+def test_voltage_collapse_has_one_branch_and_its_known_loads():
+    """Hopf points at Q1 = 10.946 and 11.407 and the fold at 11.411, by SciPy from the rates."""
+    model = voltage_collapse()
+    states, demand = sp.symbols("delta_m omega delta V"), sp.Symbol("Q1")
+    rates = sp.Matrix([model.regions["S1"].rates[s] for s in model.states])
+    plain = rates.subs({s: sp.Symbol(s.name) for s in rates.free_symbols})
+    field = sp.lambdify([*states, demand], plain)
+    jacobian = sp.lambdify([*states, demand], plain.jacobian(states))
+
+    def rest(volts):
+        """Angles and demand at rest with this voltage."""
+        start = (0.35, 0.14, 11.4)
+        found = root(lambda z: field(z[0], 0, z[1], volts, z[2])[1:].ravel(), start, tol=1e-14)
+        assert np.abs(found.fun).max() < 1e-9
+        return found.x
+
+    def growth(volts):
+        first, second, load = rest(volts)
+        values = np.linalg.eigvals(jacobian(first, 0, second, volts, load).astype(float))
+        return values[np.abs(values.imag) > 1].real.max()
+
+    def determinant(volts):
+        first, second, load = rest(volts)
+        return np.linalg.det(jacobian(first, 0, second, volts, load).astype(float))
+
+    hopf = [brentq(growth, *ends, xtol=1e-14) for ends in ((1.05, 1.15), (0.935, 0.95))]
+    fold = brentq(determinant, 0.92, 0.935, xtol=1e-14)
+    loads = [rest(volts)[2] for volts in (*hopf, fold)]
+    assert loads == pytest.approx([10.946, 11.407, 11.411], abs=6e-4)
+
+    diagram = fs.continue_equilibria(model, "Q1", (9, 12))
+    (branch,) = diagram
+    assert diagram.unexplained == ()
+    assert len(branch) < 200
+    first, second = branch.special("HB")
+    assert [first["Q1"], second["Q1"]] == pytest.approx(loads[:2], rel=1e-12)
+    assert [first["V"], second["V"]] == pytest.approx(hopf, rel=1e-9)
+    assert [first.criticality, second.criticality] == ["subcritical", "supercritical"]
+    (last,) = diagram.folds
+    assert last["Q1"] == pytest.approx(loads[2], rel=1e-12)
+    assert last["V"] == pytest.approx(fold, rel=1e-6)
+    # the operating point and the one of low voltage, in the principal range of both angles
+    assert len(fs.equilibria(model)) == 2
+    high, low = sorted(diagram.at(Q1=10), key=lambda e: -e["V"])
+    assert (high.stable, low.stable) == (True, False)
+
+
 # ---------------------------------------------------------------- runs
 
 
@@ -225,8 +325,8 @@ def test_an_overlay_modulo_the_period():
     first, second = (fs.overlay(diagram, run) for run in runs)
     for lay in (first, second):
         assert lay.transitions[0].special.code == "LP"
-        assert lay.phases[0].kind == "quiescent"
-        assert lay.phases[-1].kind == "spiking"
+        assert lay.phases[0].kind == "quasi-static"
+        assert lay.phases[-1].kind == "oscillating"
     assert second.transitions[0].time == pytest.approx(first.transitions[0].time, rel=1e-6)
     inside = first.time < 90
     assert first.distance[inside].max() < 0.05

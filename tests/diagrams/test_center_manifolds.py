@@ -13,6 +13,7 @@ from fastslow.diagrams.center_manifolds import (
     zero_hopf,
     zero_hopf_case,
 )
+from fastslow.diagrams.codimension_two import _form
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.jets import JetSpace
 
@@ -149,3 +150,70 @@ def test_jets_are_the_derivatives_of_sympy():
         exact = expression.diff(s, i, t, j) if i + j else expression
         exact = exact.subs(at) / (sp.factorial(i) * sp.factorial(j))
         assert value == pytest.approx(complex(sp.N(exact, 20)), rel=1e-12, abs=1e-14)
+
+
+def _field(rates):
+    states = [sp.Symbol(str(s)) for s in u[: len(rates)]]
+    model = fs.Model(dict(zip(states, rates, strict=True)), parameters={"p": 0, "q": 0})
+    return FrozenField(model, "p", "q")
+
+
+def _pair(x, y, frequency, cubic=0):
+    square = x**2 + y**2
+    return [-frequency * y + cubic * x * square, frequency * x + cubic * y * square]
+
+
+def test_a_resonance_leaves_no_second_lyapunov_coefficient_and_says_so():
+    """Another pair ±2iω, driven by the first: w² has no bounded response."""
+    driven = _pair(u[2], u[3], 2)
+    driven[0] += u[0] ** 2
+    field = _field([*_pair(u[0], u[1], 1), *driven])
+    found = _form(("l2",), generalized_hopf, field, 0, origin(field), 1.0)
+    assert found["normal_form"] == {}
+    assert found["degeneracy"].startswith("l2 undefined because of a resonance: ")
+    assert "2j" in found["degeneracy"]
+    off = _field([*_pair(u[0], u[1], 1), *_pair(u[2], u[3], sp.Rational(21, 10))])
+    sound = _form(("l2",), generalized_hopf, off, 0, origin(off), 1.0)
+    assert list(sound["normal_form"]) == ["l2"]
+    assert not sound["degeneracy"]
+
+
+@pytest.mark.parametrize("ratio", [2, 3])
+def test_a_double_hopf_point_in_resonance_says_so(ratio):
+    field = _field([*_pair(u[0], u[1], ratio, -1), *_pair(u[2], u[3], 1, -1)])
+    names = ("p11", "p12", "p21", "p22", "theta", "delta")
+    found = _form(names, double_hopf, field, 0, origin(field), (float(ratio), 1.0))
+    assert found["normal_form"] == {}
+    assert found["degeneracy"].startswith("p11, p12, p21, p22, theta and delta undefined")
+    assert double_hopf_case(found["normal_form"]) == "resonant or degenerate"
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_a_linear_oscillator_leaves_theta_and_delta_undefined(unit):
+    root = 5**0.5
+    field = _field([*_pair(u[0], u[1], root), *_pair(u[2], u[3], 1, -(unit**2))])
+    names = ("p11", "p12", "p21", "p22", "theta", "delta")
+    units = np.array([1, 1, 1 / unit, 1 / unit])
+    found = _form(names, double_hopf, field, 0, origin(field), (root, 1.0), units)
+    assert found["normal_form"]["p22"] == pytest.approx(-2 * unit**2, rel=1e-12)
+    assert set(found["normal_form"]) == {"p11", "p12", "p21", "p22"}
+    assert found["degeneracy"] == "theta and delta undefined because p11 or p22 vanishes"
+
+
+def test_a_hopf_pitchfork_point_says_what_is_undefined():
+    """z = 0 is invariant: the quadratic terms of the zero-Hopf form vanish by symmetry."""
+    x, y, z = sp.symbols("x y z")
+    square = x**2 + y**2
+    model = fs.Model(
+        {
+            x: q * x - y - x * (square + z**2),
+            y: x + q * y - y * (square + z**2),
+            z: p * z - z**3 - z * square,
+        },
+        parameters={"p": -0.5, "q": 0},
+    )
+    (hopf,) = fs.continue_equilibria(model, "q", (-1, 1)).special("HB")
+    (point,) = fs.continue_points(hopf, ("q", "p"), over={"q": (-1, 1), "p": (-1, 1)}).special("ZH")
+    assert (point["p"], point["q"]) == pytest.approx((0, 0), abs=1e-12)
+    assert point.subtype == "resonant or degenerate"
+    assert "degenerate: s, theta and E undefined because a = 0" in repr(point)

@@ -162,3 +162,35 @@ def test_equilibria_that_lie_in_an_interface_all_along():
     np.testing.assert_allclose(band.corners[:, 1, 1], band.values - 1.0, atol=1e-12)
     # beside them: no prey, no predator above and at the level
     assert len(diagram) == 2
+
+
+@pytest.fixture(scope="module")
+def oregonator():
+    """Tyson and Fife 1980, with z frozen."""
+    q = sp.Symbol("q")
+    z = sp.Symbol("z")
+    fast = {x: 25 * (x * (1 - x) - z * (x - q) / (x + q))}
+    return fs.Model(fast, slow={z: x - z}, parameters={q: 1e-3}).frozen()
+
+
+@pytest.mark.parametrize(
+    ("share", "lower"),
+    [(1e-2, 1e-1), (1e-2, 1e-3), (8e-4, 1e-1), (8e-4, 1e-3), (1e-4, 1e-1), (1e-5, 1e-1)],
+)
+def test_a_fold_much_smaller_than_the_range_is_not_stepped_over(oregonator, share, lower):
+    """z = x(1 − x)(x + q)/(x − q) has a fold of size q beside a pole and another branch.
+
+    Its folds are the zeros of dz/dx, by NumPy.
+    """
+    p = np.polynomial.Polynomial
+    above, below = p([0, 1]) * p([1, -1]) * p([share, 1]), p([-share, 1])
+    roots = (above.deriv() * below - above * below.deriv()).roots()
+    heights = {float(r.real): float((above(r) / below(r)).real) for r in roots if r.real > share}
+    low = lower * min(heights.values())
+    diagram = fs.continue_equilibria(
+        oregonator.with_parameters(q=share), "z", over=(low, 0.6), window={"x": (share, 2)}
+    )
+    assert diagram.coverage == "complete"
+    assert len(diagram) == 1
+    found = sorted((fold["x"], fold["z"]) for fold in diagram.folds)
+    assert np.array(found) == pytest.approx(np.array(sorted(heights.items())), rel=1e-9)

@@ -10,6 +10,7 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.optimize import brentq
 
 import fastslow as fs
 from fastslow.diagrams.detection import special_points
@@ -18,6 +19,7 @@ from fastslow.diagrams.row_tests import pair_sums
 from fastslow.diagrams.walking import Piece, Window
 from fastslow.results.points import stability_of
 from fastslow.results.windows import state_window
+from tests.campaigns.detection import campaign
 from tests.diagrams.models import LENGTH, brusselator, chafee_infante, crossing_model
 
 p = sp.Symbol("p")
@@ -54,6 +56,15 @@ def test_points_of_random_models_with_rates_over_six_decades(size):
     assert all(d.located.converged for d in found)
 
 
+def test_a_sample_of_the_campaign_of_random_block_systems():
+    """Among them a branch point on a curve along which one rate has no slope, and a Hopf
+    point between two neutral saddles within one step."""
+    report = campaign(3, seed=1, largest=12)
+    assert not report.failures, str(report)
+    assert min(report.expected.values()) >= 3
+    assert report.error < 1e-12
+
+
 @pytest.mark.parametrize("rates", [(1, 2, 1000), (1, 1e5), (1, 2, 3, 100), (1, 2, 3, 4, 5, 10, 20)])
 def test_a_hopf_point_beside_fast_passive_states(rates):
     x, y, *passive = sp.symbols(f"x y z1:{len(rates) + 1}")
@@ -67,6 +78,72 @@ def test_a_hopf_point_beside_fast_passive_states(rates):
     assert hopf["p"] == pytest.approx(0, abs=1e-14)
     assert hopf.lyapunov == pytest.approx(-2, rel=1e-12)
     assert hopf.frequency == pytest.approx(1, rel=1e-12)
+
+
+def neuron():
+    """Hodgkin and Huxley's axon with a slow calcium, a fast sensor and outer potassium.
+
+    Time constants: 500 ms (calcium), 0.05 ms (its sensor, which opens a further potassium
+    current) and 5 s (potassium outside, which shifts the reversal voltage).
+
+    Returns
+    -------
+    rates : dict
+    rest : dict
+        Every state at rest as a formula in the voltage.
+    """
+    v, m, h, n, calcium, sensor, outer, current = sp.symbols("v m h n Ca s K I")
+    exp, half = sp.exp, sp.Rational(1, 2)
+    opening = {
+        m: (v + 40) / 10 / (1 - exp(-(v + 40) / 10)),
+        h: exp(-(v + 65) / 20) * 7 / 100,
+        n: (v + 55) / 100 / (1 - exp(-(v + 55) / 10)),
+    }
+    closing = {
+        m: 4 * exp(-(v + 65) / 18),
+        h: 1 / (1 + exp(-(v + 35) / 10)),
+        n: exp(-(v + 65) / 80) / 8,
+    }
+    inflow = 1 / (1 + exp(-(v + 20) / 5))
+    ionic = (
+        120 * m**3 * h * (v - 50)
+        + 36 * n**4 * (v + 77 - 2 * (outer - 4))
+        + sp.Rational(3, 10) * (v + 54)
+        + half * sensor * (v + 77)
+    )
+    rates = {v: current - ionic}
+    rates |= {gate: opening[gate] * (1 - gate) - closing[gate] * gate for gate in opening}
+    rates[calcium] = (inflow - calcium) / 500
+    rates[sensor] = 20 * (calcium / (1 + calcium) - sensor)
+    rates[outer] = (4 + n**4 - outer) / 5000
+    rest = {gate: opening[gate] / (opening[gate] + closing[gate]) for gate in opening}
+    rest |= {calcium: inflow, sensor: inflow / (1 + inflow), outer: 4 + rest[n] ** 4}
+    return rates, rest
+
+
+def test_both_hopf_points_of_a_neuron_with_rates_over_five_decades():
+    """Against the eigenvalues along the branch in closed form, by NumPy and brentq."""
+    rates, rest = neuron()
+    v, current = sp.symbols("v I")
+    matrix = sp.Matrix(list(rates.values())).jacobian(list(rates)).subs(rest)
+    jacobian = sp.lambdify(v, matrix)
+    needed = sp.lambdify(v, (current - rates[v]).subs(rest))
+
+    def growth(voltage):
+        values = np.linalg.eigvals(np.array(jacobian(voltage), dtype=float))
+        return values[np.abs(values.imag) > 0.1].real.max()
+
+    voltages = [brentq(growth, *ends, xtol=1e-13) for ends in ((-62, -58), (-45, -41))]
+    diagram = fs.continue_equilibria(fs.Model(rates, parameters={current: 0}), "I", (0, 250))
+    (branch,) = diagram
+    first, second = branch.special("HB")
+    assert [first["I"], second["I"]] == pytest.approx([needed(x) for x in voltages], rel=1e-10)
+    assert [first["v"], second["v"]] == pytest.approx(voltages, rel=1e-10)
+    assert (first.criticality, second.criticality) == ("subcritical", "supercritical")
+    # the fastest and the slowest rate are 1e5 apart there
+    size = np.abs(first.eigenvalues)
+    assert size.max() / size.min() > 9e4
+    assert diagram.unexplained == ()
 
 
 @pytest.mark.parametrize("cells", [5, 15])

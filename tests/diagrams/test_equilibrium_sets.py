@@ -220,3 +220,79 @@ def test_two_hinges_with_dry_friction_have_a_set_that_is_searched_for():
     assert not near.exact
     assert near["y"] == pytest.approx((-math.asin(0.2), math.asin(0.2)), abs=1e-9)
     assert near["x"] == pytest.approx((-math.asin(0.3), math.asin(0.2)), abs=1e-9)
+
+
+def test_a_window_ends_bands_where_they_leave_it():
+    # the set |x - w| ≤ 1/2 has a part in x ≥ 0.2 from w = -0.3 on
+    model = block().frozen()
+    (band,) = fs.continue_equilibria(model, "w", over=(-1, 1), window={x: (0.2, 3)}).bands
+    assert band.range == pytest.approx((-0.3, 1), abs=1e-12)
+    assert fs.continue_equilibria(model, "w", over=(-1, 1), window={x: (2, 3)}).bands == ()
+    assert fs.equilibria(model, w=0.3, window={x: (2, 3)}).sets == ()
+    assert len(fs.equilibria(model, w=0.3, window={x: (0.2, 3)}).sets) == 1
+
+
+def pendulum(friction):
+    """θ'' = w − sin θ − friction · sign θ', with θ modulo 2π."""
+    rates = {x: v, v: w - sp.sin(x) - friction * sp.sign(v)}
+    return fs.Model(rates, parameters={w: 0}, periodic={x: 2 * sp.pi})
+
+
+@pytest.mark.parametrize("force", [-0.3, -0.1, 0.0, 0.2])
+def test_a_pendulum_modulo_a_turn_has_each_band_once(force):
+    model, half = pendulum(0.2), math.pi
+    found = fs.equilibria(model, w=force)
+    low, high = math.asin(force - 0.2), math.asin(force + 0.2)
+    hanging, standing = sorted(found.sets, key=lambda s: abs(s["x"][0] + s["x"][1]))
+    assert hanging["x"] == pytest.approx((low, high), abs=1e-12)
+    turn = 2 * half * round((standing["x"][0] - (half - high)) / (2 * half))
+    assert np.array(standing["x"]) - turn == pytest.approx([half - high, half - low], abs=1e-12)
+    assert abs(sum(standing["x"])) <= 2 * half + 1e-9
+    assert len(found) == 4
+    assert np.abs([e.state[0] for e in found]).max() <= half
+    # θ = π is passed by the standing one where w changes its sign
+    diagram = fs.continue_equilibria(model, "w", over=(-0.5, 0.5))
+    assert [band.range for band in diagram.bands] == [(-0.5, 0.5)] * 2
+    widths = [np.ptp(band.corners[:, :, 0], axis=1) for band in diagram.bands]
+    assert widths[0] == pytest.approx(widths[1], abs=1e-12)
+    assert len(diagram.at(w=force)) == 4
+    # a window a turn further on holds the same set
+    for turns in (0, 1):
+        window = {x: (2 + 2 * math.pi * turns, 4 + 2 * math.pi * turns)}
+        (kept,) = fs.equilibria(model, w=force, window=window).sets
+        assert kept["x"] == standing["x"]
+
+
+def test_a_pendulum_with_much_friction_rests_at_every_angle():
+    (whole,) = fs.equilibria(pendulum(2)).sets
+    assert whole["x"] == (-np.inf, np.inf)
+    assert whole["v"] == (0.0, 0.0)
+
+
+def test_a_set_of_two_dimensions_whose_states_are_no_functions_of_the_weights():
+    """|x³ + x y| ≤ 1/2, |y + y³ − x y| ≤ 1/3: at x = 0 the first weight has no slope."""
+    rates = {x: v, v: -(x**3) - x * y - sp.sign(v) / 2, y: u, u: -y - y**3 + x * y - sp.sign(u) / 3}
+    found = fs.equilibria(fs.Model(rates))
+    assert found.coverage == "found"
+    (one,) = found.sets
+    assert one.dimension == 2
+    line = np.linspace(-2, 2, 2001)
+    across, up = np.meshgrid(line, line, indexing="ij")
+    held = (np.abs(across**3 + across * up) <= 0.5) & (np.abs(up + up**3 - across * up) <= 1 / 3)
+    # each range of the grid is within, and not farther off than its cells
+    for name, places in (("x", across[held]), ("y", up[held])):
+        low, high = one[name]
+        assert low <= places.min() < low + 0.01
+        assert high - 0.01 < places.max() <= high
+    for corner in one.corners:
+        pulls = corner[0] ** 3 + corner[0] * corner[2], corner[2] ** 3 + corner[2] * (1 - corner[0])
+        assert np.abs(pulls) == pytest.approx([1 / 2, 1 / 3], abs=1e-9)
+
+
+def test_products_of_signs_are_said_not_to_be_complete():
+    """The origin is at rest, but no sliding motion is derived there."""
+    rates = {x: -sp.sign(x) * (2 + sp.sign(y)), y: -sp.sign(y)}
+    assert fs.equilibria(fs.Model(rates)).coverage == "found"
+    forced = {x: w - sp.sign(x) * (2 + sp.sign(y)), y: -sp.sign(y)}
+    diagram = fs.continue_equilibria(fs.Model(forced, parameters={w: 0}), "w", over=(-0.5, 0.5))
+    assert diagram.coverage == "found"

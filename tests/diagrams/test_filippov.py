@@ -209,7 +209,8 @@ def test_two_discontinuities_at_once_end_the_branch_in_words():
 def test_symmetry(c, m, d, stiffness):
     """(x, y, p) → −(x, y, p) maps a relay system's diagram to itself; y = c p/(c d + m)."""
     assume(abs(c * d + m) > 0.1)
-    # natural units of the states are lost where coefficients differ by more than 30 decades
+    # x' = y − c speaks for y ~ c, the term d y beside m for y ~ m/d: the natural unit of y is
+    # halfway between in logarithms, and at 1e-38 rounding in it is as large as y itself
     assume(d == 0 or abs(d) > 1e-30)
     model = RELAY.with_parameters(k1=c, k2=m, k3=d, k4=stiffness)
     diagram = fs.continue_equilibria(model, p, (-4, 4))
@@ -226,6 +227,29 @@ def test_symmetry(c, m, d, stiffness):
             if q.code == point.code
         ]
         assert min(apart) < 1e-11
+
+
+@pytest.mark.parametrize("d", [1e-45, 1e-120])
+def test_a_term_far_below_rounding_does_not_hide_the_states(d):
+    """The natural unit of y is 1e22 and more here: y = ±c at the points is not dust."""
+    c, m = 1.3, 0.8
+    model = RELAY.with_parameters(k1=c, k2=m, k3=d, k4=1)
+    points = fs.continue_equilibria(model, p, (-4, 4)).special("BE")
+    assert [(q["y"], q["p"]) for q in points] == [
+        pytest.approx((side * c, side * m), rel=1e-14) for side in (-1, 1)
+    ]
+
+
+def test_a_boundary_fold_in_an_invariant_plane():
+    """On p = 0 the row of x in F_x is (q − 2x, 0): at x = 0 all of it vanishes at q = 0."""
+    rates = {x: x * (y + k[0] + p - x), y: sp.Piecewise((p - y, y > 0), (p - 2 * y, True))}
+    model = fs.Model(rates, parameters={p: 0.3, k[0]: -0.7})
+    points = fs.continue_equilibria(model, p, (-1, 1)).special("BE")
+    (point,) = [q for q in points if abs(q["x"]) < 1e-12]
+    curve = fs.continue_points(point, (p, k[0]), {p: (-1, 1), k[0]: (-1, 1)})
+    folds = curve.special("BF")
+    assert len(folds) >= 1
+    assert all(abs(q["k1"]) < 1e-12 and abs(q["x"]) < 1e-12 for q in folds)
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -10,6 +10,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.continuation.polynomial_systems import solve_polynomials
+from fastslow.diagrams.critical import _exact_roots
 from tests.campaigns.polynomial_systems import campaign
 
 x, y, z, p, q = sp.symbols("x y z p q")
@@ -103,3 +104,52 @@ def test_a_predator_and_its_prey_have_the_same_equilibria_in_any_unit():
         assert len(states) == len(first)
         for state in first:
             assert np.abs(states - state).max(axis=1).min() < 1e-9
+
+
+#: Planar systems of the campaign, each with its difficulty.
+PLANAR = {
+    "equilibria beyond the window next to a pole": (
+        "3*p*x*y/4 - 5*x*y/4 - 2*x - 1/2",
+        "8*p**2*x/9 - p**2*y**2/3 + 8*p**2*y/5 - 2*p*x + 9*p*y**2/7 + 2*p*y + 3*x/4 + 3*y**2/5"
+        " - 8*y/3 - 1/2",
+    ),
+    "a fold at 5000 times the size of the other equilibria": (
+        "-8*p**2*y**2 - 2*p**2*y/9 - p*x**2/3 - p*x*y - 3*p*x + 3*p*y**2/5 + 3*p*y/7 + 3*p/7"
+        " - x**2/8 + 7*x*y/5 + 3*x/8 + 9*y**2/4 + y/3 + 13/3",
+        "7*p*x*y/6 + 3*x*y/5 + 20/9",
+    ),
+    "equations of different size at an interface": (
+        "-p**2/4 - 10**-5*p*y/3 + p/6 - 6*10**5*x - 10**-5*y/8 + 4/9 + 2*Abs(10**5*x - 6/7)",
+        "4*10**5*p**2*x + 5*10**-5*p**2*y/3 - 9*10**5*p*x/7 + 8*10**-5*p*y/3 + 8*p/3"
+        " + 2*10**5*x/3 - 10**-5*y/4 + 23/8",
+    ),
+}
+
+
+@pytest.mark.parametrize("rates", PLANAR.values(), ids=PLANAR.keys())
+def test_planar_diagrams_with_poles_are_complete_and_have_each_branch_once(rates):
+    first, second = (sp.sympify(r, locals={"y": y, "x": x, "p": p}, rational=True) for r in rates)
+    scales = (sp.Rational(1, 10**5), 10**5) if first.has(sp.Abs) else (1, 1)
+    model = fs.Model({x: scales[0] * first, y: scales[1] * second}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, "p", (-2, 2))
+    assert diagram.coverage == "complete"
+    assert not diagram.unexplained
+    for value in (-1.6180339, -0.4142135, 0.3183098, 1.259921):
+        listed = np.array([e.state for e in fs.equilibria(model, p=value)])
+        drawn = np.array([e.state for e in diagram.at(p=value)])
+        assert len(drawn) == len(listed)
+        size = np.abs(listed).max(axis=0)
+        for state in listed:
+            assert (np.abs(drawn - state) / size).max(axis=1).min() < 1e-9
+
+
+def test_exact_roots_that_nearly_meet_are_in_different_intervals():
+    near = sp.Rational(1, 3) + sp.Rational(1, 10**6)
+    polynomial = sp.expand((p - 1) * (p + 1) ** 2 * (3 * p - 1) * (p - near))
+    ends = np.array(_exact_roots([polynomial], p, -2.0, 2.0))
+    for root in (-1.0, 1.0 / 3.0, float(near), 1.0):
+        assert np.abs(ends - root).min() < 4e-9
+    assert np.any((ends > 1.0 / 3.0 + 1e-8) & (ends < float(near)))
+    # an exact root in the middle of the range, one at its end, and none
+    assert _exact_roots([p * (p - 2)], p, -2.0, 2.0) == [0.0, 2.0]
+    assert _exact_roots([p**2 + 1], p, -2.0, 2.0) == []

@@ -5,9 +5,13 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.continuation.location import branch_point
+from fastslow.continuation.ordering import in_order
+from fastslow.diagrams.equations import real_roots
+from fastslow.diagrams.fields import FrozenField
 from fastslow.model.units import natural_units
 from fastslow.results.points import stability_of
-from tests.unit_systems import PARAMETER, SOLVED, SYSTEMS, drawn, single
+from tests.unit_systems import PARAMETER, SYSTEMS, TIME, drawn, single
 
 #: Relative to the largest value of the same quantity at the points compared.
 ACCURACY = 1e-9
@@ -50,7 +54,7 @@ def compare(system, units, reference):
     assert np.all(np.abs(numbers - reference[1]) <= ACCURACY * size), units
 
 
-@pytest.mark.parametrize("system", SOLVED, ids=lambda s: s.name)
+@pytest.mark.parametrize("system", SYSTEMS, ids=lambda s: s.name)
 def test_units_change_nothing(system):
     """All units at once, six decades to each side, and one of the factors alone."""
     reference = read(system, {})
@@ -120,3 +124,117 @@ def test_natural_units_of_a_saturated_rate():
     expected = 1000 ** (1 / 3) * 50 ** (2 / 3)
     found = natural_units(["x"], model.regions.values(), [], {})
     assert found["x"] == 2.0 ** round(np.log2(expected)) == 128.0
+
+
+def test_what_rounding_cannot_decide_is_no_equilibrium():
+    """At x = 1 to rounding, y < −20, the factor exp(100) hides that no rate vanishes."""
+    (system,) = (s for s in SYSTEMS if s.name == "stirred tank")
+    low, high = system.range()
+    for seed in range(2, 6):
+        units = drawn(system, seed)
+        model = system.measured(units)
+        for part in PLACES:
+            value = (low + part * (high - low)) / units[PARAMETER]
+            assert len(fs.equilibria(model, {"p": value})) == 1
+
+
+@pytest.mark.parametrize("unit", [1e-12, 1.0, 1e12])
+def test_roots_are_real_in_any_unit(unit):
+    """A double root, a simple one and a pair that is clearly complex."""
+    roots = np.array([1.0, 1.0, -2.0, 0.5 + 0.1j, 0.5 - 0.1j])
+    found = real_roots(np.real(np.poly(unit * roots)))
+    assert found == pytest.approx([-2 * unit, unit, unit], rel=1e-6)
+    # what is far away is a root too
+    assert real_roots(np.array([1e-18, 1.0, 1.0])) == pytest.approx([-1e18, -1.0])
+
+
+def test_points_are_in_order_up_to_rounding():
+    generator = np.random.default_rng(5)
+    points = generator.integers(0, 3, (40, 3)).astype(float)
+    points = np.unique(points, axis=0)[generator.permutation(len(np.unique(points, axis=0)))]
+    for unit in 10.0 ** generator.uniform(-9, 9, (5, 3)):
+        noisy = points * (1 + 1e-14 * generator.standard_normal(points.shape))
+        noisy += 1e-14 * generator.standard_normal(points.shape)
+        found = points[in_order(noisy * unit, unit)]
+        assert found.tolist() == sorted(points.tolist())
+
+
+@pytest.mark.parametrize("speed", [1e-12, 1.0, 1e12])
+def test_no_branch_point_where_branches_do_not_meet(speed):
+    """x' = p x − x³ + e has one where e = 0 only, however slow it is."""
+
+    def curve(e):
+        def rates(u):
+            x, p = u
+            value, slopes = p * x - x**3 + e, [p - 3 * x**2, x]
+            return speed * np.array([value]), speed * np.array([slopes])
+
+        return rates
+
+    start, scale = np.array([0.01, 0.02]), np.ones(2)
+    met = branch_point(curve(0.0), start, scale)
+    assert met.converged
+    assert np.abs(met.u).max() < 1e-14
+    assert not branch_point(curve(1e-2), start, scale).converged
+
+
+@pytest.mark.parametrize("unit", [1e-12, 1.0, 1e12])
+def test_a_gap_is_listed_with_both_ends_in_any_unit(unit):
+    """x' = p − (|x| − 1)₊ sign x: every |x| ≤ 1 is an equilibrium at p = 0."""
+    x, p, u, r = sp.symbols("x p u r")
+    contact = sp.Max(x - 1 / u, 0) + sp.Min(x + 1 / u, 0)
+    model = fs.Model({x: (r * p - u * contact) / u}, parameters={p: 0, u: unit, r: 1 / unit})
+    over = (-unit, 2 * unit)
+    diagram = fs.continue_equilibria(model, "p", over)
+    ends = diagram.at(p=0)
+    assert [e.continuum for e in ends] == [True, True]
+    assert [e["x"] * unit for e in ends] == pytest.approx([-1, 1], rel=1e-12)
+    (only,) = diagram.at(p=unit)
+    assert only["x"] * unit == pytest.approx(2, rel=1e-12)
+    found = fs.equilibria(model, p=0)
+    assert sorted(e["x"] * unit for e in found) == pytest.approx([-1, 1], rel=1e-12)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_sticking_band_in_any_unit(unit):
+    """A pendulum-like spring sinh(x) with dry friction 1/2 sticks where |sinh x − p| ≤ 1/2."""
+    x, v, p, u = sp.symbols("x v p u")
+    model = fs.Model(
+        {x: v, v: (-sp.sinh(x * u) - sp.sign(v) / 2 + p) / u}, parameters={p: 0.3, u: unit}
+    )
+    (one,) = fs.equilibria(model).sets
+    assert [one.lower[0] * unit, one.upper[0] * unit] == pytest.approx(
+        [np.arcsinh(-0.2), np.arcsinh(0.8)], rel=1e-12
+    )
+
+
+@pytest.mark.parametrize("system", SYSTEMS, ids=lambda s: s.name)
+def test_normal_forms_in_other_units(system):
+    """Of eigenvectors of length one: a is measured in 1/(length · time), l₁ in 1/length²."""
+    model = system.measured()
+    # in a small unit rounding in the slopes of a state is no longer small
+    units = dict.fromkeys(system.factors(), 1.0)
+    units |= {f"unit_{model.states[-1]}": 1e-6, TIME: 1e3}
+    sizes = np.array([units[f"unit_{s}"] for s in model.states])
+    first, second = (
+        fs.continue_equilibria(
+            model.with_parameters(u), system.parameter, system.range(u)
+        ).special()
+        for u in ({}, units)
+    )
+    field = FrozenField(model.freed(system.parameter), system.parameter)
+    for one, other in zip(first, second, strict=True):
+        if one.code not in ("LP", "HB"):
+            continue
+        u = np.append(one.state, one[system.parameter])
+        region = field.regions.index(one.regions[0])
+        values, vectors = np.linalg.eig(field.curve(region, u)[1][:, : len(u) - 1])
+        wanted = 1j * one.frequency if one.code == "HB" else 0.0
+        vector = vectors[:, np.argmin(np.abs(values - wanted))]
+        length = np.linalg.norm(vector / sizes) / np.linalg.norm(vector)
+        if one.code == "LP":
+            expected = abs(one.coefficient) * units[TIME] / length
+            assert abs(other.coefficient) == pytest.approx(expected, rel=1e-6)
+        else:
+            assert other.frequency == pytest.approx(one.frequency * units[TIME], rel=1e-8)
+            assert other.lyapunov == pytest.approx(one.lyapunov / length**2, rel=1e-6)

@@ -6,6 +6,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from tests.campaigns.windows import campaign
 
 x, y, v, p = sp.symbols("x y v p")
 TENTH = sp.Rational(1, 10)
@@ -21,6 +22,12 @@ def rows(diagram):
 
 def codes(diagram):
     return [[o.code for o in branch.outcomes] for branch in diagram]
+
+
+def test_a_sample_of_the_campaign_of_random_diagrams():
+    report = campaign(3, seed=2)
+    assert not report.failures, str(report)
+    assert report.branches >= 3
 
 
 # ---------------------------------------------------------------- to infinity

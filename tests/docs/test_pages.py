@@ -58,6 +58,28 @@ def test_the_readme_links_to_pages():
         assert (ROOT / link).exists(), link
 
 
+def test_the_page_from_two_inertias_to_the_overlay(tmp_path, monkeypatch, capsys):
+    """Its cells run as they stand, and give what the text says about them."""
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for cell in CELL.findall((DOCS / "how-to" / "two-inertias.md").read_text("utf-8")):
+        exec(compile(cell, "two-inertias.md", "exec"), names)
+    printed = capsys.readouterr().out
+
+    assert "no equilibrium is isolated" in printed
+    assert "reduce_states" in printed
+    assert names["apart"] < 1e-11
+    assert names["angles"][0, -1] > 50, "the gear turns as a whole"
+    assert names["overlay"].run.regime == "bilateral"
+    assert len(names["overlay"].transitions) == 6
+    assert names["drawing"].ax.get_ylabel() == r"relative twist $\theta$ (mrad)"
+    below, above = names["drawing"].ax.get_ylim()
+    assert -40 < below < -17.5 < 17.5 < above < 40, "milliradians"
+    seconds = names["crossing_time"](names["run"])
+    scaled = names["crossing_time"](names["dimensionless"]) * names["scales"].time
+    assert seconds == pytest.approx(scaled, rel=1e-6)
+
+
 def test_the_tutorial(tmp_path, monkeypatch, capsys):
     """Its cells run as they stand, and give what the text says about them."""
     monkeypatch.chdir(tmp_path)
@@ -72,7 +94,7 @@ def test_the_tutorial(tmp_path, monkeypatch, capsys):
     assert [p.subtype for p in names["diagram"].boundary_equilibria] == ["degenerate"] * 2
     assert len(names["run"].crossings) == 41
     assert names["run"].regime == "bilateral"
-    assert {t.kind for t in names["lay"].transitions} == {"transit"}
+    assert {t.kind for t in names["lay"].transitions} == {"gap crossing"}
     assert "the diagram has no fold" in printed
     assert len(names["soft_diagram"].folds) == 2
     (bistable,) = names["soft_diagram"].bistable()

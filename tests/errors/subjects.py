@@ -17,10 +17,13 @@ RESULTS = (
     fs.Diagram,
     fs.Ensemble,
     fs.Equilibrium,
+    fs.LyapunovExponent,
     fs.Overlay,
     fs.PointBranch,
     fs.PointCurves,
     fs.RefinedMap,
+    fs.RegimeSet,
+    fs.Regimes,
     fs.Section,
     fs.SlowLoad,
     fs.SpecialPoint,
@@ -113,6 +116,9 @@ def results():
         "section": gap.stroboscopic(),
         "spectrum": gap.spectrum("x"),
         "steady": gap.steady(),
+        "regimes": gap.regimes(),
+        "motions": fs.classify_regime(gear, [0.0, 0.0], periods=2, longest=2),
+        "exponent": fs.lyapunov_exponent(gear, [0.0, 0.0], t=(0.0, 1.0)),
         "scaling": fs.delay_scaling(fast, fold, [1e-5, 1e-6], level={"x": 0.5}),
         "load": fs.slow_load_criterion(gear),
         "law": fs.derive(fs.Model({x: p - q * x}, parameters={p: 0, q: 1})),
@@ -139,6 +145,7 @@ def simulations(r):
     return {
         "simulate": {"model": gear, "state": [0.0, 0.0], **kept},
         "simulate_many": {"model": gear, "states": [0.0, 0.0], **kept},
+        "lyapunov_exponent": {"model": gear, "state": [0.0, 0.0], **kept},
         "bifurcation_sweep": {
             "model": gear,
             "parameter": "C",
@@ -147,6 +154,13 @@ def simulations(r):
             "settle": 0,
             "keep": 1,
             "back": False,
+        },
+        "classify_regime": {
+            "model": gear,
+            "states": [0.0, 0.0],
+            "periods": 2,
+            "longest": 2,
+            "threads": 1,
         },
         "regime_map": {
             "model": gear,
@@ -201,6 +215,7 @@ def analyses(r):
         "inspect": {"drawing": fs.plot.diagram(r["diagram"]), "result": r["diagram"]},
         "Model": {"rates": {x: -k * x}, "parameters": {k: 1.0}},
         "Continuation": {},
+        "Drift": {"rate": 0.01},
         "Integration": {},
     }
 
@@ -277,6 +292,9 @@ def methods(r):
         "Section": (r["section"], {"__getitem__": {"name": "x"}, "save": save}),
         "SlowLoad": (r["load"], {"save": save}),
         "Spectrum": (r["spectrum"], {"peaks": {}, "save": save}),
+        "LyapunovExponent": (r["exponent"], {"save": save}),
+        "RegimeSet": (r["motions"], {"save": save}),
+        "Regimes": (r["regimes"], {"save": save}),
         "SteadyState": (r["steady"], {"save": save}),
         "Sweep": (r["swept"], {"hysteresis": {}, "save": save}),
         "Trajectory": (
@@ -293,6 +311,7 @@ def methods(r):
                 "hits": {"interface": "x - D"},
                 "section": {"expression": "x"},
                 "spectrum": {"name": "x"},
+                "regimes": {},
                 "steady": {},
                 "stroboscopic": {},
                 "save": save,
@@ -325,6 +344,8 @@ def fuller(r):
     run = {"state": {"x": 0.0, "v": 0.0}}
     return {
         "simulate": {**run, "samples": [0.0, 0.5]},
+        "classify_regime": {"states": {"x": [0.0, 0.1], "v": 0.0}},
+        "lyapunov_exponent": run,
         "simulate_many": {"states": {"x": [0.0, 0.1], "v": 0.0}, "parameters": {"C": [2.0, 3.0]}},
         "bifurcation_sweep": {**run, "what": "section", "section": "v"},
         "regime_map": {

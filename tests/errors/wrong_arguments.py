@@ -7,6 +7,7 @@ from tests.errors.wrong_by_parameter import BY_PARAMETER
 from tests.errors.wrong_values import (
     COUNT,
     FIGURE,
+    FLAG,
     INF,
     MAPPING,
     NAME,
@@ -88,6 +89,19 @@ BY_FUNCTION = {
         ({"p": NAN}, Wrong, "p = nan; expected a finite number"),
     ],
     "Continuation.starts": COUNT,
+    "Drift.by_state": [
+        *MAPPING,
+        ({"x": NAN}, Wrong, "by_state['x'] = nan; expected a finite number"),
+    ],
+    "Drift.by_value": NUMBER,
+    "Drift.change": NUMBER,
+    "Drift.complete": FLAG,
+    "Drift.law": TEXT,
+    "Drift.rate": [
+        ("fast", Wrong, "rate = 'fast'; expected a finite rate of drift"),
+        (NAN, Wrong, "rate = nan; expected a finite rate of drift"),
+        (0, Wrong, "rate = 0; expected a finite rate of drift other than zero"),
+    ],
     "Integration.atol": [
         (-1, Wrong, "atol = -1; expected a finite number from 0"),
         (NAN, Wrong, "atol = nan; expected a finite number from 0"),
@@ -198,6 +212,7 @@ BY_FUNCTION = {
         *COUNT,
         (2, Wrong, "samples = 2; expected a whole number from 8"),
     ],
+    "Trajectory.regimes.tol": POSITIVE,
     "Trajectory.steady.tol": POSITIVE,
     "bifurcation_sweep.level": NUMBER,
     "bifurcation_sweep.phase": [*NUMBER, (2, Wrong, "phase = 2; expected a part of the period")],
@@ -254,6 +269,11 @@ BY_FUNCTION = {
     "export.path": [(3, Wrong, "path = 3; expected the path of a file")],
     "export.start": [*MAPPING, ({"y": 0.0}, Unknown, "unknown state 'y'")],
     "hopf_exit.rate": [*NUMBER, (-0.05, Wrong, "expected rate > 0")],
+    "lyapunov_exponent.discard": [
+        *NUMBER,
+        (2.0, Wrong, "discard = 2; expected a number from 0 below the length of the run, 1"),
+    ],
+    "lyapunov_exponent.integration": INTEGRATION,
     "plot.parameter_plane.regions": [([1], Wrong, "regions: expected a RefinedMap")],
     "plot.parameter_plane.curves": [([None], Wrong, "curves: expected a PointBranch")],
     "plot.panel.ax": [
@@ -278,6 +298,7 @@ BY_FUNCTION = {
     "predict_delay.level": LEVEL,
     "read_auto.parameter": TEXT,
     "reduce_states.rates": MAPPING,
+    "reduce_states.conserved": MAPPING,
     "refined_map.levels": [
         *COUNT,
         (100, Wrong, "levels = 100; expected a whole number from 0 to 60"),
@@ -291,6 +312,11 @@ BY_FUNCTION = {
         ({"B": "C +"}, Wrong, "'C +' is no expression"),
         (lambda a, b: 3, Wrong, "what parameters returns = 3; expected a mapping"),
     ],
+    "classify_regime.integration": INTEGRATION,
+    "classify_regime.longest": POSITIVE,
+    "classify_regime.periods": POSITIVE,
+    "regime_map.longest": POSITIVE,
+    "regime_map.state": BY_PARAMETER["states"],
     "regime_map.periods": POSITIVE,
     "regime_map.tol": POSITIVE,
     "simulate_many.parameters": [
@@ -318,7 +344,7 @@ BY_FUNCTION = {
     "simulate_many.integration": INTEGRATION,
 }
 #: Periods stand beside the t of the good call.
-for _name in ("simulate", "simulate_many"):
+for _name in ("simulate", "simulate_many", "lyapunov_exponent"):
     BY_FUNCTION[f"{_name}.periods"] = [(3, Wrong, "or periods=, received both")]
     BY_FUNCTION[f"{_name}.start"] = [*NUMBER, (2, Wrong, "start= goes with periods=")]
 
@@ -331,8 +357,8 @@ OF_SYSTEMS = [
 ]
 SCALING = [("consistnt", Unknown, "unknown scaling 'consistnt'; did you mean 'consistent'?")]
 BY_FUNCTION["systems.gear_scales.scaling"] = SCALING
-BY_FUNCTION["systems.harmonic_gear_physical.scaling"] = SCALING
-BY_FUNCTION["systems.harmonic_gear_physical.D"] = OF_SYSTEMS[:2]
+BY_FUNCTION["systems.harmonic_gear_from_physical.scaling"] = SCALING
+BY_FUNCTION["systems.harmonic_gear_from_physical.D"] = OF_SYSTEMS[:2]
 for _name in ("J_i", "J_o", "N", "xi", "K_HD", "k2"):
     BY_FUNCTION[f"systems.gear_scales.{_name}"] = POSITIVE
 BY_FUNCTION["explore.parameter"] = [

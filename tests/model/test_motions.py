@@ -1,6 +1,7 @@
 """The smooth motions of a model: regions, and sliding along its discontinuities."""
 
 import numpy as np
+import pytest
 import sympy as sp
 
 import fastslow as fs
@@ -106,3 +107,25 @@ def test_vanishing_on_a_surface_is_decided_at_its_points():
     assert vanishes_on(sp.exp(x) - sp.exp(y + 1), x - y - 1)
     assert not vanishes_on(sp.exp(x) - sp.exp(y), x - y - 1)
     assert vanishes_on(sp.sqrt(x) - y, x - y**2)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_decimal_numbers_make_sums_of_jumps(count):
+    """Sums such as 0.3 - 1 + 0.4 are rounded in every region; the parts of a jump are not."""
+    random = np.random.default_rng(2)
+    states = sp.symbols(f"x:{count}")
+    for _ in range(5):
+        base = random.integers(-30, 30, count) / 10
+        jumps = random.integers(-30, 30, (count, count)) / 10 - 4 * np.eye(count)
+        signs = sp.Matrix([sp.sign(s) for s in states])
+        rates = sp.Matrix(base) + sp.Matrix(jumps) * signs
+        model = fs.Model(dict(zip(states, rates, strict=True)))
+        found = motions_of(model)
+        assert found.undecided == ()
+        last, names = found.sliding[-1], list(model.interfaces)
+        assert len(last.slides) == count
+        weights = {
+            names[j]: float(w) for j, w in zip(last.slides, last.weights, strict=True)
+        }  # fmt: skip
+        expected = dict(zip(map(str, states), np.linalg.solve(jumps, -base), strict=True))
+        assert weights == pytest.approx(expected, rel=1e-13, abs=1e-15)

@@ -1,10 +1,12 @@
 """Entry and exit of a slow passage through a branch point, along an invariant branch."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.integrate import solve_ivp
 
 import fastslow as fs
 
@@ -100,3 +102,47 @@ def test_what_is_refused(off):
     moving = fs.continue_equilibria(model, "w", over=(-2, 2))
     with pytest.raises(fs.ArgumentError, match="not invariant while w drifts"):
         fs.predict_delay(moving.special("BP")[0], EPS, diagram=moving, entry=-1)
+
+
+@pytest.mark.parametrize(
+    ("rates", "start", "jumps"),
+    [
+        (w**2 - x**2, 1.0, False),
+        ((x - w) * (x - 3 * w), -3.0, False),
+        ((x + w) * (x + 3 * w), 1.0, True),
+    ],
+)
+def test_an_algebraic_passage_is_said_to_jump_or_not(rates, start, jumps):
+    """Krupa and Szmolyan's λ is −(m₁ + m₂)/|m₁ − m₂| = 0, −2, 2 for slopes m: jumps above 1."""
+    model = fs.Model({x: rates}, parameters={w: -1})
+    diagram = fs.continue_equilibria(model, "w", over=(-2, 2))
+    point = diagram.special("BP")[0]
+    with pytest.raises(fs.ArgumentError, match="no integral from entry to exit") as told:
+        fs.predict_delay(point, 1e-4, diagram=diagram, entry=-1)
+    assert ("by a jump" in str(told.value)) is jumps
+    # by SciPy from w = −1, to where x is far away
+    found = solve_ivp(
+        lambda s, z: [float(rates.subs({x: z[0], w: -1 + 1e-2 * s}))], (0, 160),
+        [start],
+        events=_far, rtol=1e-8,
+    )  # fmt: skip
+    assert bool(len(found.t_events[0])) is jumps
+    if jumps:
+        said = float(re.search(r"rate \(([0-9.e-]+) in", str(told.value))[1])
+        # √(1e-2/1e-4) times as late, less what the jump ends at |x| = 10³
+        assert -1 + 1e-2 * found.t_events[0][0] == pytest.approx(10 * said, rel=0.02)
+
+
+def _far(time, z):
+    return abs(z[0]) - 1e3
+
+
+_far.terminal = True
+
+
+def test_an_overlay_prints_no_integral_where_the_drift_pushes():
+    model = fs.Model({x: w**2 - x**2}, forcing={w: -1 + t / 1000})
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(-1.5, 1.5))
+    lay = fs.overlay(diagram, fs.simulate(model, [1.0], t=(0, 2000)))
+    assert lay.transitions
+    assert all(q.law is None for q in lay.transitions)

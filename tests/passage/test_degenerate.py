@@ -33,7 +33,7 @@ def covers(lay):
 
 def test_phases_cover_the_run(lay):
     covers(lay)
-    assert [p.kind for p in lay.phases] == ["quiescent", "jump"] * 4 + ["quiescent"]
+    assert [p.kind for p in lay.phases] == ["quasi-static", "jump"] * 4 + ["quasi-static"]
 
 
 def test_one_stable_sheet(gear):
@@ -55,7 +55,7 @@ def test_no_stable_sheet_on_a_cycle():
     assert np.all(lay.followed == -1)
     assert np.isinf(lay.distance).all()
     (phase,) = lay.phases
-    assert (phase.kind, phase.attractor) == ("spiking", "cycle")
+    assert (phase.kind, phase.attractor) == ("oscillating", "cycle")
     # the period of the cycle at μ = 1 is 6.663 for w = 0
     assert np.median(phase.intervals) == pytest.approx(6.66, rel=0.03)
     assert "the diagram has no stable sheet" in lay.summary()
@@ -137,11 +137,11 @@ def reversed_rows(b):
 def test_no_forcing_at_rest_and_on_the_way(cusp, diagram):
     still = cusp.with_parameters(a=0)
     rest = fs.overlay(diagram, fs.simulate(still, [-1.0], t=(0, 50)))
-    assert [p.kind for p in rest.phases] == ["quiescent"]
+    assert [p.kind for p in rest.phases] == ["quasi-static"]
     assert np.isnan(rest.lag).all()
     assert rest.turning == ()
     way = fs.overlay(diagram, fs.simulate(still, [-2.0], t=(0, 50)))
-    assert [p.kind for p in way.phases] == ["transient", "quiescent"]
+    assert [p.kind for p in way.phases] == ["transient", "quasi-static"]
     assert way.transitions == ()
     assert way.distance[-1] == pytest.approx(0, abs=1e-6)
 

@@ -10,9 +10,17 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.passage.fold_delays import MATCHING, OMEGA_0, airy_passage, fold_delay, fold_form_of
+from fastslow.passage.fold_delays import (
+    MATCHING,
+    OMEGA_0,
+    airy_passage,
+    fold_delay,
+    fold_form_of,
+    slow_part,
+)
 from fastslow.passage.sites import site_of
 
 x, y, p, q = sp.symbols("x y p q")
@@ -166,3 +174,32 @@ def test_degenerate_folds(cusp_fold):
     fold = fs.continue_equilibria(takens, "p", over=(-1, 1)).folds[0]
     with pytest.raises(fs.ArgumentError, match="double zero eigenvalue"):
         fold_delay(replace(fold, parameters={**fold.parameters, "k": 0.0}), 1e-3)
+
+
+@pytest.mark.parametrize("eta", [-1.0, 0.3, 2.0])
+def test_the_slow_part_to_first_order(eta):
+    """Against SciPy: what is left is of second order in the terms."""
+    terms = np.array([-0.3, 0.4, 0.2])
+
+    def passed(size):
+        c, g, r = size * terms
+
+        def flow(s, z):
+            y, m = z
+            return [y**2 + m + c * y**3 + g * m * y - r * (m * y**2 + m**2), 1.0]
+
+        def end(s, z):
+            return z[0] - eta
+
+        end.terminal = True
+        # near the stable sheet of the whole equation: far before it the terms would be large
+        start = -9.65
+        run = solve_ivp(
+            flow, (start, 9), [-((-start) ** 0.5), start], events=end, method="LSODA", rtol=1e-12,
+            atol=1e-13,
+        )  # fmt: skip
+        return run.y[1, -1]
+
+    left = [passed(s) - slow_part(eta, tuple(s * terms)) for s in (0.02, 0.01)]
+    assert left[0] / left[1] == pytest.approx(4, rel=0.15)
+    assert abs(left[1]) < 2e-4

@@ -2,9 +2,11 @@
 
 import math
 import pickle
+from itertools import pairwise
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -155,3 +157,92 @@ def test_two_runs_of_fitzhugh_nagumo_part_at_the_exit(neuron):
         late.append(part_at(fast, diagram, law) - law.value)
     assert abs(late[0]) < 0.01
     assert late[1] / late[0] == pytest.approx(0.5, abs=0.05)
+
+
+def neuron_at(current):
+    """Half the trace and the discriminant (of λ) of FitzHugh and Nagumo's neuron."""
+    roots = np.roots([-1 / 3, 0, 1 - 1 / 0.8, current - 0.7 / 0.8])
+    (v,) = roots[np.abs(roots.imag) < 1e-12].real
+    half = 0.5 * (1 - v**2 - 0.064)
+    return half, half**2 + 0.064 * (1 - v**2) - 0.08
+
+
+def growth_of_neuron(current):
+    """Re λ in closed form, of a pair and of the slower of two real eigenvalues."""
+    half, square = neuron_at(current)
+    return half + math.sqrt(max(square, 0.0))
+
+
+@pytest.mark.parametrize("largest", [0.005, 0.02, 0.3])
+def test_an_entry_on_a_node_does_not_depend_on_the_rows_of_the_branch(neuron, largest):
+    """The pair is real at the entry: a square root where it splits, and 25 to 365 rows."""
+    settings = fs.Continuation(step=min(0.01, largest), largest_step=largest)
+    diagram = fs.continue_equilibria(neuron[0], "I", over=(-0.5, 2), continuation=settings)
+    hopf = diagram.special("HB")[0]
+    entry = hopf["I"] - 0.6
+    law = fs.hopf_exit(diagram, hopf, entry=entry, rate=0.1)
+    grid = np.linspace(entry, law.value, 501)
+    real = np.array([neuron_at(current)[1] > 0 for current in grid])
+    assert real[0]
+    splits = [
+        brentq(lambda s: neuron_at(s)[1], grid[k], grid[k + 1], xtol=1e-15)
+        for k in np.flatnonzero(np.diff(real))
+    ]
+    edges = [entry, *splits, law.value]
+    parts = [quad(growth_of_neuron, a, b, epsabs=1e-12, limit=200)[0] for a, b in pairwise(edges)]
+    assert sum(parts) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.fixture(scope="module")
+def moving():
+    """Shishkova's z' = (p + i ω)(z − p), ω = 1: λ = 0 at p = −i ω, at the level ω²/2."""
+    x, y, p = sp.symbols("x y p")
+    return fs.Model({x: p * (x - p) - y, y: x - p + p * y}, parameters={p: 0})
+
+
+def test_the_buffer_point_bounds_the_delay(moving):
+    """M. A. Shishkova, Doklady Akademii Nauk SSSR 209, 576-579, 1973: no exit beyond p = ω."""
+    diagram = fs.continue_equilibria(moving, "p", over=(-3, 3))
+    hopf = diagram.special("HB")[0]
+    late = fs.hopf_exit(diagram, hopf, entry=-2, rate=0.1)
+    assert late.value == pytest.approx(1.0, abs=1e-5)
+    assert late.buffer == late.value
+    assert "the buffer point decides" in late.validity
+    early = fs.hopf_exit(diagram, hopf, entry=-0.9, rate=0.1)
+    assert early.value == pytest.approx(0.9, abs=1e-9)
+    assert math.isnan(early.buffer)
+    assert "lies beyond" in early.validity
+
+
+def test_runs_leave_at_the_buffer_point(moving):
+    """From p = −2 and −2.5 they grow by the same factor from p = 1 on, not from 2 and 2.5."""
+    grown = []
+    for entry in (-2.0, -2.5):
+        ramp = moving.ramped("p", 0.05, start=entry)
+        run = fs.simulate(
+            ramp, [entry, 0.0], t=(0, (1.9 - entry) / 0.05), integration=fs.Integration(rtol=1e-15)
+        )
+        late = np.array([1.4, 1.9])
+        px, py = run((late - entry) / 0.05)
+        grown.append(np.hypot(px - late, py))
+    np.testing.assert_allclose(grown[0], grown[1], rtol=2e-3)
+    # from p = 1 on exp((p² − 1)/2ε): 1.5e11 at 1.9, of the size √ε/ε of its forcing
+    assert math.log(grown[0][1] / grown[0][0]) == pytest.approx((1.9**2 - 1.4**2) / 0.1, rel=0.02)
+    assert 0.05 < grown[0][1] / math.exp((1.9**2 - 1) / 0.1) < 5
+
+
+def test_no_buffer_point_is_told_where_none_is_known(turned):
+    law = fs.hopf_exit(turned, turned.special("HB")[0], entry=-1.5, rate=EPS)
+    assert "does not move" in law.validity
+    assert law.value == pytest.approx(1.5, abs=1e-12)
+
+
+def test_a_drift_that_changes_takes_the_error_away(turned):
+    """An overlay integrates along its path; beside a point alone the rate is taken as constant."""
+    hopf = turned.special("HB")[0]
+    plain = fs.predict_delay(hopf, EPS, diagram=turned, entry=-1)
+    law = fs.predict_delay(hopf, fs.Drift(EPS, change=1e-4), diagram=turned, entry=-1)
+    assert law.value == plain.value
+    assert plain.error < 1e-6
+    assert math.isnan(law.error)
+    assert "the change of the drift left aside" in law.validity

@@ -17,7 +17,7 @@ def lay(gear):
 
 def test_the_gear_changes_sides_at_the_gap(lay):
     assert [(t.from_sheet, t.to_sheet) for t in lay.transitions] == [("S1", "S3"), ("S3", "S1")] * 3
-    assert {t.kind for t in lay.transitions} == {"transit"}
+    assert {t.kind for t in lay.transitions} == {"gap crossing"}
     assert {t.special.code for t in lay.transitions} == {"BE"}
 
 
@@ -62,7 +62,7 @@ def test_summary_tells_the_story(lay):
     text = lay.summary()
     assert "6 transitions" in text
     assert "S1 → S3" in text
-    assert "transit at BE2" in text
+    assert "gap crossing at BE2" in text
 
 
 def test_jumps_at_both_folds():

@@ -46,12 +46,15 @@ def test_the_criterion_beside_it(slow, found):
 
 def test_the_criterion_is_for_slow_loads(gear):
     fast = fs.regime_map(
-        gear, {"omega": (0.1, 3), "C": (1.5, 8)}, [0, 0], cells=(12, 10), levels=2, periods=30
+        gear, {"omega": (0.1, 3), "C": (1.5, 8)}, [0, 0], cells=(6, 5), levels=1, periods=30
     )
     beside = fast.compare(
         lambda omega, C: fs.slow_load_criterion(gear, {"omega": omega, "C": C}, exact=True).regime
     )
-    assert beside.share == pytest.approx(0.93, abs=0.03)
+    assert beside.share == pytest.approx(0.8, abs=0.04)
+    # the criterion knows nothing of chaos, which is the most of what it misses
+    missed = {found for found, _ in beside.disagreements}
+    assert {"chaotic", "bilateral"} <= missed
     wrong = np.concatenate(list(beside.disagreements.values()))
     assert wrong[:, 0].min() > 0.3
 

@@ -1,6 +1,7 @@
 """Labels, legends and the names of regions find their places, and find them again."""
 
 import dataclasses
+from io import BytesIO
 
 import numpy as np
 import pytest
@@ -44,6 +45,15 @@ def test_a_crowd_of_folds():
     shown, inked = clear(drawn)
     assert [t.get_text() for t in shown] == [f"LP{k}" for k in range(1, 17)]
     assert inked == 0
+
+
+@pytest.mark.parametrize("dpi", [300, 600])
+def test_a_figure_saved_at_another_resolution_has_its_labels_where_they_were(dpi):
+    drawn = fs.plot.diagram(crowd())
+    drawn.figure.draw_without_rendering()
+    before = [t.get_position() for t in drawn.labels]
+    drawn.figure.savefig(BytesIO(), dpi=dpi)
+    np.testing.assert_allclose([t.get_position() for t in drawn.labels], before, atol=0.5)
 
 
 def test_the_limits_are_changed_by_hand():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import sympy as sp
 from matplotlib.figure import Figure
 
 import fastslow as fs
@@ -20,7 +21,7 @@ def test_overlay_is_drawn_above_the_branches(gear_lay):
 def test_a_jump_is_told_apart_from_a_passage_of_the_gap(gear_lay, folded_lay):
     (passage,) = fs.plot.overlay(gear_lay).transitions
     (jump,) = fs.plot.overlay(folded_lay).transitions
-    assert passage.get_label() == "transit of the gap"
+    assert passage.get_label() == "gap crossing"
     assert jump.get_label() == "jump at a fold"
     assert passage.get_marker() != jump.get_marker()
     assert len(jump.get_xdata()) == len(folded_lay.transitions)
@@ -133,7 +134,7 @@ def test_the_phases_stand_above_the_time_series(folded_lay):
     written = [w.get_text() for w in drawn.time_series.words if w.get_visible() and w.get_text()]
     assert written == ["S1", "S3", "S1", "S3"]
     texts = [t.get_text() for t in drawn.legend.get_texts()]
-    assert {"quiescent phase", "jump phase"} <= set(texts)
+    assert {"quasi-static phase", "jump phase"} <= set(texts)
 
 
 def test_a_panel_of_a_columns_width(folded_lay):
@@ -150,3 +151,19 @@ def test_a_panel_of_a_columns_width(folded_lay):
 def test_a_panel_shows_a_state(gear_lay):
     with pytest.raises(fs.UnknownNameError, match="unknown state 'w'"):
         fs.plot.panel(gear_lay, "w")
+
+
+def test_what_an_overlay_does_not_tell_is_in_its_figure():
+    x, w, t = sp.symbols("x w t")
+    model = fs.Model({x: w - x}, forcing={w: sp.sin(t / 100)})
+    run = fs.simulate(model, [0.0], t=(0, 628))
+
+    def words(over, trajectory):
+        diagram = fs.continue_equilibria(model.frozen(), "w", over=over)
+        ax = fs.plot.overlay(fs.overlay(diagram, trajectory)).ax
+        return [text.get_text() for text in ax.texts]
+
+    assert "the run goes beyond the diagram" in words((-0.5, 0.5), run)
+    assert "the run goes beyond the diagram" not in words((-1.1, 1.1), run)
+    short = fs.simulate(model, [0.0], t=(0, 628), integration=fs.Integration(max_steps=5))
+    assert any(word.startswith("run ended early") for word in words((-1.1, 1.1), short))

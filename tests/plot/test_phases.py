@@ -1,5 +1,7 @@
 """The strip of phases above a time series."""
 
+from io import BytesIO
+
 import pytest
 from matplotlib.figure import Figure
 
@@ -12,7 +14,7 @@ def test_a_figure_of_its_own_names_what_has_room(folded_lay):
     drawn = fs.plot.time_series(run, phases=phases)
     assert len(drawn.phases) == len(drawn.words) == len(phases)
     for word, box, phase in zip(drawn.words, drawn.phases, phases, strict=True):
-        if phase.kind == "quiescent":
+        if phase.kind == "quasi-static":
             assert word.get_text() == phase.sheets[0]
         room = box.get_window_extent().width
         assert word.get_visible() == (word.get_window_extent().width <= room)
@@ -22,8 +24,8 @@ def test_what_has_no_room_stays_hidden_when_drawn_again(folded_lay):
     start, end = folded_lay.run.span
     half = 0.5 * (start + end)
     phases = [
-        Phase(start, half, "quiescent", ("S1",)),
-        Phase(half, half + 0.001 * (end - start), "quiescent", ("S2",)),
+        Phase(start, half, "quasi-static", ("S1",)),
+        Phase(half, half + 0.001 * (end - start), "quasi-static", ("S2",)),
     ]
     drawn = fs.plot.time_series(folded_lay.run, phases=phases)
     for _ in range(3):
@@ -31,11 +33,27 @@ def test_what_has_no_room_stays_hidden_when_drawn_again(folded_lay):
         assert [word.get_visible() for word in drawn.words] == [True, False]
 
 
+@pytest.mark.parametrize("dpi", [40, 72, 300, 600])
+def test_what_has_no_room_stays_hidden_at_another_resolution(folded_lay, dpi):
+    start, end = folded_lay.run.span
+    part = 0.02 * (end - start)
+    phases = [
+        Phase(start, start + part, "quasi-static", ("S1",)),
+        Phase(start + part, start + 2 * part, "quasi-static", ("S1", "S2", "S3")),
+        Phase(start + 2 * part, end, "quasi-static", ("S2",)),
+    ]
+    drawn = fs.plot.time_series(folded_lay.run, phases=phases)
+    shown = [word.get_visible() for word in drawn.words]
+    assert shown[1:] == [False, True]
+    drawn.figure.savefig(BytesIO(), dpi=dpi)
+    assert [word.get_visible() for word in drawn.words] == shown
+
+
 @pytest.mark.parametrize(
     ("phase", "text"),
     [
-        (Phase(0, 100, "quiescent", ("S1", "S2")), "S1 S2"),
-        (Phase(0, 100, "spiking", (), 7, "cycle"), "7 spikes"),
+        (Phase(0, 100, "quasi-static", ("S1", "S2")), "S1 S2"),
+        (Phase(0, 100, "oscillating", (), 7, "cycle"), "7 oscillations"),
         (Phase(0, 100, "outside"), "outside"),
         (Phase(0, 100, "jump", ("S1",)), ""),
     ],

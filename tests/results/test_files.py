@@ -109,7 +109,8 @@ def test_round_trip_of_a_delay(same, tmp_path):
 
 
 def test_every_public_result_can_be_saved():
-    public = [getattr(fs, name) for name in fs.__all__ if name in classes()]
+    # a drift is an argument, which results keep
+    public = [getattr(fs, n) for n in fs.__all__ if n in classes() and n != "Drift"]
     assert len(public) >= 12
     for kind in public:
         assert issubclass(kind, Result), kind

@@ -115,7 +115,7 @@ def test_phases_of_a_kind(lay):
         assert transition.leave.time <= part.time[0] < part.time[-1] <= transition.land.time
         assert [phase.kind for phase in part.phases] == ["jump"]
         assert part.bursting is None
-    assert lay.select(kind="spiking") == ()
+    assert lay.select(kind="oscillating") == ()
 
 
 def test_one_sample(lay):

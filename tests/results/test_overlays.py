@@ -48,9 +48,9 @@ def test_sentences():
     assert text == (
         "t = 3, w = 0.6: S1 → S2, jump at LP1, w = 0.5; delay 0.1; lands at w = 0.7, t = 4"
     )
-    assert "no special point ends the sheet left" in transition(None, "change").describe("w")
+    assert "no bifurcation nearby" in transition(None, "loss of tracking").describe("w")
     steep = transition(None, "steep", steepness=0.234).describe("w")
-    assert "no bifurcation: the predicted lag |dX/dw| |dw/dt| / |Re λ| grows to 0.23" in steep
+    assert "no bifurcation: the predicted lag |dX/dw| |dw/dt| / |λ| grows to 0.23" in steep
 
 
 def test_shares_and_summary(lay):
@@ -63,7 +63,10 @@ def test_shares_and_summary(lay):
         sheets=sheets,
         followed=np.array([0] * 3 + [1] * 6 + [-1] * 2),
         lag=np.full(11, -0.5),
-        phases=(Phase(0, 8, "quiescent", ("S3", "S1")), Phase(8, 10, "spiking", (), 4, "cycle")),
+        phases=(
+            Phase(0, 8, "quasi-static", ("S3", "S1")),
+            Phase(8, 10, "oscillating", (), 4, "cycle"),
+        ),
         transitions=(transition("BE", "crossing"),) * 14,
         bursting=None,
     )
@@ -71,8 +74,8 @@ def test_shares_and_summary(lay):
     lines = made.summary().splitlines()
     assert lines[0] == "14 transitions over t = 0 to 10, w from 0 to 1"
     assert "  on no sheet: 10.0% of the time" in lines
-    assert "  on S3: 30.0% of the time, typically 0.5 ahead in time" in lines
-    assert "  1 spiking phase on a cycle: 4 spikes, 2 long" in lines
+    assert "  on S3: 30.0% of the time, median lag -0.5" in lines
+    assert "  1 oscillating phase on a cycle: 4 oscillations, 2 long" in lines
     assert lines[-1] == "  and 2 more, in transitions"
     assert made.delays == pytest.approx([0.1] * 14)
 

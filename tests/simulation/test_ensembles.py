@@ -326,3 +326,14 @@ def test_wrong_names(gear, swept):
 def test_a_model_without_a_period(gear):
     with pytest.raises(ArgumentError, match="nothing in trajectory 1 has a common period"):
         simulate_many(gear, [0, 0], parameters={"omega": [0.1, 0.0]}, periods=1)
+
+
+def test_constants_of_mathematics_in_lanes():
+    """pi and e stand in the generated source by name."""
+    x, t = sp.symbols("x t")
+    switch = sp.Piecewise((1, sp.sin(sp.pi * t) > sp.exp(-1)), (-1, True))
+    model = Model({x: switch - sp.E * x})
+    starts = np.linspace(-1, 1, 8)
+    many = simulate_many(model, starts[:, None], t=(0.25, 5))
+    alone = [simulate(model, [start], t=(0.25, 5)).end[-1] for start in starts]
+    assert many.final.ravel() == pytest.approx(alone, rel=1e-8)

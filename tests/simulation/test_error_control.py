@@ -8,7 +8,9 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.integrate import solve_ivp
 
+from fastslow.model.invariance import states_together
 from fastslow.model.model import Model
 from fastslow.simulation.ensembles import simulate_many
 from fastslow.simulation.settings import Integration
@@ -194,6 +196,10 @@ def test_a_linear_growth_returns_from_1e_58():
     assert deep.end[1] == 0
     assert "x fell below 1e-300, the smallest number kept, at t = " in str(deep.outcome)
     assert "its logarithm" in str(deep.outcome)
+    brief = simulate(model, [1e-3], t=(-1100, 2100), dense=False)
+    assert "its logarithm" in str(brief.outcome)
+    many = simulate_many(model, [1e-3], t=(-1100, 2100))
+    assert "x fell below 1e-300, the smallest number kept, in 1 of 1" in repr(many)
 
 
 def test_an_absolute_tolerance_that_decides_says_so():
@@ -201,6 +207,13 @@ def test_an_absolute_tolerance_that_decides_says_so():
     run = simulate(model, [1e-3], t=(0, 230), integration=Integration(atol=1e-12))
     assert "x fell below its atol = 1e-12" in str(run.outcome)
     assert run.outcome
+    summed = {"t": (0, 230), "integration": Integration(atol=1e-12)}
+    brief = simulate(model, [1e-3], samples=100, dense=False, **summed)
+    assert "x fell below its atol = 1e-12" in str(brief.outcome)
+    many = simulate_many(model, [[1e-3], [1e-2]], **summed)
+    assert "x fell below its atol = 1e-12 in 2 of 2" in repr(many)
+    relative = simulate_many(model, [[1e-3], [1e-2]], t=(0, 230))
+    assert relative.notes == ()
 
 
 UNITS = [
@@ -246,3 +259,65 @@ def test_a_run_is_the_same_in_other_units(case):
         assert len(other.steps) == len(run.steps)
         assert other.end[1:] / numbers == pytest.approx(run.end[1:], rel=1e-7)
         assert other.word == run.word
+
+
+S, E, sick, beta, sigma, gamma = sp.symbols("S E sick beta sigma gamma")
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+def test_an_epidemic_passes_below_its_threshold_and_back(rtol):
+    """E' = b S I − s E and I' = s E − g I vanish together, neither does alone.
+
+    The logarithms of E and I, by SciPy, are the reference: both fall to 1e-20 and return.
+    """
+    season = 1 + sp.Rational(9, 10) * sp.cos(t / 40)
+    model = Model(
+        {
+            S: -beta * W * S * sick,
+            E: beta * W * S * sick - sigma * E,
+            sick: sigma * E - gamma * sick,
+        },
+        forcing={W: season},
+        parameters={beta: 1, sigma: 0.5, gamma: 1},
+    )
+    assert states_together(model) == (("E", "sick"),)
+
+    def logarithms(s, u):
+        force = (1 + 0.9 * np.cos(s / 40)) * u[0]
+        return [
+            -force * np.exp(u[2]),
+            force * np.exp(u[2] - u[1]) - 0.5,
+            0.5 * np.exp(u[1] - u[2]) - 1,
+        ]
+
+    start, end = 2.2 * 40, 9.0 * 40
+    reference = solve_ivp(
+        logarithms,
+        (start, end),
+        [1.0, math.log(1e-9), math.log(1e-9)],
+        "DOP853",
+        rtol=1e-12,
+        atol=1e-14,
+        dense_output=True,
+    )
+    times = np.linspace(start, end, 30)
+    exact = np.exp(reference.sol(times)[1:])
+    assert exact.min() < 1e-20
+    run = simulate(model, [1, 1e-9, 1e-9], t=(start, end), integration=Integration(rtol=rtol))
+    assert np.abs(run(times)[1:] / exact - 1).max() < 300 * rtol
+    # zero is zero, and nothing else is kept from its end
+    none = simulate(model, [1, 0, 0], t=(start, end), integration=Integration(rtol=rtol))
+    assert none.outcome
+    assert none.end[1:].tolist() == [1, 0, 0]
+    half = simulate(model, [1, 0, 1e-9], t=(start, end), integration=Integration(rtol=rtol))
+    assert half.outcome
+    assert len(half.steps) < 2 * len(run.steps)
+
+
+def test_states_that_vanish_together_are_told_from_an_oscillation():
+    assert states_together(Model({x: v, v: -x, y: 1 - y})) == ()
+    assert states_together(Model({x: v - x, v: x - 2 * v})) == ()
+    assert states_together(Model({x: v - x, v: x - 2 * v, y: 1 - y + x})) == (("x", "v"),)
+    fractions = Model({S: 1 - S * sick / (S + E), E: S * sick / (S + E) - E, sick: E - 2 * sick})
+    assert states_together(fractions) == (("E", "sick"),)
+    assert states_together(Model({x: y, y: z, z: x, v: -v + 1 + x})) == (("x", "y", "z"),)

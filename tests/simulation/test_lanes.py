@@ -255,5 +255,10 @@ def test_a_model_too_large_for_lanes_is_that_of_simulate(gear, table, monkeypatc
     for i in range(9):
         one = gear.with_parameters(**{name: table[name][i] for name in ("D", "C", "omega")})
         run = simulate(one, table["states"][i], t=(0, 60), integration=Integration(implicit=False))
-        assert np.array_equal(many.final[i], run.end[1:])
-        assert many.n_steps[i] == len(run.steps)
+        if 2 * np.pi / table["omega"][i] > 60:
+            assert np.array_equal(many.final[i], run.end[1:])
+            assert many.n_steps[i] == len(run.steps)
+        else:
+            # an ensemble stops at the ends of the last periods, to see what is done in each
+            assert many.final[i] == pytest.approx(run.end[1:], abs=1e-11)
+            assert abs(many.n_steps[i] - len(run.steps)) <= 3

@@ -114,6 +114,44 @@ def test_coupled_blocks_on_a_belt_against_smooth_friction():
     assert errors[1] < 0.2 * errors[0] < 1e-3
 
 
+def test_two_uncoupled_oscillators_against_smooth_friction():
+    state = [1.0, 0.0, -0.7, 0.4]
+    run = fs.simulate(oscillators(), state, t=(0, 6), integration=integration)
+
+    def smooth(y, sign):
+        return [y[1], -y[0] - 0.3 * sign(y[1]), y[3], -2 * y[2] - 0.3 * sign(y[3])]
+
+    wide, narrow = regularised(smooth, state, (0, 6), (1e-3, 1e-4))
+    errors = [np.abs(end - run(6.0)).max() for end in (wide, narrow)]
+    assert errors[1] < 0.2 * errors[0] < 1e-3
+
+
+def test_a_relay_with_two_switches_against_smooth_ones():
+    """Sliding along x2 = 0 or x1 = 0, then along both; a third state is driven by the weights.
+
+    The coefficients are decimal numbers, whose sums are not exact.
+    """
+    z = sp.Symbol("z")
+    base, jumps = np.array([0.3, -0.2, 0.1]), np.array([[-1, 0.4], [-0.3, -0.9], [0.5, 0.7]])
+    signs = sp.Matrix([sp.sign(x1), sp.sign(x2)])
+    field = sp.Matrix(base) + sp.Matrix(jumps) * signs - sp.Matrix([0, 0, z])
+    run = fs.simulate(
+        fs.Model(dict(zip((x1, x2, z), field, strict=True))),
+        [0.2, -1.0, 0.0],
+        t=(0, 3),
+        integration=integration,
+    )
+    assert run.word[-1] == "S1|S4"
+    assert len(run.word) == 3
+
+    def smooth(y, sign):
+        return base + jumps @ sign(y[:2]) - np.array([0, 0, y[2]])
+
+    wide, narrow = regularised(smooth, [0.2, -1.0, 0.0], (0, 3), (1e-3, 1e-4))
+    errors = [np.abs(end - run(3.0)).max() for end in (wide, narrow)]
+    assert errors[1] < 0.2 * errors[0] < 1e-2
+
+
 def test_a_double_pendulum_with_dry_joints_against_smooth_friction():
     one, two, p, q, g, mu1, mu2 = sp.symbols("theta1 theta2 omega1 omega2 g mu1 mu2")
 
@@ -133,11 +171,12 @@ def test_a_double_pendulum_with_dry_joints_against_smooth_friction():
     run = fs.simulate(pendulum, state, t=(0, 30), integration=integration)
     assert run.outcome
     assert run.word[-1] == "S1|S4"
-    assert np.abs(run(30.0)[2:]).max() < 1e-15
+    # zero but for products of roundings in the series between projections (4e-34 measured)
+    assert np.abs(run(30.0)[2:]).max() < 1e-30
     # while one joint sticks it turns with nothing between
     stuck = next(s for s in run.segments if s.region in ("S1|S2", "S3|S4", "S1|S3", "S2|S4"))
     middle = run(0.5 * (stuck.start + stuck.end))
-    assert min(abs(middle[2]), abs(middle[3] - middle[2])) < 1e-15
+    assert min(abs(middle[2]), abs(middle[3] - middle[2])) == 0.0
 
     def smooth(y, sign):
         rubbing = 0.9 * sign(y[2]), 0.4 * sign(y[3] - y[2])
@@ -210,6 +249,7 @@ def test_rates_that_are_no_sum_of_jumps_end_the_run_with_the_reason():
     run = fs.simulate(fs.Model(rates), [1, 2], t=(0, 5))
     assert run.outcome.code == "not decided"
     assert "no sum of one jump" in str(run.outcome)
+    assert "smooth one of the signs" in str(run.outcome)
     assert run.span[1] == pytest.approx(2.0)
     many = fs.simulate_many(fs.Model(rates), [[1, 2], [1, 3]], t=(0, 2.5))
     assert [o.code for o in many.outcomes] == ["not decided", "end of time"]
@@ -223,4 +263,4 @@ def test_interfaces_at_an_angle_are_both_kept_to_rounding():
     run = fs.simulate(fs.Model(rates), [0.4, -1.0, 0], t=(0, 20))
     assert run.outcome
     assert run.word[-1] == "S1|S4"
-    assert np.abs(run(np.linspace(15, 20, 31))[:2]).max() < 1e-15
+    assert np.abs(run(np.linspace(15, 20, 31))[:2]).max() == 0.0

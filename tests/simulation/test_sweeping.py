@@ -135,6 +135,22 @@ def test_nothing_is_lost_where_values_fail(roessler):
     assert "1 of them failed" in repr(drawn)
 
 
+def test_a_pass_says_where_noise_decides():
+    """x falls by a factor exp(−80) in every period."""
+    t = sp.Symbol("t")
+    model = fs.Model({x: x * (a + 40 * sp.cos(t)) - x**3}, parameters={a: 0.1})
+    given = {"period": 2 * sp.pi, "what": "extremes", "settle": 1, "keep": 1}
+    rough = fs.Integration(atol=1e-12)
+    sweep = fs.bifurcation_sweep(model, "a", [0.1, 0.2], [1], integration=rough, **given)
+    assert all(
+        "x fell below its atol = 1e-12" in note for o in sweep.up.outcomes for note in o.notes
+    )
+    assert all(o.notes and o for o in sweep.up.outcomes)
+    assert "noise may decide at 2 of them, first: x fell below its atol" in repr(sweep)
+    relative = fs.bifurcation_sweep(model, "a", [0.1, 0.2], [1], **given)
+    assert "noise" not in repr(relative)
+
+
 def test_falling_values_and_progress(pair, capsys):
     drawn = fs.bifurcation_sweep(
         pair,

@@ -1,5 +1,6 @@
 """Models past the budget: what is closed is given and holds, what is left is counted and said."""
 
+import re
 from functools import cache
 
 import pytest
@@ -47,10 +48,11 @@ def test_what_is_left_implicit_is_counted_and_said():
     ]
 
 
-def test_no_line_of_it_is_long():
+def test_no_line_and_no_number_of_it_is_long():
     printed = repr(world())
     assert max(map(len, printed.splitlines())) <= 200
     assert printed.count(f"note: {OPEN}") == 5
+    assert not re.search(r"\d{10}|e[+-]?\d\d", printed)
 
 
 def test_rates_past_the_budget_are_taken_apart_by_their_factors():
@@ -87,3 +89,18 @@ def test_roots_of_numbers_are_printed_whole():
     short, defined = named([a * number + 1, a * number - 1], "a")
     place = dict(defined)
     assert [e.xreplace(place) for e in short] == [a * number + 1, a * number - 1]
+
+
+def test_both_kinds_of_daisies_together_are_closed_once_degrees_are_lowered():
+    model = daisyworld(numbers=True)
+    rates = {n: sp.nsimplify(e, rational=True) for n, e in model.regions["S8"].rates.items()}
+    found = families(rates, model.states, Signs({}), Candidates((real("L"),), ()))
+    (both,) = [f for f in found if sp.S.Zero not in f.elimination.solved.values()]
+    assert not both.equations
+    light = sp.Rational(21, 20)
+    state = {real(n): e.subs(real("L"), light) for n, e in both.elimination.solved.items()}
+    assert all(e.subs(state).subs(real("L"), light) == 0 for e in rates.values())
+    equilibria = fs.equilibria(model, L=float(light))
+    assert equilibria.coverage == "complete"
+    (point,) = [e for e in equilibria if e.region == "S8" and min(e.state) > 1e-6]
+    assert point.state == pytest.approx([float(v) for v in state.values()], rel=1e-12)

@@ -48,7 +48,7 @@ def test_implicit_forms_say_so():
 def test_conditions_past_the_budget_say_so():
     region = law("hodgkin_huxley")["S1"]
     assert "the Hopf set is given by its equations" in region.notes
-    assert sum(note.startswith("Routh-Hurwitz expression") for note in region.notes) == 3
+    assert any(n.startswith("3 of the 5 Routh-Hurwitz expressions are past") for n in region.notes)
     assert not any("Routh" in note for note in law("lorenz")["S1"].notes)
 
 

@@ -47,7 +47,7 @@ def test_a_piecewise_linear_gear_pair():
         [-0.5 - 1j * math.sqrt(0.75), -0.5 + 1j * math.sqrt(0.75)], abs=1e-10
     )
     assert run.regime == "bilateral"
-    assert [t.kind for t in lay.transitions] == ["transit"] * 4
+    assert [t.kind for t in lay.transitions] == ["gap crossing"] * 4
     # far from the gap the trajectory lies on the branch, x = w + 1
     late = (run["w"] > 0.3) & (run.t > 100)
     assert np.abs(run["x"] - run["w"] - 1)[late].max() < 0.01

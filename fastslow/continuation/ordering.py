@@ -1,0 +1,44 @@
+"""The order in which points are listed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+#: Components nearer to each other than this, relative to their size or unit, are equal.
+EQUAL = 1e-8
+
+
+def in_order(points: ArrayLike, unit: ArrayLike) -> NDArray[np.intp]:
+    """Indices that sort points by their components, first to last.
+
+    Components that differ by rounding are equal, so that the next one decides and the
+    order does not depend on the units.
+
+    Parameters
+    ----------
+    points : array_like, shape (m, n)
+    unit : array_like, shape (n,)
+        Of every component, for those that are zero but for rounding.
+
+    Returns
+    -------
+    ndarray of int, shape (m,)
+
+    Examples
+    --------
+    >>> in_order([[1.0, 2.0], [1.0 + 1e-15, 1.0], [0.0, 3.0]], 1.0).tolist()
+    [2, 1, 0]
+    """
+    table = np.asarray(points, dtype=float)
+    if table.size == 0:
+        return np.arange(len(table))
+    least = np.broadcast_to(np.asarray(unit, dtype=float), table.shape[1:])
+    ranks = np.empty(table.shape, dtype=np.intp)
+    for k, column in enumerate(table.T):
+        order = np.argsort(column, kind="stable")
+        low, high = column[order[:-1]], column[order[1:]]
+        size = np.maximum(np.maximum(np.abs(low), np.abs(high)), least[k])
+        ranks[order, k] = np.append(0, np.cumsum(high - low > EQUAL * size))
+    # what is equal in every component keeps the order of the numbers themselves
+    return np.lexsort((*table.T[::-1], *ranks.T[::-1]))
