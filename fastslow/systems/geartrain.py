@@ -27,7 +27,6 @@ from fastslow.symbolic.scaling import (
 from fastslow.symbolic.verification import vanishes
 from fastslow.systems.gears import dead_zone, gear_scales, harmonic_gear
 
-
 #: What the physical values of the gear must be.
 PHYSICAL = {
     "J_i": positive,
