@@ -10,10 +10,11 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+from fastslow.compiled.signals import deferring_signals
 from fastslow.compiled.store import load_generated
 
 _ENTRY = '''"""Entry to {function} of {module}, sources {digest}."""
@@ -53,8 +54,10 @@ def load_loop(
         digest=digest_of((module, *sources)),
         arguments=", ".join(arguments),
     )
-    loaded: Callable[..., Any] = load_generated(text, function).entry
-    return loaded
+    loaded = load_generated(text, function).entry
+    # what Numba calls for arguments of types that are new to it
+    loaded.compile = partial(deferring_signals, loaded.compile)
+    return cast("Callable[..., Any]", loaded)
 
 
 def digest_of(modules: Sequence[str]) -> str:

@@ -83,8 +83,15 @@ def load_generated(source: str, stem: str) -> ModuleType:
     """
     digest = hashlib.sha256(f"{_platform_key()}\n{source}".encode()).hexdigest()[:24]
     name = f"fastslow_{stem}_{digest}"
-    if name in _loaded:
-        return _loaded[name]
+    if name not in _loaded:
+        from fastslow.compiled.signals import deferring_signals
+
+        _loaded[name] = deferring_signals(_load, name, source)
+    return _loaded[name]
+
+
+def _load(name: str, source: str) -> ModuleType:
+    """Write a module if it is not there yet, and import it."""
     directory = _writable_directory()
     path = directory / f"{name}.py"
     if directory != cache_directory():
@@ -101,7 +108,6 @@ def load_generated(source: str, stem: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)
-    _loaded[name] = module
     return module
 
 

@@ -1,0 +1,122 @@
+"""Signals that arrive during a compilation.
+
+A signal handler may raise between any two instructions of Python: the usual one for Ctrl-C
+raises KeyboardInterrupt. The compiler calls Python from C, where an exception is printed and
+lost, and changes tables that must not be left half-changed. So what arrives while it works
+is kept, and handled between two of its passes, where nothing is half-done.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+from types import FrameType
+from typing import Any, TypeVar
+
+from numba.core import event
+
+R = TypeVar("R")
+
+#: What Numba announces before and after each pass of its compiler.
+_PASS = "numba:run_pass"
+
+
+class _PassStoppedError(BaseException):
+    """Ends a compilation; no handler of exceptions in the compiler takes it for one of its own."""
+
+
+class _Deferral(event.Listener):
+    """Takes the place of the handlers of signals, and of a listener to Numba's passes."""
+
+    def __init__(self) -> None:
+        self.handlers: dict[int, Callable[[int, FrameType | None], Any]] = {}
+        self.received: list[tuple[int, FrameType | None]] = []
+        self.raised: BaseException | None = None
+        self.active = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        if self.active:
+            self.received.append((number, frame))
+        else:
+            self.handlers[number](number, frame)
+
+    def start(self) -> None:
+        """Take the place of every handler that is written in Python."""
+        for kind in signal.valid_signals():
+            handler = signal.getsignal(kind)
+            # the two constants for no handler are not callable
+            if callable(handler):
+                self.handlers[int(kind)] = handler
+        self.active = True
+        for number in self.handlers:
+            signal.signal(number, self)
+
+    def stop(self) -> None:
+        """Give the handlers their places back."""
+        while self.active:
+            # a handler that is back may raise before the others are
+            try:
+                for number, handler in self.handlers.items():
+                    if signal.getsignal(number) is self:
+                        signal.signal(number, handler)
+                self.active = False
+            except BaseException as error:
+                self.raised = self.raised or error
+
+    def handle(self) -> None:
+        """Call the handlers of what was received; the first exception is kept."""
+        while self.received:
+            number, frame = self.received.pop(0)
+            try:
+                self.handlers[number](number, frame)
+            except BaseException as error:
+                self.raised = self.raised or error
+
+    def on_start(self, _: Any) -> None:
+        """Before a pass."""
+        if threading.current_thread() is threading.main_thread():
+            self.handle()
+            if self.raised is not None:
+                raise _PassStoppedError
+
+    def on_end(self, _: Any) -> None:
+        """After a pass."""
+
+
+_deferral: _Deferral | None = None
+
+
+def deferring_signals(compiling: Callable[..., R], *arguments: Any) -> R:
+    """Call a function that compiles; signals are handled between its passes, or at its end.
+
+    What a handler raises then ends the compilation and comes out as it is, whatever
+    the compiler made of it. The next call compiles again what was not finished.
+
+    Parameters
+    ----------
+    compiling : callable
+    *arguments
+        Its arguments.
+    """
+    global _deferral
+    # handlers run in the main thread alone
+    if _deferral is not None or threading.current_thread() is not threading.main_thread():
+        return compiling(*arguments)
+    deferral = _Deferral()
+    failure: BaseException | None = None
+    try:
+        _deferral = deferral
+        deferral.start()
+        with event.install_listener(_PASS, deferral):
+            result = compiling(*arguments)
+    except BaseException as error:
+        failure = error
+    _deferral = None
+    deferral.stop()
+    deferral.handle()
+    if deferral.raised is not None:
+        raise deferral.raised
+    if failure is not None:
+        raise failure
+    return result
