@@ -53,9 +53,14 @@ def findings():
     return {(c.number, f.scaling): f for c in claims_page.all_claims() for f in c.findings}
 
 
-def same(one, other):
+#: What is taken over the samples of a run, which another processor's rounding moves: the
+#: vibration in contact is sampled at the steps. The pages show two or three digits.
+SAMPLED = {"behind": 2e-3, "upper": 1e-4, "lower": 1e-4}
+
+
+def same(one, other, rel=2e-5):
     """Whether two numbers agree to the digits kept, of which the pages show fewer."""
-    return one == pytest.approx(other, rel=2e-5, abs=1e-10, nan_ok=True)
+    return one == pytest.approx(other, rel=rel, abs=1e-10, nan_ok=True)
 
 
 def differences(findings):
@@ -109,7 +114,8 @@ def test_every_number_of_the_overlays():
             assert one.keys() == other.keys()
             for key, value in other.items():
                 told = float("nan") if value is None else value
-                assert one[key] == told if isinstance(value, str) else same(one[key], told), key
+                rel = SAMPLED.get(key, 2e-5)
+                assert one[key] == told if isinstance(value, str) else same(one[key], told, rel), key
 
 
 def test_the_overlays_against_the_load_and_the_crossings():
