@@ -115,7 +115,9 @@ def test_every_number_of_the_overlays():
             for key, value in other.items():
                 told = float("nan") if value is None else value
                 rel = SAMPLED.get(key, 2e-5)
-                assert one[key] == told if isinstance(value, str) else same(one[key], told, rel), key
+                assert one[key] == told if isinstance(value, str) else same(one[key], told, rel), (
+                    key
+                )
 
 
 def test_the_overlays_against_the_load_and_the_crossings():
