@@ -15,10 +15,9 @@ from typing import Any
 import llvmlite.binding as llvm
 from numba import types
 
-from fastslow.compiled.generic import digest_of
 from fastslow.compiled.store import load_generated
 
-_ENTRY = '''"""Entry to {function} of {module}, sources {digest}."""
+_ENTRY = '''"""Entry to {function} of {module}."""
 from numba import cfunc
 
 from {module} import {function} as called
@@ -35,9 +34,7 @@ _C_TYPES: dict[Any, Any] = {types.int64: ctypes.c_int64, types.float64: ctypes.c
 _callbacks: list[Any] = []
 
 
-def late_function(
-    module: str, function: str, signature: str, kind: Any, sources: tuple[str, ...]
-) -> Any:
+def late_function(module: str, function: str, signature: str, kind: Any) -> Any:
     """A function for compiled code to call, that is not compiled yet.
 
     Compiled code that was read from the disk finds it as well, once the module
@@ -51,8 +48,6 @@ def late_function(
         Name of its type in that module.
     kind : numba signature
         That type: numbers and pointers, and a number as result.
-    sources : tuple of str
-        Every module whose code is compiled into it.
 
     Returns
     -------
@@ -67,7 +62,6 @@ def late_function(
             module=module,
             function=function,
             signature=signature,
-            digest=digest_of((module, *sources)),
             arguments=", ".join(f"a{k}" for k in range(len(arguments))),
         )
         return prototype(load_generated(text, function).entry.address)

@@ -15,6 +15,13 @@ from numpy.typing import NDArray
 
 from fastslow.compiled.functions import without_recurrence
 from fastslow.compiled.recurrences import Recurrences, scalar_code
+from fastslow.compiled.series_modes import (
+    COLLOCATION,
+    DIRECTIONAL,
+    RATES,
+    SHORT,
+    SHORTENED,
+)
 from fastslow.compiled.store import load_generated
 from fastslow.model.model import Model
 from fastslow.model.motions import Motion, drift, motions_of, regions_of
@@ -44,17 +51,6 @@ def series(mode, inputs, parameters, W):
             mode -= {number}
             n = {short}
 '''
-
-#: Order of the short series.
-SHORT = 4
-
-#: What a mode and so many times the number of all modes ask for: the short series, the rates
-#: alone, and the derivative of the rates in a direction.
-SHORTENED, RATES, DIRECTIONAL = 1, 2, 3
-
-
-#: Highest degree of the collocation polynomials that take the place of a Taylor series.
-COLLOCATION = 12
 
 
 @dataclass(frozen=True, eq=False)

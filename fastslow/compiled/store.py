@@ -14,6 +14,8 @@ from functools import cache
 from pathlib import Path
 from types import ModuleType
 
+from fastslow.compiled.closure import digest_of_imports
+
 _loaded: dict[str, ModuleType] = {}
 
 
@@ -33,15 +35,19 @@ def cache_directory() -> Path:
 
 @cache
 def _platform_key() -> str:
-    """What compiled code depends on beside its source: Numba, LLVM and the processor."""
+    """What compiled code depends on beside its source: versions and the processor."""
     import llvmlite
     import llvmlite.binding as llvm
     import numba
+    import numpy as np
+    import scipy
 
     return "|".join(
         (
             numba.__version__,
             llvmlite.__version__,
+            np.__version__,
+            scipy.__version__,
             platform.python_version(),
             llvm.get_host_cpu_name(),
             llvm.get_host_cpu_features().flatten(),
@@ -64,9 +70,9 @@ def _writable_directory() -> Path:
 def load_generated(source: str, stem: str) -> ModuleType:
     """Import generated source as a module kept on disk, so that Numba keeps its code too.
 
-    The file name carries a hash of the source and of everything else the
-    machine code depends on, so that another version of Numba or another
-    processor never meets code that is not its own. Two processes may do this at
+    The file name carries a hash of the source, of the modules that it imports and of
+    everything else the machine code depends on, so that another version of Numba or
+    another processor never meets code that is not its own. Two processes may do this at
     once: files are written aside and moved into place. Code that was cut short
     is built again; a directory that cannot be written is read all the same.
 
@@ -81,7 +87,8 @@ def load_generated(source: str, stem: str) -> ModuleType:
     -------
     module
     """
-    digest = hashlib.sha256(f"{_platform_key()}\n{source}".encode()).hexdigest()[:24]
+    key = f"{_platform_key()}\n{digest_of_imports(source)}\n{source}"
+    digest = hashlib.sha256(key.encode()).hexdigest()[:24]
     name = f"fastslow_{stem}_{digest}"
     if name not in _loaded:
         from fastslow.compiled.signals import deferring_signals

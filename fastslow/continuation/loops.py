@@ -10,9 +10,7 @@ from fastslow.compiled.generic import load_loop
 
 _ENGINE = "fastslow.continuation.engine"
 _EVALUATION = "fastslow.continuation.evaluation"
-_LOCATION = "fastslow.continuation.location"
 _ISOLATION = "fastslow.continuation.isolation"
-_SOURCES = ("fastslow.compiled.pointers",)
 _ARGUMENTS = {
     "trace": (
         "address mode parameters start tangent signs weight lower upper low high middle "
@@ -35,9 +33,5 @@ FULL, RANGE, INTERFACE, SMALL_STEP, WINDOW, CLOSED = range(6)
 @cache
 def loop(name: str) -> Callable[..., Any]:
     """One of the loops by its name, compiled."""
-    arguments = tuple(_ARGUMENTS[name].split())
-    if name == "trace":
-        return load_loop(_ENGINE, name, arguments, _SOURCES)
-    if name == "isolate":
-        return load_loop(_ISOLATION, name, arguments, ())
-    return load_loop(_EVALUATION, name, arguments, (_ENGINE, _LOCATION, *_SOURCES))
+    module = {"trace": _ENGINE, "isolate": _ISOLATION}.get(name, _EVALUATION)
+    return load_loop(module, name, tuple(_ARGUMENTS[name].split()))

@@ -401,12 +401,4 @@ late_collocation = late_function(
     "step_by_collocation",
     "SIGNATURE",
     SIGNATURE,
-    (
-        "fastslow.simulation.lobatto",
-        "fastslow.simulation.polynomials",
-        "fastslow.simulation.scales",
-        "fastslow.compiled.parts",
-        "fastslow.compiled.pointers",
-        "fastslow.compiled.series",
-    ),
 )

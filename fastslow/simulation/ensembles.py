@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import finite, flag, instance, mapping, takes, text, whole
 from fastslow.compiled.generic import load_loop
-from fastslow.compiled.lane_steps import CompiledSteps, compile_steps
 from fastslow.compiled.series import CompiledSeries
+from fastslow.compiled.steps import CompiledSteps, compile_steps
 from fastslow.model.model import Model
 from fastslow.results.angles import periods_of as turns_of
 from fastslow.results.ensembles import Ensemble
@@ -45,7 +45,6 @@ from fastslow.simulation.settings import (
     resolve,
 )
 from fastslow.simulation.trajectories import (
-    SOURCES,
     error_rules,
     gap_of,
     layout_of,
@@ -86,7 +85,6 @@ _ARGUMENTS = (
     "pool",
 )
 
-_LANES = ("fastslow.compiled.lanes", "fastslow.compiled.lane_steps")
 
 #: Trajectories that a thread takes at a time, at most.
 _CHUNK = 512
@@ -550,4 +548,4 @@ def _bar(count: int, shown: bool) -> Any:
 
 def _many_loop() -> Callable[..., Any]:
     """The compiled loop over trajectories."""
-    return load_loop("fastslow.simulation.lanes", "drive_many", _ARGUMENTS, (*SOURCES, *_LANES))
+    return load_loop("fastslow.simulation.lanes", "drive_many", _ARGUMENTS)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
-from fastslow.compiled.series import SHORT
+from fastslow.compiled.series_modes import SHORT
 from fastslow.simulation.events import find_event
 from fastslow.simulation.matrices import factorise_in_place, forgotten_in, solve_in_place
 from fastslow.simulation.polynomials import EPSILON

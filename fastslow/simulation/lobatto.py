@@ -6,7 +6,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from fastslow.compiled.series import COLLOCATION
+from fastslow.compiled.series_modes import COLLOCATION
 
 Array = NDArray[np.float64]
 

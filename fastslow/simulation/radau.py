@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from fastslow.compiled.late import late_function
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import DOUBLES, call_address
-from fastslow.compiled.series import DIRECTIONAL, RATES
+from fastslow.compiled.series_modes import DIRECTIONAL, RATES
 from fastslow.simulation.matrices import factorise_in_place, solve_in_place
 from fastslow.simulation.polynomials import EPSILON
 from fastslow.simulation.scales import NOW, REACHED, ratio_of
@@ -428,12 +428,4 @@ late_radau = late_function(
     "radau_by_pointers",
     "SIGNATURE",
     SIGNATURE,
-    (
-        "fastslow.simulation.matrices",
-        "fastslow.simulation.polynomials",
-        "fastslow.simulation.scales",
-        "fastslow.compiled.parts",
-        "fastslow.compiled.pointers",
-        "fastslow.compiled.series",
-    ),
 )

@@ -63,23 +63,6 @@ _ARGUMENTS = (
     "counted",
     "handed",
 )
-SOURCES = (
-    "fastslow.simulation.collocation",
-    "fastslow.simulation.driver",
-    "fastslow.simulation.events",
-    "fastslow.simulation.extremes",
-    "fastslow.simulation.lobatto",
-    "fastslow.simulation.matrices",
-    "fastslow.simulation.modes",
-    "fastslow.simulation.polynomials",
-    "fastslow.simulation.radau",
-    "fastslow.simulation.rooms",
-    "fastslow.simulation.scales",
-    "fastslow.simulation.implicit_steps",
-    "fastslow.compiled.parts",
-    "fastslow.compiled.pointers",
-    "fastslow.compiled.series",
-)
 
 #: No extremes, hits and times of modes: steps and crossings are listed instead.
 _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
@@ -356,4 +339,4 @@ def error_rules(model: Model, resolved: Resolved, compiled: CompiledSeries) -> N
 
 def drive_loop() -> Callable[..., Any]:
     """The compiled stepping loop."""
-    return load_loop("fastslow.simulation.driver", "drive", _ARGUMENTS, SOURCES)
+    return load_loop("fastslow.simulation.driver", "drive", _ARGUMENTS)

@@ -8,7 +8,7 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastslow.compiled import lane_steps
+from fastslow.compiled import steps
 from fastslow.compiled.lanes import WIDTH
 from fastslow.model.model import Model
 from fastslow.results.ensembles import Ensemble
@@ -248,9 +248,9 @@ def test_an_end_at_once(gear):
 
 
 def test_a_model_too_large_for_lanes_is_that_of_simulate(gear, table, monkeypatch):
-    monkeypatch.setattr(lane_steps, "_LARGEST", 0)
-    monkeypatch.setattr(lane_steps, "_compiled", {})
-    monkeypatch.setattr(ensembles, "steps_of", lane_steps.compile_steps)
+    monkeypatch.setattr(steps, "_LARGEST", 0)
+    monkeypatch.setattr(steps, "_compiled", {})
+    monkeypatch.setattr(ensembles, "steps_of", steps.compile_steps)
     many = many_gears(gear, table, slice(0, 9))
     for i in range(9):
         one = gear.with_parameters(**{name: table[name][i] for name in ("D", "C", "omega")})

@@ -1,0 +1,98 @@
+"""The plain steps of a model, compiled for several trajectories at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fastslow.compiled.series import Equations, equations_of, mode_source
+from fastslow.compiled.store import load_generated
+from fastslow.model.model import Model
+
+_HEADER = '''"""Plain steps of order {order} for {count} regions of {states} states."""
+from numba import cfunc
+
+from fastslow.compiled.lane_steps import plain_steps
+from fastslow.compiled.pointers import SIGNATURE
+
+
+'''
+_ENTRY = """take = plain_steps(({regions}), {signs}, {sizes})
+
+
+@cfunc(SIGNATURE, cache=True, error_model="numpy")
+def steps(mode, inputs, parameters, W):
+    take(mode, inputs, parameters, W)
+"""
+
+#: Larger models are not compiled: rows of all regions times the square of the order. The
+#: instructions are that many, and take half a minute per 100,000 to compile.
+_LARGEST = 50_000
+
+
+@dataclass(frozen=True)
+class CompiledSteps:
+    """The compiled plain steps of a model.
+
+    Parameters
+    ----------
+    address : int
+        Of ``void(int64 region, double* lanes, double* parameters, double* W)``. It
+        takes steps until one of them is not `TAKEN` in every lane. The arrays
+        hold `WIDTH` numbers for each row: ``lanes`` time, states, the rows
+        that `lane_steps` names, the smallest and largest values of every
+        state, and the sizes that the run has reached; ``parameters`` those of the
+        series, the binary logarithm of the tolerance and the rules of sizes; ``W`` is
+        filled with the coefficients of states and slow quantities where a step is
+        `REPORTED`.
+    regions : int
+        How many, the first modes of the series; none for a model that is too large.
+    """
+
+    address: int
+    regions: int
+
+
+#: Of a model whose steps are not taken in lanes: without a series, with special
+#: functions, or too large.
+NO_STEPS = CompiledSteps(0, 0)
+
+_compiled: dict[Any, CompiledSteps] = {}
+
+
+def compile_steps(model: Model, order: int) -> CompiledSteps:
+    """Compile the plain steps of a model, or find them compiled already.
+
+    Parameters
+    ----------
+    model : Model
+    order : int
+        Order of the series.
+    """
+    equations = equations_of(model, order)
+    if equations not in _compiled:
+        _compiled[equations] = _compile(equations)
+    return _compiled[equations]
+
+
+def _compile(equations: Equations) -> CompiledSteps:
+    if equations.without_recurrence:
+        return NO_STEPS
+    n, order = len(equations.parameters), equations.order
+    new = equations.renamed()
+    sources = [mode_source(new, mode) for mode in new.modes]
+    if sum(rows for _, rows in sources) * order**2 > _LARGEST:
+        return NO_STEPS
+    text = _HEADER.format(order=order, count=len(sources), states=len(new.states))
+    for number, (body, _) in enumerate(sources):
+        text += f"def region_{number}(inputs, parameters, W, math):\n"
+        lines = [f"n = {order}", *(f"p{i} = parameters[{i}]" for i in range(n)), *body]
+        text += "".join(f"    {line}\n" for line in lines) + "\n\n"
+    if "special." in text:
+        return NO_STEPS
+    text += _ENTRY.format(
+        regions="".join(f"region_{i}, " for i in range(len(sources))),
+        signs=tuple(mode.signs for mode in new.modes),
+        sizes=(len(new.states), len(new.quantities), n, order),
+    )
+    return CompiledSteps(load_generated(text, "steps").steps.address, len(sources))
