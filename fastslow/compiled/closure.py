@@ -69,17 +69,17 @@ def digest_of_imports(source: str) -> str:
     str
     """
     digest = hashlib.sha256()
-    for module in sorted(closure(source)):
+    for module in sorted(import_closure(source)):
         digest.update(f"{module}\n{_digest(module)}\n".encode())
     return digest.hexdigest()
 
 
-def closure(source: str) -> set[str]:
+def import_closure(source: str) -> set[str]:
     """Names of all modules of this package that a source imports, directly or not.
 
     Examples
     --------
-    >>> sorted(closure("from fastslow.compiled import special"))
+    >>> sorted(import_closure("from fastslow.compiled import special"))
     ['fastslow.compiled', 'fastslow.compiled.parts', 'fastslow.compiled.special']
     """
     found: set[str] = set()

@@ -84,7 +84,7 @@ def test_the_key_changes_with_every_file_of_the_closure_and_with_no_other(copied
     folder, read_again = copied
     before = keys()
     assert len(set(before.values())) == len(KERNELS)
-    members = {kernel: closures.closure(source(kernel)) for kernel in KERNELS}
+    members = {kernel: closures.import_closure(source(kernel)) for kernel in KERNELS}
     for module in sorted(set().union(*members.values()) | {"fastslow.diagrams.tracing"}):
         path = folder / FILES[module].relative_to(ROOT.parent)
         whole = path.read_bytes()
@@ -133,7 +133,7 @@ for kernel in {KERNELS}:
     assert [kernel for kernel, *_ in lines] == KERNELS
     left_out = set()
     for kernel, *loaded in lines:
-        left_out |= set(loaded) - closures.closure(source(kernel))
+        left_out |= set(loaded) - closures.import_closure(source(kernel))
     # only packages above a module are left out, and they hold no code
     for name in left_out - {"fastslow"}:
         assert FILES[name].name == "__init__.py"
@@ -162,10 +162,10 @@ def test_the_imports_that_are_found_are_those_of_the_parser():
 
 def test_closures_of_kernels_hold_no_model_and_no_result():
     for kernel in KERNELS:
-        closure = closures.closure(source(kernel))
+        closure = closures.import_closure(source(kernel))
         assert all(name.split(".")[1:2] in LAYERS for name in closure), kernel
 
 
 def test_a_module_that_is_not_there_is_an_error():
     with pytest.raises(ModuleNotFoundError, match=r"no source of fastslow\.nothing"):
-        closures.closure("from fastslow.nothing import anything")
+        closures.import_closure("from fastslow.nothing import anything")
