@@ -1,7 +1,7 @@
 """Run a campaign: ``python -m tests.campaigns NAME [count] [seed]``.
 
 For ``detection`` a third number is the largest number of states, for ``polynomial_systems`` the
-number of states of all systems.
+number of states of all systems; for ``mutations`` a word is the one layer that is changed.
 """
 
 import sys
@@ -13,6 +13,7 @@ CAMPAIGNS = {
     "crossings": "crossings of random piecewise-linear systems",
     "detection": "special points of random block systems of up to 200 states",
     "overlays": "overlays of known models against SciPy; the counts are numbers of cases",
+    "mutations": "single lines changed at random, each met by the tests of its layer",
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",
     "windows": "branches of random polynomial diagrams with default windows",
 }
@@ -25,7 +26,7 @@ def main(arguments):
         print(f"{__doc__}\n\n{names}")
         return 2
     module = import_module(f"tests.campaigns.{arguments[0]}")
-    report = module.campaign(*map(int, arguments[1:]))
+    report = module.campaign(*(int(a) if a.isdigit() else a for a in arguments[1:]))
     print(report)
     return 1 if report.failures else 0
 

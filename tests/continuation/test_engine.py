@@ -11,9 +11,12 @@ from fastslow.continuation import engine
 from fastslow.continuation.location import (
     branch_point,
     fold,
+    newton,
     turning_pair,
     with_condition,
 )
+from fastslow.continuation.loops import loop
+from fastslow.diagrams.fields import FrozenField
 
 
 @settings(deadline=None)
@@ -60,6 +63,45 @@ def test_no_solution_is_said_not_hidden():
         parabola, lambda u: (u[2] + 1, np.array([0.0, 0, 1])), np.array([1.0, 0, 1]), np.ones(3)
     )
     assert not found.converged
+
+
+@pytest.mark.parametrize("steps", [12, 50])
+def test_what_is_still_a_thousandth_away_has_not_converged(steps):
+    """To the double root of (x − 10⁶)² every step goes half the way: 2⁻¹² are left, or nothing."""
+
+    def double(u):
+        return np.array([(u[0] - 1e6) ** 2])
+
+    def slope(u):
+        return np.array([[2 * (u[0] - 1e6)]])
+
+    z, _, converged, size = newton(double, np.array([1e6 + 1]), np.ones(1), slope, iterations=steps)
+    assert converged == (steps == 50)
+    assert abs(z[0] - 1e6) == pytest.approx(size, rel=1e-6, abs=1e-7)
+
+    found = with_condition(
+        lambda u: (u[1:], np.array([[0.0, 1.0]])),
+        lambda u: (float(double(u)[0]), np.array([float(slope(u)[0, 0]), 0.0])),
+        np.array([1e6 + 1, 0.5]),
+        np.ones(2),
+        iterations=steps,
+    )
+    assert found.converged == (steps == 50)
+
+
+@pytest.mark.parametrize("steps", [12, 50])
+def test_the_compiled_loop_tells_what_has_not_converged(steps):
+    """The same root, of x' = (x − 10⁶)² + p in the plane p = 0."""
+    x, p = sp.symbols("x p")
+    field = FrozenField(fs.Model({x: (x - 10**6) ** 2 + p}, parameters={p: 0}), "p")
+    compiled = field.compiled
+    start, normal = np.array([1e6 + 1, 0.0]), np.array([0.0, 1.0])
+    u, _, _, converged = loop("refine")(
+        compiled.address, 0, field.values, start, np.ones(2), -1, normal, start,
+        compiled.size, compiled.m, steps,
+    )  # fmt: skip
+    assert converged == (steps == 50)
+    assert abs(u[0] - 1e6) < (1e-6 if converged else 1e-3)
 
 
 def spiral(u):

@@ -218,6 +218,17 @@ def test_zero_hopf():
     assert fs.continue_points(point, ("p", "q"), over=over, code="LP").code == "LP"
 
 
+def test_two_real_eigenvalues_of_opposite_sign_are_no_zero_hopf():
+    """x' = p + x² beside y' = (q + 1) y, z' = −z: at q = 0 the sum of two eigenvalues vanishes."""
+    model = fs.Model(turned([p + x**2, (q + 1) * y, -z]), parameters={p: -1, q: -0.5})
+    diagram = fs.continue_equilibria(model, "p", (-1, 0.5))
+    curve = fs.continue_points(diagram.folds[0], ("p", "q"), over={"p": (-1, 1), "q": (-0.5, 1)})
+    assert curve["q"].min() == -0.5
+    assert curve["q"].max() == 1
+    assert np.abs(curve["p"]).max() < 1e-13
+    assert not curve.special("ZH")
+
+
 def test_double_hopf():
     """Two oscillators with growth p and q, coupled by cubic terms: Hopf at p = 0 and q = 0."""
     a, b = x**2 + y**2, z**2 + v**2

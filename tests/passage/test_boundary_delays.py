@@ -174,6 +174,24 @@ def test_the_gap_in_closed_form(gap, c, k, width, s):
     assert law.transit_time == pytest.approx(law.time - c / k, rel=1e-12)
 
 
+def test_a_gap_that_moves_with_the_load():
+    """Between x = ±D + m w, w = −s t, the body lags by s/c² and the far contact comes by m s t.
+
+    D + s t/c² − s t²/(2c) = −D − m s t gives the slow limit t = √(4cD/s) + 1/c + c m.
+    """
+    x, v, w = sp.symbols("x v w")
+    c, k, m, width = 0.5, 4.0, 0.3, 0.25
+    u = x - m * w
+    contact = sp.Piecewise((u - width, u > width), (u + width, u < -width), (0, True))
+    model = fs.Model({x: v, v: w - c * v - k * contact}, parameters={w: 0})
+    s = 1e-6
+    law = gap_transit(gap_point(model, 1), -s)
+    assert law.relaxation == pytest.approx(1 / c + c * m, rel=1e-12)
+    assert law.asymptotic == pytest.approx(2 * math.sqrt(c * width * s) + s * law.relaxation)
+    # what is left out is smaller by √s
+    assert law.delay == pytest.approx(law.asymptotic, abs=s * 0.02)
+
+
 def test_the_gap_is_the_same_from_both_sides(gap):
     down, up = gap_transit(gap_point(gap, 1), -0.01), gap_transit(gap_point(gap, -1), 0.01)
     assert up.delay == pytest.approx(down.delay, rel=1e-13)

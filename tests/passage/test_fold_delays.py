@@ -52,7 +52,7 @@ def test_the_airy_passage_solves_the_riccati_equation(eta):
 
 def test_coefficients_of_the_cusp_in_closed_form(cusp_fold):
     """At x = −1/√3: a = √3, b = 1, c = −1, g = 0, and the whole term of order rate."""
-    for exit_at in (-0.2, 0.5, 0.9):
+    for exit_at in (-0.5, -0.2, 0.5, 0.9):
         law = fold_delay(cusp_fold, 1e-5, level={"x": exit_at})
         assert (law.quadratic, law.slope) == pytest.approx((math.sqrt(3), 1.0), abs=1e-14)
         assert (law.cubic, law.mixed) == pytest.approx((-1.0, 0.0), abs=1e-14)

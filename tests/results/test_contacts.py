@@ -151,3 +151,24 @@ def test_sliding_rests_against_its_side():
     # lifted off the upper stop by ∫ w = 0.2 of the way of 0.5
     swing = stops.with_parameters(B=0.1, C=0.2, D=2)
     assert regime(swing, [0], periods=3) == "unilateral upper"
+
+
+def test_a_crossing_at_the_edge_of_two_parts_counts_in_the_later_one():
+    """x = 2 − 3t/2 falls through 1/2, x = t/4 grows through it: at t = 1 and at t = 2."""
+    y = sp.Symbol("y")
+    levels = {"x": x - sp.Rational(1, 2), "y": y - sp.Rational(1, 2)}
+    model = fs.Model({x: sp.Rational(-3, 2), y: sp.Rational(1, 4)}, interfaces=levels)
+    run = fs.simulate(model, [2, 0], t=(0, 4))
+    assert [(c.interface, c.time) for c in run.crossings] == [("x", 1.0), ("y", 2.0)]
+    for name, direction, time in (("x", -1, 1.0), ("y", 1, 2.0)):
+        assert run.hits(name, direction) == run.hits(name) == 1
+        assert run.hits(name, -direction) == 0
+        assert run.hits(name, until=time) == 0
+        assert run.hits(name, since=time) == 1
+    contacts = run.contacts(period=1)
+    # up and down, of x and of y, from t = 0 to 1, and so on
+    none = [0, 0]
+    assert contacts.per_period.tolist() == [
+        [none, none], [[0, 1], none], [none, [1, 0]], [none, none]
+    ]  # fmt: skip
+    assert contacts.hits.tolist() == [[0, 1], [1, 0]]

@@ -77,6 +77,11 @@ def test_the_end_counts_though_it_misses_by_rounding():
     assert times_of(run.at(x=0.0)) == pytest.approx([np.pi / 2, 1.5 * np.pi], abs=1e-12)
     value = run[-1]["x"]
     assert times_of(run.at(x=value))[-1] == pytest.approx(run.span[1], abs=1e-12)
+    # 1e-9 before the zero is no rounding
+    short = fs.simulate(
+        SWING, [1, 0], t=(0, 1.5 * np.pi - 1e-9), integration=fs.Integration(rtol=1e-14)
+    )
+    assert times_of(short.at(x=0.0)) == pytest.approx([np.pi / 2], abs=1e-12)
 
 
 def test_what_decays_is_never_zero():

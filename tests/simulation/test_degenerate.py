@@ -55,6 +55,15 @@ def test_tiny_drift_from_a_corner(gear, load):
         assert run(20.0)[0] == pytest.approx(expected, abs=1e-14)
 
 
+@pytest.mark.parametrize("drift", [1e-3, 1e-25, -1e-25, -1e-3])
+def test_a_start_on_an_interface_counts_to_the_side_that_it_drifts_to(drift):
+    """However slowly: far below the rounding of x = 1."""
+    model = Model({x: drift}, interfaces={"one": x - 1})
+    run = simulate(model, [1], t=(0, 1))
+    assert run.word == simulate(model, [2 if drift > 0 else 0], t=(0, 1)).word
+    assert not run.crossings
+
+
 @pytest.mark.parametrize("load", [1e-13, 1e-14, 1e-15, 1e-16, 1e-18])
 def test_a_continuous_model_always_goes_on(gear, load):
     # contacts of the size of rounding: which ones is anyone's guess, but the state keeps to tol

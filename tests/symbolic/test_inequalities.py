@@ -73,6 +73,14 @@ def test_fold_of_the_gear(a, d):
         assert bool(condition.subs({A: a, D: d})) == numeric
 
 
+def test_a_root_of_a_negative_number_is_not_positive():
+    """2 − √A > 0 for 0 ≤ A < 4, and 2 + √A for A ≥ 0."""
+    below, above = (positive(2 + s * sp.sqrt(A), Signs({}), [A]) for s in (-1, 1))
+    for value in (-5, -1, 0, 1, 3, 4, 5):
+        assert bool(below.subs(A, value)) == (0 <= value < 4)
+        assert bool(above.subs(A, value)) == (value >= 0)
+
+
 def test_products_and_quotients():
     both = positive(A * B, Signs({}))
     for a in (-1, 1):
