@@ -23,6 +23,7 @@ import tempfile
 import time
 import tomllib
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -51,16 +52,8 @@ LONGEST = 3000
 NOT_IMPORTED = 77
 
 #: What is imported once, for every process that runs tests.
-HEAVY = ("matplotlib.backends.backend_agg", "matplotlib.figure", "mpmath", "numba")
-HEAVY += (
-    "numpy",
-    "pandas",
-    "pytest",
-    "scipy.integrate",
-    "scipy.optimize",
-    "scipy.special",
-    "sympy",
-)
+HEAVY = ("matplotlib.backends.backend_agg", "matplotlib.figure", "mpmath", "numba", "numpy")
+HEAVY += ("pandas", "pytest", "scipy.integrate", "scipy.optimize", "scipy.special", "sympy")
 
 
 @dataclass(frozen=True)
@@ -165,9 +158,8 @@ def random_mutants(layer: str, count: int, seed: int) -> list[Mutant]:
     generator = random.Random(f"{layer} {seed}")
     by_line: dict[tuple[Path, int], list[Change]] = {}
     sources = {}
-    for path in sorted(
-        [*ROOT.glob(f"fastslow/{layer}/**/*.py"), *ROOT.glob(f"fastslow/{layer}.py")]
-    ):
+    inside, alone = ROOT.glob(f"fastslow/{layer}/**/*.py"), ROOT.glob(f"fastslow/{layer}.py")
+    for path in sorted([*inside, *alone]):
         sources[path] = path.read_text(encoding="utf-8")
         for change in changes_of(sources[path]):
             by_line.setdefault((path, change.line), []).append(change)
@@ -246,11 +238,9 @@ class Tree:
         assert process.pid is not None
         process.join(LONGEST)
         hangs = process.is_alive() or process.exitcode == -signal.SIGPROF
-        try:
+        with suppress(ProcessLookupError):
             # what tests have started as well
             os.killpg(process.pid, signal.SIGKILL)
-        except ProcessLookupError:
-            pass
         process.join()
         if process.exitcode == NOT_IMPORTED:
             return "not importable", ""
