@@ -12,6 +12,7 @@ import csv
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from functools import partial
+from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryFile
 
@@ -34,6 +35,7 @@ from analyses.cases import draw, laid_cases
 from analyses.claims_page import SOURCES, all_claims, page, write_docs
 from analyses.output import FORMATS, Output
 from analyses.passages import OMEGA, PERIODS, Row, row
+from fastslow.disk import write_text
 from fastslow.systems.gears import SCALINGS
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -56,10 +58,11 @@ def table(rows: Sequence[Row | regime_maps.MapRow]) -> str:
 
 def write(rows: Sequence[Row | regime_maps.MapRow], path: Path) -> None:
     """Write rows as comma-separated values."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [f.name for f in fields(rows[0])])
-        writer.writeheader()
-        writer.writerows(asdict(row) for row in rows)
+    text = StringIO(newline="")
+    writer = csv.DictWriter(text, [f.name for f in fields(rows[0])])
+    writer.writeheader()
+    writer.writerows(asdict(row) for row in rows)
+    write_text(path, text.getvalue())
 
 
 def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
@@ -150,7 +153,7 @@ def main(arguments: Sequence[str] | None = None) -> list[Row]:
     rows = [row(case) for case in (*cases, negative_stiffness.case())]
     write(rows, folder / "summary.csv")
     write(maps, folder / "regime_maps.csv")
-    (folder / "index.md").write_text(page(all_claims(), ""), encoding="utf-8")
+    write_text(folder / "index.md", page(all_claims(), ""))
     if docs:
         write_docs(folder, DOCS)
     print(f"\n{table(rows)}\n\n{table(maps)}\n")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 
 from PIL import Image
@@ -23,6 +24,7 @@ from analyses import (
 )
 from analyses.claims import VERDICTS, Claim, table
 from analyses.output import SHOWN
+from fastslow.disk import write_file, write_text
 
 SOURCES = (
     dead_zone,
@@ -271,10 +273,12 @@ def write_docs(drawn: Path, docs: Path) -> None:
     """
     claims = all_claims()
     (docs / "figures").mkdir(parents=True, exist_ok=True)
-    (docs / "claims.md").write_text(page(claims, "figures/"), encoding="utf-8")
+    write_text(docs / "claims.md", page(claims, "figures/"))
     for name in dict.fromkeys(name for claim in claims for name in claim.figures):
         few = shrunk(drawn / f"{name}.png").quantize(200)
-        few.save(docs / "figures" / f"{name}.png", optimize=True)
+        stream = BytesIO()
+        few.save(stream, format="PNG", optimize=True)
+        write_file(docs / "figures" / f"{name}.png", stream.getvalue())
 
 
 def shrunk(path: Path) -> Image.Image:

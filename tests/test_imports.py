@@ -29,6 +29,7 @@ LAYERS = [
     "symbolic",
     "model",
     "results",
+    "disk",
     "arguments",
     "errors",
 ]
@@ -90,6 +91,7 @@ def test_third_parties_stay_in_their_layers(path):
         assert foreign <= {"matplotlib", "numpy"}
         assert {n.split(".")[1] for n in modules_of(path) if n.startswith("fastslow.")} <= {
             "arguments",
+            "disk",
             "errors",
             "plot",
             "results",

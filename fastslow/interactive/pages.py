@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 from collections.abc import Mapping
 from html import escape
@@ -15,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
-from fastslow.errors import ArgumentError, FastSlowError, FileError, unknown_name
+from fastslow.disk import write_text
+from fastslow.errors import ArgumentError, FastSlowError, unknown_name
 from fastslow.interactive.frames import Store, frame_of, letters, looks
 from fastslow.interactive.sliders import VALUES, Slider
 from fastslow.interactive.views import at_start, view_of
@@ -41,7 +41,7 @@ def write_page(
     """Compute all frames and write the page; see `Explorer.export`."""
     data = page_data(explorer, sliders, source, most, progress)
     heading = title or f"Model of {', '.join(explorer.model.states)}"
-    _write(path, page_text(heading, data))
+    write_text(path, page_text(heading, data))
     return path
 
 
@@ -133,15 +133,3 @@ def _frame(explorer: Explorer, values: Mapping[str, float], store: Store) -> dic
 
 def _closest(values: list[float], value: float) -> int:
     return min(range(len(values)), key=lambda k: abs(values[k] - value))
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a file whole or not at all."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        beside.write_text(text, encoding="utf-8")
-        beside.replace(path)
-    except OSError as error:
-        raise FileError(f"{path} cannot be written: {error.strerror or error}") from error
-    finally:
-        beside.unlink(missing_ok=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fastslow.arguments import word
-from fastslow.errors import ArgumentError, FileError, unknown_name
+from fastslow.disk import write_file
+from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.point_types import POINT_TYPES
 
 # M. Okabe and K. Ito, Color Universal Design, 2008
@@ -297,12 +299,10 @@ def root(ax: Axes) -> Figure:
 def save(figure: Figure, path: str | Path, dpi: float = 300) -> Path:
     """Write a figure with fonts that editors and journals can read."""
     target = Path(path)
-    word("figure format", sorted(figure.canvas.get_supported_filetypes()))(
-        "path", target.suffix.removeprefix(".").lower()
-    )
-    try:
-        with rc_context({"pdf.fonttype": 42, "svg.fonttype": "none"}):
-            figure.savefig(target, dpi=dpi)
-    except OSError as error:
-        raise FileError(f"{target} cannot be written: {error.strerror or error}") from error
+    ending = target.suffix.removeprefix(".").lower()
+    word("figure format", sorted(figure.canvas.get_supported_filetypes()))("path", ending)
+    stream = BytesIO()
+    with rc_context({"pdf.fonttype": 42, "svg.fonttype": "none"}):
+        figure.savefig(stream, format=ending, dpi=dpi)
+    write_file(target, stream.getvalue())
     return target

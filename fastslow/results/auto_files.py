@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import mapping, path, takes, text
 from fastslow.errors import FileError, unknown_name
-from fastslow.results.auto_text import AutoCurve, eigenvalues_of, parameters_of, sections_of
+from fastslow.results.auto_text import (
+    MOST_PARAMETERS,
+    AutoCurve,
+    eigenvalues_of,
+    parameters_of,
+    sections_of,
+)
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import Diagram
 from fastslow.results.outcome import Outcome
@@ -174,7 +180,7 @@ class _Names:
     def _parameters(self) -> tuple[str, ...]:
         constants = self.section.constants
         given = constants.get("parnames", {})
-        count = max([constants.get("NPAR", 0), *given])
+        count = min(max([constants.get("NPAR", 0), *given]), MOST_PARAMETERS)
         return tuple(str(given.get(k, f"PAR({k})")) for k in range(1, count + 1))
 
     @property
@@ -257,13 +263,15 @@ def _outcome(kind: int, parameter: str, value: float) -> Outcome:
 
 def _tangents(points: Array) -> Array:
     """Unit tangents of a curve by differences of second order along it, shape (N, k)."""
+    # in a unit in which no square overflows, by a power of two that changes no digit
+    points = np.ldexp(points, -np.frexp(np.abs(points).max(initial=0.0))[1])
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    distinct = np.append(True, length > 0)
+    distinct = np.append(True, length > 1e-150)
     place = np.cumsum(np.append(0.0, length))[distinct]
     slopes = np.zeros_like(points)
-    if len(place) > 1:
+    if len(place) > 1 and (np.diff(place) > 0).all():
         found = np.gradient(points[distinct], place, axis=0, edge_order=2 if len(place) > 2 else 1)
         slopes = found[np.cumsum(distinct) - 1]
-    else:
-        slopes[:, -1] = 1.0
-    return np.asarray(slopes / np.linalg.norm(slopes, axis=1, keepdims=True))
+    sizes = np.linalg.norm(slopes, axis=1, keepdims=True)
+    slopes[sizes[:, 0] == 0, -1] = 1.0
+    return np.asarray(slopes / np.where(sizes == 0, 1.0, sizes))

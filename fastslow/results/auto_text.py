@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.disk import read_file
 from fastslow.errors import FileError
 
 Array = NDArray[np.float64]
@@ -25,6 +26,9 @@ WIDTH = 19
 
 #: What begins a row: branch, point, type and label.
 LEADING = 4
+
+#: Parameters that a file may name; AUTO has 36 unless it was built with more.
+MOST_PARAMETERS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +77,7 @@ def lines_of(path: Path) -> list[str]:
     FileError
         When it cannot be read.
     """
-    try:
-        return path.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
-        raise FileError(f"{path} cannot be read: {error.strerror or error}") from error
+    return read_file(path).decode("utf-8", "replace").splitlines()
 
 
 def sections_of(path: Path) -> list[AutoCurve]:
@@ -113,14 +114,16 @@ def _header(now: _Reading, line: str) -> None:
         # the window of the plot begins the header of a new run
         now.constants = {}
         return
-    for name, value in re.findall(r"(\w+)\s*=\s*(-?\d+)(?![\d.E])", text):
+    for name, value in re.findall(r"(\w+)\s*=\s*(-?\d{1,9})(?![\d.E])", text):
         now.constants[name] = int(value)
     named = re.match(r"(parnames|unames)\s*=\s*(\{.*\})", text)
     if named:
         try:
-            now.constants[named[1]] = dict(ast.literal_eval(named[2]))
-        except (ValueError, SyntaxError, TypeError):
+            names = dict(ast.literal_eval(named[2]))
+        except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
             return
+        if all(isinstance(k, int) and 0 < k <= MOST_PARAMETERS for k in names):
+            now.constants[named[1]] = names
 
 
 def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
@@ -146,6 +149,16 @@ def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
             )
         values.append([real(word, path) for word in row])
     table = np.array(values)
+    if not (np.abs(table[:, :LEADING]) < 2**31).all():
+        raise FileError(
+            f"{where}: a branch, point, type or label is no number of AUTO-07p; the file is damaged"
+        )
+    if not np.isfinite(table).all():
+        row = int(np.nonzero(~np.isfinite(table).all(axis=1))[0][0])
+        raise FileError(
+            f"{path}, row {row + 1} after line {now.line - 1}: a number is not finite; AUTO-07p "
+            "lost the curve there, or the file is damaged; remove that row to read the others"
+        )
     whole = table[:, :LEADING].astype(np.int64)
     yield AutoCurve(
         dict(now.constants),
@@ -208,9 +221,9 @@ def parameters_of(path: Path) -> dict[int, Array]:
             head = [int(word) for word in words]
             label, parts, rows, count = head[3], head[6], head[8], head[11]
         except (ValueError, IndexError):
-            raise FileError(
-                f"{path}, line {at + 1}: expected the header of a solution of AUTO-07p"
-            ) from None
+            head, rows, count = [], 0, 0
+        if rows < 1 or not 0 <= count <= MOST_PARAMETERS:
+            raise FileError(f"{path}, line {at + 1}: expected the header of a solution of AUTO-07p")
         block = [word for line in lines[at + 1 : at + 1 + rows] for word in line.split()]
         if at + rows >= len(lines) or len(block) < count:
             raise FileError(f"{path} is cut short: the solution with label {label} is not whole")

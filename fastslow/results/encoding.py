@@ -128,6 +128,8 @@ def _bits(value: float) -> bytes:
 
 def _small(node: dict[str, Any]) -> Array:
     numbers = [_NUMBERS[v] if isinstance(v, str) else v for v in node["numbers"]]
+    if node["dtype"] not in INLINE:
+        raise BrokenError(f"it holds numbers of type {str(node['dtype'])[:40]}")
     kind = np.dtype(node["dtype"])
     if kind.kind == "c":
         return np.array(numbers, dtype=np.float64).view(kind).reshape(node["shape"])

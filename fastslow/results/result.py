@@ -18,14 +18,16 @@ class Result:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write this to a file that `fastslow.load` reads back bit for bit.
 
-        The file takes its place whole or not at all. What lives only in this
-        process (the model behind a diagram, which corrects what is read off it)
-        is not kept.
+        The file is written whole or not at all; a symbolic link is followed, and a
+        file that exists keeps its permission bits. A checksum of the content is at
+        its end. What lives only in this process (the model behind a diagram, which
+        corrects what is read off it) is not kept.
 
         Parameters
         ----------
         path : str or path
-            Ends in ``.npz``, or in ``.nc`` for NetCDF (extra ``data``).
+            Ends in ``.npz``, or in ``.nc`` for NetCDF (extra ``data``), in small or
+            capital letters.
 
         Raises
         ------

@@ -13,6 +13,7 @@ from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.str import StrPrinter
 
 from fastslow.arguments import instance, mapping, path, takes, text
+from fastslow.disk import reason, write_text
 from fastslow.errors import ArgumentError, FileError, unknown_name
 from fastslow.model.interfaces import Region
 from fastslow.model.model import Model, number
@@ -136,10 +137,10 @@ def export(
         folder = Path(path)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            for name, text in files.items():
-                (folder / name).write_text(text, encoding="utf-8")
         except OSError as error:
-            raise FileError(f"{folder} cannot be written: {error.strerror or error}") from error
+            raise FileError(f"{folder} cannot be written: {reason(error)}") from error
+        for name, text in files.items():
+            write_text(folder / name, text)
     return Named("file", files)
 
 

@@ -12,6 +12,7 @@ from importlib import import_module
 CAMPAIGNS = {
     "crossings": "crossings of random piecewise-linear systems",
     "detection": "special points of random block systems of up to 200 states",
+    "files": "damaged files of every kind of result, and of AUTO-07p; so many of each format",
     "overlays": "overlays of known models against SciPy; the counts are numbers of cases",
     "mutations": "single lines changed at random, each met by the tests of its layer",
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",

@@ -53,17 +53,13 @@ def test_anything_of_plain_data_comes_back_bit_for_bit(same, tree):
 
 
 @given(tree=trees)
-@settings(
-    max_examples=60,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
-)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 @pytest.mark.parametrize(
     ("write", "load"), [(write_archive, read_archive), (write_netcdf, read_netcdf)]
 )
-def test_files_keep_every_bit(same, tmp_path, write, load, tree):
+def test_files_keep_every_bit(same, write, load, tree):
     holder = {"kept": tree}
     arrays = {}
     text = json.dumps(encoded(holder, "x", arrays), allow_nan=False)
-    write(tmp_path / "file", text, arrays)
-    again = load(tmp_path / "file", lambda text, array: decoded(json.loads(text), array))
+    again = load(write(text, arrays), lambda text, array: decoded(json.loads(text), array))
     assert same(holder, again)
