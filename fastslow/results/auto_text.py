@@ -154,9 +154,9 @@ def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
             f"{where}: a branch, point, type or label is no number of AUTO-07p; the file is damaged"
         )
     if not np.isfinite(table).all():
-        row = int(np.nonzero(~np.isfinite(table).all(axis=1))[0][0])
+        first = int(np.nonzero(~np.isfinite(table).all(axis=1))[0][0])
         raise FileError(
-            f"{path}, row {row + 1} after line {now.line - 1}: a number is not finite; AUTO-07p "
+            f"{path}, row {first + 1} after line {now.line - 1}: a number is not finite; AUTO-07p "
             "lost the curve there, or the file is damaged; remove that row to read the others"
         )
     whole = table[:, :LEADING].astype(np.int64)

@@ -10,6 +10,7 @@ what the HDF5 library does with them.
 from __future__ import annotations
 
 import random
+import re
 import resource
 import select
 import struct
@@ -185,11 +186,11 @@ def number_changed(generator, content):
 
 def constant_changed(generator, content):
     """A constant in the header of AUTO is another one."""
-    names = [b"NDIM", b"NPAR", b"IPS", b"ISW", b"ILP", b"NTST"]
-    name = generator.choice(names)
+    name = generator.choice([b"NDIM", b"NPAR", b"IPS", b"ISW", b"ILP", b"NTST"])
     value = generator.choice([b"-1", b"0", b"2", b"999999999", b"9" * 5000])
-    head, found, rest = content.partition(name + b" =")
-    return head + found + b" " + value + b" " + rest.lstrip()[1:] if found else content + b" 0\n"
+    return re.sub(
+        name + rb" *= *-?\d+", name + b"= " + value, content, count=generator.choice((0, 1))
+    )
 
 
 def lines_changed(generator, content):

@@ -8,6 +8,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.results.auto_files import _tangents
 
 DATA = Path(__file__).parent / "data"
 
@@ -162,3 +163,41 @@ def test_what_cannot_be_read(tmp_path, fhn):
         fs.read_auto(DATA / "b.fhn", parameter="v")
     with pytest.raises(fs.FastSlowError, match="no model"):
         fs.continue_points(fhn.folds[0], ("w", "b"), over={"w": (0, 1), "b": (1, 3)})
+
+
+def damaged(folder, kind="b", **changes):
+    """A copy of the files of fhn with words replaced in one of them."""
+    for letter in "bsd":
+        text = (DATA / f"{letter}.fhn").read_text()
+        if letter == kind:
+            for old, new in changes.items():
+                assert old in text
+                text = text.replace(old, new, 1)
+        (folder / f"{letter}.fhn").write_text(text)
+    return folder / "b.fhn"
+
+
+def test_impossible_numbers_are_refused_or_left_out(tmp_path, fhn):
+    """Each ended in a raw error, in a warning, or not at all."""
+    last = (DATA / "b.fhn").read_text().splitlines()[-1]
+    _, point, *_, number = last.split()
+    for new in ("nan", "1E+999"):
+        with pytest.raises(fs.FileError, match=r"a number is not finite; .* remove that row"):
+            fs.read_auto(damaged(tmp_path, **{number: new}))
+    with pytest.raises(fs.FileError, match="is no number of AUTO-07p; the file is damaged"):
+        fs.read_auto(damaged(tmp_path, **{last: last.replace(point, "9" * 30, 1)}))
+    long = fs.read_auto(damaged(tmp_path, **{"NPAR=   4": f"NPAR= {'9' * 5000}"}))
+    many = fs.read_auto(damaged(tmp_path, **{"NPAR=   4": "NPAR= 999999999"}))
+    assert len(long[0]) == len(many[0]) == len(fhn[0])
+    deep = fs.read_auto(damaged(tmp_path, **{"parnames = {": "parnames = {" + "(" * 9999}))
+    assert len(deep[0]) == len(fhn[0])
+    head = (DATA / "s.fhn").read_text().splitlines()[0].split()
+    back = "  ".join([*head[:8], "-1", *head[9:]])
+    with pytest.raises(fs.FileError, match="line 1: expected the header of a solution"):
+        fs.read_auto(damaged(tmp_path, "s", **{(DATA / "s.fhn").read_text().splitlines()[0]: back}))
+
+
+def test_tangents_of_extreme_points():
+    points = np.array([[1e308, 0.0], [-1e308, 0.0], [5e-324, 1e-300], [5e-324, 1e-300]])
+    assert np.allclose(np.linalg.norm(_tangents(points), axis=1), 1)
+    assert np.allclose(_tangents(np.zeros((3, 2))), [0, 1])
