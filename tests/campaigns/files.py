@@ -274,7 +274,7 @@ class Worker:
         self.process: subprocess.Popen[str] | None = None
 
     def outcome(self, kind: str, path: Path, original: Path) -> tuple[str, float, int]:
-        """What became of a file, the seconds it took, and the growth of the process in bytes."""
+        """What became of a file, the processor time it took, and the growth in bytes."""
         if self.process is None:
             self.process = subprocess.Popen(
                 [sys.executable, "-c", "from tests.campaigns.files import work; work()"],
@@ -318,7 +318,7 @@ def work() -> None:
     for line in sys.stdin:
         kind, path, original = line.rstrip("\n").split("\t")
         expected = whole(original) if kind == "result" else None
-        started = time.perf_counter()
+        started = time.process_time()
         try:
             if kind == "result":
                 outcome = "identical" if same(expected, fs.load(path)) else "different"
@@ -330,7 +330,7 @@ def work() -> None:
             outcome = "refused for want of memory" if short else "refused"
         except BaseException as error:
             outcome = f"{type(error).__name__}: {str(error)[:120]!r}"
-        seconds = time.perf_counter() - started
+        seconds = time.process_time() - started
         grown = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
         print(outcome, seconds, grown, sep="\t", flush=True)
 
