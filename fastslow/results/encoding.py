@@ -8,6 +8,7 @@ Text and numbers become JSON; arrays are kept beside it under names such as
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
@@ -118,12 +119,17 @@ def _array(value: Array, path: str, arrays: dict[str, Array]) -> Any:
 
 
 def _name(value: float) -> str:
-    """The key in `_NUMBERS` of a float that is not finite; ``repr`` forgets the sign of NaN."""
-    return next(n for n, v in _NUMBERS.items() if _bits(v) == _bits(value) or n == repr(value))
+    """The key in `_NUMBERS` of a float that is not finite, or the bytes of any other NaN."""
+    known = (name for name, one in _NUMBERS.items() if _bits(one) == _bits(value))
+    return next(known, _bits(value).hex())
 
 
 def _bits(value: float) -> bytes:
-    return np.float64(value).tobytes()
+    return struct.pack("<d", value)
+
+
+def _float(name: str) -> float:
+    return _NUMBERS[name] if name in _NUMBERS else struct.unpack("<d", bytes.fromhex(name))[0]
 
 
 def _small(node: dict[str, Any]) -> Array:
@@ -189,7 +195,7 @@ def decoded(node: Any, arrays: Arrays) -> Any:
         return node
     try:
         return _built(node, arrays)
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, struct.error) as error:
         raise BrokenError(f"it does not read as a result ({error!r})") from None
 
 
@@ -204,7 +210,7 @@ def _built(node: dict[str, Any], arrays: Arrays) -> Any:
     if "numbers" in node:
         return _small(node)
     if "float" in node:
-        return _NUMBERS[node["float"]]
+        return _float(node["float"])
     if "complex" in node:
         return complex(*(decoded(part, arrays) for part in node["complex"]))
     if "mapping" in node:

@@ -19,7 +19,7 @@ import hashlib
 import math
 import zipfile
 from collections.abc import Callable, Mapping
-from io import BytesIO
+from io import SEEK_END, BytesIO
 from typing import Any
 
 import numpy as np
@@ -51,7 +51,7 @@ def sealed(content: bytes) -> bytes:
     --------
     >>> check_seal(sealed(b"1.5"))
     """
-    return content + _seal(content)
+    return _sealed(BytesIO(content), len(content))
 
 
 def check_seal(content: bytes) -> None:
@@ -72,6 +72,15 @@ def check_seal(content: bytes) -> None:
         raise FileError("is damaged: its content is not what its checksum was computed of")
 
 
+def _sealed(stream: BytesIO, size: int) -> bytes:
+    """Put the checksum behind so many bytes; nothing is copied, as results can be large."""
+    with stream.getbuffer() as content:
+        seal = _seal(content[:size])
+    stream.seek(size)
+    stream.write(seal)
+    return stream.getvalue()
+
+
 def _seal(content: bytes | memoryview) -> bytes:
     return SEAL + hashlib.sha256(content).hexdigest().encode()
 
@@ -85,7 +94,7 @@ def write_archive(text: str, arrays: Mapping[str, Array]) -> bytes:
             entry = zipfile.ZipInfo(f"{name}.npy")
             with archive.open(entry, "w", force_zip64=True) as member:
                 np.lib.format.write_array(member, array, allow_pickle=False)
-    return sealed(stream.getvalue()[:-SEAL_SIZE])
+    return _sealed(stream, stream.seek(0, SEEK_END) - SEAL_SIZE)
 
 
 def read_archive(content: bytes, use: Use) -> Any:
@@ -140,7 +149,7 @@ def write_netcdf(text: str, arrays: Mapping[str, Array]) -> bytes:
                 _write_variable(file, f"{name}_imag", array.imag)
             else:
                 _write_variable(file, name, array)
-    return sealed(stream.getvalue())
+    return _sealed(stream, stream.seek(0, SEEK_END))
 
 
 def _write_variable(file: Any, name: str, array: Array) -> None:

@@ -1,6 +1,7 @@
 """Plain data as text and arrays, and back, bit for bit."""
 
 import json
+import struct
 
 import numpy as np
 import pytest
@@ -63,3 +64,11 @@ def test_files_keep_every_bit(same, write, load, tree):
     text = json.dumps(encoded(holder, "x", arrays), allow_nan=False)
     again = load(write(text, arrays), lambda text, array: decoded(json.loads(text), array))
     assert same(holder, again)
+
+
+@pytest.mark.parametrize("bits", ["7ff8000000000001", "fff8000000000000", "7ff0000000000001"])
+def test_every_nan_keeps_its_bits(bits):
+    (value,) = struct.unpack(">d", bytes.fromhex(bits))
+    text = json.dumps(encoded([value, complex(value, 0)], "", {}), allow_nan=False)
+    again = decoded(json.loads(text), None)
+    assert [struct.pack(">d", v).hex() for v in (again[0], again[1].real)] == [bits] * 2
