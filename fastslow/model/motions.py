@@ -324,16 +324,22 @@ def _vanishes(expression: sp.Expr, heights: Sequence[sp.Expr]) -> bool:
     if expression == 0:
         return True
     left = list(heights)
-    while len(left) > 1:
-        height = left.pop(0)
+    while len(left) > 1 and (solved := _solved(left)) is not None:
+        number, symbol, root = solved
+        del left[number]
+        expression = expression.subs(symbol, root)
+        left = [h.subs(symbol, root) for h in left]
+    return any(vanishes_on(expression, height) for height in left)
+
+
+def _solved(heights: Sequence[sp.Expr]) -> tuple[int, sp.Symbol, sp.Expr] | None:
+    """The first function that is affine in a symbol: its number, the symbol, and its root."""
+    for number, height in enumerate(heights):
         for symbol in sorted(height.free_symbols, key=lambda s: s.name):
             slope = height.diff(symbol)
             if slope != 0 and symbol not in slope.free_symbols:
-                root = sp.expand(symbol - height / slope)
-                expression = expression.subs(symbol, root)
-                left = [h.subs(symbol, root) for h in left]
-                break
-    return vanishes_on(expression, left[0])
+                return number, symbol, sp.expand(symbol - height / slope)
+    return None
 
 
 def _determinant(matrix: sp.Matrix) -> sp.Expr:

@@ -145,3 +145,11 @@ def test_functions_with_infinitely_many_jumps(function):
         fs.Model({state: -function(state)})
     # of a parameter it is a number
     assert fs.Model({state: -function(rate) * state}, parameters={rate: 2.5}).states == ("x",)
+
+
+@pytest.mark.parametrize(
+    "condition", [sp.Contains(x, sp.Interval(0, 1)), ~sp.Contains(x, sp.S.Naturals)]
+)
+def test_a_condition_that_is_no_inequality(condition):
+    with pytest.raises(fs.ModelError, match="cannot read the condition Contains"):
+        fs.Model({x: sp.Piecewise((x, condition), (-x, True))})

@@ -8,7 +8,7 @@ import fastslow as fs
 from fastslow.compiled.series import compile_series
 from fastslow.diagrams.modes import modes_of
 from fastslow.model.interfaces import vanishes_on
-from fastslow.model.motions import motions_of
+from fastslow.model.motions import _vanishes, motions_of
 
 x, y, z, v, p = sp.symbols("x y z v p", real=True)
 
@@ -129,3 +129,12 @@ def test_decimal_numbers_make_sums_of_jumps(count):
         }  # fmt: skip
         expected = dict(zip(map(str, states), np.linalg.solve(jumps, -base), strict=True))
         assert weights == pytest.approx(expected, rel=1e-13, abs=1e-15)
+
+
+def test_what_vanishes_where_several_functions_do():
+    """x² − 4 where x = y and y² = 4; the order in which they are given does not matter."""
+    heights = [x - y, y**2 - 4]
+    for given in (heights, heights[::-1]):
+        assert _vanishes(x**2 - 4, given)
+        assert _vanishes(x * y - 4, given)
+        assert not _vanishes(x**2 - 3, given)

@@ -42,3 +42,10 @@ def test_length_is_counted_in_pixels_and_not_across_gaps():
     (line,) = ax.plot([0, 1, np.nan, 4, 6], [0, 0, np.nan, 0, 0])
     one = np.diff(ax.transData.transform([(0, 0), (1, 0)]), axis=0)[0, 0]
     np.testing.assert_allclose(length_along(line) / one, [0, 1, 1, 1, 3], atol=1e-9)
+
+
+def test_heads_are_drawn_before_the_axes_know_their_limits():
+    """A curve that was just drawn lies inside of the axes, though no limit has been set."""
+    ax = Figure().add_subplot()
+    (line,) = ax.plot(np.linspace(100, 300, 201), np.linspace(-7, -5, 201))
+    assert len(draw_heads(line, [50, 100])) == 2

@@ -6,7 +6,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.results.regimes import REGIMES
+from fastslow.results.regimes import REGIMES, in_words
 
 x, v, w, t = sp.symbols("x v w t")
 D, k, a, B, C, omega = sp.symbols("D k a B C omega")
@@ -172,3 +172,12 @@ def test_a_crossing_at_the_edge_of_two_parts_counts_in_the_later_one():
         [none, none], [[0, 1], none], [none, [1, 0]], [none, none]
     ]  # fmt: skip
     assert contacts.hits.tolist() == [[0, 1], [1, 0]]
+
+
+def test_a_regime_in_words():
+    assert in_words("bilateral", ["bilateral"]) == "bilateral in the last period"
+    assert in_words("free", ["free"] * 4) == "free in each of the last 4 periods"
+    mixed = ["free", "bilateral", "bilateral", "bilateral"]
+    told = "chaotic: bilateral in 75.0 %, free in 25.0 % of the last 4 periods"
+    assert in_words("chaotic", mixed) == told
+    assert in_words("chaotic", ["free"] * 2) == "chaotic: free in 100.0 % of the last 2 periods"

@@ -1,0 +1,68 @@
+"""Quotients of polynomials with roots: the same value, nothing common left."""
+
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fastslow.model.rational import exact, quotient
+
+x, y, a, b = sp.symbols("x y a b", positive=True)
+
+#: Positive everywhere, with square and cube roots of sums.
+CASES = [
+    (x + a) ** 3 / (x + a),
+    x ** sp.Rational(3, 2) / sp.sqrt(x),
+    sp.sqrt(x + a) ** 3 / (x + a),
+    1 / (sp.sqrt(x) - sp.sqrt(a + x + 1)),
+    (x * y + a) ** -2 - (x * y - a - 50) ** -2,
+    1 / (x + sp.sqrt(a)) + 1 / (x + 3 * sp.sqrt(a)),
+    (x + 1) ** sp.Rational(2, 3) * (x + 1) ** sp.Rational(1, 3),
+    (a - 7 * b) / (x * (a + b)) + sp.Rational(2, 3) * b / x,
+    x**-3 + (a + b) ** 4 / x,
+    (x + a) ** sp.Rational(5, 7) + 1 / (x + a) ** sp.Rational(2, 7),
+]
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+@settings(max_examples=5, deadline=None)
+@given(st.tuples(*[st.fractions(sp.Rational(1, 9), 9, max_denominator=20)] * 4))
+def test_the_value_stays(case, place):
+    found = quotient(case)
+    at = {s: sp.Rational(v) for s, v in zip((x, y, a, b), place, strict=True)}
+    whole = (found.numerator.as_expr() / found.denominator.as_expr()).subs(at)
+    expected = case.subs(at).n(30)
+    for form in (whole, found.expanded().subs(at), found.factored().subs(at)):
+        assert abs(form.n(30) - expected) <= sp.Float("1e-20") * (1 + abs(expected))
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        ((x**2 - a**2) / (x - a), x + a),
+        (x ** sp.Rational(3, 2) / sp.sqrt(x), x),
+        (sp.sqrt(x + a) ** 4 / (x + a) - x, a),
+        ((x + 1) ** sp.Rational(2, 3) * (x + 1) ** sp.Rational(1, 3), x + 1),
+        ((x + a) ** 5 / (x + a) ** 3, x**2 + 2 * a * x + a**2),
+    ],
+)
+def test_what_cancels_is_gone(expression, expected):
+    found = quotient(expression)
+    assert found.denominator == 1
+    assert sp.expand(found.expanded() - expected) == 0
+
+
+def test_one_square_root_goes_to_the_numerator():
+    """(x + 2√a)/(x + √a) = (x² + x√a − 2a)/(x² − a)."""
+    found = quotient((x + 2 * sp.sqrt(a)) / (x + sp.sqrt(a)))
+    assert found.denominator.as_expr() == x**2 - a
+    assert sp.expand(found.numerator.as_expr() - (x**2 + x * sp.sqrt(a) - 2 * a)) == 0
+
+
+def test_what_is_no_quotient_or_too_long():
+    assert quotient(sp.sin(x) + 1) is None
+    assert quotient((x + a) ** 25) is None
+    assert quotient((x + a) ** 24 / (x + a) ** 23) is not None
+    assert quotient(x**25) is not None
+    assert quotient(sp.Add(*sp.symbols("c0:1600"))) is None
+    assert exact(0.25 * x + sp.Float("0.1")) == x / 4 + sp.Rational(1, 10)
