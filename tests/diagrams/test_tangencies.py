@@ -80,6 +80,16 @@ def test_an_equation_that_is_no_polynomial():
     assert found[0].second_derivative == pytest.approx(2, rel=1e-14)
 
 
+@pytest.mark.parametrize(("degree", "coverage"), [(5, "complete"), (61, "found")])
+def test_a_polynomial_of_a_high_degree_is_searched(degree, coverage):
+    """yⁿ − y + 1/7 has three real roots for odd n."""
+    found = fs.tangencies(switched(x, (y**degree - y + sp.Rational(1, 7), 1), (1, 0)))
+    assert found.coverage == coverage
+    roots = np.roots([1, *[0] * (degree - 2), -1, 1 / 7])
+    real = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
+    assert [t["y"] for t in found] == pytest.approx(real, abs=1e-12)
+
+
 def test_held_states():
     """x' = y z − 2 and y z = 2 on a curve: with z held there is one point."""
     model = switched(x, (y * z - 2, 1, y), (1, 1, 1))

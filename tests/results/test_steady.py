@@ -43,4 +43,5 @@ def test_from_the_first_repeat_on(tol):
     first = math.ceil(math.log(tol * RANGE / (0.4 * (1 - SHRINKS))) / math.log(SHRINKS))
     assert steady.since == pytest.approx(2 * math.pi * first, rel=1e-12)
     assert steady.multiple == 1
+    assert steady.period == pytest.approx(2 * math.pi, rel=1e-12)
     assert steady.distance == pytest.approx(0.4 * SHRINKS**first * (1 - SHRINKS) / RANGE, rel=1e-2)
