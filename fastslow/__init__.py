@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from fastslow.passage.regimes import classify_regime, regime_map
     from fastslow.passage.scaling_runs import delay_scaling
     from fastslow.passage.slow_loads import slow_load_criterion, slow_load_gap
+    from fastslow.precompilation import precompile
     from fastslow.results.auto_files import read_auto
     from fastslow.results.branches import Branch
     from fastslow.results.delay_scalings import DelayScaling
@@ -64,7 +65,6 @@ if TYPE_CHECKING:
     from fastslow.symbolic.reduction import reduce_states
     from fastslow.symbolic.scaling import disagreements, nondimensionalise
     from fastslow.symbolic.sources import export
-    from fastslow.warming import warm
 
 __version__ = "0.1.0"
 
@@ -118,6 +118,7 @@ _HOME = {
     "nondimensionalise": "symbolic.scaling",
     "overlay": "passage.overlays",
     "plot": "",
+    "precompile": "precompilation",
     "predict_delay": "passage.delay_laws",
     "read_auto": "results.auto_files",
     "reduce_states": "symbolic.reduction",
@@ -129,7 +130,6 @@ _HOME = {
     "slow_load_gap": "passage.slow_loads",
     "systems": "",
     "tangencies": "diagrams.tangency_points",
-    "warm": "warming",
 }
 
 __all__ = [
@@ -183,6 +183,7 @@ __all__ = [
     "nondimensionalise",
     "overlay",
     "plot",
+    "precompile",
     "predict_delay",
     "read_auto",
     "reduce_states",
@@ -194,7 +195,6 @@ __all__ = [
     "slow_load_gap",
     "systems",
     "tangencies",
-    "warm",
 ]
 
 

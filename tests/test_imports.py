@@ -18,7 +18,7 @@ LAYERS = [
     "systems",
     "interactive",
     "plot",
-    "warming",
+    "precompilation",
     "passage",
     "sweeps",
     "orbits",

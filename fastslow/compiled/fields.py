@@ -13,7 +13,7 @@ from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.pycode import PythonCodePrinter
 
 from fastslow.compiled.functions import refusal, teach_functions
-from fastslow.compiled.store import load_generated
+from fastslow.compiled.generated import compile_callback
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
@@ -106,8 +106,9 @@ def _address(
                 "call frozen() on the model first"
             )
         bodies.append(_body(rows, n, rename))
-    module = load_generated(_source(bodies, unknowns, parameters), "field")
-    return int(module.field.address)
+    from fastslow.compiled.pointers import SIGNATURE
+
+    return compile_callback(_source(bodies, unknowns, parameters), "field", SIGNATURE)
 
 
 def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -> list[str]:
@@ -169,11 +170,7 @@ def _source(bodies: Sequence[list[str]], unknowns: int, parameters: int) -> str:
     uses_special = any("special." in line for body in bodies for line in body)
     lines = [
         "import math",
-        "from numba import cfunc",
         *(["from fastslow.compiled import special"] if uses_special else []),
-        "from fastslow.compiled.pointers import SIGNATURE",
-        "",
-        "@cfunc(SIGNATURE, cache=True, error_model='numpy')",
         "def field(region, u, p, out):",
         *(f"    u{k} = u[{k}]" for k in range(unknowns)),
         *(f"    p{k} = p[{k}]" for k in range(parameters)),

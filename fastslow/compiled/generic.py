@@ -6,20 +6,16 @@ Each has a generated module for its entry, whose key has all that the loop is ma
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, partial
-from typing import Any, cast
+from functools import cache
+from typing import Any
 
-from fastslow.compiled.signals import deferring_signals
-from fastslow.compiled.store import load_generated
+from fastslow.compiled.generated import compile_loop
 
-_ENTRY = '''"""Entry to {function} of {module}."""
-from numba import njit
-
+_SOURCE = '''"""Entry to {function} of {module}."""
 from {module} import {function} as loop
 
 
-@njit(cache=True, nogil=True)
-def entry({arguments}):
+def {function}({arguments}):
     return loop({arguments})
 '''
 
@@ -39,12 +35,6 @@ def load_loop(module: str, function: str, arguments: tuple[str, ...]) -> Callabl
     -------
     callable
     """
-    text = _ENTRY.format(
-        module=module,
-        function=function,
-        arguments=", ".join(arguments),
-    )
-    loaded = load_generated(text, function).entry
-    # what Numba calls for arguments of types that are new to it
-    loaded.compile = partial(deferring_signals, loaded.compile)
-    return cast("Callable[..., Any]", loaded)
+    listed = ", ".join(arguments)
+    source = _SOURCE.format(module=module, function=function, arguments=listed)
+    return compile_loop(source, function)

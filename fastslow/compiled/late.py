@@ -15,17 +15,13 @@ from typing import Any
 import llvmlite.binding as llvm
 from numba import types
 
-from fastslow.compiled.store import load_generated
+from fastslow.compiled.generated import compile_callback
 
 _ENTRY = '''"""Entry to {function} of {module}."""
-from numba import cfunc
-
 from {module} import {function} as called
-from {module} import {signature} as kind
 
 
-@cfunc(kind, cache=True, error_model="numpy")
-def entry({arguments}):
+def {function}({arguments}):
     return called({arguments})
 '''
 
@@ -34,7 +30,7 @@ _C_TYPES: dict[Any, Any] = {types.int64: ctypes.c_int64, types.float64: ctypes.c
 _callbacks: list[Any] = []
 
 
-def late_function(module: str, function: str, signature: str, kind: Any) -> Any:
+def late_function(module: str, function: str, kind: Any) -> Any:
     """A function for compiled code to call, that is not compiled yet.
 
     Compiled code that was read from the disk finds it as well, once the module
@@ -44,10 +40,8 @@ def late_function(module: str, function: str, signature: str, kind: Any) -> Any:
     ----------
     module, function : str
         Where the function is.
-    signature : str
-        Name of its type in that module.
     kind : numba signature
-        That type: numbers and pointers, and a number as result.
+        Its type: numbers and pointers, and a number as result.
 
     Returns
     -------
@@ -61,10 +55,9 @@ def late_function(module: str, function: str, signature: str, kind: Any) -> Any:
         text = _ENTRY.format(
             module=module,
             function=function,
-            signature=signature,
             arguments=", ".join(f"a{k}" for k in range(len(arguments))),
         )
-        return prototype(load_generated(text, function).entry.address)
+        return prototype(compile_callback(text, function, kind))
 
     def called(*given: Any) -> float:
         # an exception does not pass through compiled code, which would go on with any number

@@ -14,6 +14,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.compiled.functions import without_recurrence
+from fastslow.compiled.generated import compile_callback
 from fastslow.compiled.recurrences import Recurrences, scalar_code
 from fastslow.compiled.series_modes import (
     COLLOCATION,
@@ -22,20 +23,14 @@ from fastslow.compiled.series_modes import (
     SHORT,
     SHORTENED,
 )
-from fastslow.compiled.store import load_generated
 from fastslow.model.model import Model
 from fastslow.model.motions import Motion, drift, motions_of, regions_of
 from fastslow.model.structure import TIME, real
 
 _HEADER = '''"""{what} for {modes} modes of {states} states."""
 import math
+{special}
 
-from numba import cfunc
-
-{special}from fastslow.compiled.pointers import SIGNATURE
-
-
-@cfunc(SIGNATURE, cache=True, error_model="numpy")
 def series(mode, inputs, parameters, W):
     n = {order}
     clock = 1.0
@@ -227,11 +222,13 @@ def _compile(
 ) -> CompiledSeries:
     parameters = equations.parameters
     source, n_rows = _source(equations.renamed(), len(parameters))
-    module = load_generated(source, "series")
+    from fastslow.compiled.pointers import SIGNATURE
+
+    address = compile_callback(source, "series", SIGNATURE)
     m, q, p = (len(g) for g in (equations.states, equations.quantities, equations.interfaces))
     signs = np.array([mode.signs for mode in equations.modes], dtype=np.int64)
     return CompiledSeries(
-        module.series.address,
+        address,
         equations.order,
         parameters,
         m,

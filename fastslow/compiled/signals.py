@@ -87,6 +87,12 @@ class _Deferral(event.Listener):
 _deferral: _Deferral | None = None
 
 
+def between_passes() -> None:
+    """Handle signals that have been kept, where a compilation waits for something else."""
+    if _deferral is not None:
+        _deferral.on_start(None)
+
+
 def deferring_signals(compiling: Callable[..., R], *arguments: Any) -> R:
     """Call a function that compiles; signals are handled between its passes, or at its end.
 

@@ -5,22 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from fastslow.compiled.generated import compile_callback
 from fastslow.compiled.series import Equations, equations_of, mode_source
-from fastslow.compiled.store import load_generated
 from fastslow.model.model import Model
 
 _HEADER = '''"""Plain steps of order {order} for {count} regions of {states} states."""
-from numba import cfunc
-
 from fastslow.compiled.lane_steps import plain_steps
-from fastslow.compiled.pointers import SIGNATURE
 
 
 '''
 _ENTRY = """take = plain_steps(({regions}), {signs}, {sizes})
 
 
-@cfunc(SIGNATURE, cache=True, error_model="numpy")
 def steps(mode, inputs, parameters, W):
     take(mode, inputs, parameters, W)
 """
@@ -95,4 +91,6 @@ def _compile(equations: Equations) -> CompiledSteps:
         signs=tuple(mode.signs for mode in new.modes),
         sizes=(len(new.states), len(new.quantities), n, order),
     )
-    return CompiledSteps(load_generated(text, "steps").steps.address, len(sources))
+    from fastslow.compiled.pointers import SIGNATURE
+
+    return CompiledSteps(compile_callback(text, "steps", SIGNATURE), len(sources))

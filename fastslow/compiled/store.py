@@ -1,160 +1,311 @@
-"""Generated source as importable modules in a per-user cache directory."""
+"""Compiled code on disk: where it is kept, who may have written it, and whether it is whole.
+
+What is in these files is run. So they are read only where they belong to this user or to root
+and nobody else can write to them or to their directory. Both are asked of what has been opened,
+and a checksum is taken of the very bytes that are used: nothing can be exchanged in between.
+Windows tells neither owners nor modes in this way, and has no such locks: there, the directory
+of the user is trusted, and processes do not wait for each other.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-import importlib.util
 import os
-import pickletools
-import platform
-import shutil
+import stat
 import sys
-import tempfile
-from functools import cache
+import time
+import uuid
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from types import ModuleType
 
-from fastslow.compiled.closure import digest_of_imports
+try:
+    import fcntl
+except ImportError:
+    _LOCKS = False
+else:
+    _LOCKS = True
 
-_loaded: dict[str, ModuleType] = {}
+_OWNERS = hasattr(os, "geteuid")
+
+_BEGINNING = b"fastslow compiled code "
+_SUFFIX, _ASIDE = ".code", ".tmp"
+
+#: Files not used for so many days are removed, and the longest unused ones beyond so many bytes.
+KEPT_DAYS, KEPT_BYTES = 90, 2**30
+_DAY = 86400.0
+
+#: Seconds that a process waits for another one that compiles the same, and between two looks.
+LONGEST_WAIT, _PAUSE = 600.0, 0.05
+
+_MEMORY = "compiled code is kept in memory alone, and every process compiles its own"
 
 
-def cache_directory() -> Path:
-    """Where compiled code is kept: ``FASTSLOW_CACHE``, else the user's cache directory."""
+def writable_directory() -> Path | None:
+    """Where compiled code is kept: ``FASTSLOW_CACHE``, else the user's cache directory.
+
+    None where neither can be written.
+    """
+    with _folders() as folders:
+        return next((folder.path for folder in folders if folder.writable), None)
+
+
+def _candidates() -> list[Path]:
+    """The chosen directory, then the user's own, for what the first one cannot take."""
     chosen = os.environ.get("FASTSLOW_CACHE")
-    if chosen:
-        return Path(chosen)
+    places = [Path(chosen).absolute() if chosen else None, _own_directory()]
+    return [place for place in places if place is not None]
+
+
+def _own_directory() -> Path | None:
+    """The user's cache directory, as each system has it."""
+    home = _home()
     if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+        base = _from_environment("LOCALAPPDATA") or (home and home / "AppData" / "Local")
     elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
+        base = home and home / "Library" / "Caches"
     else:
-        base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    return base / "fastslow"
+        base = _from_environment("XDG_CACHE_HOME") or (home and home / ".cache")
+    return base and base / "fastslow"
 
 
-@cache
-def _platform_key() -> str:
-    """What compiled code depends on beside its source: versions and the processor."""
-    import llvmlite
-    import llvmlite.binding as llvm
-    import numba
-    import numpy as np
-    import scipy
-
-    return "|".join(
-        (
-            numba.__version__,
-            llvmlite.__version__,
-            np.__version__,
-            scipy.__version__,
-            platform.python_version(),
-            llvm.get_host_cpu_name(),
-            llvm.get_host_cpu_features().flatten(),
-        )
-    )
+def _from_environment(variable: str) -> Path | None:
+    """A directory that a variable names; an empty or relative one counts as unset (XDG)."""
+    path = Path(os.environ.get(variable, ""))
+    return path if path.is_absolute() else None
 
 
-@cache
-def _writable_directory() -> Path:
-    """The cache directory, or one of this process alone where it cannot be written."""
-    directory = cache_directory()
+def _home() -> Path | None:
     try:
-        directory.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=directory):
-            return directory
-    except OSError:
-        return Path(tempfile.mkdtemp(prefix="fastslow-"))
+        home = Path.home()
+    except (RuntimeError, KeyError):
+        return None
+    return home if home.is_absolute() and os.environ.get("HOME") != "" else None
 
 
-def load_generated(source: str, stem: str) -> ModuleType:
-    """Import generated source as a module kept on disk, so that Numba keeps its code too.
+def read(name: str) -> bytes | None:
+    """Compiled code by its name, wherever it is kept; None where it is not, or is damaged."""
+    with _folders() as folders:
+        for folder in folders:
+            try:
+                content = folder.read(name)
+            except OSError as error:
+                file = folder.path / f"{name}{_SUFFIX}"
+                _say(f"{file} is not loaded ({_reason(error)}): it is compiled again")
+                continue
+            if content is not None:
+                return content
+    return None
 
-    The file name carries a hash of the source, of the modules that it imports and of
-    everything else the machine code depends on, so that another version of Numba or
-    another processor never meets code that is not its own. Two processes may do this at
-    once: files are written aside and moved into place. Code that was cut short
-    is built again; a directory that cannot be written is read all the same.
+
+def write(name: str, content: bytes) -> None:
+    """Keep compiled code, in memory alone where no directory takes it.
 
     Parameters
     ----------
-    source : str
-        Python source.
-    stem : str
-        Beginning of the file name, for a person who looks into the directory.
-
-    Returns
-    -------
-    module
+    name : str
+        By which it is read. Says everything that the code depends on.
+    content : bytes
     """
-    key = f"{_platform_key()}\n{digest_of_imports(source)}\n{source}"
-    digest = hashlib.sha256(key.encode()).hexdigest()[:24]
-    name = f"fastslow_{stem}_{digest}"
-    if name not in _loaded:
-        from fastslow.compiled.signals import deferring_signals
-
-        _loaded[name] = deferring_signals(_load, name, source)
-    return _loaded[name]
-
-
-def _load(name: str, source: str) -> ModuleType:
-    """Write a module if it is not there yet, and import it."""
-    directory = _writable_directory()
-    path = directory / f"{name}.py"
-    if directory != cache_directory():
-        _copy(name, cache_directory(), directory)
-    _sweep(name, directory)
-    if not path.exists() or path.read_text(encoding="utf-8") != source:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(source)
-        Path(temporary).replace(path)
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
+    with _folders() as folders:
+        refusals = []
+        for folder in folders:
+            try:
+                folder.write(name, content)
+            except OSError as error:
+                refusals.append(f"{folder.path} takes no compiled code ({_reason(error)})")
+            else:
+                _say_instead(refusals, f"{folder.path} does")
+                _sweep(folder)
+                return
+        _say_instead(refusals, _MEMORY)
 
 
-def _stored(name: str, directory: Path) -> list[Path]:
-    """What Numba keeps for a module."""
-    return sorted((directory / "__pycache__").glob(f"{name}.*.nb[ci]"))
+@contextmanager
+def alone(name: str, waiting: Callable[[], None]) -> Iterator[None]:
+    """Let one process at a time compile what will have this name; others wait here.
+
+    The system ends the lock with the process, however it ends. Where there are no locks, and
+    after `LONGEST_WAIT`, nothing is waited for. Meanwhile ``waiting`` is called again and again.
+    """
+    with _folders() as folders, ExitStack() as stack:
+        if _LOCKS and folders:
+            with contextlib.suppress(OSError):
+                descriptor = folders[-1].open("lock", os.O_RDWR | os.O_CREAT)
+                stack.callback(os.close, descriptor)
+                _wait(descriptor, name, waiting)
+        yield
 
 
-def _copy(name: str, origin: Path, target: Path) -> None:
-    """Take what a read-only directory holds of a module, with its times, by which it is known."""
-    source = origin / f"{name}.py"
-    if (target / source.name).exists() or not source.exists():
+def _wait(descriptor: int, name: str, waiting: Callable[[], None]) -> None:
+    # a byte of the file, which need not exist, stands for the name
+    byte = int.from_bytes(hashlib.sha256(name.encode()).digest()[:4])
+    end = time.monotonic() + LONGEST_WAIT
+    while True:
+        try:
+            fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, byte)
+        except (BlockingIOError, PermissionError):
+            if time.monotonic() > end:
+                _say(f"{name} is compiled here too: another process has been at it for too long")
+                return
+            waiting()
+            time.sleep(_PAUSE)
+        else:
+            return
+
+
+@contextmanager
+def _folders() -> Iterator[list[_Folder]]:
+    """Open directories to read from; only the last one may be written to."""
+    with ExitStack() as stack:
+        found: list[_Folder] = []
+        refusals = []
+        for path in _candidates():
+            try:
+                path.mkdir(mode=0o755, parents=True, exist_ok=True)
+                folder = _Folder(path)
+            except OSError as error:
+                refusals.append(f"no compiled code is loaded from {path} ({_reason(error)})")
+                continue
+            stack.callback(folder.close)
+            found.append(folder)
+            if folder.writable:
+                break
+        if not found and not refusals:
+            refusals = ["there is no home directory, and FASTSLOW_CACHE is not set"]
+        _say_instead(refusals, f"{found[0].path} is used" if found else _MEMORY)
+        yield found
+
+
+class _UntrustedError(OSError):
+    """Somebody else could have written this."""
+
+
+def _check(status: os.stat_result, what: str) -> None:
+    if not _OWNERS:
         return
-    (target / "__pycache__").mkdir(exist_ok=True)
-    for file in _stored(name, origin):
-        shutil.copy2(file, target / "__pycache__" / file.name)
-    shutil.copy2(source, target / source.name)
+    if status.st_uid not in (os.geteuid(), 0):
+        raise _UntrustedError(f"the {what} belongs to the user of number {status.st_uid}")
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise _UntrustedError(f"the {what} can be written by others (chmod go-w)")
 
 
-def _sweep(name: str, directory: Path) -> None:
-    """Remove the machine code of a module if one of its files is not whole."""
-    files = _stored(name, directory)
-    if not all(map(_whole, files)):
-        for file in files:
-            file.unlink(missing_ok=True)
+class _Folder:
+    """An open directory that nobody else can write to."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.descriptor: int | None = None
+        if _OWNERS:
+            self.descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+            try:
+                _check(os.fstat(self.descriptor), "directory")
+            except OSError:
+                self.close()
+                raise
+
+    @property
+    def writable(self) -> bool:
+        return os.access(self.path, os.W_OK)
+
+    def close(self) -> None:
+        if self.descriptor is not None:
+            os.close(self.descriptor)
+
+    def at(self, file: str) -> str:
+        """Path of a file for functions that take the descriptor of a directory too."""
+        return file if self.descriptor is not None else str(self.path / file)
+
+    def open(self, file: str, flags: int) -> int:
+        for name in ("O_NOFOLLOW", "O_CLOEXEC", "O_BINARY"):
+            flags |= getattr(os, name, 0)
+        return os.open(self.at(file), flags, 0o644, dir_fd=self.descriptor)
+
+    def remove(self, file: str) -> None:
+        with contextlib.suppress(OSError):
+            os.unlink(self.at(file), dir_fd=self.descriptor)
+
+    def read(self, name: str) -> bytes | None:
+        file = name + _SUFFIX
+        try:
+            # a pipe in the place of the file must not block
+            descriptor = self.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+        except FileNotFoundError:
+            return None
+        with os.fdopen(descriptor, "rb") as stream:
+            status = os.fstat(descriptor)
+            _check(status, "file")
+            if not stat.S_ISREG(status.st_mode):
+                raise _UntrustedError("it is not a file")
+            content = _content(name, stream.read())
+        if content is not None and time.time() - status.st_mtime > _DAY:
+            # its last use, for `_sweep`
+            with contextlib.suppress(OSError):
+                os.utime(self.at(file), dir_fd=self.descriptor)
+        return content
+
+    def write(self, name: str, content: bytes) -> None:
+        aside = f"{name}.{uuid.uuid4().hex}{_ASIDE}"
+        descriptor = self.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL)
+        try:
+            with os.fdopen(descriptor, "wb") as stream:
+                stream.write(_BEGINNING + _checksum(name, content) + b"\n" + content)
+            inside = {"src_dir_fd": self.descriptor, "dst_dir_fd": self.descriptor}
+            os.replace(self.at(aside), self.at(name + _SUFFIX), **inside)  # noqa: PTH105
+        except BaseException:
+            self.remove(aside)
+            raise
 
 
-def _whole(file: Path) -> bool:
-    """Whether a file is a sequence of complete pickles; nothing in it is executed."""
-    try:
-        with file.open("rb") as stream:
-            size = os.fstat(stream.fileno()).st_size
-            if size == 0:
-                return False
-            while stream.tell() < size:
-                for _ in pickletools.genops(stream):
-                    pass
-    except OSError:
-        return True  # another process has just replaced it
-    except Exception:
-        # whatever the reader of opcodes stumbles over
-        return False
-    return True
+def _checksum(name: str, content: bytes) -> bytes:
+    digest = hashlib.sha256(name.encode() + b"\n")
+    digest.update(content)
+    return digest.hexdigest().encode()
+
+
+def _content(name: str, whole: bytes) -> bytes | None:
+    """What a file holds; None where that is not what was written under its name."""
+    length = len(_BEGINNING) + 64
+    content = whole[length + 1 :]
+    beginning = _BEGINNING + _checksum(name, content) + b"\n"
+    return content if whole[: length + 1] == beginning else None
+
+
+def _sweep(folder: _Folder) -> None:
+    """Remove what has not been used for long, as code for other versions is."""
+    files = []
+    where = folder.path if folder.descriptor is None else folder.descriptor
+    # another process may remove them at the same time
+    with contextlib.suppress(OSError), os.scandir(where) as entries:
+        for entry in entries:
+            if entry.name.endswith((_SUFFIX, _ASIDE)):
+                status = entry.stat(follow_symlinks=False)
+                used = max(status.st_atime, status.st_mtime)
+                files.append((used, status.st_size, entry.name))
+    total, now = 0, time.time()
+    for used, size, file in sorted(files, reverse=True):
+        total += size
+        days = KEPT_DAYS if file.endswith(_SUFFIX) else 1
+        if total > KEPT_BYTES or now - used > days * _DAY:
+            folder.remove(file)
+
+
+_said: set[str] = set()
+
+
+def _say_instead(refusals: list[str], instead: str) -> None:
+    if refusals:
+        _say(f"{'; '.join(refusals)}: {instead}")
+
+
+def _say(sentence: str) -> None:
+    """Warn once in a process."""
+    if sentence not in _said:
+        _said.add(sentence)
+        warnings.warn(sentence, RuntimeWarning, stacklevel=2)
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or str(error)

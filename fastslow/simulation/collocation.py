@@ -399,6 +399,5 @@ SIGNATURE = types.float64(
 late_collocation = late_function(
     "fastslow.simulation.collocation",
     "step_by_collocation",
-    "SIGNATURE",
     SIGNATURE,
 )

@@ -426,6 +426,5 @@ SIGNATURE = types.float64(
 late_radau = late_function(
     "fastslow.simulation.radau",
     "radau_by_pointers",
-    "SIGNATURE",
     SIGNATURE,
 )

@@ -10,6 +10,7 @@ from importlib import import_module
 #: Name of each campaign, and what one of its counts is. A module of the name has
 #: ``campaign(count, seed)``, which returns a report with ``failures``, and prints as text.
 CAMPAIGNS = {
+    "cache": "damaged files of compiled code, each loaded in a process of its own",
     "crossings": "crossings of random piecewise-linear systems",
     "detection": "special points of random block systems of up to 200 states",
     "files": "damaged files of every kind of result, and of AUTO-07p; so many of each format",

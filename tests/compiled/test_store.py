@@ -1,131 +1,168 @@
-"""Compiled code on disk: shared, cut short, read-only, and warmed."""
+"""Compiled code on disk: whose is loaded, where it is kept, and who compiles it."""
 
+import json
 import os
-import pickle
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from fastslow.compiled.store import _whole
-
-PROGRAM = """
-import sympy as sp, fastslow as fs
-from fastslow.compiled import store
-x = sp.Symbol("x")
-run = fs.simulate(fs.Model({x: -x}), [1.0], t=(0, 1))
-print(repr(float(run.end[1])), store._writable_directory())
-"""
-
-EXPECTED = 0.36787944117144233
-
-
-def start(cache, program=PROGRAM):
-    environment = {**os.environ, "FASTSLOW_CACHE": str(cache)}
-    return subprocess.Popen(
-        [sys.executable, "-c", program],
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
-def finish(process):
-    out, error = process.communicate(timeout=300)
-    assert process.returncode == 0, error
-    value, directory = out.split()
-    return float(value), Path(directory)
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="users and forks of POSIX")
+as_root = pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="other users are played by root"
+)
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
-def cache(tmp_path_factory):
-    """A directory that two processes have filled at the same time."""
-    directory = tmp_path_factory.mktemp("cache")
-    for process in [start(directory), start(directory)]:
-        assert finish(process)[0] == pytest.approx(EXPECTED, rel=1e-9)
-    return directory
+def found():
+    """What the scenarios found."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.compiled.store_scenarios"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
 
 
-def stored(cache):
-    return sorted(p for p in cache.rglob("*") if p.suffix in (".nbi", ".nbc"))
+def check(result, *, compiled, said=(), value=1.0):
+    """A child lived, had the right value, and said one sentence for each that is expected."""
+    assert result.get("error") is None, result["error"]
+    assert result["signal"] == 0
+    assert (result["value"], result["compiled"]) == (value, compiled)
+    assert len(result["said"]) == len(said), result["said"]
+    for sentence, parts in zip(result["said"], said, strict=True):
+        for part in parts:
+            assert part in sentence
 
 
-def test_two_processes_at_once_leave_whole_files_only(cache):
-    assert len(stored(cache)) >= 4
-    assert not list(cache.rglob("*.tmp*"))
-    before = {p: p.stat().st_mtime_ns for p in stored(cache)}
-    assert finish(start(cache))[0] == pytest.approx(EXPECTED, rel=1e-9)
-    # the third compiled nothing
-    assert {p: p.stat().st_mtime_ns for p in stored(cache)} == before
+MEMORY = "kept in memory alone, and every process compiles its own"
 
 
-@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
-def test_files_cut_short_are_built_again(cache, suffix):
-    broken = [p for p in stored(cache) if p.suffix == suffix and "series" in p.name]
-    assert broken
-    for k, path in enumerate(broken):
-        whole = path.read_bytes()
-        path.write_bytes(whole[: len(whole) // 2] if k % 2 == 0 else b"")
-        assert finish(start(cache))[0] == pytest.approx(EXPECTED, rel=1e-9)
-        assert path.stat().st_size > 0
+@pytest.mark.parametrize(
+    ("umask", "directory", "file"), [("002", 755, 644), ("022", 755, 644), ("077", 700, 600)]
+)
+def test_files_are_for_others_to_read_as_the_umask_says(found, umask, directory, file):
+    first, again, folder, files = found[f"umask {umask}"]
+    check(first, compiled=1)
+    check(again, compiled=0)
+    assert folder == f"0o{directory}"
+    assert [mode for mode, _ in files.values()] == [f"0o{file}"]
 
 
-@pytest.mark.parametrize("junk", [b"garbage", b"", b"\x80\x04K\x01"])
-def test_foreign_or_unfinished_bytes_are_not_whole(tmp_path, junk):
-    path = tmp_path / "code.nbi"
-    path.write_bytes(junk)
-    assert not _whole(path)
+def test_one_of_four_processes_compiles_and_the_others_wait(found):
+    assert sorted(child["compiled"] for child in found["at_once"]) == [0, 0, 0, 1]
+    for child in found["at_once"]:
+        check(child, compiled=child["compiled"])
 
 
-def test_two_pickles_in_a_row_are_whole(tmp_path):
-    path = tmp_path / "code.nbi"
-    path.write_bytes(pickle.dumps("version") + pickle.dumps({"a": b"." * 1000}))
-    assert _whole(path)
-    path.write_bytes(path.read_bytes()[:-1])
-    assert not _whole(path)
+def test_the_lock_ends_with_the_process(found):
+    check(found["killed_while_compiling"], compiled=1)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="permissions of directories differ")
-def test_a_read_only_directory_is_used_without_compiling_again(cache, tmp_path):
-    if os.geteuid() == 0:
-        # root may write everywhere: a file in the place of the probe stands for the refusal
-        program = PROGRAM.replace(
-            "x = sp.Symbol",
-            "import tempfile\n"
-            "real = tempfile.TemporaryFile\n"
-            "def refuse(*a, dir=None, **k):\n"
-            "    if str(dir) == str(store.cache_directory()):\n"
-            "        raise PermissionError('read-only')\n"
-            "    return real(*a, dir=dir, **k)\n"
-            "tempfile.TemporaryFile = refuse\n"
-            "x = sp.Symbol",
-        )
-    else:
-        program = PROGRAM
-        cache.chmod(0o555)
-    try:
-        value, directory = finish(start(cache, program))
-    finally:
-        cache.chmod(0o755)
-    assert value == pytest.approx(EXPECTED, rel=1e-9)
-    assert directory != cache
-    names = {p.name: p.stat().st_mtime_ns for p in stored(directory)}
-    kept = {p.name: p.stat().st_mtime_ns for p in stored(cache)}
-    assert names
-    assert all(kept[name] == time for name, time in names.items())
+def test_who_waits_can_be_interrupted(found):
+    check(found["interrupted_while_waiting"], compiled=0, value="interrupted")
 
 
-def test_code_with_special_functions_is_found_by_another_process(cache):
-    program = """
-import sympy as sp, fastslow as fs
-from fastslow.compiled import store
-x, t = sp.symbols("x t")
-run = fs.simulate(fs.Model({x: sp.besselj(0, t) - sp.airyai(x) * x}), [1.0], t=(0, 1))
-print(repr(float(run.end[1])), store._writable_directory())
-"""
-    first = finish(start(cache, program))[0]
-    before = {p: p.stat().st_mtime_ns for p in stored(cache)}
-    assert finish(start(cache, program))[0] == first
-    assert {p: p.stat().st_mtime_ns for p in stored(cache)} == before
+def test_nobody_waits_for_ever(found):
+    check(found["waited_for_too_long"], compiled=1, said=[["compiled here too: another process"]])
+
+
+def test_without_locks_everybody_compiles(found):
+    check(found["no_locks"], compiled=1)
+
+
+@as_root
+def test_others_load_what_root_has_compiled(found):
+    loaded, missing, again, homeless, hidden = found["shared"]
+    check(loaded, compiled=0)
+    lacks = ["shared takes no compiled code (Permission denied)"]
+    check(missing, compiled=1, value=[1.0, 2.0], said=[[*lacks, "home/.cache/fastslow does"]])
+    check(again, compiled=0, value=[1.0, 2.0])
+    check(homeless, compiled=1, value=[1.0, 2.0], said=[[*lacks, MEMORY]])
+    check(hidden, compiled=1, said=[["is not loaded (Permission denied)"], [*lacks, MEMORY]])
+
+
+@as_root
+@pytest.mark.parametrize(
+    ("how", "why"),
+    [
+        ("belongs_to_stranger", "the directory belongs to the user of number 65534"),
+        ("file_of_stranger", "the file belongs to the user of number 65534"),
+        ("open_to_all", "the directory can be written by others (chmod go-w)"),
+        ("file_open_to_group", "the file can be written by others (chmod go-w)"),
+        ("link", "symbolic link"),
+    ],
+)
+def test_planted_code_is_not_run(found, how, why):
+    result, trace = found["planted"][how]
+    check(result, compiled=1, said=[[f"{how}/", why]])
+    assert not trace
+
+
+@as_root
+def test_the_planted_code_would_be_run_from_an_own_file(found):
+    assert found["planted"]["own"][1]
+
+
+def test_a_pipe_in_the_place_of_a_file_does_not_block(found):
+    result, replaced = found["pipe"]
+    check(result, compiled=1, said=[["is not loaded (it is not a file)"]])
+    assert replaced
+
+
+@as_root
+def test_directories_that_are_unset_empty_or_relative(found):
+    empty, relative, given, empty_home, no_home, kept = found["locations"]
+    # nothing is written where the process runs
+    check(empty, compiled=1, value=[1.0, []])
+    check(relative, compiled=0, value=[1.0, []])
+    check(given, compiled=1, value=[1.0, []])
+    assert kept == [["home/.cache/fastslow", "xdg/fastslow"]]
+    for result in (empty_home, no_home):
+        said = ["there is no home directory, and FASTSLOW_CACHE is not set", MEMORY]
+        check(result, compiled=1, value=[1.0, []], said=[said])
+
+
+def test_a_full_disk_means_memory(found):
+    result, left = found["full_disk"]
+    check(result, compiled=2, value=[1.0, 2.0], said=[["File too large", MEMORY]])
+    assert left == ["lock"]
+
+
+def test_a_file_in_the_place_of_the_directory(found):
+    homeless, at_home = found["no_directory"]
+    check(homeless, compiled=1, said=[["no_directory/file", MEMORY]])
+    check(at_home, compiled=1, said=[["no_directory/file", "home/.cache/fastslow is used"]])
+
+
+def test_what_was_not_used_for_long_is_removed(found):
+    result, by_age, by_size = found["sweep"]
+    check(result, compiled=1)
+    assert by_age == ["fasts", "forei", "lock", "old", "used"]
+    # where there is too little space for anything, nothing but foreign files is kept
+    assert by_size == ["forei", "lock"]
+
+
+def test_the_last_use_is_marked(found):
+    result, marked = found["touched"]
+    check(result, compiled=0)
+    assert marked
+
+
+@pytest.mark.parametrize("seed", [1])
+def test_damaged_files_are_built_again(seed):
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.campaigns", "cache", "40", str(seed)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -183,7 +183,7 @@ def simulations(r):
             "level": {"x": 0.5},
             "integration": fs.Integration(rtol=1e-13, max_steps=2000),
         },
-        "warm": {"models": []},
+        "precompile": {"models": []},
         "explore": {"model": gear, "over": (-1.0, 1.0), "sliders": {"C": (2.0, 3.0)}, **kept},
     }
 

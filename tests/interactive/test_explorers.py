@@ -37,7 +37,7 @@ def test_nothing_is_compiled_anew_by_a_slider(explorer, monkeypatch):
     explorer.set(D=0.4)
     from fastslow.compiled import store
 
-    monkeypatch.setattr(store, "cache_directory", None)
+    monkeypatch.setattr(store, "read", None)
     assert explorer.set(D=0.35).outcomes == ()
 
 

@@ -1,4 +1,4 @@
-"""What is warmed is not compiled again."""
+"""What is compiled ahead is not compiled again."""
 
 import os
 import subprocess
@@ -11,7 +11,7 @@ gap = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
 model = fs.Model({x: v, v: w - v - gap}, forcing={w: sp.sin(t)}, parameters={D: 0.25})
 """
 
-WARM = MODEL + "print(fs.warm(model))"
+AHEAD = MODEL + "print(fs.precompile(model))"
 USE = MODEL + (
     "other = model.with_parameters(D=0.5);"
     "fs.simulate(other, [0, 0], periods=1);"
@@ -19,7 +19,7 @@ USE = MODEL + (
 )
 
 
-def test_a_warmed_model_is_compiled_once(tmp_path):
+def test_a_precompiled_model_is_compiled_once(tmp_path):
     environment = {**os.environ, "FASTSLOW_CACHE": str(tmp_path)}
 
     def run(program):
@@ -33,9 +33,9 @@ def test_a_warmed_model_is_compiled_once(tmp_path):
         assert done.returncode == 0, done.stderr
         return done.stdout.strip()
 
-    assert run(WARM) == str(tmp_path)
-    before = {p.name for p in tmp_path.rglob("*.nbc")}
+    assert run(AHEAD) == str(tmp_path)
+    before = {p.name for p in tmp_path.rglob("*.code")}
     assert any("series" in name for name in before)
     assert any("field" in name for name in before)
     run(USE)
-    assert {p.name for p in tmp_path.rglob("*.nbc")} == before
+    assert {p.name for p in tmp_path.rglob("*.code")} == before

@@ -8,9 +8,10 @@ import numpy as np
 import sympy as sp
 
 from fastslow.arguments import instance, takes
-from fastslow.compiled.store import cache_directory
+from fastslow.compiled.store import writable_directory
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.tracing import continue_equilibria
+from fastslow.errors import FileError
 from fastslow.model.model import Model
 from fastslow.simulation.ensembles import simulate_many
 from fastslow.simulation.settings import Integration
@@ -18,12 +19,13 @@ from fastslow.simulation.trajectories import simulate
 
 
 @takes(models=instance(Model))
-def warm(*models: Model) -> Path:
+def precompile(*models: Model) -> Path:
     """Compile what simulation and continuation need, and keep it on disk.
 
     For a cluster, a container image or a class: run it once where the
     directory can be written; all later processes of the same processor and
-    versions start fast, also where the directory is read-only.
+    versions start fast, also where the directory is read-only. Other users load what
+    root has compiled, and nobody loads what anybody else has.
 
     Parameters
     ----------
@@ -34,13 +36,24 @@ def warm(*models: Model) -> Path:
     Returns
     -------
     Path
-        The directory, chosen by the environment variable ``FASTSLOW_CACHE``.
+        The directory: that of the environment variable ``FASTSLOW_CACHE``, or the user's own.
+
+    Raises
+    ------
+    FileError
+        If there is no directory that can be written.
 
     Examples
     --------
-    >>> warm().is_dir()
+    >>> precompile().is_dir()
     True
     """
+    directory = writable_directory()
+    if directory is None:
+        raise FileError(
+            "there is no directory for compiled code that can be written; "
+            "name one by the environment variable FASTSLOW_CACHE"
+        )
     x, v, w = sp.symbols("x v w")
     # planar, with an interface, a fold and no polynomial: every common loop has its turn
     common = Model({x: v, v: w - v - sp.sin(x) - sp.Abs(x)}, forcing={w: sp.sin(sp.Symbol("t"))})
@@ -49,7 +62,7 @@ def warm(*models: Model) -> Path:
     )
     for model in (common, *models):
         _use(model)
-    return cache_directory()
+    return directory
 
 
 def _use(model: Model) -> None:
