@@ -225,7 +225,9 @@ def use_on_full_disk():
 
 
 def full_disk(folder):
-    return run(use_on_full_disk, FASTSLOW_CACHE=folder), sorted(os.listdir(folder))
+    return run(use_on_full_disk, FASTSLOW_CACHE=folder), sorted(
+        path.name for path in folder.iterdir()
+    )
 
 
 def no_directory(folder):
