@@ -4,6 +4,11 @@ import os
 import subprocess
 import sys
 
+import pytest
+
+import fastslow as fs
+from fastslow.compiled import store
+
 MODEL = """
 import sympy as sp, fastslow as fs
 x, v, t, w, D = sp.symbols("x v t w D")
@@ -39,3 +44,15 @@ def test_a_precompiled_model_is_compiled_once(tmp_path):
     assert any("field" in name for name in before)
     run(USE)
     assert {p.name for p in tmp_path.rglob("*.code")} == before
+
+
+def test_where_nothing_can_be_kept_there_is_nothing_to_compile_ahead(tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("FASTSLOW_CACHE", str(tmp_path / "file"))
+    monkeypatch.setattr(store, "_own_directory", lambda: None)
+    monkeypatch.setattr(store, "_said", set())
+    with (
+        pytest.warns(RuntimeWarning, match="kept in memory alone"),
+        pytest.raises(fs.FileError, match="name one by the environment variable FASTSLOW_CACHE"),
+    ):
+        fs.precompile()
