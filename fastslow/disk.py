@@ -21,7 +21,7 @@ import secrets
 import stat
 from pathlib import Path
 
-from fastslow.errors import FileError
+from fastslow.errors import FileError, raised_by_handler
 
 
 def write_file(path: str | os.PathLike[str], content: bytes) -> None:
@@ -47,6 +47,8 @@ def write_file(path: str | os.PathLike[str], content: bytes) -> None:
     try:
         _replace(Path(os.path.realpath(path)), content)
     except (OSError, ValueError) as error:
+        if raised_by_handler(error):
+            raise
         raise FileError(f"{os.fspath(path)} cannot be written: {reason(error)}") from error
 
 
@@ -82,6 +84,8 @@ def read_file(path: str | os.PathLike[str]) -> bytes:
             _check_regular(os.fstat(file.fileno()))
             return file.read()
     except (OSError, ValueError, MemoryError) as error:
+        if raised_by_handler(error):
+            raise
         raise FileError(f"{os.fspath(path)} cannot be read: {reason(error)}") from error
 
 
@@ -129,12 +133,16 @@ def _keep_access(path: Path, old: os.stat_result) -> None:
 
 def _sync_folder(folder: Path) -> None:
     """Make a new name last a power failure, where the system can."""
-    with contextlib.suppress(OSError):
+    try:
         handle = os.open(folder, os.O_RDONLY)
         try:
             os.fsync(handle)
         finally:
             os.close(handle)
+    except OSError as error:
+        # a TimeoutError is one of these
+        if raised_by_handler(error):
+            raise
 
 
 def _check_regular(status: os.stat_result) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import signal
 from collections.abc import Iterable
 
 
@@ -69,3 +70,25 @@ def unknown_name(kind: str, name: object, valid: Iterable[object]) -> UnknownNam
     hint = f"; did you mean '{near[0]}'?" if near else ""
     known = ", ".join(names) if names else "none"
     return UnknownNameError(f"unknown {kind} '{name}'{hint} (known: {known})")
+
+
+def raised_by_handler(error: BaseException) -> bool:
+    """Whether the handler of a signal raised an exception, and so nothing that was called.
+
+    Such an exception passes through whatever deals with those of the same class.
+
+    Examples
+    --------
+    >>> raised_by_handler(TimeoutError())
+    False
+    """
+    codes = {
+        getattr(getattr(handler, "func", handler), "__code__", None)
+        for handler in map(signal.getsignal, signal.valid_signals())
+    }
+    trace = error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code in codes:
+            return True
+        trace = trace.tb_next
+    return False

@@ -42,3 +42,24 @@ def call_address(  # type: ignore[no-untyped-def]
         return context.get_dummy_value()
 
     return signature, codegen
+
+
+@intrinsic
+def call_number(typingctx, address, arguments):  # type: ignore[no-untyped-def]
+    """Call the function at an address with numbers and arrays, given to it by their pointers.
+
+    The arguments are a tuple of int64, float64 and arrays of float64; the result is a float64.
+    """
+    signature = types.float64(types.int64, arguments)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        values = []
+        for k, kind in enumerate(sig.args[1]):
+            value = builder.extract_value(args[1], k)
+            if isinstance(kind, types.Array):
+                value = cgutils.create_struct_proxy(kind)(context, builder, value=value).data
+            values.append(value)
+        function = ir.FunctionType(ir.DoubleType(), [value.type for value in values])
+        return builder.call(builder.inttoptr(args[0], function.as_pointer()), values)
+
+    return signature, codegen

@@ -12,7 +12,15 @@ import numpy as np
 from numba import njit
 
 from fastslow.compiled.pointers import call_address
-from fastslow.continuation.loops import CLOSED, FULL, INTERFACE, RANGE, SMALL_STEP, WINDOW
+from fastslow.continuation.loops import (
+    CLOSED,
+    FULL,
+    INTERFACE,
+    PAUSED,
+    RANGE,
+    SMALL_STEP,
+    WINDOW,
+)
 
 #: A state is measured by this part of its distance from the middle of the equilibria at which
 #: branches start, once that exceeds its unit: a branch to infinity has rows equal in log(x).
@@ -122,8 +130,6 @@ def trace(  # type: ignore[no-untyped-def]
     address,
     mode,
     parameters,
-    start,
-    tangent,
     signs,
     weight,
     lower,
@@ -132,23 +138,23 @@ def trace(  # type: ignore[no-untyped-def]
     high,
     middle,
     periods,
-    step,
     smallest,
     largest,
     turn,
     tolerance,
     iterations,
-    points,
     closing,
+    rows,
+    tangents,
+    in_use,
+    progress,
 ):
-    """Follow one curve inside one region until something ends it.
+    """Follow one curve inside one region until something ends it, or to a pause.
 
     Parameters
     ----------
     address, mode, parameters
         The generated function, the region's number and the parameter array.
-    start, tangent : ndarray, shape (n + 1,)
-        A point of the curve and the unit tangent (in the weighted norm) to follow.
     signs : ndarray, shape (m,)
         Sign of each h in the region; 0 leaves an interface out.
     weight : ndarray, shape (n + 1,)
@@ -163,21 +169,27 @@ def trace(  # type: ignore[no-untyped-def]
         Period of each of the others, 0 if there is none.
     closing : bool
         Whether a return to the start ends the curve.
+    rows, tangents : ndarray, shape (N, n + 1)
+        Points of the curve and unit tangents (in the weighted norm), the first of which is to
+        be given; the others are filled in.
+    in_use : ndarray, shape (1,)
+        The step, changed here.
+    progress : ndarray of int64, shape (2,)
+        How many rows there are, and how many steps are tried before the next pause; changed here.
 
     Returns
     -------
-    u, tangents : ndarray, shape (N, n + 1)
-    status : int
-        With RANGE, INTERFACE and WINDOW the last row lies beyond the end.
-    step : float
-        The step in use at the end.
+    int
+        What ended it, or PAUSED. With RANGE, INTERFACE and WINDOW the last row lies beyond
+        the end.
     """
-    size = start.shape[0]
+    size = rows.shape[1]
+    start = rows[0]
+    tangent = tangents[0]
+    step = in_use[0]
     n = size - 1
     m = signs.shape[0]
     width = n * (n + 2) + m * (n + 2)
-    rows = np.empty((points, size))
-    tangents = np.empty((points, size))
     out = np.empty(width)
     matrix = np.empty((size, size))
     right = np.empty(size)
@@ -191,23 +203,26 @@ def trace(  # type: ignore[no-untyped-def]
     local = np.empty(size)
     heights = n * (n + 2)
 
-    rows[0] = start
-    tangents[0] = tangent
-    call_address(address, mode, rows[0], parameters, out)
+    count = progress[0]
+    call_address(address, mode, rows[count - 1], parameters, out)
     for k in range(m):
         h[k] = signs[k] * out[heights + k]
         slope[k] = 0.0
         for j in range(size):
-            slope[k] += signs[k] * out[heights + m + k * size + j] * tangent[j]
-    count = 1
-    while count < points:
+            slope[k] += signs[k] * out[heights + m + k * size + j] * tangents[count - 1, j]
+    while count < rows.shape[0]:
+        progress[0] = count
+        in_use[0] = step
+        if progress[1] <= 0:
+            return PAUSED
+        progress[1] -= 1
         last = rows[count - 1]
         direction = tangents[count - 1]
         accepted = False
         used = 0
         cosine = 1.0
         if step < smallest:
-            return rows[:count], tangents[:count], SMALL_STEP, step
+            return SMALL_STEP
         farthest = _local_weight(last, weight, middle, local)
         unit = 1.0 / _norm(direction, local)
         for j in range(size):
@@ -301,17 +316,18 @@ def trace(  # type: ignore[no-untyped-def]
         rows[count] = guess
         tangents[count] = turned
         count += 1
+        progress[0] = count
         for k in range(m):
             if signs[k] != 0.0 and new_h[k] < 0.0:
-                return rows[:count], tangents[:count], INTERFACE, step
+                return INTERFACE
             h[k] = new_h[k]
             slope[k] = new_slope[k]
         if guess[n] < lower or guess[n] > upper:
-            return rows[:count], tangents[:count], RANGE, step
+            return RANGE
         for i in range(n):
             slack = TANGENT / math.sqrt(local[i])
             if guess[i] < low[i] - slack or guess[i] > high[i] + slack:
-                return rows[:count], tangents[:count], WINDOW, step
+                return WINDOW
         if closing and count > 4:
             ahead = 0.0
             apart = 0.0
@@ -329,9 +345,10 @@ def trace(  # type: ignore[no-untyped-def]
                 off = gap - ahead * direction[j] * unit
                 apart += off * off * local[j]
             if 0.0 < ahead <= step and math.sqrt(apart) < 0.2 * step and same > 0.9:
-                return rows[:count], tangents[:count], CLOSED, step
+                return CLOSED
         if used <= 3 and cosine > math.cos(0.5 * turn):
             step = min(1.5 * step, largest * min(farthest, GROWTH))
         elif used >= 6:
             step *= 0.7
-    return rows[:count], tangents[:count], FULL, step
+    in_use[0] = step
+    return FULL

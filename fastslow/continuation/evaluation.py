@@ -16,46 +16,42 @@ _grown = njit(error_model="numpy")(grown)
 
 
 @njit(error_model="numpy")
-def evaluate(address, modes, points, parameters, width):  # type: ignore[no-untyped-def]
-    """Output of the generated function at every row of points, shape (N, width)."""
-    result = np.empty((points.shape[0], width))
+def evaluate(address, modes, points, parameters, out):  # type: ignore[no-untyped-def]
+    """Fill in the output of the generated function at every row of points, shape (N, width)."""
     for k in range(points.shape[0]):
-        call_address(address, modes[k], points[k], parameters, result[k])
-    return result
+        call_address(address, modes[k], points[k], parameters, out[k])
 
 
 @njit(error_model="numpy")
-def value_at(address, mode, point, parameters, width):  # type: ignore[no-untyped-def]
-    """Output of the generated function at one point, shape (width,)."""
-    out = np.empty(width)
+def value_at(address, mode, point, parameters, out):  # type: ignore[no-untyped-def]
+    """Fill in the output of the generated function at one point, shape (width,)."""
     call_address(address, mode, point, parameters, out)
-    return out
 
 
 @njit(error_model="numpy")
 def newton_from(  # type: ignore[no-untyped-def]
-    address, mode, parameters, starts, value, unit, width, iterations
+    address, mode, parameters, states, converged, value, unit, width, iterations
 ):
     """Newton's method at a fixed last component from many starts.
 
     A step longer than ten times the state's size, in the units, is shortened to it.
 
-    Returns
-    -------
+    Parameters
+    ----------
     states : ndarray, shape (m, n)
-        Where each start led.
+        The starts; where each leads is put in its place.
     converged : ndarray of bool, shape (m,)
+        Filled in.
     """
-    count, n = starts.shape
-    states = starts.copy()
-    converged = np.zeros(count, dtype=np.bool_)
+    count, n = states.shape
     u = np.empty(n + 1)
     out = np.empty(width)
     matrix = np.empty((n, n))
     right = np.empty(n)
     for k in range(count):
-        u[:n] = starts[k]
+        u[:n] = states[k]
         u[n] = value
+        converged[k] = False
         for _ in range(iterations):
             call_address(address, mode, u, parameters, out)
             for i in range(n):
@@ -76,31 +72,30 @@ def newton_from(  # type: ignore[no-untyped-def]
                 converged[k] = True
                 break
         states[k] = u[:n]
-    return states, converged
 
 
 @njit(error_model="numpy")
 def refine(  # type: ignore[no-untyped-def]
-    address, mode, parameters, start, scale, row, normal, point, width, m, iterations
+    address, mode, parameters, u, scale, row, normal, point, width, m, iterations
 ):
     """Newton's method for F = 0 with one more equation along the curve.
 
     Parameters
     ----------
+    u : ndarray, shape (n + 1,)
+        The start; the solution is put in its place.
     row : int
         Number of the switching function that vanishes; -1 for the plane through
         ``point`` with ``normal``.
 
     Returns
     -------
-    u : ndarray, shape (n + 1,)
     residual, size : float
         Of the equations, and of the last correction in units of the scale.
     converged : bool
     """
-    columns = start.shape[0]
+    columns = u.shape[0]
     n = columns - 1
-    u = start.copy()
     out = np.empty(width)
     slopes = np.empty((columns, columns))
     matrix = np.empty((columns, columns))
@@ -136,13 +131,13 @@ def refine(  # type: ignore[no-untyped-def]
                 matrix[i, j] = slopes[i, j] * scale[j]
                 largest = max(largest, abs(matrix[i, j]))
             if not (math.isfinite(largest) and math.isfinite(value[i])):
-                return u, np.inf, np.inf, False
+                return np.inf, np.inf, False
             largest = largest if largest > 0.0 else 1.0
             for j in range(columns):
                 matrix[i, j] /= largest
             right[i] = -value[i] / largest
         if not solve(matrix, right):
-            return u, np.inf, np.inf, False
+            return np.inf, np.inf, False
         size = 0.0
         for j in range(columns):
             u[j] += right[j] * scale[j]
@@ -168,22 +163,24 @@ def refine(  # type: ignore[no-untyped-def]
             terms += abs(slopes[i, j]) * max(abs(u[j]), scale[j])
         residual = max(residual, abs(value[i]))
         balanced = balanced and abs(value[i]) <= 1e-9 * terms + 1e-300
-    return u, residual, size, size < 1e-8 and balanced
+    return residual, size, size < 1e-8 and balanced
 
 
 @njit(error_model="numpy")
 def survey(  # type: ignore[no-untyped-def]
-    address, mode, parameters, points, tangents, scale, reach, width
+    address, mode, parameters, points, tangents, scale, reach, width, branching, jacobians
 ):
     """What is tested at every row of a piece.
 
-    Returns
-    -------
+    Parameters
+    ----------
     branching : ndarray, shape (N,)
+        Filled in:
         `signed_distance` of [F_x F_p; tangent], columns in units of the scale, rows in units
         of their largest entry there and ``reach`` of the scale ahead and behind: at a branch
         point in an invariant plane a whole row vanishes.
     jacobians : ndarray, shape (N, n, n)
+        Filled in.
     """
     count, columns = points.shape
     n = columns - 1
@@ -191,8 +188,6 @@ def survey(  # type: ignore[no-untyped-def]
     matrix = np.empty((columns, columns))
     largest = np.empty(columns)
     beside = np.empty(columns)
-    branching = np.empty(count)
-    jacobians = np.empty((count, n, n))
     for k in range(count):
         largest[:] = 0.0
         length = 0.0
@@ -220,7 +215,6 @@ def survey(  # type: ignore[no-untyped-def]
                 else:
                     matrix[i, j] = tangents[k, j] / scale[j]
         branching[k] = signed_distance(matrix, largest)
-    return branching, jacobians
 
 
 @njit(error_model="numpy")
@@ -289,10 +283,9 @@ def signed_distance(matrix, least):  # type: ignore[no-untyped-def]
 
 
 @njit(error_model="numpy")
-def pairs(jacobians):  # type: ignore[no-untyped-def]
-    """Eigenvalues of 2×2 matrices as LAPACK's dlanv2 finds them, shape (N, 2)."""
+def pairs(jacobians, result):  # type: ignore[no-untyped-def]
+    """Fill in the eigenvalues of 2×2 matrices as LAPACK's dlanv2 finds them, shape (N, 2)."""
     count = jacobians.shape[0]
-    result = np.empty((count, 2), dtype=np.complex128)
     for k in range(count):
         a, b = jacobians[k, 0, 0], jacobians[k, 0, 1]
         c, d = jacobians[k, 1, 0], jacobians[k, 1, 1]
@@ -308,17 +301,21 @@ def pairs(jacobians):  # type: ignore[no-untyped-def]
         else:
             result[k, 0] = complex(0.5 * (a + d), math.sqrt(-inside))
             result[k, 1] = complex(0.5 * (a + d), -math.sqrt(-inside))
-    return result
 
 
 @njit(error_model="numpy")
-def passing(points, scale, u, within):  # type: ignore[no-untyped-def]
+def passing(points, scale, u, within, found):  # type: ignore[no-untyped-def]
     """Chords of a curve that are nearest to a point, each nearer than its two neighbours.
+
+    Parameters
+    ----------
+    found : ndarray of int, shape (N - 1,)
+        Numbers of the chords with a distance below ``within``, in scaled units, filled in.
 
     Returns
     -------
-    ndarray of int
-        Numbers of the chords with a distance below ``within``, in scaled units.
+    int
+        How many.
     """
     count, columns = points.shape
     apart = np.empty(count - 1)
@@ -335,7 +332,6 @@ def passing(points, scale, u, within):  # type: ignore[no-untyped-def]
             off = (points[k, j] + part * (points[k + 1, j] - points[k, j]) - u[j]) / scale[j]
             total += off * off
         apart[k] = math.sqrt(total)
-    found = np.empty(count - 1, dtype=np.int64)
     number = 0
     for k in range(count - 1):
         if (
@@ -345,4 +341,4 @@ def passing(points, scale, u, within):  # type: ignore[no-untyped-def]
         ):
             found[number] = k
             number += 1
-    return found[:number]
+    return number

@@ -12,6 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fastslow.continuation.loops import PAUSED, TABLE_FULL
+
 #: By how much a box is enlarged on either side before Krawczyk's test, in units of its width.
 #: A solution on the face of two boxes is then inside both.
 MARGIN = 0.1
@@ -156,9 +158,10 @@ def _deviation(tensor, degrees, strides, row, width, rounding, deviation):  # ty
 
 @njit(error_model="numpy")
 def isolate(  # type: ignore[no-untyped-def]
-    power, degrees, low, high, logarithmic, floor, tolerance, budget, large, small, share
-):
-    """Every solution of N polynomial equations in N unknowns inside boxes.
+    power, degrees, low, high, logarithmic, floor, tolerance, budget, large, small, share,
+    stack, solutions, clusters, progress,
+):  # fmt: skip
+    """Every solution of N polynomial equations in N unknowns inside boxes, or a pause.
 
     Parameters
     ----------
@@ -182,16 +185,23 @@ def isolate(  # type: ignore[no-untyped-def]
     small : ndarray of bool, shape (N,)
         Unknowns that are looked at up to ``share`` times the large one only.
     share : float
+    stack : tuple of ndarray
+        Memory for the boxes that wait: coefficients (B, N, S), their rounding (B, N), and the
+        two corners (B, N).
+    solutions : ndarray, shape (R, N)
+        Filled in: each in a box of its own, accurate to Krawczyk's operator; some are given
+        twice.
+    clusters : ndarray, shape (C, 2, N)
+        Filled in: boxes with nothing proved, at the tolerance or at rounding, around multiple
+        solutions and along what runs to infinity.
+    progress : ndarray of int64, shape (6,)
+        At first zeros: boxes begun, boxes that wait, solutions, clusters, and boxes looked at,
+        above the budget where it did not suffice; last how many to look at before a pause.
 
     Returns
     -------
-    solutions : ndarray, shape (R, N)
-        Each in a box of its own, accurate to Krawczyk's operator; some are given twice.
-    clusters : ndarray, shape (C, 2, N)
-        Boxes with nothing proved, at the tolerance or at rounding: around multiple
-        solutions, and along what runs to infinity.
-    looked_at : int
-        Boxes looked at; above the budget where it did not suffice.
+    int
+        0, `PAUSED`, or `TABLE_FULL` where there is no room for a solution or cluster more.
     """
     n = degrees.shape[0]
     size = power.shape[1]
@@ -241,15 +251,10 @@ def isolate(  # type: ignore[no-untyped-def]
             largest = max(largest, total)
         growth *= largest
 
-    capacity = 128 * n + 16
-    tensors = np.empty((capacity, n, size))
-    errors = np.empty((capacity, n))
-    lows = np.empty((capacity, n))
-    highs = np.empty((capacity, n))
-    solutions = np.empty((64, n))
-    clusters = np.empty((64, 2, n))
-    found = 0
-    unclear = 0
+    tensors, errors, lows, highs = stack
+    capacity = lows.shape[0]
+    seed, waiting, found = progress[0], progress[1], progress[2]
+    unclear, looked_at, left = progress[3], progress[4], progress[5]
     jacobian = np.empty((n, n))
     inverse = np.empty((n, n))
     preconditioned = np.empty((n, size))
@@ -259,16 +264,25 @@ def isolate(  # type: ignore[no-untyped-def]
     deviation = np.empty(n)
     scratch = np.empty(most + 1)
     sizes = np.empty(n)
-    looked_at = 0
-    for seed in range(low.shape[0]):
-        lows[0] = low[seed]
-        highs[0] = high[seed]
-        _converted(power, degrees, strides, lows[0], highs[0], table, tensors[0], errors[0])
-        waiting = 1
+    code = 0
+    while waiting > 0 or seed < low.shape[0]:
+        if waiting == 0:
+            lows[0] = low[seed]
+            highs[0] = high[seed]
+            _converted(power, degrees, strides, lows[0], highs[0], table, tensors[0], errors[0])
+            seed += 1
+            waiting += 1
         while waiting > 0:
+            if left <= 0:
+                code = PAUSED
+                break
+            if found == solutions.shape[0] or unclear == clusters.shape[0]:
+                code = TABLE_FULL
+                break
+            left -= 1
             looked_at += 1
             if looked_at > budget:
-                return solutions[:found], clusters[:unclear], looked_at
+                break
             waiting -= 1
             here = waiting
             tensor = tensors[here]
@@ -368,10 +382,6 @@ def isolate(  # type: ignore[no-untyped-def]
                             and centre[k] + reach < 1.0 + MARGIN
                         )
                     if near:
-                        if found == solutions.shape[0]:
-                            more = np.empty((2 * found, n))
-                            more[:found] = solutions
-                            solutions = more
                         for m in range(n):
                             wide = highs[here, m] - lows[here, m]
                             solutions[found, m] = lows[here, m] + centre[m] * wide
@@ -402,10 +412,6 @@ def isolate(  # type: ignore[no-untyped-def]
                     most_change = change
                     axis = m
             if axis < 0 or here + 2 >= capacity:
-                if unclear == clusters.shape[0]:
-                    wider = np.empty((2 * unclear, 2, n))
-                    wider[:unclear] = clusters
-                    clusters = wider
                 clusters[unclear, 0] = lows[here]
                 clusters[unclear, 1] = highs[here]
                 unclear += 1
@@ -420,4 +426,8 @@ def isolate(  # type: ignore[no-untyped-def]
             lows[here, axis] = cut
             highs[here + 1, axis] = cut
             waiting += 2
-    return solutions[:found], clusters[:unclear], looked_at
+        if code != 0 or looked_at > budget:
+            break
+    progress[0], progress[1], progress[2] = seed, waiting, found
+    progress[3], progress[4], progress[5] = unclear, looked_at, left
+    return code

@@ -11,7 +11,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation.loops import loop
+from fastslow.continuation.loops import PAUSED, TABLE_FULL, WORK, loop
 from fastslow.continuation.ordering import in_order
 
 Array = NDArray[np.float64]
@@ -191,12 +191,29 @@ def _isolated(
     inverse = chart[0] if chart else -1
     fixed = {*limits, *bounds, *chart}
     small = np.array([bool(chart) and m not in fixed for m in range(count)])
-    simple, clusters, looked_at = loop("isolate")(
-        power, degrees, np.ascontiguousarray(boxes[:, :, 0]),
-        np.ascontiguousarray(boxes[:, :, 1]), free, floor, NARROWEST, most,
-        inverse, small, COMPARABLE,
-    )  # fmt: skip
-    return (simple, clusters, looked_at * count * size) if looked_at <= most else None
+    capacity = 128 * count + 16
+    stack = tuple(
+        np.empty((capacity, *shape)) for shape in ((count, size), (count,), (count,), (count,))
+    )
+    solutions, clusters = np.empty((64, count)), np.empty((64, 2, count))
+    progress = np.zeros(6, dtype=np.int64)
+    code = PAUSED
+    while code != 0:
+        # a box is looked at by products of all coefficients with those of every unknown
+        progress[5] = max(1, WORK // (4 * count * count * size))
+        code = loop("isolate")(
+            power, degrees, np.ascontiguousarray(boxes[:, :, 0]),
+            np.ascontiguousarray(boxes[:, :, 1]), free, floor, NARROWEST, most,
+            inverse, small, COMPARABLE, stack, solutions, clusters, progress,
+        )  # fmt: skip
+        if code == TABLE_FULL:
+            solutions, clusters = (
+                np.concatenate([table, np.empty_like(table)]) for table in (solutions, clusters)
+            )
+    _, _, found, unclear, looked_at, _ = progress.tolist()
+    if looked_at > most:
+        return None
+    return solutions[:found], clusters[:unclear], looked_at * count * size
 
 
 def _charts(free: Sequence[int]) -> list[tuple[int, ...]]:

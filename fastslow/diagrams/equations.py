@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.continuation.loops import loop
+from fastslow.continuation.loops import blocks, loop
 from fastslow.continuation.ordering import in_order
 from fastslow.continuation.polynomial_systems import FARTHEST, Terms, solve_polynomials
 from fastslow.diagrams.fields import FrozenField
@@ -400,11 +400,13 @@ class RegionEquations:
                 rows = generator.integers(0, before, (count // 2, n))
                 nearby = 1.0 + 0.1 * generator.standard_normal(rows.shape)
                 starts[1::2] = nearby * distinct[rows, np.arange(n)]
-            states, converged = loop("newton_from")(
-                field.compiled.address, self.region, field.values, starts, value, unit,
-                field.compiled.size, 100,
-            )  # fmt: skip
-            for state in field.wrapped(states[converged]):
+            converged = np.empty(len(starts), dtype=np.bool_)
+            for s in blocks(len(starts), 100 * (16 * field.compiled.size + n**3)):
+                loop("newton_from")(
+                    field.compiled.address, self.region, field.values, starts[s], converged[s],
+                    value, unit, field.compiled.size, 100,
+                )  # fmt: skip
+            for state in field.wrapped(starts[converged]):
                 if np.all(np.abs(state) <= FARTHEST * unit) and not self._among(
                     state, distinct, unit, 1e-5
                 ):

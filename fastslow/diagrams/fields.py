@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.compiled.fields import CompiledField, compile_field, parameter_array
 from fastslow.continuation.location import REACH, Located, with_condition
-from fastslow.continuation.loops import loop
+from fastslow.continuation.loops import blocks, loop
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
@@ -204,7 +204,8 @@ class FrozenField:
         u = np.asarray(points, dtype=float)
         n, m, columns, first, second, one = self._layout
         if u.ndim == 1:
-            out = one(self.compiled.address, region, u, self.values, second + m * columns)
+            out = np.empty(second + m * columns)
+            one(self.compiled.address, region, u, self.values, out)
             return (
                 out[:n],
                 out[n:first].reshape(n, columns),
@@ -213,7 +214,9 @@ class FrozenField:
             )
         rows = np.atleast_2d(u)
         modes = np.full(len(rows), region, dtype=np.int64)
-        out = loop("evaluate")(self.compiled.address, modes, rows, self.values, self.compiled.size)
+        out = np.empty((len(rows), self.compiled.size))
+        for s in blocks(len(rows), 16 * self.compiled.size):
+            loop("evaluate")(self.compiled.address, modes[s], rows[s], self.values, out[s])
         lead = u.shape[:-1]
         return (
             out[:, :n].reshape(*lead, n),
@@ -264,10 +267,13 @@ class FrozenField:
     def _surveyed(
         self, region: int, points: Array, tangents: Array, scale: Array
     ) -> tuple[Array, Array]:
-        branching, jacobians = loop("survey")(
-            self.compiled.address, region, self.values, np.ascontiguousarray(points),
-            np.ascontiguousarray(tangents), scale, REACH, self.compiled.size,
-        )  # fmt: skip
+        points, tangents = np.ascontiguousarray(points), np.ascontiguousarray(tangents)
+        branching, jacobians = np.empty(len(points)), np.empty((len(points), self.n, self.n))
+        for s in blocks(len(points), 48 * self.compiled.size + 2 * self.n**3):
+            loop("survey")(
+                self.compiled.address, region, self.values, points[s], tangents[s], scale, REACH,
+                self.compiled.size, branching[s], jacobians[s],
+            )  # fmt: skip
         return branching, jacobians
 
     def with_infinite(self, region: int, finite: NDArray[np.complex128]) -> NDArray[np.complex128]:
@@ -283,12 +289,19 @@ class FrozenField:
         """Eigenvalues of matrices; NaN where one is not finite, as at a two-fold (0/0)."""
         if jacobian.shape[-1] == 2:
             flat = np.ascontiguousarray(jacobian).reshape(-1, 2, 2)
-            return np.asarray(loop("pairs")(flat)).reshape(jacobian.shape[:-1])
+            found = np.empty((len(flat), 2), dtype=complex)
+            loop("pairs")(flat, found)
+            return found.reshape(jacobian.shape[:-1])
         finite = np.asarray(np.isfinite(jacobian).all(axis=(-1, -2)))[..., None]
         if jacobian.shape[-1] == 1:
             return np.where(finite, jacobian[..., 0].astype(complex), np.nan)
-        jacobian = np.where(finite[..., None], jacobian, 0.0)
-        return np.where(finite, np.linalg.eigvals(jacobian).astype(complex), np.nan)
+        n = jacobian.shape[-1]
+        flat = np.where(finite[..., None], jacobian, 0.0).reshape(-1, n, n)
+        values = np.empty((len(flat), n), dtype=complex)
+        # some 25 n**3 products each
+        for s in blocks(len(flat), 25 * n**3):
+            values[s] = np.linalg.eigvals(flat[s])
+        return np.where(finite, values.reshape(jacobian.shape[:-1]), np.nan)
 
     def refined(
         self,
@@ -303,8 +316,9 @@ class FrozenField:
         """Where the curve F = 0 meets h[row] = 0, or the plane through a point with a normal."""
         normal = start if normal is None else normal
         point = start if point is None else point
-        u, residual, size, converged = loop("refine")(
-            self.compiled.address, region, self.values, start, scale, row, normal, point,
+        u = start.copy()
+        residual, size, converged = loop("refine")(
+            self.compiled.address, region, self.values, u, scale, row, normal, point,
             self.compiled.size, self.compiled.m, 40,
         )  # fmt: skip
         if converged:

@@ -204,14 +204,22 @@ def _traced(
     while True:
         largest = continuation.largest_step / FINER**finer
         left = continuation.points - sum(map(len, rows))
-        u, along, status, step = loops.loop("trace")(
-            field.compiled.address, region, field.values, start, tangent, signs,
-            window.weight, window.lower, window.upper, low, high, window.states.middle(),
-            field.periods, max(step, 10 * continuation.smallest_step),
-            continuation.smallest_step, largest, continuation.largest_turn,
-            continuation.tolerance, continuation.iterations,
-            min(left, CHUNK) if finer else left, closing and not rows,
-        )  # fmt: skip
+        count = min(left, CHUNK) if finer else left
+        u, along = np.empty((count, len(start))), np.empty((count, len(start)))
+        u[0], along[0] = start, tangent
+        in_use = np.array([max(step, 10 * continuation.smallest_step)])
+        progress = np.array([1, 0])
+        status = loops.PAUSED
+        while status == loops.PAUSED:
+            progress[1] = max(1, loops.WORK // (8 * len(start) ** 3 + 16 * field.compiled.size))
+            status = loops.loop("trace")(
+                field.compiled.address, region, field.values, signs, window.weight,
+                window.lower, window.upper, low, high, window.states.middle(), field.periods,
+                continuation.smallest_step, largest, continuation.largest_turn,
+                continuation.tolerance, continuation.iterations, closing and not rows,
+                u, along, in_use, progress,
+            )  # fmt: skip
+        u, along, step = u[: progress[0]], along[: progress[0]], float(in_use[0])
         missed = False
         if status == loops.RANGE:
             end, _, ended = _cut(field, region, u.copy(), along.copy(), window, status)

@@ -11,7 +11,13 @@ from typing import Any, NoReturn
 
 from fastslow.arguments import path, takes
 from fastslow.disk import read_file, reason, write_file
-from fastslow.errors import ArgumentError, FastSlowError, FileError, MissingPackageError
+from fastslow.errors import (
+    ArgumentError,
+    FastSlowError,
+    FileError,
+    MissingPackageError,
+    raised_by_handler,
+)
 from fastslow.results.encoding import Arrays, BrokenError, decoded, encoded
 from fastslow.results.storage import read_archive, read_netcdf, write_archive, write_netcdf
 
@@ -44,6 +50,8 @@ def write(result: object, path: str | os.PathLike[str]) -> None:
     except FastSlowError:
         raise
     except (OSError, ValueError, RuntimeError, struct.error) as error:
+        if raised_by_handler(error):
+            raise
         # of the HDF5 library, and of `zipfile` for a name that is too long
         raise FileError(f"{target} cannot be written: {reason(error)}") from error
     write_file(target, content)
@@ -98,6 +106,8 @@ def load(path: str | os.PathLike[str]) -> Any:
     except BrokenError as error:
         raise FileError(f"{source} cannot be read: {error}") from None
     except Exception as error:
+        if raised_by_handler(error):
+            raise
         # what a file written by hand with a right checksum can raise has no end
         raise FileError(
             f"{source} is damaged, or not written by fastslow: {reason(error)}"

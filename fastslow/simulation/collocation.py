@@ -14,7 +14,6 @@ from numba import types
 from numba.extending import register_jitable
 from numba.np.numpy_support import carray
 
-from fastslow.compiled.late import late_function
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import DOUBLES, call_address
 from fastslow.simulation.lobatto import (
@@ -393,11 +392,4 @@ SIGNATURE = types.float64(
     DOUBLES,
     types.float64,
     *[DOUBLES, types.int64] * 2,
-)
-
-#: Few runs need it: it is compiled when the first of them does.
-late_collocation = late_function(
-    "fastslow.simulation.collocation",
-    "step_by_collocation",
-    SIGNATURE,
 )

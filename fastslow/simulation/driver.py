@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
 from fastslow.simulation.events import find_event, holds, put_on_all
@@ -20,7 +18,9 @@ from fastslow.simulation.implicit_steps import (
 )
 from fastslow.simulation.modes import (
     MANY_MODES,
+    MISSING,
     NOT_DEFINED,
+    UNKNOWN_MODE,
     across,
     choose_mode,
     expand,
@@ -30,17 +30,29 @@ from fastslow.simulation.modes import (
 from fastslow.simulation.polynomials import ZERO, horner, sample
 from fastslow.simulation.rooms import (
     CALM,
+    CHOOSING,
+    COLLOCATED_WORK,
     CROSSINGS,
     CROWDED,
+    DEPTH,
+    FLOOR,
+    FRESH,
+    IMPLICIT_WORK,
+    IN_A_ROW,
+    INTERFACE,
     LAST_EVENT,
     LATE,
+    LONGEST,
     MODE,
     PAUSE,
+    PAUSED,
     SAMPLES,
     SIZES,
     STEPS,
+    TOUCHED,
     USUAL,
-    grown,
+    WANTED,
+    WORK,
 )
 from fastslow.simulation.scales import (
     REACHED,
@@ -64,6 +76,10 @@ ACCUMULATION = 7
 #: It did not end: a plain step was taken in a region, and others may take the next.
 HANDED_OVER = -1
 
+#: It pauses between two steps, and goes on as if it had not when it is called again: its work is
+#: done, there is no room for another step or crossing, or it needs code that is not there.
+OUT_OF_WORK, TABLE_FULL, NEEDS_COLLOCATION, NEEDS_RADAU = -2, -3, -4, -5
+
 #: Crossings in a row, none farther from the last than rounding of time, that end a run.
 CROWD = 40
 
@@ -73,6 +89,7 @@ TANGENTIAL = 1e-6
 
 @part
 def drive(
+    late_code,
     address,
     layout,
     sizes,
@@ -86,6 +103,8 @@ def drive(
     samples,
     since,
     limits,
+    steps,
+    crossings,
     store,
     extremes,
     hits,
@@ -96,13 +115,15 @@ def drive(
     counted,
     handed,
 ):
-    """Follow one trajectory to its end, or until others may take its next step.
+    """Follow one trajectory to its end, until others may take its next step, or to a pause.
 
     Every step and every crossing is put into a table, or, where there are
     arrays for it, they are summed up as the run goes.
 
     Parameters
     ----------
+    late_code : tuple of int
+        Addresses of the steps by collocation and of those of Radau, 0 where they are not there.
     address : int
         Of the compiled series.
     layout : tuple of int
@@ -126,36 +147,38 @@ def drive(
         Time from which extremes and hits count.
     limits : tuple of int
         Largest numbers of steps and crossings.
+    steps : float64 array, shape (room, 4)
+        Begin, length, mode and kind of every step, filled here; without rows where steps and
+        crossings are to be summed up.
+    crossings : float64 array, shape (room, 6 + n_states)
+        Time, interface, direction, mode before, mode after, near-tangential and state of
+        every crossing, filled here.
     store : float64 array
-        Room for the series of every step, replaced by a larger one where it does
-        not suffice; empty where they are not to be kept.
+        The coefficients of states and slow quantities, step by step, filled here; empty where
+        they are not to be kept.
     extremes : float64 array, shape (2, n_states)
         Smallest and largest value of every state, widened here; without rows
-        where steps and crossings are to be listed.
+        where steps and crossings are listed.
     hits : int64 array, shape (n_interfaces, 2)
         Crossings upwards and downwards, counted here unless they are listed.
     seen : float64 array, shape (n_modes,)
         When each mode was last left, set here unless steps are listed.
     room : tuple of arrays
-        From `room_for`.
+        From `room_for`; after a pause the one that the run paused in.
     inputs : float64 array, shape (1 + n_states + n_forcing,)
         Time and state, changed here.
-    carried : float64 array, shape (3 + n_states + n_forcing + n_interfaces,)
-    counted : int64 array, shape (7,)
+    carried : float64 array, shape (SIZES + n_states + n_forcing + n_interfaces,)
+    counted : int64 array, shape (14,)
         What is carried from step to step, at first that of `beginnings`; changed here.
+        The work up to the next pause is to be set, in steps of the series.
     handed : int
         After a plain step in one of so many first modes the run is handed over.
 
     Returns
     -------
-    code : int
-        How it ended, or `HANDED_OVER`.
-    listed : tuple of ndarray
-        Time, length and mode of every step, shape (n_steps, 3), no rows where
-        they are summed up; coefficients of states and slow quantities, step by
-        step, where they are kept; and time, interface, direction, mode before, mode
-        after, near-tangential and state of every crossing, shape (n_crossings,
-        6 + n_states).
+    int
+        How it ended, `HANDED_OVER`, or why it pauses. Nothing but a number is returned: to make
+        an array Numba runs Python, in which an interrupt would be raised and lost.
     """
     n_states, n_forcing, n_interfaces, n_modes, order = layout
     columns = order + 1
@@ -165,16 +188,9 @@ def drive(
     whole = stop - span[0]
     work, W, b, d, stack, gradient, noise, on, hit, rests, side, offsets = room[:12]
     right, poly, matrices, vectors, memory, scales, rigid = room[12:]
-    memory[:] = 0.0
     n_rows = kept + n_interfaces
-    for i in range(n_rows):
-        scales[REACHED, i] = carried[SIZES + i]
     n_fast = sizes[2]
-    for j in range(n_interfaces):
-        on[j] = hit[j] = rests[j] = False
     listing, dense = extremes.shape[0] == 0, store.shape[0] > 0
-    steps = np.empty((64 if listing else 0, 4))
-    crossings = np.empty((16 if listing else 0, 6 + n_states))
     n_steps, n_crossings = counted[STEPS], counted[CROSSINGS]
     n_samples, crowd = counted[SAMPLES], counted[CROWDED]
     mode, interface = counted[MODE], ZERO - 1
@@ -183,9 +199,30 @@ def drive(
     calm, pause, in_a_row = counted[CALM], counted[PAUSE], ZERO
     wanted = longest = 0.0
     code = REACHED_END
-    choosing, touched, ahead, fresh = mode < 0, False, False, mode < 0
+    choosing, touched, ahead, fresh, raised = mode < 0, False, False, mode < 0, False
+    left = counted[WORK]
+    if counted[PAUSED] > 0:
+        in_a_row, interface = counted[IN_A_ROW], counted[INTERFACE]
+        wanted, longest = carried[WANTED], carried[LONGEST]
+        depth, floor = carried[DEPTH], carried[FLOOR]
+        choosing, touched = counted[CHOOSING] > 0, counted[TOUCHED] > 0
+        fresh = counted[FRESH] > 0
+    else:
+        memory[:] = 0.0
+        for i in range(n_rows):
+            scales[REACHED, i] = carried[SIZES + i]
+        for j in range(n_interfaces):
+            on[j] = hit[j] = rests[j] = False
     while True:
+        if listing and (
+            n_steps == steps.shape[0]
+            or n_crossings + n_interfaces > crossings.shape[0]
+            or (dense and (n_steps + 1) * stride > store.shape[0])
+        ):
+            code = TABLE_FULL
+            break
         if choosing:
+            left -= n_modes
             # most often one interface is crossed where the rates are continuous
             before = mode
             mode = across(signs, before, interface) if interface >= 0 and not touched else before
@@ -208,6 +245,7 @@ def drive(
             )
             if not ahead:
                 mode = choose_mode(
+                    late_code,
                     address,
                     layout,
                     signs,
@@ -230,6 +268,8 @@ def drive(
                     code = NOT_UNIQUE
                 elif mode == NOT_DEFINED:
                     code = NOT_FINITE
+                elif mode == UNKNOWN_MODE:
+                    code = NEEDS_COLLOCATION
                 mode = before
                 break
             for j in range(n_interfaces):
@@ -237,8 +277,6 @@ def drive(
                 if changed or (touched and mode == before and j == interface):
                     turn = signs[mode, j] - signs[before, j]
                     if listing:
-                        if n_crossings == crossings.shape[0]:
-                            crossings = grown(crossings)
                         crossings[n_crossings, 0] = t
                         crossings[n_crossings, 1] = j
                         crossings[n_crossings, 2] = min(max(turn, -1), 1)
@@ -268,17 +306,36 @@ def drive(
             W, right = right, W
         else:
             longest = expand(
-                address, layout, mode, inputs, parameters, tol, scales, remaining, W, memory, ahead
+                late_code,
+                address,
+                layout,
+                mode,
+                inputs,
+                parameters,
+                tol,
+                scales,
+                remaining,
+                W,
+                memory,
+                ahead,
             )
-            ahead = False
+            ahead = raised = False
+            if longest == MISSING:
+                code = NEEDS_COLLOCATION
+                break
             if fresh and longest < SUDDEN * (usual if usual > 0.0 else remaining):
+                # should the step have to be taken again, it begins with the sizes as they were
+                raised = True
+                for i in range(n_rows):
+                    carried[SIZES + i] = scales[REACHED, i]
                 raise_sizes(W, n_rows, order, tol, remaining, rules, scales)
                 if memory[0] == 0.0:
                     longest = step_length(W, n_rows, order, tol, scales)
-            fresh = False
             if not longest > 0.0:
                 code = NOT_FINITE
                 break
+            if memory[0] > 0.0:
+                left -= COLLOCATED_WORK
         taken, long = 0.0, False
         for i in range(n_states, kept):
             inputs[1 + i] = W[i * columns]
@@ -287,7 +344,9 @@ def drive(
             if in_a_row == 0:
                 wanted = 1.25 * longest
                 rigid[0] = 0.0
+            left -= IMPLICIT_WORK + n_fast * n_fast // 8
             taken, growth = long_step(
+                late_code,
                 address,
                 layout,
                 n_fast,
@@ -315,14 +374,27 @@ def drive(
                 stack,
                 gradient,
             )
+            if taken == MISSING:
+                code = NEEDS_RADAU
+                if in_a_row > 0:
+                    W, right = right, W
+                elif raised:
+                    for i in range(n_rows):
+                        scales[REACHED, i] = carried[SIZES + i]
+                calm += 1
+                break
             long = taken > 0.0
             if long:
                 wanted, pause, in_a_row = growth * taken, ZERO + WAIT, in_a_row + 1
                 W, poly = poly, W
                 s, h, interface, final = 2.0, taken, ZERO - 1, taken >= remaining
             else:
+                pause = min(2 * pause, LONGEST_WAIT)
+                calm = pause
                 if in_a_row > 0:
+                    in_a_row = ZERO
                     longest = expand(
+                        late_code,
                         address,
                         layout,
                         mode,
@@ -335,8 +407,14 @@ def drive(
                         memory,
                         False,
                     )
-                pause = min(2 * pause, LONGEST_WAIT)
-                calm, in_a_row = pause, ZERO
+                    if longest == MISSING:
+                        code = NEEDS_COLLOCATION
+                        calm += 1
+                        break
+                    if not longest > 0.0:
+                        code = NOT_FINITE
+                        break
+        fresh = False
         if not long:
             final = longest >= remaining
             # a step between two times that are exact in floating point loses none of it
@@ -388,8 +466,6 @@ def drive(
         if taken > 0.0:
             remember_sizes(rules, scales)
             if listing:
-                if n_steps == steps.shape[0]:
-                    steps = grown(steps)
                 steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, taken, mode
                 kind = RADAU if rigid[0] > 0.0 else IMPLICIT
                 steps[n_steps, 3] = kind if long else memory[0]
@@ -399,11 +475,6 @@ def drive(
                     unused = (since - begin) - lag
                     widen_extremes(W, n_states, order, unused, taken, extremes, b, d, stack)
             if dense:
-                if (n_steps + 1) * stride > store.shape[0]:
-                    larger = np.empty(2 * store.shape[0] + 64 * stride)
-                    for i in range(n_steps * stride):
-                        larger[i] = store[i]
-                    store = larger
                 for i in range(stride):
                     store[n_steps * stride + i] = W[i]
             n_steps += 1
@@ -425,6 +496,7 @@ def drive(
         if interface >= 0:
             hit[interface] = choosing = True
         put_on_all(address, n_modes, hit, inputs, parameters, gradient, n_states)
+        left -= 1
         if interface >= 0:
             crowd = crowd + 1 if t - last_event <= 1e-13 * max(abs(t), whole) else 0
             last_event = t
@@ -434,10 +506,29 @@ def drive(
         elif mode < handed and not choosing and not final and in_a_row == 0:
             code = HANDED_OVER
             break
+        if left <= 0:
+            code = OUT_OF_WORK
+            break
+    counted[PAUSED] = code < HANDED_OVER
+    if code < HANDED_OVER:
+        if in_a_row > 0:
+            # the arrays have changed their places
+            held_W, held_right = room[1], room[12]
+            for i in range(W.shape[0]):
+                work[i] = right[i]
+            for i in range(W.shape[0]):
+                held_W[i] = W[i]
+            for i in range(W.shape[0]):
+                held_right[i] = work[i]
+        counted[IN_A_ROW], counted[INTERFACE] = in_a_row, interface
+        counted[CHOOSING], counted[TOUCHED], counted[FRESH] = choosing, touched, fresh
+        carried[WANTED], carried[LONGEST] = wanted, longest
+        carried[DEPTH], carried[FLOOR] = depth, floor
+    counted[WORK] = left
     carried[LATE], carried[USUAL], carried[LAST_EVENT] = late, usual, last_event
     for i in range(n_rows):
         carried[SIZES + i] = scales[REACHED, i]
     counted[STEPS], counted[CROSSINGS] = n_steps, n_crossings
     counted[SAMPLES], counted[CROWDED], counted[MODE] = n_samples, crowd, mode
     counted[CALM], counted[PAUSE] = calm, pause
-    return code, (steps[:n_steps], store, crossings[:n_crossings])
+    return code

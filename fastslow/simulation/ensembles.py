@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,8 +27,9 @@ from fastslow.results.regimes import (
     periods_at_the_end,
     repeats,
 )
+from fastslow.simulation.driver import OUT_OF_WORK, REACHED_END
 from fastslow.simulation.grouping import alike
-from fastslow.simulation.lanes import pool_for
+from fastslow.simulation.lanes import LEFT, pool_for
 from fastslow.simulation.many_arguments import (
     periods_of,
     spans_of,
@@ -35,8 +37,9 @@ from fastslow.simulation.many_arguments import (
     threads_of,
     times_of,
 )
+from fastslow.simulation.pauses import Pace, late_code, provide
 from fastslow.simulation.remembering import notes_on_noise
-from fastslow.simulation.rooms import MODE, STEPS, beginnings
+from fastslow.simulation.rooms import MODE, STEPS, beginnings, room_for
 from fastslow.simulation.settings import (
     DEFAULT,
     Integration,
@@ -61,6 +64,7 @@ steps_of = once_a_model(compile_steps)
 
 _ARGUMENTS = (
     "bounds",
+    "late_code",
     "address",
     "lanes",
     "layout",
@@ -83,6 +87,7 @@ _ARGUMENTS = (
     "counted",
     "codes",
     "pool",
+    "room",
 )
 
 
@@ -482,58 +487,83 @@ def _run(
 
     stops = spans.copy()
     kept = _Kept(ending, spans, starts, lanes.regions) if ending is not None else None
+    stopping = threading.Event()
 
-    def follow(chunk: tuple[int, int]) -> None:
+    def follow(chunk: tuple[int, int]) -> Iterator[int]:
+        """Follow a chunk to its end; what is yielded on the way has to be provided."""
         for stop in range(1 if kept is None else kept.stops(chunk)):
             if kept is not None:
                 kept.before(stop, chunk, stops, whole, codes)
-            advance(chunk)
+            yield from advance(chunk)
             if kept is not None:
                 kept.after(stop, chunk, places, seen, codes)
 
-    def advance(chunk: tuple[int, int]) -> None:
-        many(
-            chunk,
-            compiled.address,
-            (lanes.address, lanes.regions),
-            layout,
-            sizes,
-            compiled.signs,
-            compiled.continuous,
-            resolved.rtol,
-            rules,
-            resolved.limits,
-            values,
-            stops,
-            since,
-            times,
-            samples,
-            extremes,
-            hits,
-            seen,
-            places,
-            carried,
-            whole,
-            codes,
-            pool_for(layout, lanes.regions, values.shape[1], count),
-        )
+    def advance(chunk: tuple[int, int]) -> Iterator[int]:
+        pool = pool_for(layout, lanes.regions, values.shape[1], count)
+        room = room_for(layout, sizes, times.shape[1])
+        pace = Pace(compiled.n_rows, compiled.order)
+        while True:
+            pool[-1][LEFT] = pace.begin()
+            code = many(
+                chunk,
+                late_code(sizes[2]),
+                compiled.address,
+                (lanes.address, lanes.regions),
+                layout,
+                sizes,
+                compiled.signs,
+                compiled.continuous,
+                resolved.rtol,
+                rules,
+                resolved.limits,
+                values,
+                stops,
+                since,
+                times,
+                samples,
+                extremes,
+                hits,
+                seen,
+                places,
+                carried,
+                whole,
+                codes,
+                pool,
+                room,
+            )
+            if code == REACHED_END:
+                return
+            if stopping.is_set():
+                raise CancelledError
+            if code == OUT_OF_WORK:
+                pace.end()
+            else:
+                yield code
 
     size = min(_CHUNK, max(1, count // (4 * threads)))
     chunks = [(i, min(i + size, count)) for i in range(0, count, size)]
+    under_way = {follow(chunk): chunk[1] - chunk[0] for chunk in chunks}
     if min(threads, len(chunks)) == 1:
-        for chunk in chunks:
-            follow(chunk)
-            report(chunk[1] - chunk[0])
+        for following, number in under_way.items():
+            for code in following:
+                provide(code, sizes[2])
+            report(number)
     else:
-        pool = ThreadPoolExecutor(min(threads, len(chunks)))
+        executor = ThreadPoolExecutor(min(threads, len(chunks)))
         try:
-            waiting = {pool.submit(follow, chunk): chunk for chunk in chunks}
-            for done in as_completed(waiting):
-                done.result()
-                first, last = waiting[done]
-                report(last - first)
+            waiting = {executor.submit(next, f, None): f for f in under_way}
+            while waiting:
+                # signals are handled in this thread, on some systems between two waits only
+                for done in wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED).done:
+                    following, needed = waiting.pop(done), done.result()
+                    if needed is None:
+                        report(under_way[following])
+                    else:
+                        provide(needed, sizes[2])
+                        waiting[executor.submit(next, following, None)] = following
         finally:
-            pool.shutdown(cancel_futures=True)
+            stopping.set()
+            executor.shutdown(cancel_futures=True)
     extremes[np.isinf(extremes)] = np.nan
     endings = np.column_stack([codes, whole[:, MODE], whole[:, STEPS]])
     last = None if kept is None else (kept.touched, kept.states)

@@ -20,12 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.compiled.parts import part
-from fastslow.compiled.pointers import call_address
+from fastslow.compiled.pointers import call_address, call_number
 from fastslow.compiled.series_modes import SHORT
 from fastslow.simulation.events import find_event
 from fastslow.simulation.matrices import factorise_in_place, forgotten_in, solve_in_place
+from fastslow.simulation.modes import MISSING
 from fastslow.simulation.polynomials import EPSILON
-from fastslow.simulation.radau import STAGES, accept, late_radau
+from fastslow.simulation.radau import STAGES, accept
 from fastslow.simulation.scales import NOW, REACHED, ratio_of
 
 #: Taylor coefficients that are matched at the beginning and at the end of a step.
@@ -106,6 +107,7 @@ _BINOMIAL = np.array([[float(math.comb(k, i)) for i in range(P + 1)] for k in ra
 
 @part
 def long_step(
+    late,
     address,
     layout,
     n_fast,
@@ -159,7 +161,7 @@ def long_step(
     Returns
     -------
     length : float
-        0 where no such step pays.
+        0 where no such step pays, `MISSING` where Radau's steps are needed and are not there.
     growth : float
         How much longer the next one may be.
     """
@@ -194,6 +196,7 @@ def long_step(
             )
         if rigid or (error < 0.0 and CONTRACTION * h > RESOLVED * longest):
             found = by_radau(
+                late,
                 address,
                 layout,
                 n_fast,
@@ -208,6 +211,8 @@ def long_step(
                 poly,
                 carried,
             )
+            if found == MISSING:
+                return MISSING, 1.0
             if rigid or found <= 1.0:
                 rigid, error, power = True, found, -1.0 / (STAGES + 1)
         error = abs(error)
@@ -230,6 +235,7 @@ def long_step(
 
 @part
 def by_radau(
+    late,
     address,
     layout,
     n_fast,
@@ -244,27 +250,32 @@ def by_radau(
     poly,
     carried,
 ):
-    """Call `late_radau`."""
+    """Call `radau_by_pointers`."""
+    if late[1] == 0:
+        return MISSING
     n_states, n_forcing, n_interfaces, n_modes, order = layout
-    return late_radau(
-        address,
-        n_states,
-        n_forcing,
-        n_interfaces,
-        n_modes,
-        order,
-        n_fast,
-        mode,
-        inputs.ctypes,
-        parameters.ctypes,
-        tol,
-        scales.ctypes,
-        rate,
-        h,
-        right.ctypes,
-        poly.ctypes,
-        poly.shape[0],
-        carried.ctypes,
+    return call_number(
+        late[1],
+        (
+            address,
+            n_states,
+            n_forcing,
+            n_interfaces,
+            n_modes,
+            order,
+            n_fast,
+            mode,
+            inputs,
+            parameters,
+            tol,
+            scales,
+            rate,
+            h,
+            right,
+            poly,
+            poly.shape[0],
+            carried,
+        ),
     )
 
 

@@ -16,17 +16,21 @@ from fastslow.compiled import lane_steps as step
 from fastslow.compiled.lanes import WIDTH
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
-from fastslow.simulation.driver import HANDED_OVER, drive
+from fastslow.simulation.driver import HANDED_OVER, OUT_OF_WORK, REACHED_END, drive
 from fastslow.simulation.extremes import widen_extremes
 from fastslow.simulation.polynomials import ZERO, sample
-from fastslow.simulation.rooms import CALM, LATE, MODE, SAMPLES, SIZES, STEPS, USUAL, room_for
+from fastslow.simulation.rooms import CALM, LATE, MODE, SAMPLES, SIZES, STEPS, USUAL, WORK
 from fastslow.simulation.scales import FIXED, LASTING
-
-# made where it is used: arguments on the stack are slow to hand on
-own_room = part(room_for)
 
 #: Trajectories under way at a time, so that some region has one for every lane.
 UNDER_WAY = 8 * WIDTH
+
+#: Steps in lanes before the loop is asked whether to go on.
+IN_LANES = 1000
+
+#: What the loop goes on from after a pause: that it paused, the next trajectory that is not yet
+#: under way, how many are to be followed alone and in lanes, the mode of those, the work left.
+PAUSED, FOLLOWING, ALONE, COUNT, LANES_MODE, LEFT = range(6)
 
 
 def pool_for(
@@ -44,12 +48,15 @@ def pool_for(
         np.empty((max(1, regions), under_way), dtype=np.int64),
         np.empty(max(1, regions), dtype=np.int64),
         np.empty(under_way, dtype=np.int64),
+        np.zeros(WIDTH, dtype=np.int64),
+        np.zeros(LEFT + 1, dtype=np.int64),
     )
 
 
 @part
 def drive_many(
     bounds,
+    late_code,
     address,
     lanes,
     layout,
@@ -72,36 +79,49 @@ def drive_many(
     counted,
     codes,
     pool,
+    room,
 ):
-    """Follow the trajectories from one number to another to their ends.
+    """Follow the trajectories from one number to another to their ends, or to a pause.
 
     The arguments are those of `drive` with one row for each trajectory
     (``times`` may have one row for all); ``lanes`` holds the address of the plain
     steps and the number of their regions, ``codes`` is filled with how each
-    ended, ``pool`` comes from `pool_for`.
+    ended, ``pool`` comes from `pool_for` and ``room`` from `room_for`; both keep what it
+    goes on from after a pause. The last number of the pool is the work up to the next one.
+
+    Returns
+    -------
+    int
+        `REACHED_END`, or why it pauses, as `drive`.
     """
     n_states = layout[0]
     steps, regions = lanes
-    rows, given, series, held, ready, n_ready, alone = pool
-    room = own_room(layout, sizes, times.shape[1])
-    store, following = np.empty(0), bounds[0]
-    n_alone = count = mode = ZERO
-    for region in range(n_ready.shape[0]):
-        n_ready[region] = 0
-    for lane in range(WIDTH):
-        held[lane] = -1
-        given[parameters.shape[1], lane] = math.log2(tol)
-        for k in range(rules.shape[1]):
-            given[parameters.shape[1] + 1 + k, lane] = rules[FIXED, k]
-            given[parameters.shape[1] + 1 + rules.shape[1] + k, lane] = rules[LASTING, k]
-    while n_alone < min(alone.shape[0], bounds[1] - bounds[0]):
-        alone[n_alone] = following
-        n_alone += 1
-        following += 1
+    rows, given, series, held, ready, n_ready, alone, beyond, progress = pool
+    table, store, left = np.empty((0, 0)), np.empty(0), progress[LEFT]
+    following, n_alone = progress[FOLLOWING], progress[ALONE]
+    count, mode = progress[COUNT], progress[LANES_MODE]
+    if progress[PAUSED] == 0:
+        following = bounds[0]
+        n_alone = count = mode = ZERO
+        for region in range(n_ready.shape[0]):
+            n_ready[region] = 0
+        for lane in range(WIDTH):
+            held[lane] = -1
+            given[parameters.shape[1], lane] = math.log2(tol)
+            for k in range(rules.shape[1]):
+                given[parameters.shape[1] + 1 + k, lane] = rules[FIXED, k]
+                given[parameters.shape[1] + 1 + rules.shape[1] + k, lane] = rules[LASTING, k]
+        while n_alone < min(alone.shape[0], bounds[1] - bounds[0]):
+            alone[n_alone] = following
+            n_alone += 1
+            following += 1
+    code = ZERO + REACHED_END
     while True:
         while n_alone > 0:
             i = alone[n_alone - 1]
-            codes[i], _ = drive(
+            counted[i, WORK] = left
+            codes[i] = drive(
+                late_code,
                 address,
                 layout,
                 sizes,
@@ -115,6 +135,8 @@ def drive_many(
                 samples[i],
                 since[i],
                 limits,
+                table,
+                table,
                 store,
                 extremes[i],
                 hits[i],
@@ -125,6 +147,10 @@ def drive_many(
                 counted[i],
                 regions,
             )
+            left = counted[i, WORK]
+            if codes[i] < HANDED_OVER:
+                code = codes[i]
+                break
             if codes[i] != HANDED_OVER and following < bounds[1]:
                 alone[n_alone - 1] = following
                 following += 1
@@ -134,6 +160,8 @@ def drive_many(
                 region = counted[i, MODE]
                 ready[region, n_ready[region]] = i
                 n_ready[region] += 1
+        if code != REACHED_END:
+            break
         fullest = mode
         for region in range(regions):
             if n_ready[region] > n_ready[fullest]:
@@ -143,7 +171,10 @@ def drive_many(
             for lane in range(WIDTH):
                 i = held[lane]
                 if i >= 0:
-                    put_down(rows, lane, i, limits, since, places, carried, counted, extremes, seen)
+                    put_down(
+                        rows, lane, i, limits, beyond, since, places, carried, counted, extremes,
+                        seen,
+                    )  # fmt: skip
                     ready[mode, n_ready[mode]] = i
                     n_ready[mode] += 1
                     held[lane] = -1
@@ -156,15 +187,19 @@ def drive_many(
                 count += 1
                 i = held[lane] = ready[mode, n_ready[mode]]
                 take_up(
-                    rows, lane, i, limits, since, spans, times, places, carried, counted, extremes
-                )
+                    rows, lane, i, limits, beyond, since, spans, times, places, carried, counted,
+                    extremes,
+                )  # fmt: skip
                 if sizes[2] == 0:
                     rows[1 + n_states + step.CALM, lane] = np.inf
                 for k in range(parameters.shape[1]):
                     given[k, lane] = parameters[i, k]
         if count < WIDTH:
             copy_into_the_rest(held, rows, given)
+        allowed = rows[1 + n_states + step.ALLOWED, 0]
         call_address(steps, mode, rows, given, series)
+        # the lanes go together, two steps of a trajectory alone in one of theirs
+        left -= 2 + 2 * np.int64(allowed - rows[1 + n_states + step.ALLOWED, 0])
         for lane in range(WIDTH):
             i = held[lane]
             if i < 0:
@@ -175,15 +210,35 @@ def drive_many(
                     rows, lane, i, series, layout, since, times, counted, samples, extremes, room
                 )
             elif outcome == step.NOT_TAKEN:
-                put_down(rows, lane, i, limits, since, places, carried, counted, extremes, seen)
+                if rows[1 + n_states + step.ALLOWED, lane] < 1.0 and beyond[lane] > 0:
+                    allow(rows, lane, n_states, beyond, beyond[lane])
+                    continue
+                put_down(
+                    rows, lane, i, limits, beyond, since, places, carried, counted, extremes, seen
+                )
                 held[lane] = -1
                 count -= 1
                 alone[n_alone] = i
                 n_alone += 1
+        if left <= 0:
+            code = ZERO + OUT_OF_WORK
+            break
+    progress[PAUSED] = code != REACHED_END
+    progress[FOLLOWING], progress[ALONE] = following, n_alone
+    progress[COUNT], progress[LANES_MODE] = count, mode
+    return code
 
 
 @part
-def take_up(rows, lane, i, limits, since, spans, times, places, carried, counted, extremes):
+def allow(rows, lane, n, beyond, steps):
+    """Allow a lane so many steps, a part of them at a time."""
+    first = min(steps, IN_LANES)
+    rows[1 + n + step.ALLOWED, lane] = first
+    beyond[lane] = steps - first
+
+
+@part
+def take_up(rows, lane, i, limits, beyond, since, spans, times, places, carried, counted, extremes):
     """Give a trajectory a lane."""
     n = extremes.shape[2]
     for k in range(1 + n):
@@ -193,7 +248,7 @@ def take_up(rows, lane, i, limits, since, spans, times, places, carried, counted
     first = 1 + n + step.ROWS + 2 * n
     for k in range(rows.shape[0] - first):
         rows[first + k, lane] = carried[i, SIZES + k]
-    rows[1 + n + step.ALLOWED, lane] = limits[0] - counted[i, STEPS]
+    allow(rows, lane, n, beyond, limits[0] - counted[i, STEPS])
     rows[1 + n + step.CALM, lane] = counted[i, CALM]
     rows[1 + n + step.NEXT, lane] = next_time(times, i, counted[i, SAMPLES])
     # no extremes are widened before they count, and no step goes from there to where they do
@@ -205,10 +260,10 @@ def take_up(rows, lane, i, limits, since, spans, times, places, carried, counted
 
 
 @part
-def put_down(rows, lane, i, limits, since, places, carried, counted, extremes, seen):
+def put_down(rows, lane, i, limits, beyond, since, places, carried, counted, extremes, seen):
     """Take a trajectory from its lane."""
     n = extremes.shape[2]
-    steps = limits[0] - np.int64(rows[1 + n + step.ALLOWED, lane])
+    steps = limits[0] - beyond[lane] - np.int64(rows[1 + n + step.ALLOWED, lane])
     if steps > counted[i, STEPS]:
         seen[i, counted[i, MODE]] = rows[0, lane]
         counted[i, STEPS] = steps

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastslow.compiled.parts import part
-from fastslow.compiled.pointers import call_address
-from fastslow.simulation.collocation import late_collocation
+from fastslow.compiled.pointers import call_address, call_number
 from fastslow.simulation.polynomials import EPSILON, ONE, ZERO, first_nonzero, first_strong
 from fastslow.simulation.scales import step_length
 
@@ -17,12 +16,16 @@ BEGINNING = 1.0 / 16.0
 #: How well a mode agrees with an interface that it starts on.
 AGREES, LEANS, RESTS, LEANS_AWAY, DISAGREES = 3, 2, 1, 0, -1
 
-#: No mode agrees; more than one does; the rates of none that could are finite.
-NO_MODE, MANY_MODES, NOT_DEFINED = -1, -2, -3
+#: No mode agrees; more than one does; the rates of none that could are finite; this is not known
+#: before the code for collocation is there.
+NO_MODE, MANY_MODES, NOT_DEFINED, UNKNOWN_MODE = -1, -2, -3, -4
+
+#: The length of a step that needs code which is not there yet.
+MISSING = -1.0
 
 
 @part
-def expand(address, layout, mode, inputs, parameters, tol, scales, room, W, memory, known):
+def expand(late, address, layout, mode, inputs, parameters, tol, scales, room, W, memory, known):
     """Fill ``W`` with polynomials of time from a point on.
 
     The Taylor series where there is one; else, where its coefficients are not
@@ -30,8 +33,8 @@ def expand(address, layout, mode, inputs, parameters, tol, scales, room, W, memo
 
     Parameters
     ----------
-    address, layout, mode, inputs, parameters
-        As for `drive`: the compiled function, and where.
+    late, address, layout, mode, inputs, parameters
+        As for `drive`: the compiled functions, and where.
     tol : float
     scales : float64 array, shape (2, rows)
         In which errors are measured, see `step_length`.
@@ -48,7 +51,8 @@ def expand(address, layout, mode, inputs, parameters, tol, scales, room, W, memo
     Returns
     -------
     float
-        How far the polynomials hold, NaN where the rates are not finite.
+        How far the polynomials hold, NaN where the rates are not finite, `MISSING` where
+        collocation is needed and is not there.
     """
     if not known:
         call_address(address, mode, inputs, parameters, W)
@@ -57,30 +61,35 @@ def expand(address, layout, mode, inputs, parameters, tol, scales, room, W, memo
         memory[0] = 0.0
     if length > 0.0:
         return length
-    return instead(address, layout, mode, inputs, parameters, tol, scales, room, W, memory)
+    return instead(late, address, layout, mode, inputs, parameters, tol, scales, room, W, memory)
 
 
 @part
-def instead(address, layout, mode, inputs, parameters, tol, scales, room, W, memory):
-    """Call `late_collocation`: apart, so that the common case stays short."""
+def instead(late, address, layout, mode, inputs, parameters, tol, scales, room, W, memory):
+    """Call `step_by_collocation`: apart, so that the common case stays short."""
+    if late[0] == 0:
+        return MISSING
     n_states, n_forcing, n_interfaces, n_modes, order = layout
-    return late_collocation(
-        address,
-        n_states,
-        n_forcing,
-        n_interfaces,
-        n_modes,
-        order,
-        mode,
-        inputs.ctypes,
-        parameters.ctypes,
-        tol,
-        scales.ctypes,
-        room,
-        W.ctypes,
-        W.shape[0],
-        memory.ctypes,
-        memory.shape[0],
+    return call_number(
+        late[0],
+        (
+            address,
+            n_states,
+            n_forcing,
+            n_interfaces,
+            n_modes,
+            order,
+            mode,
+            inputs,
+            parameters,
+            tol,
+            scales,
+            room,
+            W,
+            W.shape[0],
+            memory,
+            memory.shape[0],
+        ),
     )
 
 
@@ -151,6 +160,7 @@ def agreement(b, order, noise, side):
 
 @part
 def choose_mode(
+    late,
     address,
     layout,
     signs,
@@ -171,6 +181,8 @@ def choose_mode(
 
     Parameters
     ----------
+    late : tuple of int
+        As for `drive`.
     address : int
         Of the compiled series.
     layout : tuple of int
@@ -195,7 +207,7 @@ def choose_mode(
     Returns
     -------
     int
-        The mode, `NO_MODE`, `MANY_MODES` or `NOT_DEFINED`.
+        The mode, `NO_MODE`, `MANY_MODES`, `NOT_DEFINED` or `UNKNOWN_MODE`.
     """
     n_states, n_forcing, n_interfaces, n_modes, order = layout
     first_h = n_states + n_forcing
@@ -219,8 +231,21 @@ def choose_mode(
             if not possible:
                 continue
             length = expand(
-                address, layout, mode, inputs, parameters, tol, scales, longest, W, memory, False
+                late,
+                address,
+                layout,
+                mode,
+                inputs,
+                parameters,
+                tol,
+                scales,
+                longest,
+                W,
+                memory,
+                False,
             )
+            if length == MISSING:
+                return UNKNOWN_MODE
             if not length > 0.0:
                 broken = True
                 continue

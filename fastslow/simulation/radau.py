@@ -18,7 +18,6 @@ from numba.np.numpy_support import carray
 from numpy.polynomial import Polynomial, legendre
 from numpy.typing import NDArray
 
-from fastslow.compiled.late import late_function
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import DOUBLES, call_address
 from fastslow.compiled.series_modes import DIRECTIONAL, RATES
@@ -420,11 +419,4 @@ SIGNATURE = types.float64(
     *[DOUBLES] * 2,
     types.int64,
     DOUBLES,
-)
-
-#: Few runs need it: it is compiled when the first of them does.
-late_radau = late_function(
-    "fastslow.simulation.radau",
-    "radau_by_pointers",
-    SIGNATURE,
 )

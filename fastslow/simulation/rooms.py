@@ -7,20 +7,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.compiled.parts import part
 from fastslow.simulation.collocation import memory_size
 from fastslow.simulation.implicit_steps import WAIT, Q
 from fastslow.simulation.radau import carried_size
 from fastslow.simulation.scales import FIXED
 
 #: Numbers carried from step to step: by how much the time is late, the usual length of a
-#: step, the time of the last event, and from then on the sizes that the run has reached.
-LATE, USUAL, LAST_EVENT, SIZES = 0, 1, 2, 3
+#: step, the time of the last event; the length that an implicit step tries first, and that
+#: of the series at the last one; depth and rounding error of h at the last event. From then on
+#: the sizes that the run has reached.
+LATE, USUAL, LAST_EVENT, WANTED, LONGEST, DEPTH, FLOOR, SIZES = range(8)
 
 #: Whole numbers carried: steps, crossings and samples so far, crossings crowded
 #: together, the mode, -1 before the first was chosen, steps until an implicit one is
-#: tried, and how many to wait for should it fail.
-STEPS, CROSSINGS, SAMPLES, CROWDED, MODE, CALM, PAUSE = 0, 1, 2, 3, 4, 5, 6
+#: tried, and how many to wait for should it fail. Then what only a run that paused goes on
+#: from: that it did, how many implicit steps in a row, the interface of the last event,
+#: whether it was touched, whether a mode is to be chosen, and whether it has just been. Last
+#: the work that is left before the next pause.
+(
+    STEPS, CROSSINGS, SAMPLES, CROWDED, MODE, CALM, PAUSE,
+    PAUSED, IN_A_ROW, INTERFACE, TOUCHED, CHOOSING, FRESH, WORK,
+) = range(14)  # fmt: skip
+
+#: Work of a step by collocation, and of an attempt at an implicit one with one fast state, in
+#: units of a step of the series.
+COLLOCATED_WORK, IMPLICIT_WORK = 50, 4
 
 
 def beginnings(
@@ -42,15 +53,15 @@ def beginnings(
     -------
     places : ndarray, shape (m, 1 + n + n_forcing)
         Times, states, and room for the slow quantities.
-    carried : ndarray, shape (m, 3 + rows)
-    counted : ndarray of int64, shape (m, 7)
+    carried : ndarray, shape (m, SIZES + rows)
+    counted : ndarray of int64, shape (m, 14)
     """
     m = len(times)
     places = np.column_stack([times, states, np.zeros((m, n_forcing))])
     carried = np.zeros((m, SIZES + rules.shape[1]))
     carried[:, SIZES:] = rules[FIXED]
     carried[:, LAST_EVENT] = -np.inf
-    counted = np.zeros((m, 7), dtype=np.int64)
+    counted = np.zeros((m, WORK + 1), dtype=np.int64)
     counted[:, MODE] = -1
     counted[:, [CALM, PAUSE]] = WAIT
     return places, carried, counted
@@ -59,7 +70,7 @@ def beginnings(
 def room_for(
     layout: tuple[int, int, int, int, int], sizes: tuple[int, int, int], n_times: int
 ) -> tuple[NDArray[Any], ...]:
-    """Work space of `drive`, for one run after the other."""
+    """Work space of `drive`, for one run after the other; one that paused goes on in its own."""
     n_states, n_forcing, n_interfaces, _, order = layout
     columns = order + 1
     settling = sizes[0] * columns if sizes[2] > 0 else 0
@@ -84,13 +95,3 @@ def room_for(
         np.zeros((2, n_states + n_forcing + n_interfaces)),
         np.zeros(carried_size(n_states)),
     )
-
-
-@part
-def grown(array):
-    """A copy with room for twice as many rows."""
-    larger = np.empty((2 * array.shape[0] + 16, array.shape[1]))
-    for i in range(array.shape[0]):
-        for j in range(array.shape[1]):
-            larger[i, j] = array[i, j]
-    return larger

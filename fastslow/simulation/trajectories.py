@@ -6,7 +6,7 @@ import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -26,10 +26,20 @@ from fastslow.simulation.arguments import (
     sample_times,
     time_span,
 )
+from fastslow.simulation.driver import OUT_OF_WORK, TABLE_FULL
 from fastslow.simulation.implicit_steps import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
+from fastslow.simulation.pauses import Pace, late_code, provide
 from fastslow.simulation.radau import RADAU_ORDER
 from fastslow.simulation.remembering import with_noise
-from fastslow.simulation.rooms import MODE, SAMPLES, STEPS, beginnings, room_for
+from fastslow.simulation.rooms import (
+    CROSSINGS,
+    MODE,
+    SAMPLES,
+    STEPS,
+    WORK,
+    beginnings,
+    room_for,
+)
 from fastslow.simulation.scales import FORGETTING, rules_of
 from fastslow.simulation.settings import (
     DEFAULT,
@@ -40,6 +50,7 @@ from fastslow.simulation.settings import (
 )
 
 _ARGUMENTS = (
+    "late_code",
     "address",
     "layout",
     "sizes",
@@ -53,6 +64,8 @@ _ARGUMENTS = (
     "samples",
     "since",
     "limits",
+    "steps",
+    "crossings",
     "store",
     "extremes",
     "hits",
@@ -193,7 +206,7 @@ def simulate(
     (place,), (carried,), (counted,) = beginnings(
         np.array([span[0]]), begin[None], compiled.n_forcing, rules
     )
-    code, (steps, store, crossings) = drive_loop()(
+    constant = (
         compiled.address,
         layout,
         sizes,
@@ -207,14 +220,25 @@ def simulate(
         sampled,
         span[0],
         resolved.limits,
-        _room.store if dense else np.empty(0),
-        *_LISTED,
-        room_for(layout, sizes, len(times)),
-        place,
-        carried,
-        counted,
-        0,
     )
+    room = room_for(layout, sizes, len(times))
+    stride = kept * (compiled.order + 1) if dense else 0
+    tables = _memory.taken(compiled.n_states, stride)
+    loop, pace = drive_loop(), Pace(compiled.n_rows, compiled.order)
+    while True:
+        counted[WORK] = pace.begin()
+        code = loop(
+            late_code(sizes[2]), *constant, *tables, *_LISTED, room, place, carried, counted, 0
+        )
+        if code == OUT_OF_WORK:
+            pace.end()
+        elif code == TABLE_FULL:
+            tables = tables.with_space(counted, compiled.n_interfaces, stride)
+        elif code < 0:
+            provide(code, sizes[2])
+        else:
+            break
+    steps, crossings, store = _memory.given_back(tables, counted, stride)
     end, reached = place[: 1 + compiled.n_states].copy(), counted[SAMPLES]
     n_steps, mode = int(counted[STEPS]), int(counted[MODE])
     names = (*model.states, *model.slow_states)
@@ -228,7 +252,7 @@ def simulate(
         resolved.limits,
         compiled.undecided,
     )
-    series = _kept(store, len(steps), kept, compiled.order + 1) if dense else None
+    series = store.reshape(len(steps), kept, compiled.order + 1) if dense else None
     vanishing, together = vanishing_of(model), together_of(model)
     if vanishing or together:
         if series is not None:
@@ -269,26 +293,80 @@ def simulate(
     )
 
 
-class _Room(threading.local):
-    """Memory for the series of a run, used again by the next one of the same thread."""
-
-    def __init__(self) -> None:
-        self.store = np.empty(2**16)
-
-
-_room = _Room()
-
-#: Larger series (in numbers) are handed over as they are instead of copied.
+#: Larger tables (in numbers) are handed over as they are instead of copied.
 _LARGE = 2**23
 
+#: Numbers that are copied at a time, and with which a table begins.
+_BLOCK, _LEAST = 2**22, 2**12
 
-def _kept(store: NDArray[np.float64], *shape: int) -> NDArray[np.float64]:
-    """The series out of the memory it was written to, which is kept for the next run."""
-    series = store[: math.prod(shape)]
-    if store.size <= _LARGE:
-        _room.store = store
-        series = series.copy()
-    return series.reshape(shape)
+
+class _Tables(NamedTuple):
+    """What `drive` fills: steps, crossings, and the coefficients of all steps one after another."""
+
+    steps: NDArray[np.float64]
+    crossings: NDArray[np.float64]
+    store: NDArray[np.float64]
+
+    def filled(self, counted: NDArray[np.int64], stride: int) -> tuple[int, int, int]:
+        """How many rows of each hold something, of `stride` coefficients for each step."""
+        steps = int(counted[STEPS])
+        return steps, int(counted[CROSSINGS]), steps * stride
+
+    def with_space(self, counted: NDArray[np.int64], n_interfaces: int, stride: int) -> _Tables:
+        """Tables with space for another step and a crossing of every interface."""
+        needed = (1, n_interfaces, stride)
+        return _Tables(
+            *(
+                table if used + more <= len(table) else _larger(table, used, more)
+                for table, used, more in zip(
+                    self, self.filled(counted, stride), needed, strict=True
+                )
+            )
+        )
+
+
+def _larger(table: NDArray[np.float64], used: int, more: int) -> NDArray[np.float64]:
+    """A copy with space for twice as many rows, made in parts."""
+    copy = np.empty((2 * len(table) + more, *table.shape[1:]))
+    rows = max(1, _BLOCK // math.prod(table.shape[1:]))
+    for first in range(0, used, rows):
+        last = min(first + rows, used)
+        copy[first:last] = table[first:last]
+    return copy
+
+
+class _Memory(threading.local):
+    """Memory for the tables of a run, used again by the next one of the same thread."""
+
+    def __init__(self) -> None:
+        self.free = [np.empty(0) for _ in _Tables._fields]
+
+    def taken(self, n_states: int, stride: int) -> _Tables:
+        """Tables for a run, its own until they are given back: a signal handler may simulate."""
+        own = [flat if flat.size else np.empty(_LEAST) for flat in self.free]
+        self.free = [np.empty(0) for _ in _Tables._fields]
+        steps, crossings = (
+            flat[: len(flat) - len(flat) % columns].reshape(-1, columns)
+            for flat, columns in zip(own, (4, 6 + n_states), strict=False)
+        )
+        # an empty store is for none
+        return _Tables(steps, crossings, own[2] if stride else np.empty(0))
+
+    def given_back(
+        self, tables: _Tables, counted: NDArray[np.int64], stride: int
+    ) -> tuple[NDArray[np.float64], ...]:
+        """What a run has filled of its tables."""
+        kept = []
+        for k, (table, used) in enumerate(zip(tables, tables.filled(counted, stride), strict=True)):
+            rows = table[:used]
+            if table.size <= _LARGE:
+                self.free[k] = table.reshape(-1)
+                rows = rows.copy()
+            kept.append(rows)
+        return tuple(kept)
+
+
+_memory = _Memory()
 
 
 def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:

@@ -20,7 +20,7 @@ from fastslow.arguments import (
     takes,
     whole,
 )
-from fastslow.errors import ArgumentError
+from fastslow.errors import ArgumentError, raised_by_handler
 from fastslow.results.map_boundaries import MapEdges
 from fastslow.results.refined_maps import FAILED, Label, RefinedMap, label_of
 
@@ -81,7 +81,8 @@ def refined_map(
         For ranges that are empty, not two, or not finite, for a wrong number of
         cells or levels, or labels of another kind or number.
     Exception
-        Whatever the function raises at every point of the first level.
+        Whatever the function raises at every point of the first level, or the handler of a
+        signal at any time.
 
     Examples
     --------
@@ -207,6 +208,8 @@ class _Points:
         try:
             values = self.function(points[:, 0].copy(), points[:, 1].copy())
         except Exception as error:
+            if raised_by_handler(error):
+                raise
             # one of them, whichever it is, loses none of the others
             if len(points) > 1:
                 half = len(points) // 2

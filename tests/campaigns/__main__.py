@@ -14,6 +14,7 @@ CAMPAIGNS = {
     "crossings": "crossings of random piecewise-linear systems",
     "detection": "special points of random block systems of up to 200 states",
     "files": "damaged files of every kind of result, and of AUTO-07p; so many of each format",
+    "interrupts": "interrupts of a process that computes; needs POSIX signals",
     "overlays": "overlays of known models against SciPy; the counts are numbers of cases",
     "mutations": "single lines changed at random, each met by the tests of its layer",
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",
