@@ -13,7 +13,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.errors import ArgumentError, OutOfRangeError, unknown_name
+from fastslow.errors import QUOTED, ArgumentError, OutOfRangeError, quoted, unknown_name
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -21,8 +21,8 @@ R = TypeVar("R")
 #: Takes the name of an argument and what was received; returns what the function is given.
 Check = Callable[[str, Any], Any]
 
-#: The longest text of a value that an error quotes.
-QUOTED = 60
+#: Kinds of parameters that a value may be given for by its place.
+_BY_PLACE = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 
 #: The kinds of arrays that hold real numbers; "O" may, and is tried.
 _REAL = "iufO"
@@ -61,8 +61,14 @@ def takes(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
         kinds = {parameters[n].kind: n for n in checks}
         listed = kinds.get(inspect.Parameter.VAR_POSITIONAL)
         extra = kinds.get(inspect.Parameter.VAR_KEYWORD)
+        places = [n for n in names if parameters[n].kind in _BY_PLACE]
+        open_ended = any(p.kind is inspect.Parameter.VAR_POSITIONAL for p in parameters.values())
+
+        without_name = _without_name
 
         def checked(*args: Any, **kwargs: Any) -> Any:
+            if len(args) > len(places) and not open_ended:
+                raise without_name(function.__name__, parameters, args, args[len(places)])
             given = list(args)
             for k, value in enumerate(given):
                 name = names[k] if listed is None and k < len(names) else listed
@@ -85,6 +91,22 @@ def takes(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
     return decorate
 
 
+def _without_name(
+    function: str, parameters: Mapping[str, inspect.Parameter], args: tuple[Any, ...], value: Any
+) -> ArgumentError:
+    """The error for a value without the name that it needs, to be raised."""
+    if any(p.kind is inspect.Parameter.VAR_KEYWORD for p in parameters.values()):
+        owner = args[0] if "self" in parameters else None
+        names = (getattr(owner, n, None) for n in ("parameter_name", "parameter"))
+        name = next((n for n in names if isinstance(n, str)), "t" if owner is not None else "name")
+        wanted = f"its name, such as {function}({name}={shown(value)})"
+    else:
+        named = [n for n, p in parameters.items() if p.kind is inspect.Parameter.KEYWORD_ONLY]
+        wanted = " or ".join(f"{n}=" for n in named) if named else "fewer arguments"
+        wanted = f"{wanted} before it" if named else wanted
+    return ArgumentError(f"{function} received {shown(value)} without a name; expected {wanted}")
+
+
 def shown(value: object) -> str:
     """What was received, as an error quotes it: a short value itself, else what it is.
 
@@ -95,6 +117,8 @@ def shown(value: object) -> str:
     """
     if isinstance(value, np.ndarray) and value.size > 4:
         return f"a ndarray of shape {value.shape}"
+    if isinstance(value, str):
+        return quoted(value)
     text = repr(value)
     return f"a {type(value).__name__}" if len(text) > QUOTED or "\n" in text else text
 

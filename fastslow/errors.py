@@ -42,6 +42,28 @@ class MissingPackageError(FastSlowError, ImportError):
     """A package of an extra is needed that is not installed."""
 
 
+#: The longest text that an error repeats.
+QUOTED = 60
+
+
+def quoted(text: str) -> str:
+    """A text as an error repeats it, a long one cut short.
+
+    Examples
+    --------
+    >>> quoted("x +"), quoted("x + " * 100)
+    ("'x +'", "'x + x + x + x + x + x + x + x …' (400 characters)")
+    """
+    if len(text) > QUOTED:
+        return f"{quoted(text[: QUOTED // 2] + '…')} ({len(text)} characters)"
+    return repr(text) if _encodable(text) else ascii(text)
+
+
+def _encodable(text: str) -> bool:
+    """Whether a text can be printed: it holds no half of a pair of surrogates."""
+    return text.isascii() or not any("\ud800" <= c <= "\udfff" for c in text)
+
+
 def unknown_name(kind: str, name: object, valid: Iterable[object]) -> UnknownNameError:
     """Build the error for a name that is not valid, with the nearest valid one.
 
@@ -65,11 +87,13 @@ def unknown_name(kind: str, name: object, valid: Iterable[object]) -> UnknownNam
     unknown parameter 'omga'; did you mean 'omega'? (known: A, omega)
     """
     names = [str(v) for v in valid]
-    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
-    near = near or [v for v in names if v.casefold() == str(name).casefold()]
+    text = str(name)
+    near = difflib.get_close_matches(text[: 2 * QUOTED], names, n=1, cutoff=0.5)
+    near = near or [v for v in names if v.casefold() == text.casefold()]
+    shown = f"'{text}'" if len(text) <= QUOTED and _encodable(text) else quoted(text)
     hint = f"; did you mean '{near[0]}'?" if near else ""
     known = ", ".join(names) if names else "none"
-    return UnknownNameError(f"unknown {kind} '{name}'{hint} (known: {known})")
+    return UnknownNameError(f"unknown {kind} {shown}{hint} (known: {known})")
 
 
 def raised_by_handler(error: BaseException) -> bool:

@@ -30,6 +30,7 @@ LAYERS = [
     "model",
     "results",
     "disk",
+    "formulas",
     "arguments",
     "errors",
 ]
@@ -87,12 +88,17 @@ def test_third_parties_stay_in_their_layers(path):
     if layer == "results":
         now = {name.split(".")[0] for name in modules_of(path, late=False)} - own
         assert now <= {"numpy"}
+    if layer == "formulas":
+        assert foreign <= {"numpy"} or path.name == "symbolic.py"
+    if layer in {"results", "plot"}:
+        assert "fastslow.formulas.symbolic" not in modules_of(path)
     if layer == "plot":
         assert foreign <= {"matplotlib", "numpy"}
         assert {n.split(".")[1] for n in modules_of(path) if n.startswith("fastslow.")} <= {
             "arguments",
             "disk",
             "errors",
+            "formulas",
             "plot",
             "results",
         }

@@ -16,7 +16,8 @@ from fastslow.plot.branches import draw_branches
 from fastslow.plot.motions import draw_motion, phase_portrait, time_series
 from fastslow.plot.passages import draw_passage
 from fastslow.plot.quantities import Quantity, along_run
-from fastslow.plot.style import GREY, MOTION, SMALL, TEXT, VERMILION, dressed, typeset
+from fastslow.plot.style import GREY, MOTION, SMALL, TEXT, VERMILION, dressed
+from fastslow.plot.typesetting import paragraph, plain, typeset
 
 #: Size of a figure of our own, in inches, and places of its axes in it.
 SIZE = (9.0, 5.0)
@@ -102,7 +103,7 @@ def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:
             handlelength=1.8,
         )
     words = "  ".join(str(outcome) for outcome in view.outcomes)
-    figure.text(0.01, 0.012, words, fontsize=SMALL, color=VERMILION, wrap=True)
+    figure.text(0.01, 0.012, plain(words), fontsize=SMALL, color=VERMILION, wrap=True)
     return tuple(curves)
 
 
@@ -112,7 +113,15 @@ def _other(states: tuple[str, ...], name: str) -> str:
 
 def _empty(ax: Axes, words: str) -> None:
     ax.set_axis_off()
-    ax.text(0.5, 0.5, words, ha="center", va="center", fontsize=TEXT, color=GREY)
+    ax.text(
+        0.5,
+        0.5,
+        paragraph(words),
+        ha="center",
+        va="center",
+        fontsize=TEXT,
+        color=GREY,
+    )
 
 
 def _mark_value(ax: Axes, view: View) -> list[Any]:

@@ -18,7 +18,6 @@ from fastslow.plot.stretches import runs, worth_a_marker
 from fastslow.plot.style import (
     BANDS,
     BRANCH,
-    GREEK,
     GREY,
     LINES,
     MOTION,
@@ -26,6 +25,7 @@ from fastslow.plot.style import (
     VERMILION,
     point_colour,
 )
+from fastslow.plot.typesetting import GREEK
 from fastslow.results.branches import Branch
 from fastslow.results.crossings import regions_at
 from fastslow.results.point_types import POINT_TYPES
@@ -238,7 +238,7 @@ def letters(name: str) -> str:
     ('ω', 'Ω_1', 'x')
     """
     head, *below = name.split("_")
-    if head in GREEK.split():
+    if head in GREEK:
         size = "CAPITAL" if head[0].isupper() else "SMALL"
         # Unicode spells the letter so
         word = head.upper().replace("LAMBDA", "LAMDA")

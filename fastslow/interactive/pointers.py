@@ -15,6 +15,7 @@ from fastslow.arguments import function, takes
 from fastslow.errors import MissingPackageError
 from fastslow.interactive.picking import Curve, Pick, curves_of, pick
 from fastslow.plot.style import BLACK, GREY, SMALL
+from fastslow.plot.typesetting import paragraph
 from fastslow.results.diagrams import Diagram
 from fastslow.results.overlays import Overlay
 from fastslow.results.trajectories import Trajectory
@@ -197,7 +198,7 @@ def box_for(found: Pick) -> Annotation:
     right = x < 0.5 * (frame.x0 + frame.x1)
     upper = y < 0.5 * (frame.y0 + frame.y1)
     return ax.annotate(
-        found.text,
+        paragraph(found.text),
         (found.x, found.y),
         xytext=(10 if right else -10, 10 if upper else -10),
         textcoords="offset points",

@@ -10,6 +10,7 @@ import sympy as sp
 
 from fastslow.arguments import shown
 from fastslow.errors import ModelError, unknown_name
+from fastslow.formulas.grammar import normalised
 from fastslow.model.structure import Structure, real, sympified
 
 #: Random states and parameter values at which an expression is compared with its copy.
@@ -43,7 +44,7 @@ when theta grows by 2*pi
     """
     periods: dict[str, sp.Expr] = {}
     for key, given in periodic.items():
-        name = str(key)
+        name = normalised(str(key))
         if name not in structure.states:
             raise unknown_name("state in periodic", name, structure.states)
         periods[name] = _period(name, given)

@@ -12,10 +12,18 @@ import sympy as sp
 
 from fastslow.arguments import formula, mapping, real_number, shown, takes
 from fastslow.errors import ModelError, unknown_name
+from fastslow.formulas.grammar import normalised
 from fastslow.model.angles import read_periods
 from fastslow.model.interfaces import Interface, Region, vanishes_on
 from fastslow.model.periods import common_period
-from fastslow.model.structure import TIME, Structure, read_expression, read_structure, real
+from fastslow.model.structure import (
+    TIME,
+    Structure,
+    name_of,
+    read_expression,
+    read_structure,
+    real,
+)
 from fastslow.results.named import Named
 
 Written = Mapping[Any, Any]
@@ -109,7 +117,12 @@ class Model:
         regions: Written | None = None,
         periodic: Written | None = None,
     ) -> None:
-        values = {str(k): number(f"parameter {k}", v) for k, v in (parameters or {}).items()}
+        values = {
+            name_of(k, "parameter"): number(f"parameter {k}", v)
+            for k, v in (parameters or {}).items()
+        }
+        if len(values) < len(parameters or {}):
+            raise ModelError("two parameters have one name; expected different names")
         structure = read_structure(
             rates, forcing or {}, slow or {}, tuple(values), interfaces or {}, (), regions or {}
         )
@@ -169,9 +182,10 @@ class Model:
         values = dict(self.parameters)
         valid = [*self.parameters, *(n for n in self.free if n not in values)]
         for key, value in {**(changes or {}), **named}.items():
-            if str(key) not in valid:
+            name = normalised(str(key))
+            if name not in valid:
                 raise unknown_name("parameter", key, valid)
-            values[str(key)] = number(f"parameter {key}", value)
+            values[name] = number(f"parameter {key}", value)
         return self._from(self.structure, values)
 
     @takes(name=formula)
@@ -197,7 +211,7 @@ class Model:
         >>> len(model.regions), len(model.freed("D").regions)
         (3, 6)
         """
-        key = str(name)
+        key = normalised(str(name))
         if key in self.free and key not in self.parameters:
             return self
         if key not in self.parameters:
@@ -239,9 +253,10 @@ class Model:
         quantities = (*self.forcing, *self.slow_states)
         path: dict[str, sp.Expr] = {}
         for key, law in (slow or {}).items():
-            if str(key) not in quantities:
+            name = normalised(str(key))
+            if name not in quantities:
                 raise unknown_name("slow quantity", key, quantities)
-            path[str(key)] = read_expression(f"path of {key}", law)
+            path[name] = read_expression(f"path of {key}", law, (*self.parameters, *self.free))
         return self._from(*self.structure.frozen(path, self.parameters))
 
     @takes(name=formula)
@@ -275,7 +290,7 @@ class Model:
         >>> print(fast.ramped(w, 0.5, start=-1).forcing["w"])
         t*w_rate + w_start
         """
-        key = str(name)
+        key = normalised(str(name))
         if key in (*self.forcing, *self.slow_states):
             raise ModelError(f"'{key}' already varies in time; ramp it in model.frozen() instead")
         freed = self.freed(key)

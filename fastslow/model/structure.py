@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
-from typing import Any
+from typing import Any, TypeVar
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
 from sympy.logic.boolalg import Boolean
 
 from fastslow.arguments import shown
-from fastslow.errors import ModelError, unknown_name
+from fastslow.errors import ArgumentError, ModelError, unknown_name
+from fastslow.formulas.grammar import normalised
+from fastslow.formulas.symbolic import read
 from fastslow.model.geometry import Pattern, affine_rows, possible_patterns
 from fastslow.model.interfaces import Interface, Region
 from fastslow.model.reading import (
@@ -32,13 +34,34 @@ TIME = sp.Symbol("t", real=True)
 #: Functions with infinitely many jumps.
 STAIRS = (sp.floor, sp.ceiling, sp.frac, sp.Mod)
 
+R = TypeVar("R")
+
 Cell = frozenset[tuple[sp.Expr, int]]
 Values = Mapping[sp.Symbol, float]
 
 
 def real(name: str) -> sp.Symbol:
     """The real symbol of a name: the one that every expression inside uses."""
-    return sp.Symbol(name, real=True)
+    return sp.Symbol(normalised(name), real=True)
+
+
+def name_of(key: object, what: str = "a name") -> str:
+    """The name of a symbol, or a text, as it is kept.
+
+    Raises
+    ------
+    ModelError
+        For an empty name, and one that cannot be written to a file.
+
+    Examples
+    --------
+    >>> name_of(sp.Symbol("x")), name_of("µ") == "μ"
+    ('x', True)
+    """
+    name = normalised(str(key))
+    if not name.strip() or (not name.isascii() and any("\ud800" <= c <= "\udfff" for c in name)):
+        raise ModelError(f"{what}: expected a name of letters, such as x, received {name!a}")
+    return name
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,9 +241,9 @@ def read_structure(
         If a symbol is unknown, a name is used twice, or an expression is not finite and real.
     """
     groups = {
-        "state": [str(n) for n in rates],
-        "slow state": [str(n) for n in slow],
-        "slow quantity": [str(n) for n in forcing],
+        "state": [name_of(n, "state") for n in rates],
+        "slow state": [name_of(n, "slow state") for n in slow],
+        "slow quantity": [name_of(n, "slow quantity") for n in forcing],
         "parameter": [*parameters, *free],
     }
     seen: dict[str, str] = {}
@@ -233,15 +256,15 @@ def read_structure(
             seen[name] = kind
     if not rates:
         raise ModelError("a model needs at least one state with its rate")
-    laws = {str(n): _checked(f"law of {n}", e, {*parameters, "t"}) for n, e in forcing.items()}
-    known = {*seen, "t"}
-    equations = {str(n): _checked(f"rate of {n}", e, known) for n, e in {**rates, **slow}.items()}
+    known, constants = {*seen, "t"}, {*parameters, "t"}
+    laws = _named_by("law of", forcing, lambda what, e: _checked(what, e, constants))
+    equations = _named_by("rate of", {**rates, **slow}, lambda what, e: _checked(what, e, known))
     moving = (*(real(n) for kind, names in groups.items() if kind != "parameter" for n in names),)
     moving = (*moving, TIME)
     for what, written in (("rate of", equations), ("law of", laws)):
         for name, expression in written.items():
             _refuse_stairs(f"{what} {name}", expression, moving)
-    listed = {str(n): _checked(f"interface {n}", h, known) for n, h in interfaces.items()}
+    listed = _named_by("interface", interfaces, lambda what, h: _checked(what, h, known))
     found = [Interface(n, _irreducible(n, h, moving)) for n, h in listed.items()]
     shapes = {_shape(i.function, moving) for i in found}
     for expression in (*equations.values(), *laws.values()):
@@ -253,7 +276,7 @@ def read_structure(
                     function = factor if whole is None else whole
                     taken = {*known, *(i.name for i in found)}
                     found.append(Interface(_name(function, moving, taken), function))
-    conditions = {str(n): _checked_condition(f"region {n}", c, known) for n, c in regions.items()}
+    conditions = _named_by("region", regions, lambda what, c: _checked_condition(what, c, known))
     return Structure(
         tuple(groups["state"]),
         tuple(groups["slow state"]),
@@ -264,35 +287,63 @@ def read_structure(
         frozenset(listed),
         conditions,
         continuous=all(
-            continuous(read_expression(f"rate of {n}", e)) for n, e in {**rates, **slow}.items()
+            continuous(read_expression(f"rate of {n}", e, known))
+            for n, e in {**rates, **slow}.items()
         ),
     )
 
 
-def _read(given: Any) -> Any:
-    """What SymPy makes of an expression or its text, None where it makes nothing of it."""
-    try:
-        return sp.sympify(given)
-    except Exception:
-        # SymPy hands text to Python, and anything may come back
-        return None
+def _named_by(
+    what: str, given: Mapping[Any, Any], read_one: Callable[[str, Any], R]
+) -> dict[str, R]:
+    """What was written, by the names as they are kept."""
+    names = {name_of(key, what.removesuffix(" of")): value for key, value in given.items()}
+    if len(names) < len(given):
+        raise ModelError(f"{what} {', '.join(map(str, given))}: two have one name")
+    return {name: read_one(f"{what} {name}", value) for name, value in names.items()}
 
 
-def sympified(what: str, given: Any) -> sp.Expr:
-    """An expression as SymPy reads it.
+def sympified(
+    what: str, given: Any, known: Collection[str] = (), *, exact: bool = False
+) -> sp.Expr:
+    """An expression as it was written in SymPy, or of a text.
+
+    Parameters
+    ----------
+    what : str
+        What it is, for the error.
+    given : Expr, number or str
+    known : collection of str
+        Names that may stand in a text; a name that is none of them may be a constant.
+    exact : bool
+        Whether decimal numbers in a text become fractions.
 
     Raises
     ------
     ModelError
         For what is no expression.
     """
-    expression = _read(given)
+    expression = _sympified(what, given, known, exact)
     if not isinstance(expression, sp.Expr) or expression.is_Matrix:
         raise ModelError(f"{what}: expected an expression, received {shown(given)}")
     return expression
 
 
-def read_expression(what: str, expression: Any) -> sp.Expr:
+def _sympified(what: str, given: Any, known: Collection[str], exact: bool = False) -> Any:
+    """What SymPy makes of something, None where it makes nothing of it."""
+    if isinstance(given, str):
+        try:
+            return read(given, real, known, exact)
+        except ArgumentError as error:
+            raise ModelError(f"{what}: {error}") from error
+    try:
+        # strictly: SymPy would hand the text of other objects to Python
+        return sp.sympify(given, strict=True)
+    except (sp.SympifyError, TypeError, ValueError, AttributeError):
+        return None
+
+
+def read_expression(what: str, expression: Any, known: Collection[str] = ()) -> sp.Expr:
     """An expression in real symbols.
 
     Raises
@@ -300,15 +351,31 @@ def read_expression(what: str, expression: Any) -> sp.Expr:
     ModelError
         For what is no expression, or not finite and real.
     """
-    written = sympified(what, expression)
+    written = sympified(what, expression, known)
     written = written.xreplace({s: real(s.name) for s in written.free_symbols})
     if written.has(sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I):
         raise ModelError(f"{what}: expected a finite real expression, received {written}")
     return written
 
 
+def read_condition(
+    what: str, condition: Any, known: Collection[str] = (), *, exact: bool = False
+) -> Boolean:
+    """A condition as it was written in SymPy, or of a text; as `sympified`.
+
+    Raises
+    ------
+    ModelError
+        For what is no condition.
+    """
+    written = _sympified(what, condition, known, exact)
+    if not isinstance(written, Boolean):
+        raise ModelError(f"{what}: expected a condition such as x > D, received {shown(condition)}")
+    return written
+
+
 def _checked(what: str, expression: Any, known: set[str]) -> sp.Expr:
-    written = read_expression(what, expression)
+    written = read_expression(what, expression, known)
     for function in sorted(written.atoms(AppliedUndef), key=str):
         raise ModelError(
             f"{what}: {function} is a function without a definition; expected symbols for states "
@@ -321,6 +388,8 @@ def _checked(what: str, expression: Any, known: set[str]) -> sp.Expr:
                 f"{what}: {reason}; every symbol is a state, a slow quantity, "
                 "a parameter with a value, or t"
             )
+    # SymPy writes a remainder of 1 into products without brackets
+    written = written.replace(sp.frac, lambda argument: argument - sp.floor(argument))
     return with_piecewise(written)
 
 
@@ -350,9 +419,7 @@ def _irreducible(name: str, function: sp.Expr, moving: Sequence[sp.Symbol]) -> s
 
 
 def _checked_condition(what: str, condition: Any, known: set[str]) -> Boolean:
-    written = _read(condition)
-    if not isinstance(written, Boolean):
-        raise ModelError(f"{what}: expected a condition such as x > D, received {shown(condition)}")
+    written = read_condition(what, condition, known)
     for symbol in sorted(written.free_symbols, key=lambda s: s.name):
         if symbol.name not in known:
             raise ModelError(f"{what}: {unknown_name('symbol', symbol.name, sorted(known))}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
@@ -25,6 +25,40 @@ def equations_text(
     return "\n".join([*lines, *(f"{name} modulo {period}" for name, period in periodic)])
 
 
+#: What LaTeX reads as more than a character, and how the character is written.
+_ESCAPED = {
+    "\\": r"\textbackslash{}",
+    "^": r"\textasciicircum{}",
+    "~": r"\textasciitilde{}",
+    "|": r"\textbar{}",
+    **{c: f"\\{c}" for c in "{}$&#%_"},
+}
+
+
+def latex(expression: Any) -> str:
+    r"""An expression in LaTeX; a symbol whose name is no identifier is written as text.
+
+    Examples
+    --------
+    >>> latex(sp.Symbol("omega_0") / sp.Symbol("m%"))
+    '\\frac{\\omega_{0}}{\\text{m\\%}}'
+    """
+    symbols = getattr(expression, "free_symbols", ())
+    odd = {s: rf"\text{{{latex_text(s.name)}}}" for s in symbols if not s.name.isidentifier()}
+    return str(sp.latex(expression, symbol_names=odd))
+
+
+def latex_text(name: str) -> str:
+    r"""A name as text of LaTeX, on one line.
+
+    Examples
+    --------
+    >>> latex_text("x^{2} & y")
+    'x\\textasciicircum{}\\{2\\} \\& y'
+    """
+    return "".join(_ESCAPED.get(c, c) for c in " ".join(name.split()))
+
+
 def model_latex(model: Model) -> str:
     r"""Typeset the equations of a model region by region, as one aligned display.
 
@@ -40,14 +74,13 @@ def model_latex(model: Model) -> str:
     rows = []
     for region in model.regions.values():
         rates = r",\quad ".join(
-            rf"\dot{{{sp.latex(real(name))}}} = {sp.latex(rate)}"
-            for name, rate in region.rates.items()
+            rf"\dot{{{latex(real(name))}}} = {latex(rate)}" for name, rate in region.rates.items()
         )
-        where = r",\ ".join(sp.latex(c) for c in region.conditions)
-        rows.append(rates + rf"&&\text{{{region.name}}}:\ {where}" if where else rates)
+        where = r",\ ".join(latex(c) for c in region.conditions)
+        rows.append(rates + rf"&&\text{{{latex_text(region.name)}}}:\ {where}" if where else rates)
     for name, law in model.forcing.items():
-        rows.append(rf"{sp.latex(real(name))}({sp.latex(TIME)}) = {sp.latex(law)}")
+        rows.append(rf"{latex(real(name))}({latex(TIME)}) = {latex(law)}")
     for name, period in model.structure.periodic.items():
-        rows.append(rf"{sp.latex(real(name))} \bmod {sp.latex(period)}")
+        rows.append(rf"{latex(real(name))} \bmod {latex(period)}")
     body = " \\\\\n".join(f"  & {row}" for row in rows)
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"

@@ -7,11 +7,11 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
+from fastslow.formulas.columns import evaluated
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import Diagram
-from fastslow.results.formulas import evaluated
 from fastslow.results.trajectories import Trajectory
 
 Array = NDArray[np.float64]

@@ -101,8 +101,9 @@ def _on_a_path(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift:
     """From the rate of the quantity that varies most along the path: g' = w'/u'(g)."""
     values = {real(n): sp.Float(v, DIGITS) for n, v in slow.constants.items()}
     parameter = real(slow.name)
+    known = (*slow.constants, slow.name)
     path = {
-        real(n): read_expression(f"path of {n}", text).xreplace(values)
+        real(n): read_expression(f"path of {n}", text, known).xreplace(values)
         for n, text in slow.laws.items()
     }
     here = {n: point[n] for n in (*slow.states, slow.name)}

@@ -276,9 +276,8 @@ def jump_time(site: Site, form: FoldForm, drift: Drift, kappa: float, level: Lev
         if isinstance(level, str):
             done = _turned(run, speed)
         else:
-            hits = run.section(
-                site.field.model.states[level[0]], float(site.u[level[0]]) + level[1]
-            )
+            state_name, height = site.field.model.states[level[0]], float(site.u[level[0]])
+            hits = run.section(state_name, level=height + level[1])
             done = float(hits.times[0]) if len(hits) else math.nan
         if math.isnan(done):
             return math.nan

@@ -61,7 +61,7 @@ class LocalDrift:
         if not self.drift.law:
             return None
         names = [*self.site.field.model.states, self.site.field.parameter, "t"]
-        expression = read_expression("law of the drift", self.drift.law)
+        expression = read_expression("law of the drift", self.drift.law, names)
         return sp.lambdify([real(n) for n in names], expression, "numpy")
 
     def __call__(self, z: Array, time: float) -> float:

@@ -20,9 +20,9 @@ from fastslow.arguments import (
     text,
 )
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.formulas.columns import evaluated, names_in
 from fastslow.model.model import Model
 from fastslow.results.ensembles import Ensemble
-from fastslow.results.formulas import evaluated, names_in
 from fastslow.results.lyapunov import LyapunovExponent
 from fastslow.results.outcome import Outcome
 from fastslow.results.refined_maps import RefinedMap

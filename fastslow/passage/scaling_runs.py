@@ -312,5 +312,5 @@ def _hits(run: Trajectory, law: Law, passed: float) -> Section:
     else:
         assert isinstance(law.level, dict)
         ((state, value),) = law.level.items()
-        found = run.section(state, value, since=min(passed, run.span[1]))
+        found = run.section(state, level=value, since=min(passed, run.span[1]))
     return found

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.formulas.columns import evaluated, names_in
 from fastslow.results.diagrams import Diagram
-from fastslow.results.formulas import evaluated, names_in
 from fastslow.results.trajectories import Trajectory
 
 Array = NDArray[np.float64]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fastslow.errors import unknown_name
 from fastslow.plot.arguments import line_colour
 from fastslow.plot.style import GREY
+from fastslow.plot.typesetting import as_given
 from fastslow.results.refined_maps import FAILED, RefinedMap
 
 Floats = NDArray[np.float64]
@@ -57,7 +58,8 @@ def draw_areas(
     drawn = {}
     for code, word in enumerate(result.labels):
         colour = colours[word]
-        look: dict[str, Any] = {"facecolor": colour, "edgecolor": colour, "label": str(word)}
+        look: dict[str, Any] = {"facecolor": colour, "edgecolor": colour}
+        look["label"] = as_given(str(word))
         drawn[word] = PolyCollection(shapes[code], linewidth=0.3, zorder=0.5, **look)
         ax.add_collection(drawn[word], autolim=False)
     return drawn
@@ -69,7 +71,7 @@ def samples(fills: Mapping[Any, PolyCollection]) -> list[Patch]:
     for word, area in fills.items():
         colour: Any = area.get_facecolor()
         look: dict[str, Any] = {"facecolor": colour[0], "edgecolor": GREY, "linewidth": 0.5}
-        found.append(Patch(label=str(word), **look))
+        found.append(Patch(label=as_given(str(word)), **look))
     return found
 
 

@@ -14,6 +14,7 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from fastslow.plot.style import BANDS, DARK, GREY, SMALL
+from fastslow.plot.typesetting import plain
 
 #: Interface to (state, value), for interfaces that are a plain value of one state.
 Values = Mapping[str, tuple[str, float]]
@@ -136,6 +137,6 @@ SIDE = 0.95
 def _name(ax: Axes, text: str, vertical: bool) -> Text:
     frame = ax.get_xaxis_transform() if vertical else ax.get_yaxis_transform()
     look: dict[str, Any] = {"fontsize": SMALL, "color": DARK, "zorder": 1.5}
-    name = ax.text(0.5, 0.5, text, transform=frame, ha="center", va="center", **look)
+    name = ax.text(0.5, 0.5, plain(text), transform=frame, ha="center", va="center", **look)
     name.set_in_layout(False)
     return name

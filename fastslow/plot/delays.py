@@ -19,7 +19,8 @@ from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.legends import explained
-from fastslow.plot.style import BLUE, GREY, SMALL, VERMILION, axes_for, typeset
+from fastslow.plot.style import BLUE, GREY, SMALL, VERMILION, axes_for
+from fastslow.plot.typesetting import typeset
 from fastslow.results.delay_scalings import DelayScaling
 
 Array = NDArray[np.float64]

@@ -24,7 +24,8 @@ from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place, tag
 from fastslow.plot.legends import explained
-from fastslow.plot.style import GREY, SMALL, TEXT, VERMILION, axes_for, point_colour, root, typeset
+from fastslow.plot.style import GREY, SMALL, TEXT, VERMILION, axes_for, point_colour, root
+from fastslow.plot.typesetting import plain, typeset
 from fastslow.results.branches import Branch
 from fastslow.results.overlays import Overlay
 from fastslow.results.point_types import POINT_TYPES
@@ -224,7 +225,7 @@ def clarke_path(
             markers += _dots(ax, on, marker, VERMILION, "black", f"{text}, q = {found:.4g}")
     bar = _framed(ax, paths, typeset("q"))
     if label:
-        ax.set_title(f"{point.label}: {point.subtype}", fontsize=TEXT)
+        ax.set_title(plain(f"{point.label}: {point.subtype}"), fontsize=TEXT)
     shown = explained(ax, markers, own, label, legend)
     return EigenvalueDrawing(ax, paths, (), tuple(markers), (), bar, shown)
 
@@ -325,7 +326,7 @@ def _marks(
             roots += values.tolist()
             if label and len(values):
                 top = max(values, key=lambda z: z.imag)
-                labels.append(tag(ax, point.label, (float(top.real), float(top.imag))))
+                labels.append(tag(ax, plain(point.label), (float(top.real), float(top.imag))))
         if roots:
             marker, colour = known.marker, point_colour(code)
             at = np.array(roots)

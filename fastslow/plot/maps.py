@@ -21,7 +21,8 @@ from fastslow.plot.covering import covered, settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place, tag
 from fastslow.plot.legends import explained
-from fastslow.plot.style import BLACK, GREY, SMALL, VERMILION, axes_for, typeset
+from fastslow.plot.style import BLACK, GREY, SMALL, VERMILION, axes_for
+from fastslow.plot.typesetting import as_given, typeset
 from fastslow.results.refined_maps import RefinedMap
 
 #: Hatches of areas too small for their names, in turn.
@@ -136,7 +137,8 @@ def regime_map(
     for number, (name, (x, y)) in enumerate((curves or {}).items()):
         dashes = (0, (4, 2)) if number == 0 else (0, (1 + number, 1.5, 4, 1.5))
         dressing: dict[str, Any] = {"linestyle": dashes, "linewidth": 1.3, "zorder": 3.0}
-        over += ax.plot(np.asarray(x), np.asarray(y), color=VERMILION, label=name, **dressing)
+        dressing |= {"color": VERMILION, "label": as_given(str(name))}
+        over += ax.plot(np.asarray(x), np.asarray(y), **dressing)
     points: list[Line2D] = []
     tags: list[Annotation] = []
     for name, at in (marks or {}).items():
@@ -146,9 +148,9 @@ def regime_map(
             "markeredgecolor": "white",
             "zorder": 4,
         }
-        points += ax.plot(*at, "o", label=name, **dot)
+        points += ax.plot(*at, "o", label=as_given(str(name)), **dot)
         if label:
-            tags.append(tag(ax, name, at))
+            tags.append(tag(ax, as_given(str(name)), at))
     shown_key = explained(ax, [*samples(drawn), *over], own, label, legend)
     settle(ax)
     names = _names(ax, result, list((marks or {}).values())) if label else {}
@@ -189,7 +191,7 @@ def _names(ax: Axes, result: RefinedMap, marks: list[tuple[float, float]]) -> di
     for word in result.labels:
         mine = np.flatnonzero(found == word)
         look: dict[str, Any] = {"fontsize": SMALL, "zorder": 3.5, "clip_on": True}
-        text = ax.text(0, 0, str(word), ha="center", va="center", **look)
+        text = ax.text(0, 0, as_given(str(word)), ha="center", va="center", **look)
         text.set_transform(None)
         box = text.get_window_extent().padded(3.0)
         half = np.array([box.width, box.height]) / 2.0

@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from fastslow.plot.quantities import Array, Quantity, at_times
-from fastslow.plot.style import MOTION, TRANSITIONS, VERMILION, typeset
+from fastslow.plot.style import MOTION, TRANSITIONS, VERMILION
+from fastslow.plot.typesetting import typeset
 from fastslow.results.overlays import Overlay
 
 

@@ -21,6 +21,7 @@ from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.passages import OverlayDrawing, draw_passage
 from fastslow.plot.quantities import of_diagram
 from fastslow.plot.style import MM, PHASES, TEXT, dressed, inches, new_figure
+from fastslow.plot.typesetting import as_given
 from fastslow.results.overlays import Overlay
 
 #: Figures narrower than this have their three parts one below the other.
@@ -151,5 +152,5 @@ def _new_axes(width: float, title: str) -> list[Axes]:
     else:
         grid = figure.subplots(1, 3, width_ratios=[1.0, 1.0, 1.3])
     if title:
-        figure.suptitle(title, fontsize=TEXT)
+        figure.suptitle(as_given(title), fontsize=TEXT)
     return [dressed(ax) for ax in grid]

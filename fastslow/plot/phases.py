@@ -10,6 +10,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
 from fastslow.plot.style import BLACK, PHASES, WHITE_WORDS, root
+from fastslow.plot.typesetting import plain
 from fastslow.results.transitions import Phase
 
 #: Height of the strip and size of its words, in points.
@@ -92,7 +93,8 @@ def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text], renderer: Rende
 def _text(phase: Phase) -> str:
     if phase.kind == "quasi-static":
         # along the edge of a band of equilibria
-        return " ".join("edge" if name.startswith("edge of ") else name for name in phase.sheets)
+        names = ("edge" if name.startswith("edge of ") else name for name in phase.sheets)
+        return plain(" ".join(names))
     if phase.kind == "oscillating":
         return f"{phase.oscillations} oscillations"
     return phase.kind if phase.kind in ("outside", "sticking") else ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.plot.style import typeset
+from fastslow.formulas.columns import evaluated, names_in, written_formula
+from fastslow.plot.typesetting import plain, written
 from fastslow.results.angles import principal
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import Diagram
-from fastslow.results.formulas import evaluated, names_in
 from fastslow.results.overlays import Overlay
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectories import Trajectory
@@ -75,7 +74,7 @@ class Quantity:
     def label(self) -> str:
         """The label of the axis."""
         if self.function is not None:
-            return "$f$" if self.text == "<lambda>" else self.text.replace("_", " ")
+            return "$f$" if self.text == "<lambda>" else plain(self.text.replace("_", " "))
         return written(self.text)
 
 
@@ -106,7 +105,7 @@ def quantity_of(
     # symbols of SymPy are callable too
     if callable(given) and not hasattr(given, "free_symbols"):
         return Quantity(getattr(given, "__name__", type(given).__name__), given)
-    text = default if given is None else str(given)
+    text = default if given is None else written_formula(given)
     if text not in varying:
         known = dict.fromkeys((*varying, *fixed), 0.0)
         if text.isidentifier() or not names_in(text, known) & set(varying):
@@ -223,59 +222,3 @@ def at_times(
 
 def _fixed(lay: Overlay) -> dict[str, Any]:
     return {**lay.run.parameters, **lay.diagram.parameters}
-
-
-def written(expression: str) -> str:
-    r"""An expression as the label of an axis, in mathematics.
-
-    Examples
-    --------
-    >>> written("x**2 + 2*v*omega_0"), written("sqrt((a + x)/2)"), written("load")
-    ('$x^{2} + 2\\,v\\,\\omega_{0}$', '$\\sqrt{(a + x)/2}$', '$\\mathrm{load}$')
-    """
-    try:
-        tree = ast.parse(expression, mode="eval").body
-    except SyntaxError:  # a name need not be an identifier
-        return typeset(expression)
-    return f"${_mathematics(tree)[0]}$"
-
-
-#: Functions that mathematics has commands for.
-COMMANDS = ("cos", "cosh", "exp", "log", "max", "min", "sin", "sinh", "tan", "tanh")
-
-#: How operators are written, and how tightly they bind.
-SIGNS: dict[type[ast.operator], tuple[str, int]] = {
-    ast.Add: (" + ", 1),
-    ast.Sub: (" - ", 1),
-    ast.Mult: (r"\,", 2),
-    ast.Div: ("/", 2),
-}
-
-
-def _mathematics(node: ast.expr) -> tuple[str, int]:
-    """A part of an expression in mathematics, and how tightly it binds."""
-    if isinstance(node, ast.Name):
-        return typeset(node.id).strip("$"), 4
-    if isinstance(node, ast.UnaryOp):
-        return f"-{_bound(node.operand, 2)}", 1
-    if isinstance(node, ast.BinOp):
-        if isinstance(node.op, ast.Pow):
-            return f"{_bound(node.left, 4)}^{{{_mathematics(node.right)[0]}}}", 3
-        sign, level = SIGNS[type(node.op)]
-        # a − (b − c) and a/(b c) keep their brackets
-        after = level + isinstance(node.op, ast.Sub | ast.Div)
-        return f"{_bound(node.left, level)}{sign}{_bound(node.right, after)}", level
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-        name, inside = node.func.id.lower(), ", ".join(_mathematics(a)[0] for a in node.args)
-        if name == "sqrt":
-            return rf"\sqrt{{{inside}}}", 4
-        if name == "abs":
-            return f"|{inside}|", 4
-        command = f"\\{name}" if name in COMMANDS else rf"\mathrm{{{name}}}"
-        return f"{command}({inside})", 4
-    return ast.unparse(node), 4
-
-
-def _bound(node: ast.expr, level: int) -> str:
-    text, own = _mathematics(node)
-    return f"({text})" if own < level else text

@@ -18,7 +18,8 @@ from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place, tag
 from fastslow.plot.legends import explained
-from fastslow.plot.style import MOTION, VERMILION, axes_for, note_early_end, typeset
+from fastslow.plot.style import MOTION, VERMILION, axes_for, note_early_end
+from fastslow.plot.typesetting import typeset
 from fastslow.results.spectra import Spectrum
 
 #: Amplitudes below this part of the largest are not looked for when the axes are chosen.

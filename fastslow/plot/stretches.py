@@ -12,6 +12,7 @@ from matplotlib.text import Annotation
 from fastslow.plot.labels import tag
 from fastslow.plot.quantities import Quantity, at_points
 from fastslow.plot.style import dot_look
+from fastslow.plot.typesetting import plain
 from fastslow.results.branches import Branch
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
@@ -51,7 +52,7 @@ def draw_points(
         if label:
             # branches that cross share their branch point: it is named once
             spots = {(_words(p), *np.round(s, 9)): s for p, s in zip(same, at, strict=True)}
-            labels += [tag(ax, word, spot) for (word, *_), spot in spots.items()]
+            labels += [tag(ax, plain(word), spot) for (word, *_), spot in spots.items()]
     return tuple(markers), tuple(labels)
 
 

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from fastslow.arguments import word
 from fastslow.disk import write_file
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.plot.typesetting import plain
 from fastslow.results.point_types import POINT_TYPES
 
 # M. Okabe and K. Ito, Color Universal Design, 2008
@@ -93,30 +94,6 @@ TEXT, SMALL = 8.0, 7.0
 
 #: Widths of figures by name, in millimetres.
 WIDTHS = {"column": 85.0, "page": 170.0}
-
-
-GREEK = (
-    "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau "
-    "upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega"
-)
-
-
-def typeset(name: str) -> str:
-    r"""A name as mathematics: Greek letters by their names, subscripts after an underscore.
-
-    Examples
-    --------
-    >>> typeset("x"), typeset("omega_0"), typeset("theta_in"), typeset("load")
-    ('$x$', '$\\omega_{0}$', '$\\theta_{\\mathrm{in}}$', '$\\mathrm{load}$')
-    """
-    head, *below = name.split("_")
-    return "$" + _letter(head) + (f"_{{{','.join(map(_letter, below))}}}" if below else "") + "$"
-
-
-def _letter(word: str) -> str:
-    if word in GREEK.split():
-        return f"\\{word}"
-    return word if len(word) < 2 else f"\\mathrm{{{word}}}"
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -278,7 +255,7 @@ def note(ax: Axes, words: str) -> None:
     """
     if words:
         ax.annotate(
-            words,
+            plain(words),
             (0.02, 0.98),
             xycoords="axes fraction",
             ha="left",

@@ -14,7 +14,8 @@ from fastslow.arguments import flag, instance, positive, takes
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.legends import explained
-from fastslow.plot.style import BLACK, BLUE, GREY, VERMILION, axes_for, typeset, widen
+from fastslow.plot.style import BLACK, BLUE, GREY, VERMILION, axes_for, widen
+from fastslow.plot.typesetting import typeset
 from fastslow.results.sweeps import Sweep, SweepPass
 
 #: More points than this are stored as pixels, in files of vectors too.

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import mapping, path, takes, text
+from fastslow.arguments import mapping, path, refusal, takes, text
 from fastslow.errors import FileError, unknown_name
 from fastslow.results.auto_text import (
     MOST_PARAMETERS,
@@ -172,9 +172,11 @@ class _Names:
 
     def __post_init__(self) -> None:
         valid = dict.fromkeys([*self.section.columns, *self._parameters])
-        for name in self.changes:
+        for name, own in self.changes.items():
             if name not in valid:
                 raise unknown_name("name in the file", name, valid)
+            if not isinstance(own, str):
+                raise refusal(f"names[{name!r}]", own, "a name as text")
 
     @property
     def _parameters(self) -> tuple[str, ...]:

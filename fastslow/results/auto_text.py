@@ -6,7 +6,6 @@ bifurcation software for ordinary differential equations, chapter 4).
 
 from __future__ import annotations
 
-import ast
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.disk import read_file
-from fastslow.errors import FileError
+from fastslow.errors import FileError, quoted
 
 Array = NDArray[np.float64]
 
@@ -29,6 +28,13 @@ LEADING = 4
 
 #: Parameters that a file may name; AUTO has 36 unless it was built with more.
 MOST_PARAMETERS = 10_000
+
+
+#: An entry of ``parnames`` or ``unames``: a number and the name in quotes.
+_NAMED = re.compile(r"(\d{1,9})\s*:\s*(['\"])(.*?)\2")
+
+#: A number as Fortran writes it.
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf\w*)", re.I | re.A)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,15 +120,12 @@ def _header(now: _Reading, line: str) -> None:
         # the window of the plot begins the header of a new run
         now.constants = {}
         return
-    for name, value in re.findall(r"(\w+)\s*=\s*(-?\d{1,9})(?![\d.E])", text):
+    for name, value in re.findall(r"\b(\w+)\s*=\s*(-?\d{1,9})(?![\d.E])", text):
         now.constants[name] = int(value)
-    named = re.match(r"(parnames|unames)\s*=\s*(\{.*\})", text)
+    named = re.match(r"(parnames|unames)\s*=\s*\{(.*)\}", text)
     if named:
-        try:
-            names = dict(ast.literal_eval(named[2]))
-        except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
-            return
-        if all(isinstance(k, int) and 0 < k <= MOST_PARAMETERS for k in names):
+        names = {int(k): name for k, _, name in _NAMED.findall(named[2])}
+        if all(0 < k <= MOST_PARAMETERS for k in names):
             now.constants[named[1]] = names
 
 
@@ -137,8 +140,8 @@ def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
     columns = _columns(now.header, count - LEADING)
     if count <= LEADING + 1 or len(columns) != count - LEADING:
         raise FileError(
-            f"{where}: {count} numbers under the header {now.header.strip()!r}; expected a diagram "
-            "file of AUTO-07p"
+            f"{where}: {count} numbers under the header {quoted(now.header.strip())}; expected a "
+            "diagram file of AUTO-07p"
         )
     values = []
     for k, row in enumerate(now.rows):
@@ -191,12 +194,9 @@ def real(word: str, path: Path) -> float:
     (0.0015, -1.7976e+308)
     """
     text = re.sub(r"(?<=[\d.])[dD]?([+-]\d+)$", r"e\1", word)
-    try:
-        return float(text)
-    except ValueError:
-        raise FileError(
-            f"{path}: {word!r} is no number; the file is cut short or damaged"
-        ) from None
+    if not _NUMBER.fullmatch(text):
+        raise FileError(f"{path}: {quoted(word)} is no number; the file is cut short or damaged")
+    return float(text)
 
 
 def parameters_of(path: Path) -> dict[int, Array]:
@@ -235,10 +235,10 @@ def parameters_of(path: Path) -> dict[int, Array]:
 
 
 #: A line of diagnostics with an eigenvalue: its number and its two parts.
-_EIGENVALUE = re.compile(r"\s*-?\d+\s+-?\d+\s+Eigenvalue\s+(\d+):\s+(\S+)\s+(\S+)")
+_EIGENVALUE = re.compile(r"\s*-?\d+\s+-?\d+\s+Eigenvalue\s+(\d{1,9}):\s+(\S+)\s+(\S+)")
 
 #: A line of diagnostics that repeats a row of the diagram: branch and point.
-_ROW = re.compile(r"\s*(-?\d+)\s+(-?\d+)\s+(?:[A-Z]{2}\s+)?\d+(?:\s+-?\d\.\d+\S*){3}")
+_ROW = re.compile(r"\s*(-?\d{1,15})\s+(-?\d{1,15})\s+(?:[A-Z]{2}\s+)?\d+(?:\s+-?\d\.\d+\S*){3}")
 
 
 def eigenvalues_of(path: Path, curves: Sequence[AutoCurve], n: int) -> list[NDArray[np.complex128]]:

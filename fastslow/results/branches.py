@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import flag, formula, position, takes, text
 from fastslow.errors import unknown_name
-from fastslow.results import formulas, selecting, stretches
+from fastslow.formulas.columns import by_value, column
+from fastslow.results import selecting, stretches
 from fastslow.results.levels import Pieces, asked, chosen, passages, pieces_of, stored
 from fastslow.results.markup import branch_html
 from fastslow.results.meetings import intersections
@@ -173,7 +174,7 @@ class Branch(Table, Result):
             return stored(self, position(key, len(self), "row"), self.parameters)
         columns = {n: self._state(k) for k, n in enumerate(self.states)}
         columns[self.parameter_name] = lambda: self.parameter
-        return formulas.column(key, columns, self.parameters, len(self))
+        return column(key, columns, self.parameters, len(self), by_value(self.parameter_name, key))
 
     def _state(self, k: int) -> Callable[[], NDArray[np.float64]]:
         return lambda: self.state[:, k]

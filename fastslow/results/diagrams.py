@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import flag, position, takes, text, whole
 from fastslow.errors import ArgumentError, IncompleteWarning, unknown_name
-from fastslow.results import formulas, stretches
+from fastslow.formulas.columns import by_value, column
+from fastslow.results import stretches
 from fastslow.results.branches import Branch
 from fastslow.results.equilibrium_sets import EquilibriumBand
 from fastslow.results.levels import asked, chosen, passages
@@ -131,10 +132,15 @@ class Diagram(Table, Result):
         """
         if isinstance(key, int | np.integer) and not isinstance(key, bool):
             return self.branches[position(key, len(self), "branch")]
+        if isinstance(key, slice):
+            raise ArgumentError(
+                "a diagram has no slices; expected the number of a branch, a name or an "
+                "expression (some of its branches are diagram.branches[0:2])"
+            )
         names = (*self.states, self.parameter)
         columns = {name: partial(self._joined, name) for name in names}
         count = sum(map(len, self.branches))
-        return formulas.column(key, columns, self.parameters, count)
+        return column(key, columns, self.parameters, count, by_value(self.parameter, key))
 
     def _joined(self, name: str) -> NDArray[np.float64]:
         return np.concatenate([np.empty(0), *(branch[name] for branch in self.branches)])

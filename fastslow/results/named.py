@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Generic, TypeVar
 
 from fastslow.errors import unknown_name
+from fastslow.formulas.grammar import normalised
 
 V = TypeVar("V")
 
@@ -13,8 +14,9 @@ V = TypeVar("V")
 class Named(Mapping[str, V], Generic[V]):
     """An ordered, immutable mapping from names to values.
 
-    A key may be a name or anything that prints as one (a SymPy symbol). An
-    unknown key raises an error that suggests the nearest name.
+    A key may be a name or anything that prints as one (a SymPy symbol); identifiers
+    are compared as Python compares them. An unknown key raises an error that suggests
+    the nearest name.
 
     Parameters
     ----------
@@ -39,20 +41,20 @@ class Named(Mapping[str, V], Generic[V]):
     def __init__(self, kind: str, items: Mapping[str, V] | Iterable[tuple[str, V]] = ()) -> None:
         self.kind = kind
         pairs = items.items() if isinstance(items, Mapping) else items
-        self._items: dict[str, V] = {str(key): value for key, value in pairs}
+        self._items: dict[str, V] = {normalised(str(key)): value for key, value in pairs}
 
     def __getitem__(self, key: object) -> V:
         try:
-            return self._items[str(key)]
+            return self._items[normalised(str(key))]
         except KeyError:
             raise unknown_name(self.kind, key, self._items) from None
 
     def get(self, key: object, default: V | None = None) -> V | None:  # type: ignore[override]
         """The value of a name, or the default."""
-        return self._items.get(str(key), default)
+        return self._items.get(normalised(str(key)), default)
 
     def __contains__(self, key: object) -> bool:
-        return str(key) in self._items
+        return normalised(str(key)) in self._items
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._items)
@@ -74,4 +76,4 @@ class Named(Mapping[str, V], Generic[V]):
     def index(self, key: object) -> int:
         """Position of a name among the keys."""
         self[key]
-        return list(self._items).index(str(key))
+        return list(self._items).index(normalised(str(key)))

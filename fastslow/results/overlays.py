@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import among, position, takes, text
+from fastslow.formulas.columns import by_value, evaluated
 from fastslow.results import overlay_queries
 from fastslow.results.crossings import regions_at
 from fastslow.results.delays import BranchPointExit, HopfExit
 from fastslow.results.diagrams import Diagram
-from fastslow.results.formulas import evaluated
 from fastslow.results.moments import Moment, in_blocks, sample
 from fastslow.results.outcome import Outcome
 from fastslow.results.result import Result
@@ -194,7 +194,7 @@ class Overlay(Table, Result):
             **{name: self.run[name] for name in self.run.columns},
             self.parameter: self.slow,
         }
-        return np.broadcast_to(evaluated(key, known), self.time.shape)
+        return np.broadcast_to(evaluated(key, known, by_value("t", key)), self.time.shape)
 
     @takes(region=text, sheet=text, direction=among(-1, 0, 1, None))
     def at(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import finite, formula, takes
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.results import formulas
+from fastslow.formulas.columns import column
 from fastslow.results.curve_levels import points_at
 from fastslow.results.markup import points_html
 from fastslow.results.meetings import intersections
@@ -106,7 +106,7 @@ class PointBranch(Table, Result):
     def __getitem__(self, name: object) -> NDArray[np.float64]:
         """A state, a parameter, or an expression in them, shape (N,)."""
         columns = {key: partial(self._column, k) for k, key in enumerate(self.point_names)}
-        return formulas.column(name, columns, self.parameters, len(self))
+        return column(name, columns, self.parameters, len(self))
 
     def _column(self, k: int) -> NDArray[np.float64]:
         n = len(self.states)

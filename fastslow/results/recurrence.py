@@ -70,8 +70,8 @@ class Recurrence:
     def section(
         self,
         expression: object = None,
-        level: float = 0.0,
         *,
+        level: float = 0.0,
         direction: int | None = None,
         interface: object = None,
         since: float | None = None,
@@ -108,7 +108,7 @@ class Recurrence:
         >>> x, v = sp.symbols("x v")
         >>> fine = fs.Integration(rtol=1e-13)
         >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 10), integration=fine)
-        >>> (run.section("x", 0.0, direction=-1).times / sp.pi.evalf()).astype(float).round(9)
+        >>> (run.section("x", direction=-1).times / sp.pi.evalf()).astype(float).round(9)
         array([0.5, 2.5])
         """
         window = window_of(self._run, since, until)

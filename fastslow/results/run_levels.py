@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.results.expressions import StepPolynomials, along_steps
 from fastslow.results.moments import Moment, check_readable, is_dense, moments_at
+from fastslow.results.step_polynomials import StepPolynomials, along_steps
 from fastslow.results.step_roots import CLOSE, Zero, find_zeros
 from fastslow.results.turning import extremes_of
 

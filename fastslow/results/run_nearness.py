@@ -14,9 +14,9 @@ from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.angles import copies, periods_of
 from fastslow.results.dense import refined_table
-from fastslow.results.expressions import StepPolynomials, along_steps
 from fastslow.results.moments import Moment, check_readable, is_dense, moments_at
 from fastslow.results.nearness import along_line
+from fastslow.results.step_polynomials import StepPolynomials, along_steps
 from fastslow.results.step_roots import find_zeros
 
 if TYPE_CHECKING:

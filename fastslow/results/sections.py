@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.results import formulas
+from fastslow.formulas.columns import column
 from fastslow.results.dense import evaluate
-from fastslow.results.expressions import StepPolynomials, along_steps
 from fastslow.results.outcome import early_end
 from fastslow.results.result import Result
+from fastslow.results.step_polynomials import StepPolynomials, along_steps
 from fastslow.results.step_roots import StepRoots, find_roots
 from fastslow.results.tables import Table
 
@@ -58,7 +58,7 @@ class Section(Table, Result):
     def __getitem__(self, name: object) -> NDArray[np.float64]:
         """A column, or an expression in columns, at the times of the section, shape (K,)."""
         columns = {key: partial(self.table.__getitem__, k) for k, key in enumerate(self.names)}
-        return formulas.column(name, {**columns, "t": lambda: self.times}, {}, len(self))
+        return column(name, {**columns, "t": lambda: self.times}, {}, len(self))
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Time t, every column, and the direction."""

@@ -14,7 +14,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.results.expressions import StepPolynomials
+from fastslow.results.step_polynomials import StepPolynomials
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import among, finite, numbers, position, positive, takes
-from fastslow.results import formulas
+from fastslow.formulas.columns import by_value, column
 from fastslow.results.contacts import (
     Contacts,
     contacts_of,
@@ -160,7 +160,9 @@ class Trajectory(Queries, Recurrence, Table, Result):
         if isinstance(key, int | np.integer) and not isinstance(key, bool):
             return sample(self, position(key, len(self), "sample"))
         columns = {name: partial(self._column, k) for k, name in enumerate(self.columns)}
-        return formulas.column(key, {**columns, "t": lambda: self.t}, self.parameters, len(self.t))
+        return column(
+            key, {**columns, "t": lambda: self.t}, self.parameters, len(self.t), by_value("t", key)
+        )
 
     def _column(self, row: int) -> NDArray[np.float64]:
         values = self._table[1]
@@ -282,8 +284,8 @@ class Trajectory(Queries, Recurrence, Table, Result):
     def hits(
         self,
         interface: object,
-        direction: int | None = None,
         *,
+        direction: int | None = None,
         since: float | None = None,
         until: float | None = None,
     ) -> int:

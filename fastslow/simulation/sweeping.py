@@ -301,7 +301,8 @@ def _points(run: Trajectory, settings: _Settings) -> Array:
     name = run.columns[settings.column]
     assert run.period is not None
     if settings.what == "section":
-        return run.section(settings.section, settings.level, direction=settings.direction)[name]
+        level, direction = settings.level, settings.direction
+        return run.section(settings.section, level=level, direction=direction)[name]
     if settings.what == "stroboscopic":
         # the end of the last period is the beginning of the next value's first
         return run.stroboscopic(phase=settings.phase * run.period)[name][: settings.keep]

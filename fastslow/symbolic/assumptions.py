@@ -9,8 +9,7 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.model.structure import real
-from fastslow.symbolic.reading import read_relation
+from fastslow.model.structure import read_condition, real
 from fastslow.symbolic.signs import Signs, with_facts
 
 WORDS = {"positive": 1, "negative": -1, "real": None}
@@ -86,7 +85,11 @@ def _named(values: Mapping[str, float], name: Any, word: Any) -> tuple[sp.Symbol
 
 def _positive_part(item: Any, values: Mapping[str, float]) -> sp.Expr:
     """Give the expression that an assumed strict inequality says is positive."""
-    relation = read_relation(item) if isinstance(item, str) else item
+    relation = item
+    if isinstance(item, str):
+        relation = read_condition("assume", item, values, exact=True)
+    if relation in (sp.true, sp.false):
+        raise ArgumentError(f"assume: {item} is always {relation}; expected {EXPECTED}")
     if not isinstance(relation, Relational):
         raise ArgumentError(f"assume: received {item}; expected {EXPECTED}")
     for symbol in sorted(relation.free_symbols, key=lambda s: s.name):

@@ -9,10 +9,9 @@ import sympy as sp
 
 from fastslow.arguments import mapping, takes
 from fastslow.errors import ArgumentError
-from fastslow.model.structure import read_expression, real
+from fastslow.model.structure import read_expression, real, sympified
 from fastslow.results.named import Named
 from fastslow.symbolic.algebra import tidy
-from fastslow.symbolic.reading import read_formula
 
 
 @takes(rates=mapping, combinations=mapping, conserved=mapping)
@@ -97,8 +96,7 @@ def reduce_states(
 
 
 def _real(expression: Any) -> sp.Expr:
-    written = read_formula(expression) if isinstance(expression, str) else expression
-    return read_expression("a formula", written)
+    return read_expression("a formula", sympified("a formula", expression, exact=True))
 
 
 def _arguments_expanded(expression: sp.Expr) -> sp.Expr:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,6 @@ from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real, sympified
 from fastslow.results.named import Named
 from fastslow.symbolic.algebra import light, spread
-from fastslow.symbolic.reading import read_formula
 from fastslow.symbolic.verification import vanishes
 
 
@@ -98,7 +97,8 @@ def nondimensionalise(
     scale = {n: scale_symbol(n) for n in (*quantities, "t")}
     positive = {real(n): sp.Symbol(n, positive=v > 0) for n, v in model.parameters.items() if v > 0}
     place = {real(n): scale[n] * real(n) for n in quantities}
-    given = {real(str(k)): _formula(e) for k, e in (replace or {}).items()}
+    known = {*model.parameters, *quantities}
+    given = {real(str(k)): _formula(e, known) for k, e in (replace or {}).items()}
 
     def scaled(state: str, rate: sp.Expr) -> sp.Expr:
         inside = rate.xreplace(given).xreplace(positive).subs(place, simultaneous=True)
@@ -111,7 +111,7 @@ def nondimensionalise(
     for state, term in items(_pair)("ones", ones):
         if str(state) not in smooth:
             raise unknown_name("state", state, smooth)
-        monomial = _formula(term)
+        monomial = _formula(term, known)
         monomial = monomial.xreplace({s: real(s.name) for s in monomial.free_symbols})
         found = _coefficient(scaled(str(state), smooth[str(state)]), monomial, names.values())
         if found == 0:
@@ -161,8 +161,8 @@ def _pair(name: str, value: Any) -> tuple[Any, ...]:
     return both
 
 
-def _formula(given: Any) -> sp.Expr:
-    return read_formula(given) if isinstance(given, str) else sympified("a formula", given)
+def _formula(given: Any, known: Collection[str]) -> sp.Expr:
+    return sympified("a formula", given, known, exact=True)
 
 
 def _coefficient(rate: sp.Expr, monomial: sp.Expr, quantities: Iterable[sp.Symbol]) -> sp.Expr:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import sympy as sp
 
 from fastslow.model.structure import real
+from fastslow.model.typesetting import latex, latex_text
 from fastslow.results.point_types import point_name
 from fastslow.symbolic.decimals import readable
 from fastslow.symbolic.equilibrium_sets import EDGE
@@ -59,16 +60,16 @@ def _blocks(law: Derivation) -> list[Block]:
         each = [rf"{_tex(real(q.total))} = {_tex(q.expression)}" for q in law.conserved_quantities]
         blocks.append(("Conserved", [r",\quad ".join(each)]))
     for region in law.regions.values():
-        blocks.append((f"Region {region.name}", _region(region, taken)))
+        blocks.append((f"Region {latex_text(region.name)}", _region(region, taken)))
     for one in law.equilibrium_sets:
         lines = [_tex(condition) for condition in one.conditions]
         lines += [rf"{_tex(real(n))} = {_tex(e)}" for n, e in one.state.items() if e != real(n)]
         for edge in one.edges:
             values = (f"{_tex(real(n))} = {_tex(e)}" for n, e in edge.items())
             lines.append(r"\text{edge: } " + r",\quad ".join(values))
-        blocks.append((f"Equilibrium set {one.region}".replace("|", r"\textbar "), lines))
+        blocks.append((f"Equilibrium set {latex_text(one.region)}", lines))
     for form in law.boundary_equilibria:
-        joined = " and ".join(form.regions)
+        joined = " and ".join(map(latex_text, form.regions))
         blocks.append((f"Boundary equilibrium between {joined}", _boundary(form, taken)))
     return blocks
 
@@ -202,7 +203,7 @@ def _when(exists: sp.Basic, admissible: sp.Basic) -> str:
 
 
 def _named(name: str) -> str:
-    return rf"\text{{{name}}}"
+    return rf"\text{{{latex_text(name)}}}"
 
 
 def _comma(conditions: Iterable[sp.Basic]) -> str:
@@ -214,4 +215,4 @@ def _tex(expression: sp.Basic) -> str:
     expression = expression.applyfunc(readable) if matrix else readable(expression)
     if not matrix and folds(expression):
         return r"\langle\text{a long expression}\rangle"
-    return str(sp.latex(expression))
+    return latex(expression)

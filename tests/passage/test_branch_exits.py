@@ -44,7 +44,7 @@ def test_the_exit_mirrors_the_entry(pitchfork, off):
     assert "the rate of x has it as a factor" in law.validity
     run = fs.simulate(pitchfork, [1e-3], t=(0, 205))
     assert run(100.0)[0] == pytest.approx(bernoulli(100.0), rel=1e-6)
-    out = run.section("x", 1e-3, direction=1)
+    out = run.section("x", level=1e-3, direction=1)
     assert out["w"][-1] == pytest.approx(law.value, abs=2e-8)
 
 
@@ -68,7 +68,7 @@ def test_a_predator_that_its_prey_lets_in():
     assert law.value < 2
     ramp = model.ramped("p", -1e-3, start=3.0)
     run = fs.simulate(ramp, [1 / 3, 1e-2], t=(0, 2000))
-    out = run.section("y", 1e-2, direction=1)
+    out = run.section("y", level=1e-2, direction=1)
     assert out["p"][-1] == pytest.approx(law.value, abs=5e-3)
 
 

@@ -47,7 +47,7 @@ def test_hindmarsh_rose_spikes(hindmarsh_rose, r, spikes):
     bursts = [p for p in lay.phases if p.kind == "oscillating"][1:-1]
     assert {p.attractor for p in bursts} == {"cycle"}
     for phase in bursts:
-        section = lay.run.section("x", 1.0, direction=1, since=phase.start, until=phase.end)
+        section = lay.run.section("x", level=1.0, direction=1, since=phase.start, until=phase.end)
         assert len(section.times) == phase.oscillations == spikes
         on = (lay.time > phase.start) & (lay.time < phase.end)
         assert np.all(lay.followed[on] == -1)

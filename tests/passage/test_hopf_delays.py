@@ -41,7 +41,7 @@ def test_the_exit_mirrors_the_entry(turned, ramped):
     law = fs.hopf_exit(turned, turned.special("HB")[0], entry=-1, rate=EPS)
     assert law.value == pytest.approx(1.0, abs=1e-12)
     assert law.decay == pytest.approx(1 / (2 * EPS), rel=1e-12)
-    out = ramped.section("x**2 + y**2", RADIUS**2, direction=1)
+    out = ramped.section("x**2 + y**2", level=RADIUS**2, direction=1)
     known = brentq(lambda p: bernoulli(p) - RADIUS**2, 0.5, 1.5, xtol=1e-14)
     assert out["p"][-1] == pytest.approx(known, abs=1e-9)
     assert known == pytest.approx(law.value, abs=1e-6)
@@ -51,7 +51,7 @@ def test_a_gain_of_amplitude(turned, ramped):
     """|z| ten times as large: p² = 1 + 2ε ln 10."""
     law = fs.hopf_exit(turned, turned.special("HB")[0], entry=-1, rate=EPS, gain=10)
     assert law.value == pytest.approx(math.sqrt(1 + 2 * EPS * math.log(10)), abs=1e-12)
-    out = ramped.section("x**2 + y**2", 1e2 * RADIUS**2, direction=1)
+    out = ramped.section("x**2 + y**2", level=1e2 * RADIUS**2, direction=1)
     assert out["p"][-1] == pytest.approx(law.value, abs=1e-5)
 
 

@@ -55,15 +55,16 @@ def test_expressions(branch, folded):
         ("y", "unknown column 'y' .*known: x, p, q"),
         ("x + lst", "unknown column 'lst'"),
         ("sn(x)", "unknown function 'sn'; did you mean 'sin'"),
-        ("sin(x, p)", "sin takes one argument, received 2"),
-        ("max()", "max takes at least one"),
+        ("sin(x, p)", "sin takes 1 argument, received 2"),
+        ("max()", "max takes 2 to 12 arguments, received 0"),
+        ("max(x)", "max takes 2 to 12 arguments, received 1"),
         ("__import__('os')", "cannot read \"'os'\"|unknown function"),
-        ("x.real", "cannot read 'x.real'"),
+        ("x.real", "attributes cannot be read"),
         ("x if p else q", "cannot read"),
         ("[x]", "cannot read"),
         ("x[0]", "cannot read"),
         ("x // 2", "cannot read"),
-        ("True", "cannot read 'True'|unknown column"),
+        ("True", "'True' is a condition; expected a value"),
         ("(lambda: x)()", "cannot read"),
         ("x -", "is no expression in x, p"),
         ("", "is no expression"),
@@ -75,6 +76,36 @@ def test_expressions(branch, folded):
 def test_what_is_no_expression(branch, text, message):
     with pytest.raises((fs.ArgumentError, fs.UnknownNameError), match=message):
         branch[text]
+
+
+@pytest.mark.parametrize("key", [5.0, None, 1j, ["x"], b"x", True])
+def test_what_is_no_text_is_no_column(branch, key):
+    with pytest.raises(fs.ArgumentError, match="expected a name such as 'x' or an expression") as e:
+        branch[key]
+    assert ("at(p=5.0)" in str(e.value)) == (key == 5.0)
+
+
+def test_a_diagram_has_no_slices(branch):
+    diagram = fs.continue_equilibria(fs.systems.cusp().frozen(), "p", over=(-1, 1))
+    with pytest.raises(fs.ArgumentError, match=r"diagram.branches\[0:2\]"):
+        diagram[0:1]
+
+
+def test_a_value_is_given_by_name(branch):
+    with pytest.raises(fs.ArgumentError, match=r"received 0.1 without a name.* at\(p=0.1\)"):
+        branch.at(0.1)
+
+
+def test_a_sum_of_many_terms(branch):
+    assert branch["+".join(["x"] * 991)] == pytest.approx(991 * branch["x"], rel=1e-12)
+
+
+def test_conditions_within_a_piecewise(branch):
+    found = branch["Piecewise((-x, x < 0), (x**2, (x >= 0) & (x < 0.5)), (7, x < 0.8))"]
+    x = branch["x"]
+    expected = np.where(x < 0, -x, np.where(x < 0.5, x**2, np.where(x < 0.8, 7.0, np.nan)))
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(branch["Heaviside(x, 1) + Mod(x, 0.25)"], (x >= 0) + x % 0.25)
 
 
 def test_huge_powers_end(branch):

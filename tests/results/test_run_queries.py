@@ -349,7 +349,7 @@ def test_crossings_of_an_interface(forced):
     assert [c.time for c in up] == [
         c.time for c in forced.crossings if c.interface == "x - D" and c.direction == 1
     ]
-    assert len(up) == forced.hits("x - D", 1) > 0
+    assert len(up) == forced.hits("x - D", direction=1) > 0
     assert forced.crossings(direction=1)("x - D") == up
     assert isinstance(forced.crossings, tuple)
     assert pickle.loads(pickle.dumps(up)).interfaces == forced.interfaces

@@ -62,7 +62,7 @@ def test_stroboscopic_points_of_a_linear_oscillator(meshed):
 
 
 def test_section_of_the_van_der_pol_oscillator(cycle):
-    up = cycle.section("x", 0.0, direction=1)
+    up = cycle.section("x", level=0.0, direction=1)
     assert np.diff(up.times)[5:] == pytest.approx(VAN_DER_POL, abs=1e-11)
     assert np.abs(up["x"]).max() < 1e-13
     event = solve_ivp(
@@ -78,15 +78,15 @@ def test_section_of_the_van_der_pol_oscillator(cycle):
     assert both.times == pytest.approx(event.t_events[0], abs=1e-9)
     assert both["v"] == pytest.approx(event.y_events[0][:, 1], abs=1e-9)
     assert both.directions.tolist() == np.sign(both["v"]).tolist()
-    assert cycle.section("v", 0.5).times == pytest.approx(event.t_events[1], abs=1e-9)
+    assert cycle.section("v", level=0.5).times == pytest.approx(event.t_events[1], abs=1e-9)
     assert len(up) + len(cycle.section("x", direction=-1)) == len(both)
 
 
 def test_the_maxima_are_where_the_speed_falls_through_zero(cycle):
-    top = cycle.section("v", 0.0, direction=-1, since=60.0)
+    top = cycle.section("v", level=0.0, direction=-1, since=60.0)
     high = cycle.extremes("x", since=60.0)[1]
     assert top["x"].max() == pytest.approx(high, abs=1e-14)
-    touch = cycle.section("x", high, since=60.0)
+    touch = cycle.section("x", level=high, since=60.0)
     # the level of one maximum only touches there
     assert 0 in touch.directions
     assert np.abs(touch["x"] - high).max() < 1e-12
@@ -94,7 +94,7 @@ def test_the_maxima_are_where_the_speed_falls_through_zero(cycle):
 
 def test_a_section_may_be_a_polynomial(cycle):
     x, v, mu = sp.symbols("x v mu")
-    circle = cycle.section(x**2 + v**2 / 4 - mu, 2.0, since=60.0)
+    circle = cycle.section(x**2 + v**2 / 4 - mu, level=2.0, since=60.0)
     assert len(circle)
     assert circle["x"] ** 2 + circle["v"] ** 2 / 4 - 1 == pytest.approx(2.0, abs=1e-12)
     minute = cycle.section("t/60 - 1")
@@ -127,7 +127,7 @@ def test_contacts_period_by_period(rattling):
     share = (last - first).mean() / length
     assert 0 < share < 1
     assert contacts.residence["S2"] == pytest.approx(share, abs=1e-6)
-    assert rattling.hits("x - D", 1, since=end - 3 * length) == 3
+    assert rattling.hits("x - D", direction=1, since=end - 3 * length) == 3
     half = rattling.hits("x - D", until=end / 2) + rattling.hits("x - D", since=end / 2)
     assert half == rattling.hits("x - D")
 
@@ -210,22 +210,32 @@ def test_wrong_questions(cycle, meshed):
     with pytest.raises(fs.ArgumentError, match="direction = 2"):
         meshed.section("x", direction=2)
     with pytest.raises(fs.ArgumentError, match="level = nan"):
-        meshed.section("x", math.nan)
+        meshed.section("x", level=math.nan)
     with pytest.raises(fs.UnknownNameError, match="unknown interface 'x-D'; did you mean 'x - D'"):
         meshed.section(interface="x-D")
     with pytest.raises(fs.UnknownNameError, match="unknown column or parameter 'zta'; did you"):
         meshed.section("x - zta")
-    for text in ("sin(x)", "x**v", "1/x", "x if v else x", "x**0.5", "'x'", "x[0]"):
+    for text in ("sin(x)", "x**v", "1/x", "x**0.5", "x/0", "Max(x, v)"):
         with pytest.raises(fs.ArgumentError, match="is no polynomial"):
             meshed.section(text)
-    with pytest.raises(fs.ArgumentError, match="is no expression"):
-        meshed.section("x -")
+    for text in ("x -", "x if v else x", "'x'", "x[0]", "x > v", "True", 5.0):
+        with pytest.raises(fs.ArgumentError, match=r"is no expression|expected a name or an"):
+            meshed.section(text)
+    for text, degree in (("(x**8)**8", 64), ("x**8*v", 9), ("(x + v)**1000", 1000)):
+        with pytest.raises(fs.ArgumentError, match=f"has the degree {degree} .*up to 8"):
+            meshed.section(text)
+    with pytest.raises(fs.ArgumentError, match="is not finite along the run"):
+        meshed.section("1e300*x*1e300*x")
+    with pytest.raises(fs.ArgumentError, match=r"received 1.1 without a name; expected level="):
+        meshed.section("x", 1.1)
+    with pytest.raises(fs.ArgumentError, match="received 1 without a name; expected direction="):
+        meshed.hits("x - D", 1)
     with pytest.raises(fs.UnknownNameError, match="unknown window 'han'; did you mean 'hann'"):
         meshed.spectrum("x", window="han")
     with pytest.raises(fs.UnknownNameError, match="unknown column 'y'"):
         meshed.spectrum("y")
     with pytest.raises(fs.UnknownNameError, match="unknown column 'y'"):
-        meshed.section("x", 1.1)["y"]
+        meshed.section("x", level=1.1)["y"]
     light = fs.simulate(
         fs.systems.gear_pair(),
         [1.1, 0],

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fastslow.results.expressions import StepPolynomials
+from fastslow.results.step_polynomials import StepPolynomials
 from fastslow.results.step_roots import find_roots
 
 

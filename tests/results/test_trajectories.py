@@ -108,7 +108,7 @@ def test_contact_statistics(run):
     assert set(run.residence) == {"S1", "S2", "S3"}
     both = run.hits("x - D") + run.hits("x + D")
     assert both == len(run.crossings)
-    assert run.hits("x - D", 1) + run.hits("x - D", -1) == run.hits("x - D")
+    assert run.hits("x - D", direction=1) + run.hits("x - D", direction=-1) == run.hits("x - D")
     with pytest.raises(UnknownNameError, match="unknown interface 'x-D'; did you mean 'x - D'"):
         run.hits("x-D")
 

@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 from fastslow import ArgumentError, UnknownNameError
-from fastslow.results.formulas import evaluated, names_in
+from fastslow.formulas.columns import evaluated, names_in
 
 x, v = sp.symbols("x v")
 VALUES = {"x": np.array([0.3, -1.2]), "v": np.array([2.0, 0.5]), "k": 3.0}

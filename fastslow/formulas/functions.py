@@ -1,0 +1,163 @@
+"""The functions that a formula may use: names, numbers of arguments, values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fastslow.formulas.limits import ARGUMENTS, PIECES
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function of formulas.
+
+    Parameters
+    ----------
+    symbolic : str
+        Its name in SymPy.
+    values : callable, optional
+        Its values from arrays, element by element; none for those that SymPy alone knows.
+    least, most : int
+        Number of arguments.
+    """
+
+    symbolic: str
+    values: Callable[..., Any] | None = None
+    least: int = 1
+    most: int = 1
+
+
+def _folded(function: Callable[[Any, Any], Any]) -> Callable[..., Any]:
+    def values(first: Any, *rest: Any) -> Any:
+        for other in rest:
+            first = function(first, other)
+        return first
+
+    return values
+
+
+def _inverse(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    return lambda x: 1.0 / function(x)
+
+
+def _of_inverse(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    return lambda x: function(1.0 / x)
+
+
+def _step(x: Any, there: Any = 0.5) -> Any:
+    return np.heaviside(x, there)
+
+
+_ELEMENTARY: dict[str, Callable[[Any], Any]] = {
+    "Abs": np.abs,
+    "acos": np.arccos,
+    "acosh": np.arccosh,
+    "acot": _of_inverse(np.arctan),
+    "acoth": _of_inverse(np.arctanh),
+    "acsc": _of_inverse(np.arcsin),
+    "acsch": _of_inverse(np.arcsinh),
+    "asec": _of_inverse(np.arccos),
+    "asech": _of_inverse(np.arccosh),
+    "asin": np.arcsin,
+    "asinh": np.arcsinh,
+    "atan": np.arctan,
+    "atanh": np.arctanh,
+    "cbrt": np.cbrt,
+    "ceiling": np.ceil,
+    "cos": np.cos,
+    "cosh": np.cosh,
+    "cot": _inverse(np.tan),
+    "coth": _inverse(np.tanh),
+    "csc": _inverse(np.sin),
+    "csch": _inverse(np.sinh),
+    "erf": np.vectorize(math.erf, otypes=[float]),
+    "erfc": np.vectorize(math.erfc, otypes=[float]),
+    "exp": np.exp,
+    "floor": np.floor,
+    "frac": lambda x: x - np.floor(x),
+    "sec": _inverse(np.cos),
+    "sech": _inverse(np.cosh),
+    "sign": np.sign,
+    "sin": np.sin,
+    "sinc": lambda x: np.sinc(x / np.pi),
+    "sinh": np.sinh,
+    "sqrt": np.sqrt,
+    "tan": np.tan,
+    "tanh": np.tanh,
+}
+
+#: Special functions that equations may hold, with their numbers of arguments.
+SPECIAL: dict[str, tuple[int, int]] = {
+    "Chi": (1, 1),
+    "Ci": (1, 1),
+    "Ei": (1, 1),
+    "LambertW": (1, 2),
+    "Shi": (1, 1),
+    "Si": (1, 1),
+    "airyai": (1, 1),
+    "airyaiprime": (1, 1),
+    "airybi": (1, 1),
+    "airybiprime": (1, 1),
+    "besseli": (2, 2),
+    "besselj": (2, 2),
+    "besselk": (2, 2),
+    "bessely": (2, 2),
+    "beta": (2, 2),
+    "elliptic_e": (1, 2),
+    "elliptic_f": (2, 2),
+    "elliptic_k": (1, 1),
+    "erfcinv": (1, 1),
+    "erfi": (1, 1),
+    "erfinv": (1, 1),
+    "expint": (2, 2),
+    "factorial": (1, 1),
+    "fresnelc": (1, 1),
+    "fresnels": (1, 1),
+    "gamma": (1, 1),
+    "li": (1, 1),
+    "loggamma": (1, 1),
+    "lowergamma": (2, 2),
+    "polygamma": (2, 2),
+    "uppergamma": (2, 2),
+    "zeta": (1, 1),
+}
+
+_NAMED: dict[str, Function] = {
+    **{name: Function(name, values) for name, values in _ELEMENTARY.items()},
+    **{name: Function(name, None, *count) for name, count in SPECIAL.items()},
+    "Heaviside": Function("Heaviside", _step, 1, 2),
+    "Max": Function("Max", _folded(np.maximum), 2, ARGUMENTS),
+    "Min": Function("Min", _folded(np.minimum), 2, ARGUMENTS),
+    "Mod": Function("Mod", np.mod, 2, 2),
+    # its arguments are pairs, which every use reads itself
+    "Piecewise": Function("Piecewise", None, 1, PIECES),
+    "atan2": Function("atan2", np.arctan2, 2, 2),
+    "log": Function("log", lambda x, base=np.e: np.log(x) / np.log(base), 1, 2),
+}
+
+#: Names of NumPy and Python by those of SymPy.
+_ALIASES = {
+    "abs": "Abs",
+    "arccos": "acos",
+    "arcsin": "asin",
+    "arctan": "atan",
+    "max": "Max",
+    "min": "Min",
+}
+
+FUNCTIONS: dict[str, Function] = {
+    **_NAMED,
+    **{name: _NAMED[meant] for name, meant in _ALIASES.items()},
+}
+
+#: Conditions that SymPy prints as functions, by their operators.
+RELATIONS = {"Eq": "==", "Ne": "!=", "Gt": ">", "Ge": ">=", "Lt": "<", "Le": "<="}
+CONNECTIVES = {"And": "and", "Or": "or", "Not": "not"}
+
+#: Constants, where no name of the model hides them.
+CONSTANTS = {"pi": math.pi, "E": math.e}

@@ -1,0 +1,253 @@
+"""Formulas as SymPy expressions. SymPy sees only the tree, and nothing that it would write out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Sequence
+from functools import reduce
+from operator import mul, truediv
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from fastslow.errors import ArgumentError, quoted
+from fastslow.formulas.functions import CONSTANTS, FUNCTIONS, SPECIAL
+from fastslow.formulas.grammar import (
+    Call,
+    Comparison,
+    Logic,
+    Name,
+    Negative,
+    Node,
+    Number,
+    Pair,
+    Power,
+    Product,
+    Sum,
+    Truth,
+    normalised,
+    parse,
+    parts,
+    refused,
+    text_of,
+)
+from fastslow.formulas.limits import ARGUMENT, EXPONENT
+
+_COMPARED: dict[str, Any] = {
+    "<": sp.Lt,
+    "<=": sp.Le,
+    ">": sp.Gt,
+    ">=": sp.Ge,
+    "==": sp.Eq,
+    "!=": sp.Ne,
+}
+_JOINED: dict[str, Any] = {"and": sp.And, "or": sp.Or, "not": sp.Not}
+_CONSTANTS: dict[str, sp.Expr] = {"pi": sp.pi, "E": sp.E}
+
+#: Factors that are multiplied one by one, as Python does; more at once, for the time it takes.
+ONE_BY_ONE = 50
+
+
+def read(
+    text: str, symbol: Callable[[str], sp.Symbol], known: Collection[str] = (), exact: bool = False
+) -> sp.Basic:
+    """Read an expression or a condition.
+
+    Parameters
+    ----------
+    text : str
+    symbol : callable
+        Gives the symbol of a name.
+    known : collection of str
+        Names that are not constants, should they be pi or E. One that is no identifier is
+        read where it stands alone.
+    exact : bool
+        Whether decimal numbers become fractions.
+
+    Returns
+    -------
+    sympy.Expr or Boolean
+
+    Raises
+    ------
+    ArgumentError
+        For what is no formula; for powers that are too large, and numbers and constant parts
+        that are not finite and real.
+
+    Examples
+    --------
+    >>> read("x**2*v + sqrt(2)/3", sp.Symbol)
+    v*x**2 + sqrt(2)/3
+    >>> read("Piecewise((x, x > 0), (0, True))", sp.Symbol)
+    Piecewise((x, x > 0), (0, True))
+    >>> read("10**10**10", sp.Symbol)
+    Traceback (most recent call last):
+    ...
+    fastslow.errors.ArgumentError: '10**10**10' is no expression: the exponent 10**10 is larger \
+than 64 in size
+    """
+    if text in known:
+        return symbol(text)
+    tree = parse(text)
+    names = {normalised(name): name for name in known}
+    _Bounds(text, names).of(tree)
+
+    def named(name: str) -> sp.Expr:
+        if name in _CONSTANTS and name not in names:
+            return _CONSTANTS[name]
+        return symbol(names.get(name, name))
+
+    try:
+        return _made(tree, named, exact)
+    except (TypeError, ValueError, ArithmeticError, NotImplementedError, RecursionError) as error:
+        # what SymPy cannot compare or evaluate
+        raise refused(text, f"SymPy cannot read it ({quoted(str(error))})") from error
+
+
+class _Bounds:
+    """A check of everything that SymPy would compute or expand."""
+
+    def __init__(self, text: str, known: Collection[str]) -> None:
+        self.text, self.known = text, known
+
+    def refused(self, reason: str) -> ArgumentError:
+        return refused(self.text, reason)
+
+    def finite(self, value: Any, node: Node) -> float:
+        number = float(np.real(value)) if np.isreal(value) else math.nan
+        if not math.isfinite(number):
+            raise self.refused(f"{quoted(text_of(node))} has no finite real value")
+        return number
+
+    def of(self, node: Node) -> tuple[float | None, int]:
+        """The value of a part without names, None for others, and its total degree."""
+        found = [self.of(part) for part in parts(node)]
+        values = [value for value, _ in found]
+        degrees = [degree for _, degree in found]
+        value: float | None = None
+        degree = max(degrees, default=0)
+        with np.errstate(all="ignore"):
+            match node:
+                case Number():
+                    value = node.value
+                case Name(name):
+                    value = CONSTANTS.get(name) if name not in self.known else None
+                    degree = int(value is None)
+                case Negative():
+                    value = None if values[0] is None else -values[0]
+                case Sum(pairs):
+                    value = self.joined(node, "+", pairs, values)
+                case Product(pairs):
+                    value = self.joined(node, "*", pairs, values)
+                    degree = sum(degrees)
+                case Power():
+                    value, degree = self.power(node, values, degree)
+                case Call(function):
+                    value = self.called(function, node, values)
+                    degree = int(value is None)
+        if degree > EXPONENT:
+            raise self.refused(
+                f"{quoted(text_of(node))} has the degree {degree}; expected at most {EXPONENT}"
+            )
+        return value, degree
+
+    def joined(
+        self,
+        node: Node,
+        first: str,
+        pairs: Sequence[tuple[str, Node]],
+        values: Sequence[float | None],
+    ) -> float | None:
+        """The value of all terms or factors without names, which SymPy joins."""
+        total = np.float64(first == "*")
+        join = {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
+        for (sign, _), value in zip(pairs, values, strict=True):
+            if value is not None:
+                total = join[sign](total, value)
+        number = self.finite(total, node)
+        return None if None in values else number
+
+    def power(
+        self, node: Power, values: Sequence[float | None], degree: int
+    ) -> tuple[float | None, int]:
+        base, exponent = values
+        if exponent is None:
+            return None, degree
+        if abs(exponent) > EXPONENT:
+            shown = text_of(node.exponent)
+            raise self.refused(f"the exponent {shown} is larger than {EXPONENT} in size")
+        if base is None:
+            return None, degree * max(1, math.ceil(abs(exponent)))
+        return self.finite(np.power(np.float64(base), exponent), node), 0
+
+    def called(self, name: str, node: Call, values: Sequence[float | None]) -> float | None:
+        function = FUNCTIONS[name]
+        if function.symbolic in SPECIAL:
+            for part, value in zip(node.arguments, values, strict=True):
+                if value is not None and abs(value) > ARGUMENT:
+                    raise self.refused(
+                        f"{name} is given {quoted(text_of(part))}; expected a number of at most "
+                        f"{ARGUMENT:g} in size"
+                    )
+        known = [value for value in values if value is not None]
+        if name == "Piecewise" or len(known) < len(values):
+            return None
+        if function.values is not None:
+            return self.finite(function.values(*map(np.float64, known)), node)
+        try:
+            number = complex(sp.N(getattr(sp, function.symbolic)(*map(sp.Float, known))))
+        except (TypeError, ValueError, ArithmeticError, NotImplementedError):
+            number = complex(math.nan)
+        return self.finite(number, node)
+
+
+def _made(node: Node, named: Callable[[str], sp.Expr], exact: bool) -> Any:
+    """The SymPy expression of a checked tree."""
+    match node:
+        case Number(text):
+            if text.isdecimal():
+                return sp.Integer(text)
+            return sp.Rational(text) if exact else sp.Float(text)
+        case Name(name):
+            return named(name)
+        case Truth(value):
+            return sp.true if value else sp.false
+        case Negative(operand):
+            return -_made(operand, named, exact)
+        case Sum(pairs):
+            terms = [(sign, _made(term, named, exact)) for sign, term in pairs]
+            return sp.Add(*(term if sign == "+" else -term for sign, term in terms))
+        case Product(pairs):
+            return _product([(sign, _made(factor, named, exact)) for sign, factor in pairs])
+        case Power(base, exponent):
+            return _made(base, named, exact) ** _made(exponent, named, exact)
+        case Call("Piecewise", pairs):
+            return sp.Piecewise(
+                *(
+                    (_made(p.value, named, exact), _made(p.condition, named, exact))
+                    for p in pairs
+                    if isinstance(p, Pair)
+                )
+            )
+        case Call(function, arguments):
+            made = [_made(argument, named, exact) for argument in arguments]
+            return getattr(sp, FUNCTIONS[function].symbolic)(*made)
+        case Comparison(operators, operands):
+            made = [_made(operand, named, exact) for operand in operands]
+            return sp.And(
+                *(
+                    _COMPARED[sign](one, other)
+                    for sign, one, other in zip(operators, made[:-1], made[1:], strict=True)
+                )
+            )
+        case Logic(word, operands):
+            return _JOINED[word](*(_made(operand, named, exact) for operand in operands))
+    raise TypeError(node)
+
+
+def _product(factors: list[tuple[str, sp.Expr]]) -> sp.Expr:
+    if len(factors) > ONE_BY_ONE:
+        return sp.Mul(*(f if sign == "*" else 1 / f for sign, f in factors))
+    (_, first), *rest = factors
+    return reduce(lambda total, f: (mul if f[0] == "*" else truediv)(total, f[1]), rest, first)
