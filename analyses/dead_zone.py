@@ -13,7 +13,8 @@ import fastslow as fs
 from analyses.claims import Claim, Finding
 from analyses.output import Output
 from fastslow.plot.bands import draw_bands
-from fastslow.plot.style import BRANCH, LINES, axes_for, typeset
+from fastslow.plot.style import BRANCH, LINES, axes_for
+from fastslow.plot.typesetting import typeset
 
 GAP = 0.25
 

@@ -31,8 +31,8 @@ LETTERS = (
 GREEK = frozenset(LETTERS.split())
 
 #: Functions that mathematics has commands for.
-COMMANDS = ("cos", "cosh", "cot", "coth", "csc", "exp", "log", "max", "min", "sec", "sin", "sinh")
-COMMANDS += ("tan", "tanh")
+FUNCTIONS = "cos cosh cot coth csc exp log max min sec sin sinh tan tanh"
+COMMANDS = frozenset(FUNCTIONS.split())
 
 #: How comparisons and connectives are written.
 SIGNS = {"<=": r"\leq", ">=": r"\geq", "==": "=", "!=": r"\neq"}
@@ -168,10 +168,10 @@ def _mathematics(node: Node) -> tuple[str, int]:
         case Pair(value, condition):
             return rf"{_mathematics(value)[0]}\;\mathrm{{if}}\;{_mathematics(condition)[0]}", 0
         case Comparison(operators, operands):
-            first, *others = (_bound(o, 1) for o in operands)
-            signs = (SIGNS.get(sign, sign) for sign in operators)
-            compared = [f" {sign} {o}" for sign, o in zip(signs, others, strict=True)]
-            return first + "".join(compared), 0
+            sides = [_bound(o, 1) for o in operands]
+            signs = [SIGNS.get(sign, sign) for sign in operators]
+            compared = [f" {sign} {o}" for sign, o in zip(signs, sides[1:], strict=True)]
+            return sides[0] + "".join(compared), 0
         case Logic("not", (operand,)):
             return rf"\neg {_bound(operand, 4)}", 0
         case Logic(word, operands):
