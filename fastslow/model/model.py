@@ -35,6 +35,8 @@ class Model:
 
     Symbols are matched by name and are real inside, so ``Symbol("x")`` and
     ``Symbol("x", real=True)`` are the same state. Time is the symbol named t.
+    Expressions and conditions may also be text, such as ``"w - x**3"`` and ``"x > D"``,
+    with functions named as in SymPy.
 
     Parameters
     ----------
@@ -84,6 +86,8 @@ class Model:
     (['x - D', 'x + D'], ['S1', 'S2', 'S3'])
     >>> print(model.regions["S2"].rates["x"])
     0
+    >>> Model({"x": "-x + k"}, parameters={"k": 2}).equations
+    "x' = k - x"
     """
 
     states: tuple[str, ...]

@@ -175,7 +175,7 @@ def to_numpy(
     entries = [f"            [{', '.join(map(code, matrix.row(k)))}]," for k in range(len(names))]
     functions = [f"            {code(i.function)}," for i in model.interfaces.values()]
     blocks = [
-        f'"""{", ".join(names)}, region {region}."""',
+        f'"""{_comment(", ".join(names))}, region {_comment(region)}."""',
         "import numpy",
         f"STATES = {tuple(names)!r}\nSTART = {tuple(first.values())!r}\nPARAMETERS = {numbers!r}\n"
         f"SIGNS = {dict(part.signs)!r}",
@@ -216,9 +216,9 @@ def to_xpp(
     def code(expression: sp.Expr) -> str:
         return str(printer.doprint(_supported(expression).xreplace(place)))
 
-    lines = [f"# {', '.join(names)}, region {region}"]
+    lines = [f"# {_comment(', '.join(names))}, region {_comment(region)}"]
     where = ", ".join(map(str, part.conditions))
-    lines += [f"# where {where}"] if where else []
+    lines += [f"# where {_comment(where)}"] if where else []
     lines += [f"par {inside[n]}={value!r}" for n, value in numbers.items()]
     lines += [f"{inside[n]}={code(law)}" for n, law in part.forcing.items()]
     lines += [f"{inside[n]}'={code(part.rates[n])}" for n in names]
@@ -288,7 +288,7 @@ def to_auto(
     ]
     declared = "  DOUBLE PRECISION, INTENT(IN) :: U(NDIM), PAR(*)"
     text = [
-        f"! {', '.join(model.states)}, region {region}",
+        f"! {_comment(', '.join(model.states))}, region {_comment(region)}",
         "SUBROUTINE FUNC(NDIM,U,ICP,PAR,IJAC,F,DFDU,DFDP)",
         "  IMPLICIT NONE",
         "  INTEGER, INTENT(IN) :: NDIM, ICP(*), IJAC",
@@ -349,6 +349,12 @@ def _supported(expression: sp.Expr) -> sp.Expr:
             f"cannot export {names}; expected {', '.join(f.__name__ for f in FUNCTIONS)}"
         )
     return expression
+
+
+def _comment(text: str) -> str:
+    """A text that stays within a comment or a docstring: one line without quotes."""
+    line = "".join(c if c.isprintable() else " " for c in text)
+    return line.replace("\\", "/").replace('"', "'")
 
 
 def _names(

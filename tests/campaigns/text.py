@@ -288,6 +288,7 @@ def entries() -> dict[str, Entry]:
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(-1, 1))
     run = fs.simulate(model, [0.0, 0.0], periods=2)
     lay = fs.overlay(diagram, run)
+    path = fs.continue_equilibria(model.frozen(slow={"w": "g"}), "g", over=(-1, 1))
     section = run.section("v")
     fold = fs.continue_equilibria(fs.systems.cusp().frozen(), "p", over=(-1, 1)).folds[0]
     curve = fs.continue_points(fold, ("p", "q"), over={"p": (-1, 1), "q": (-1, 2)})
@@ -309,7 +310,7 @@ def entries() -> dict[str, Entry]:
         return fs.read_auto("b.text")
 
     def along(text: str) -> object:
-        return fs.overlay(replace(diagram, parameter="g", path={"w": text}), run)
+        return fs.overlay(replace(path, path={"w": text}), run)
 
     def derived(text: str) -> object:
         return fs.derive(fs.Model({x: D - k * x}, parameters={D: 1, k: 1}), assume=text)
@@ -319,6 +320,7 @@ def entries() -> dict[str, Entry]:
         return drawn.ax.get_ylabel()
 
     gear = fs.Model({x: D - k * x}, parameters={D: 1, k: 1})
+    logistic = fs.Model({x: D * x - k * x**2}, parameters={D: 1, k: 1})
     return {
         "Model rate": rates,
         "Model law": lambda s: written_model(forcing={"w": s}),
@@ -352,7 +354,7 @@ def entries() -> dict[str, Entry]:
         "derive assume": derived,
         "derive parameter": lambda s: fs.derive(gear, parameter=s),
         "continue parameter": lambda s: fs.continue_equilibria(gear, s, over=(0, 2)),
-        "scale": lambda s: fs.nondimensionalise(gear, [("x", s), ("x", "D")]),
+        "scale": lambda s: fs.nondimensionalise(logistic, [("x", s), ("x", "x**2")]),
         "reduce": lambda s: fs.reduce_states({x: s, v: -v}, {"u": x + v}),
         "combine": lambda s: fs.reduce_states({x: -x, v: -v}, {"u": s}),
         "compare": lambda s: fs.disagreements({"A": D * k}, {"A": s}),

@@ -119,3 +119,17 @@ def test_bad_requests():
     x = sp.Symbol("x")
     with pytest.raises(ArgumentError, match="gamma"):
         export(Model({x: -sp.gamma(x)}), "xpp")
+
+
+def test_names_stay_in_their_comments():
+    name = '"""\nimport os\n"""\\'
+    state = sp.Symbol(name)
+    model = Model({state: -state})
+    (source,) = export(model, "numpy").values()
+    space = {}
+    exec(source, space)
+    assert "os" not in space
+    assert space["STATES"] == (name,)
+    for target in ("xpp", "auto"):
+        for text in export(model, target).values():
+            assert not any(line.strip() == "import os" for line in text.splitlines())
