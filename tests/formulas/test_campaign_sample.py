@@ -40,6 +40,8 @@ def test_what_is_right_is_answered():
         "section": "x*v",
         "curve": "x*p",
         "run.section": "x*v - D",
+        "reduce": "-x",
+        "combine": "x + v",
         "sweep section": "v",
         "compare": "k",
         "drift": "0.1 + w",
