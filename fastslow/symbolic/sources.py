@@ -302,8 +302,8 @@ def to_auto(
         "  INTEGER, INTENT(IN) :: NDIM",
         "  DOUBLE PRECISION, INTENT(INOUT) :: U(NDIM), PAR(*)",
         "  DOUBLE PRECISION, INTENT(IN) :: T",
-        *(f"  PAR({index[n]}) = {_double(v)} ! {n}" for n, v in numbers.items()),
-        *(f"  U({k + 1}) = {_double(v)} ! {n}" for k, (n, v) in enumerate(first.items())),
+        *(f"  PAR({index[n]}) = {_double(v)} ! {_comment(n)}" for n, v in numbers.items()),
+        *(f"  U({k + 1}) = {_double(v)} ! {_comment(n)}" for k, (n, v) in enumerate(first.items())),
         "END SUBROUTINE STPNT",
         *(f"SUBROUTINE {name}\nEND SUBROUTINE {name}" for name in ("BCND", "ICND", "FOPT", "PVLS")),
     ]
