@@ -94,7 +94,7 @@ BY_PARAMETER = {
     "key": [
         *COLUMN,
         (10**6, fs.OutOfRangeError, "1000000; the last of"),
-        (True, Wrong, "'True' is no expression"),
+        (True, Wrong, "in SymPy, received True"),
     ],
     "label": FLAG,
     "largest_step": POSITIVE,

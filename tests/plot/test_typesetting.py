@@ -93,7 +93,7 @@ def test_every_figure_survives_its_names(odd):
         fs.plot.section(run.section("m%"), "t", "$"),
         fs.plot.spectrum(run.spectrum("m%")),
         fs.plot.eigenvalue_path(diagram[0]),
-        fs.plot.parameter_plane([curve]),
+        fs.plot.parameter_plane(curve),
         fs.plot.regime_map(wedge, marks={"$a": (0.3, 0.5)}, curves={"_{": ([0, 1], [1, 0])}),
         fs.plot.sweep(swept),
     ]
