@@ -83,6 +83,20 @@ def test_a_branch_that_does_not_move():
     assert "rounding decides" in far.validity
 
 
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_whether_a_branch_moves_does_not_depend_on_its_unit(unit):
+    """x = unit rests, x = ±w unit moves."""
+    s = x / unit - 1
+    still = fs.Model({x: unit * (p * s - s**3)}, parameters={p: -1})
+    diagram = fs.continue_equilibria(still, "p", over=(-2, 2))
+    law = fs.predict_delay(diagram.special("BP")[0], 0.05, diagram=diagram, entry=-1)
+    assert law.value == pytest.approx(1.0, abs=1e-9)
+    model = fs.Model({x: unit * (x / unit - w) * (x / unit + w)}, parameters={w: -1})
+    moving = fs.continue_equilibria(model, "w", over=(-2, 2))
+    with pytest.raises(fs.ArgumentError, match="not invariant while w drifts"):
+        fs.predict_delay(moving.special("BP")[0], 0.05, diagram=moving, entry=-1)
+
+
 def test_a_factor_remembers_down_to_the_smallest_number(off):
     point = off.special("BP")[0]
     assert "decides" not in fs.predict_delay(point, 1e-3, diagram=off, entry=-1).validity

@@ -11,6 +11,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import fastslow as fs
+from fastslow.passage.buffer_points import LevelCurve
+from fastslow.passage.hopf_delays import hopf_mode
 
 RADIUS, EPS = 1e-3, 0.05
 
@@ -246,3 +248,15 @@ def test_a_drift_that_changes_takes_the_error_away(turned):
     assert plain.error < 1e-6
     assert math.isnan(law.error)
     assert "the change of the drift left aside" in law.validity
+
+
+def test_a_level_that_the_branch_does_not_reach_is_nowhere(turned):
+    """∫ Re λ dp over −2 ≤ p ≤ 0 is 2: a decay by more has no entry."""
+    mode = hopf_mode(turned, turned.special("HB")[0], 1)
+    curves = LevelCurve(mode, lambda *_: np.zeros((2, 3)))
+    enter, leave = curves.ends(0.5)
+    assert (enter, leave) == pytest.approx((-1, 1), abs=1e-12)
+    assert curves.focal(0.5)
+    assert all(map(math.isnan, curves.ends(2.5)))
+    assert not curves.focal(2.5)
+    assert not curves.leads_back(2.5)

@@ -6,6 +6,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.model.structure import real
 from fastslow.systems import (
     gear_scales,
     harmonic_gear,
@@ -13,6 +14,7 @@ from fastslow.systems import (
     harmonic_gear_twist,
     harmonic_gear_two_inertias,
 )
+from fastslow.systems.geartrain import gear_scaling
 
 # computed from the source's values with 40 digits, to all digits kept
 CONSISTENT = {"A": "41.6666667", "B": "2.37197934", "C": "3.54545564", "D": "0.298869397"}
@@ -40,6 +42,32 @@ def test_the_printed_formulas():
     assert p["A"] == pytest.approx(2500 * 19000 * j**2 / c**4, rel=1e-14)
     assert p["B"] == pytest.approx(19000 * j**2 * 7 / c**4, rel=1e-14)
     assert p["C"] == pytest.approx(19000 * j**3 * 31 / (c**4 * 0.03), rel=1e-14)
+
+
+def test_the_slip_alone_explains_what_is_printed():
+    """Printed A, B and C are what follows with θ_s left out, and not what follows."""
+    found = gear_scaling()
+    k1, k2, j, c, mean, wave, outer = map(real, ["k1", "k2", "J_eq", "C_eq", "T_m", "T_am", "J_o"])
+    stiff = sp.sqrt(k2 * j / c**2)
+    printed = {
+        "A": k1 * k2 * j**2 / c**4,
+        "B": k2 * j**2 * mean / c**4,
+        "C": k2 * j**3 * wave / (c**4 * outer),
+    }
+    consistent = {
+        "A": k1 * j / c**2,
+        "B": stiff * j * mean / c**2,
+        "C": stiff * j**2 * wave / (c**2 * outer),
+    }
+    positive = {s: sp.Symbol(s.name, positive=True) for s in (k1, k2, j, c, mean, wave, outer)}
+    for name in "ABC":
+        for values, expected in ((found.slip, printed), (found.consistent, consistent)):
+            ratio = (values[name] / expected[name]).subs(positive)
+            assert sp.simplify(ratio) == 1, name
+    assert found.reproduced
+    assert found.agrees
+    assert found.reduced
+    assert set(found.ratios) == {"A", "B", "C"}
 
 
 def test_the_consistent_scaling_solves_the_physical_equation():
