@@ -43,6 +43,9 @@ def test_the_value_stays(case, place):
         (x ** sp.Rational(3, 2) / sp.sqrt(x), x),
         (sp.sqrt(x + a) ** 4 / (x + a) - x, a),
         ((x + 1) ** sp.Rational(2, 3) * (x + 1) ** sp.Rational(1, 3), x + 1),
+        # powers of one root, which SymPy itself does not bring together
+        (((x + a) ** sp.Rational(3, 2) + sp.sqrt(x + a)) / (x + a + 1), sp.sqrt(x + a)),
+        ((x + 1) ** sp.Rational(4, 3) - x * sp.cbrt(x + 1), sp.cbrt(x + 1)),
         ((x + a) ** 5 / (x + a) ** 3, x**2 + 2 * a * x + a**2),
     ],
 )
