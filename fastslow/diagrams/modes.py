@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from fastslow.model.derived import once, partition_of
 from fastslow.model.model import Model
 from fastslow.model.motions import Motion, motions_of
 from fastslow.model.structure import real
@@ -65,6 +66,7 @@ class Mode:
     sides: Sides | None = None
 
 
+@once(partition_of)
 def modes_of(model: Model) -> tuple[Mode, ...]:
     """Every region of a frozen model, then sliding and escaping along each discontinuity.
 

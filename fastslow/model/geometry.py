@@ -22,10 +22,15 @@ def affine_rows(
             rows.append(None)
             continue
         rest = function.subs(dict.fromkeys(moving, 0))
-        row = np.array([*map(float, slopes), float(rest)])
-        size = np.abs(row[:-1]).max(initial=0.0)
-        rows.append(row / size if size else row)
+        rows.append(scaled_row([*map(float, slopes), float(rest)]))
     return rows
+
+
+def scaled_row(row: Sequence[float]) -> NDArray[np.float64]:
+    """Slopes and constant of an affine function, its largest slope one."""
+    numbers = np.array(row, dtype=float)
+    size = np.abs(numbers[:-1]).max(initial=0.0)
+    return numbers / size if size else numbers
 
 
 def possible_patterns(rows: Sequence[NDArray[np.float64] | None]) -> list[Pattern]:

@@ -18,11 +18,13 @@ from fastslow.model.interfaces import Interface, Region, vanishes_on
 from fastslow.model.periods import common_period
 from fastslow.model.structure import (
     TIME,
+    Partition,
     Structure,
     name_of,
     read_expression,
     read_structure,
     real,
+    shared,
 )
 from fastslow.results.named import Named
 
@@ -37,6 +39,10 @@ class Model:
     ``Symbol("x", real=True)`` are the same state. Time is the symbol named t.
     Expressions and conditions may also be text, such as ``"w - x**3"`` and ``"x > D"``,
     with functions named as in SymPy.
+
+    Models cannot be changed, and are equal, with one hash, when their content is:
+    equations, parameter values, interfaces, regions and periods, with their names and in
+    the same order. Names of regions that are empty at these values (``vanished``) count.
 
     Parameters
     ----------
@@ -100,6 +106,7 @@ class Model:
     regions: Named[Region]
     periodic: Named[float]
     structure: Structure = field(repr=False)
+    partition: Partition = field(repr=False)
 
     @takes(
         rates=mapping,
@@ -131,27 +138,52 @@ class Model:
             rates, forcing or {}, slow or {}, tuple(values), interfaces or {}, (), regions or {}
         )
         periods = read_periods(structure, values, periodic or {})
-        self._fill(replace(structure, periodic=periods), values)
+        periodic_states = Named("periodic state", periods)
+        self._fill(shared(replace(structure, periodic=periodic_states)), values)
 
     def _fill(self, structure: Structure, values: Mapping[str, float]) -> None:
-        numbers = {real(name): value for name, value in values.items()}
-        interfaces, regions, structure = structure.regions_at(numbers)
+        partition = structure.partition(values)
+        structure = partition.structure
         fields = {
             "states": structure.states,
             "slow_states": structure.slow_states,
-            "rates": Named("state", structure.rates),
-            "forcing": Named("slow quantity", structure.forcing),
+            "rates": structure.rates,
+            "forcing": structure.forcing,
             "parameters": Named("parameter", values),
             "free": structure.free,
-            "interfaces": Named("interface", {i.name: i for i in interfaces}),
-            "regions": Named("region", {r.name: r for r in regions}),
-            "periodic": Named(
-                "periodic state", {n: float(p) for n, p in structure.periodic.items()}
-            ),
+            "interfaces": partition.interfaces,
+            "regions": partition.regions,
+            "periodic": structure.lengths,
             "structure": structure,
+            "partition": partition,
         }
         for name, value in fields.items():
             object.__setattr__(self, name, value)
+
+    @cached_property
+    def _content(self) -> tuple[Partition, tuple[tuple[str, float], ...]]:
+        return self.partition, tuple(self.parameters.items())
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(self._content)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Model):
+            return NotImplemented
+        return self is other or (self._hash == other._hash and self._content == other._content)
+
+    def __copy__(self) -> Model:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Model:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Model._from, (self.structure, dict(self.parameters))
 
     @classmethod
     def _from(cls, structure: Structure, values: Mapping[str, float]) -> Model:
@@ -312,9 +344,10 @@ class Model:
             raise ModelError(
                 f"a ramp of {key} needs the name {taken[0]}, which the model already uses"
             )
+        law = real(first) + real(speed) * TIME
         structure = replace(
             freed.structure,
-            forcing={**freed.structure.forcing, key: real(first) + real(speed) * TIME},
+            forcing=Named("slow quantity", {**freed.structure.forcing, key: law}),
             free=tuple(n for n in freed.free if n != key),
         )
         return self._from(structure, {**freed.parameters, **numbers})
@@ -342,7 +375,8 @@ class Model:
         >>> model.vanished, model.with_parameters(D=0).vanished
         ((), ('S2',))
         """
-        return tuple(n for n in sorted(set(self.structure.names.values())) if n not in self.regions)
+        seen = {name for _, name in self.structure.names}
+        return tuple(name for name in sorted(seen) if name not in self.regions)
 
     @property
     def path(self) -> Named[sp.Expr]:
@@ -354,7 +388,7 @@ class Model:
         >>> Model({x: u - x}, forcing={u: sp.cos(t) ** 2}).frozen(slow={u: g**2}).path
         {u: g**2}
         """
-        return Named("slow quantity", self.structure.path)
+        return self.structure.path
 
     @property
     def values(self) -> dict[sp.Symbol, float]:
@@ -446,4 +480,5 @@ def number(what: str, value: object) -> float:
     result = real_number(value)
     if result is None or not math.isfinite(result):
         raise ModelError(f"{what}: expected a finite number, received {shown(value)}")
-    return result
+    # −0.0 is 0.0: equal models have equal values
+    return result + 0.0

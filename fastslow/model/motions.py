@@ -9,6 +9,7 @@ from math import prod
 
 import sympy as sp
 
+from fastslow.model.derived import once, partition_of
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.model import Model
 from fastslow.model.rational import exact
@@ -100,6 +101,7 @@ def regions_of(model: Model) -> tuple[Motion, ...]:
     )
 
 
+@once(partition_of)
 def motions_of(model: Model, *, at_once: int | None = None, most: int = MOST) -> Motions:
     """Derive the smooth motions of a model.
 

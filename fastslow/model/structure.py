@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache, partial
 from itertools import count
 from typing import Any, TypeVar
+from weakref import WeakValueDictionary
 
+import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 from sympy.core.function import AppliedUndef
 from sympy.logic.boolalg import Boolean
 
@@ -15,8 +19,9 @@ from fastslow.arguments import shown
 from fastslow.errors import ArgumentError, ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.formulas.symbolic import read
-from fastslow.model.geometry import Pattern, affine_rows, possible_patterns
+from fastslow.model.geometry import Pattern, affine_rows, possible_patterns, scaled_row
 from fastslow.model.interfaces import Interface, Region
+from fastslow.model.keyed import Keyed
 from fastslow.model.reading import (
     LONG,
     as_written,
@@ -64,40 +69,155 @@ def name_of(key: object, what: str = "a name") -> str:
     return name
 
 
+#: Sets of regions that are remembered, and frozen structures.
+PARTITIONS, FROZEN = 256, 64
+
+
+@dataclass(frozen=True)
+class Partition:
+    """All of a model but the values of its parameters: its regions where they are.
+
+    Parameters
+    ----------
+    structure : Structure
+        With the names of these regions.
+    interfaces : Named of Interface
+    regions : Named of Region
+    """
+
+    structure: Structure
+    interfaces: Named[Interface]
+    regions: Named[Region]
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.structure, tuple(self.regions), tuple(self.interfaces)))
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __getstate__(self) -> dict[str, Any]:
+        return fields_alone(self)
+
+
+def fields_alone(one: Any) -> dict[str, Any]:
+    """What is pickled: not what follows from it, as hashes differ from process to process."""
+    return {n: v for n, v in one.__dict__.items() if n in one.__dataclass_fields__}
+
+
 @dataclass(frozen=True, eq=False)
 class Structure:
     """The equations with their interfaces, and the names given to regions so far.
 
     ``continuous`` is whether the rates as they were written are seen to be continuous;
-    where they are not, the regions on both sides of an interface decide.
+    where they are not, the regions on both sides of an interface decide. Two structures
+    are equal when all of this is, in the same order.
     """
 
     states: tuple[str, ...]
     slow_states: tuple[str, ...]
-    rates: dict[str, sp.Expr]
-    forcing: dict[str, sp.Expr]
+    rates: Named[sp.Expr]
+    forcing: Named[sp.Expr]
     free: tuple[str, ...]
     interfaces: tuple[Interface, ...]
     given: frozenset[str]
-    conditions: dict[str, Boolean]
-    names: dict[Cell, str] = field(default_factory=dict)
-    path: dict[str, sp.Expr] = field(default_factory=dict)
-    periodic: dict[str, sp.Expr] = field(default_factory=dict)
+    conditions: Named[Boolean]
+    names: tuple[tuple[Cell, str], ...] = ()
+    path: Named[sp.Expr] = field(default_factory=partial(Named, "slow quantity"))
+    periodic: Named[sp.Expr] = field(default_factory=partial(Named, "periodic state"))
     continuous: bool = False
 
-    @property
+    @cached_property
+    def content(self) -> tuple[Any, ...]:
+        """What is equal in equal structures."""
+        mappings = (self.rates, self.forcing, self.conditions, self.path, self.periodic)
+        return (
+            self.states,
+            self.slow_states,
+            self.free,
+            self.interfaces,
+            self.given,
+            self.names,
+            self.continuous,
+            *(tuple(one.items()) for one in mappings),
+        )
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(self.content)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Structure):
+            return NotImplemented
+        return self is other or (self._hash == other._hash and self.content == other.content)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return fields_alone(self)
+
+    @cached_property
+    def lengths(self) -> Named[float]:
+        """The periods as numbers."""
+        return Named("periodic state", {n: float(p) for n, p in self.periodic.items()})
+
+    @cached_property
     def moving(self) -> tuple[sp.Symbol, ...]:
         """Symbols that change along a solution or that have no value: what interfaces depend on."""
         names = (*self.states, *self.slow_states, *self.forcing, *self.free)
         return (*(real(n) for n in names), TIME)
 
-    def regions_at(
-        self, values: Values
-    ) -> tuple[tuple[Interface, ...], tuple[Region, ...], Structure]:
-        """Interfaces and regions at parameter values, and the structure with their names."""
+    @cached_property
+    def deciding(self) -> tuple[str, ...]:
+        """Names of all symbols that decide, by their values, which regions there are."""
+        used = set().union(*(i.function.free_symbols for i in self.interfaces))
+        used |= set().union(*(c.free_symbols for c in self.conditions.values()))
+        for expression in (*self.rates.values(), *self.forcing.values()):
+            for piecewise in expression.atoms(sp.Piecewise):
+                used |= set().union(*(c.free_symbols for _, c in piecewise.args))
+        return tuple(sorted(s.name for s in used))
+
+    @cached_property
+    def timed(self) -> tuple[str, ...]:
+        """Names of all symbols in rates and laws that hold time."""
+        written = (e.free_symbols for e in (*self.rates.values(), *self.forcing.values()))
+        return tuple(sorted({s.name for symbols in written if TIME in symbols for s in symbols}))
+
+    def partition(self, values: Mapping[str, float]) -> Partition:
+        """Interfaces and regions at parameter values, found once for those that decide."""
+        known = tuple((n, values[n]) for n in self.deciding if n in values)
+        return _partition(self, known)
+
+    @cached_property
+    def scales(self) -> tuple[sp.Expr, ...]:
+        """Factors of switching expressions that hold parameters alone: their signs decide."""
+        written = [*self.rates.values(), *self.forcing.values()]
+        written += map(_indicator, self.conditions.values())
+        switching = [i.function for i in self.interfaces]
+        switching += [s for expression in written for s in switching_expressions(expression)]
+        found = (factorise(s, self.moving).scales for s in switching)
+        return tuple(dict.fromkeys(factor for scales in found for factor, _ in scales))
+
+    def patterns(self, values: Values) -> tuple[Pattern, ...]:
+        """The sign patterns of the interfaces that are not empty at parameter values."""
+        loose = [z for z in self.moving if z not in values]
+        rows: list[NDArray[np.float64] | None] = []
+        for interface, row in zip(self.interfaces, _rows(self, tuple(values)), strict=True):
+            try:
+                found = None if row is None else scaled_row(row(*values.values()))
+            except (ArithmeticError, ValueError, TypeError, NameError):
+                # a value outside the domain, or a function that only SymPy evaluates
+                found = None
+            if found is None:
+                rows += affine_rows([interface.function.subs(values)], loose)
+            else:
+                rows.append(found)
+        return tuple(possible_patterns(rows))
+
+    def partition_of(self, patterns: Sequence[Pattern], values: Values) -> Partition:
+        """Interfaces and regions of sign patterns; values decide the signs of `scales` alone."""
         functions = [i.function for i in self.interfaces]
-        numbers = [f.subs(values) for f in functions]
-        patterns = possible_patterns(affine_rows(numbers, self.moving))
         contents = {p: self._contents(functions, p, values) for p in patterns}
         keep = [
             j
@@ -122,11 +242,15 @@ class Structure:
             )
             for pattern, name in named.items()
         )
-        names = {
-            **self.names,
-            **{_cell(interfaces, pattern): name for pattern, name in named.items()},
-        }
-        return interfaces, regions, replace(self, names=names)
+        cells_named = {_cell(interfaces, pattern): name for pattern, name in named.items()}
+        names = tuple({**dict(self.names), **cells_named}.items())
+        return _shared_partition(
+            Partition(
+                self if names == self.names else shared(replace(self, names=names)),
+                Named("interface", {i.name: i for i in interfaces}),
+                Named("region", {r.name: r for r in regions}),
+            )
+        )
 
     def _contents(
         self, functions: Sequence[sp.Expr], pattern: Pattern, values: Values
@@ -160,7 +284,7 @@ class Structure:
                     f"regions {asked[0]!r} and {asked[1]!r} overlap; expected one condition "
                     "for each region"
                 )
-            kept = next((n for c, n in self.names.items() if any(c <= w for w in whole)), None)
+            kept = next((n for c, n in self.names if any(c <= w for w in whole)), None)
             name = asked[0] if asked else kept
             if name is not None and name not in named.values():
                 named[pattern] = name
@@ -169,11 +293,12 @@ class Structure:
                     f"region {name!r} ({self.conditions[asked[0]]}) holds more than one sign "
                     "pattern of the interfaces; expected one condition for each region"
                 )
-        unused = set(self.conditions) - set(named.values()) - set(self.names.values())
+        known = {name for _, name in self.names}
+        unused = set(self.conditions) - set(named.values()) - known
         if unused:
             name = min(unused)
             raise ModelError(f"region {name!r} ({self.conditions[name]}) is empty or unknown")
-        taken = {*named.values(), *self.names.values()}
+        taken = {*named.values(), *known}
         number = 0
         for pattern in patterns:
             if pattern not in named:
@@ -187,6 +312,12 @@ class Structure:
         self, path: Mapping[str, sp.Expr], values: Mapping[str, float]
     ) -> tuple[Structure, dict[str, float]]:
         """The fast structure with slow quantities free, and the values that it still uses."""
+        structure, used = _frozen(self, tuple(path.items()), tuple(values))
+        return structure, {n: v for n, v in values.items() if n in used}
+
+    def _frozen(
+        self, path: Mapping[str, sp.Expr], values: Sequence[str]
+    ) -> tuple[Structure, frozenset[str]]:
         along = {real(name): law for name, law in path.items()}
         rates = {n: self.rates[n].xreplace(along) for n in self.states}
         known = {*map(real, values), *map(real, self.states)}
@@ -209,19 +340,82 @@ class Structure:
         structure = replace(
             self,
             slow_states=(),
-            rates=rates,
-            forcing={},
+            rates=Named("state", rates),
+            forcing=Named("slow quantity"),
             free=free,
-            path={**self.path, **path},
+            path=Named("slow quantity", {**self.path, **path}),
             interfaces=tuple(i for i in interfaces if i.function.free_symbols & set(moving))
             if path
             else interfaces,
-            names={
-                frozenset((h.xreplace(along), s) for h, s in cell if TIME not in h.free_symbols): n
-                for cell, n in reversed(self.names.items())
-            },
+            names=tuple(
+                {
+                    frozenset(
+                        (h.xreplace(along), s) for h, s in cell if TIME not in h.free_symbols
+                    ): n
+                    for cell, n in reversed(self.names)
+                }.items()
+            ),
         )
-        return structure, {n: v for n, v in values.items() if real(n) in used}
+        return shared(structure), frozenset(s.name for s in used)
+
+
+_structures: WeakValueDictionary[Any, Structure] = WeakValueDictionary()
+_partitions: WeakValueDictionary[Any, Partition] = WeakValueDictionary()
+
+
+def shared(structure: Structure) -> Structure:
+    """The structure in use that is equal to this one, so that they are compared in no time."""
+    return _structures.setdefault(structure.content, structure)
+
+
+def _shared_partition(one: Partition) -> Partition:
+    content = (one.structure, tuple(one.interfaces.items()), tuple(one.regions.items()))
+    return _partitions.setdefault(content, one)
+
+
+@lru_cache(maxsize=PARTITIONS)
+def _partition(structure: Structure, values: tuple[tuple[str, float], ...]) -> Partition:
+    numbers = {real(name): value for name, value in values}
+    patterns = structure.patterns(numbers)
+    signs = tuple(_sign(scale.subs(numbers)) for scale in structure.scales)
+    return _partition_of(structure, Keyed((patterns, signs), (patterns, numbers)))
+
+
+@lru_cache(maxsize=PARTITIONS)
+def _partition_of(
+    structure: Structure, given: Keyed[tuple[tuple[Pattern, ...], Values]]
+) -> Partition:
+    return structure.partition_of(*given.value)
+
+
+def _sign(number: sp.Expr) -> int | None:
+    known = number.is_number and number.is_real and number.is_finite
+    return int(np.sign(float(number))) if known else None
+
+
+@lru_cache(maxsize=PARTITIONS)
+def _rows(
+    structure: Structure, known: tuple[sp.Symbol, ...]
+) -> tuple[Callable[..., list[float]] | None, ...]:
+    """Numbers for the known symbols to the slopes and the constant of each affine interface."""
+    loose = [z for z in structure.moving if z not in known]
+    found: list[Callable[..., list[float]] | None] = []
+    for interface in structure.interfaces:
+        slopes = [interface.function.diff(z) for z in loose]
+        if any(slope.free_symbols & set(loose) for slope in slopes):
+            # may yet be affine at some values
+            found.append(None)
+        else:
+            rest = interface.function.subs(dict.fromkeys(loose, 0))
+            found.append(sp.lambdify(known, [*slopes, rest], "math"))
+    return tuple(found)
+
+
+@lru_cache(maxsize=FROZEN)
+def _frozen(
+    structure: Structure, path: tuple[tuple[str, sp.Expr], ...], parameters: tuple[str, ...]
+) -> tuple[Structure, frozenset[str]]:
+    return structure._frozen(dict(path), parameters)
 
 
 def read_structure(
@@ -280,12 +474,12 @@ def read_structure(
     return Structure(
         tuple(groups["state"]),
         tuple(groups["slow state"]),
-        equations,
-        laws,
+        Named("state", equations),
+        Named("slow quantity", laws),
         free,
         tuple(found),
         frozenset(listed),
-        conditions,
+        Named("region", conditions),
         continuous=all(
             continuous(read_expression(f"rate of {n}", e, known))
             for n, e in {**rates, **slow}.items()

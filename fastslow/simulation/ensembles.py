@@ -15,6 +15,7 @@ from fastslow.arguments import finite, flag, instance, mapping, takes, text, who
 from fastslow.compiled.generic import load_loop
 from fastslow.compiled.series import CompiledSeries
 from fastslow.compiled.steps import CompiledSteps, compile_steps
+from fastslow.model.derived import once, partition_of
 from fastslow.model.model import Model
 from fastslow.results.angles import periods_of as turns_of
 from fastslow.results.ensembles import Ensemble
@@ -51,7 +52,6 @@ from fastslow.simulation.trajectories import (
     error_rules,
     gap_of,
     layout_of,
-    once_a_model,
     series_of,
     sizes_of,
     together_of,
@@ -60,7 +60,7 @@ from fastslow.simulation.trajectories import (
 
 Floats = NDArray[np.float64]
 
-steps_of = once_a_model(compile_steps)
+steps_of = once(partition_of)(compile_steps)
 
 _ARGUMENTS = (
     "bounds",

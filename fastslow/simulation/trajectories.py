@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from functools import wraps
-from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
-from weakref import WeakKeyDictionary
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +13,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import finite, flag, instance, positive, takes, text
 from fastslow.compiled.generic import load_loop
 from fastslow.compiled.series import CompiledSeries, compile_series
+from fastslow.model.derived import deciding, once, partition_of, timed
 from fastslow.model.invariance import factor_states, states_together
 from fastslow.model.model import Model
 from fastslow.results.endings import outcome_of
@@ -83,32 +82,11 @@ _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
 #: Depth of the work space of the event search.
 STACK_ROWS = 46
 
-
-P = ParamSpec("P")
-R = TypeVar("R")
-
-
-def once_a_model(
-    function: Callable[Concatenate[Model, P], R],
-) -> Callable[Concatenate[Model, P], R]:
-    """Keep what was derived from a model for as long as the model lives."""
-    known: WeakKeyDictionary[Model, dict[Any, R]] = WeakKeyDictionary()
-
-    @wraps(function)
-    def remembered(model: Model, /, *args: P.args, **kwargs: P.kwargs) -> R:
-        values = known.setdefault(model, {})
-        if args not in values:
-            values[args] = function(model, *args, **kwargs)
-        return values[args]
-
-    return remembered
-
-
-gap_of = once_a_model(gap_regions)
-vanishing_of = once_a_model(factor_states)
-together_of = once_a_model(states_together)
-series_of = once_a_model(compile_series)
-period_of = once_a_model(Model.period)
+gap_of = once(deciding)(gap_regions)
+vanishing_of = once(partition_of)(factor_states)
+together_of = once(partition_of)(states_together)
+series_of = once(partition_of)(compile_series)
+period_of = once(timed)(Model.period)
 
 
 @takes(
