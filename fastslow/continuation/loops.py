@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any
 
+from numpy.typing import NDArray
+
 from fastslow.compiled.generic import load_loop
 
 _ENGINE = "fastslow.continuation.engine"
@@ -63,3 +65,11 @@ def loop(name: str) -> Callable[..., Any]:
     """
     module = {"trace": _ENGINE, "isolate": _ISOLATION}.get(name, _EVALUATION)
     return load_loop(module, name, tuple(_ARGUMENTS[name].split()))
+
+
+def writeable(array: NDArray[Any]) -> NDArray[Any]:
+    """An array that a loop takes: of a read-only one a copy.
+
+    To Numba a read-only array is another type, for which the loop would be compiled again.
+    """
+    return array if array.flags.writeable else array.copy()

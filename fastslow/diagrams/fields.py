@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.compiled.fields import CompiledField, compile_field, parameter_array
 from fastslow.continuation.location import REACH, Located, with_condition
-from fastslow.continuation.loops import blocks, loop
+from fastslow.continuation.loops import blocks, loop, writeable
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
@@ -66,7 +66,7 @@ class Source:
     window: StateWindow
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class FrozenField:
     """The frozen rates of every region over (states, varying parameters).
 
@@ -201,7 +201,7 @@ class FrozenField:
 
     def at(self, region: int, points: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """F (…, n), [F_x F_p] (…, n, n + k), h (…, m) and ∇h (…, m, n + k) at points u."""
-        u = np.asarray(points, dtype=float)
+        u = writeable(np.asarray(points, dtype=float))
         n, m, columns, first, second, one = self._layout
         if u.ndim == 1:
             out = np.empty(second + m * columns)
@@ -267,7 +267,8 @@ class FrozenField:
     def _surveyed(
         self, region: int, points: Array, tangents: Array, scale: Array
     ) -> tuple[Array, Array]:
-        points, tangents = np.ascontiguousarray(points), np.ascontiguousarray(tangents)
+        points = writeable(np.ascontiguousarray(points))
+        tangents = writeable(np.ascontiguousarray(tangents))
         branching, jacobians = np.empty(len(points)), np.empty((len(points), self.n, self.n))
         for s in blocks(len(points), 48 * self.compiled.size + 2 * self.n**3):
             loop("survey")(
@@ -288,7 +289,7 @@ class FrozenField:
     def spectrum(jacobian: Array) -> NDArray[np.complex128]:
         """Eigenvalues of matrices; NaN where one is not finite, as at a two-fold (0/0)."""
         if jacobian.shape[-1] == 2:
-            flat = np.ascontiguousarray(jacobian).reshape(-1, 2, 2)
+            flat = writeable(np.ascontiguousarray(jacobian).reshape(-1, 2, 2))
             found = np.empty((len(flat), 2), dtype=complex)
             loop("pairs")(flat, found)
             return found.reshape(jacobian.shape[:-1])
@@ -314,8 +315,8 @@ class FrozenField:
         point: Array | None = None,
     ) -> Located:
         """Where the curve F = 0 meets h[row] = 0, or the plane through a point with a normal."""
-        normal = start if normal is None else normal
-        point = start if point is None else point
+        normal = writeable(start if normal is None else normal)
+        point = writeable(start if point is None else point)
         u = start.copy()
         residual, size, converged = loop("refine")(
             self.compiled.address, region, self.values, u, scale, row, normal, point,

@@ -22,7 +22,7 @@ from fastslow.arguments import (
     mapping,
     takes,
 )
-from fastslow.continuation.loops import loop
+from fastslow.continuation.loops import loop, writeable
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.assembly import Curve, branch_of, joined, rising
 from fastslow.diagrams.equations import region_equations
@@ -450,7 +450,7 @@ def _holds(field: FrozenField, branch: Branch, rows: Array, u: Array, window: Wi
     scale = window.scale.copy()
     scale[:-1] = np.maximum(scale[:-1], FAR * np.abs(u[:-1]))
     chords = np.empty(len(rows) - 1, dtype=np.int64)
-    for k in chords[: loop("passing")(rows, scale, u, 1e-2, chords)]:
+    for k in chords[: loop("passing")(writeable(rows), scale, u, 1e-2, chords)]:
         chord = (rows[k + 1] - rows[k]) / scale
         length = max(float(chord @ chord), 1e-300)
         part = float(np.clip(((u - rows[k]) / scale) @ chord / length, 0.0, 1.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -74,8 +75,8 @@ def _law(
         return None
 
 
-def _rounded(what: str | dict[str, float] | Drift | None) -> str:
-    if isinstance(what, dict):
+def _rounded(what: str | Mapping[str, float] | Drift | None) -> str:
+    if isinstance(what, Mapping):
         return " ".join(f"{name} {value:.6g}" for name, value in what.items())
     # a law in time differs by the period, its first terms do not
     return str(replace(what, law="") if isinstance(what, Drift) else what)

@@ -183,7 +183,7 @@ def _event(law: Law) -> str:
         return f"{law.interfaces[1]} = 0"
     if law.level is None or (isinstance(law, BoundaryDelay) and law.subtype == "persistence"):
         return f"{law.point.interface} = 0"
-    assert isinstance(law.level, dict)
+    assert isinstance(law.level, Mapping)
     ((state, value),) = law.level.items()
     return f"{state} = {value:g}"
 
@@ -310,7 +310,7 @@ def _hits(run: Trajectory, law: Law, passed: float) -> Section:
     elif law.level is None or (isinstance(law, BoundaryDelay) and law.subtype == "persistence"):
         found = run.section(interface=law.point.interface)
     else:
-        assert isinstance(law.level, dict)
+        assert isinstance(law.level, Mapping)
         ((state, value),) = law.level.items()
         found = run.section(state, level=value, since=min(passed, run.span[1]))
     return found

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import path, takes, within
 from fastslow.plot.style import root, save
+from fastslow.results.immutable import fixed
 
 #: Dots per inch of a figure shown in a notebook.
 SHOWN = 150
@@ -49,7 +50,8 @@ class Drawing:
     def data(self) -> dict[str, tuple[NDArray[np.float64], ...]]:
         """The points drawn, by what the legend calls them.
 
-        For each kind one array for each curve, shape (N, 2), or (N, 3) in space.
+        For each kind one array for each curve, shape (N, 2), or (N, 3) in space: copies of
+        what is drawn, read-only.
 
         Examples
         --------
@@ -66,7 +68,7 @@ class Drawing:
             # what helps the eye (interfaces, triangles) has no name
             if curves and not str(artist.get_label()).startswith("_"):
                 found.setdefault(str(artist.get_label()), []).extend(curves)
-        return {kind: tuple(curves) for kind, curves in found.items()}
+        return {kind: fixed(kind, curves) for kind, curves in found.items()}
 
     @takes(path=path, dpi=within(10.0, 10_000.0))
     def save(self, path: str | Path, dpi: float = 300) -> Path:

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import among, takes
 from fastslow.errors import unknown_name
+from fastslow.results.immutable import Immutable, ImmutableSequence
 
 if TYPE_CHECKING:
     from fastslow.results.trajectories import Trajectory
 
 
 @dataclass(frozen=True, eq=False)
-class Crossing:
+class Crossing(Immutable):
     """One passage through an interface, or one touch.
 
     Parameters
@@ -52,7 +53,7 @@ class Crossing:
         )
 
 
-class Crossings(tuple[Crossing, ...]):
+class Crossings(ImmutableSequence, tuple[Crossing, ...]):
     """Crossings in order of time; called with an interface, those of that interface.
 
     ``crossings("x - D", direction=+1)`` are the upward ones of an interface.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fastslow.results.drifts import Drift
@@ -46,6 +47,7 @@ class Delay(Result, ABC):
     time: float = math.nan
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if math.isnan(self.time) and (self.drift is None or self.drift.constant):
             object.__setattr__(self, "time", self.delay / abs(self.rate))
 
@@ -99,7 +101,7 @@ class FoldDelay(Delay):
     mixed: float
     coefficients: tuple[float, float, float]
     feedback: float = 0.0
-    level: dict[str, float] | str | None = None
+    level: Mapping[str, float] | str | None = None
 
     @property
     def leading(self) -> float:
@@ -131,7 +133,7 @@ class BoundaryDelay(Delay):
     lag: float
     stable: float
     unstable: float
-    level: dict[str, float] | str | None = None
+    level: Mapping[str, float] | str | None = None
 
     @property
     def subtype(self) -> str:

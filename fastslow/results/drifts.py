@@ -9,10 +9,11 @@ from typing import Any
 
 from fastslow.arguments import finite, flag, mapping, text
 from fastslow.errors import ArgumentError
+from fastslow.results.immutable import Immutable
 
 
-@dataclass(frozen=True)
-class Drift:
+@dataclass(frozen=True, eq=False)
+class Drift(Immutable):
     """The rate of the slow quantity w near a special point (x*, w*), which it passes at t = 0.
 
     w' = rate + change·t + by_value·(w − w*) + Σ by_state[x]·(x − x*).
@@ -74,6 +75,7 @@ class Drift:
             raise ArgumentError(f"rate = {self.rate!r}; expected {expected}")
         for name, value in values.items():
             object.__setattr__(self, name, value)
+        super().__post_init__()
 
     @property
     def constant(self) -> bool:

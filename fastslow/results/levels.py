@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.angles import periods_of, principal
+from fastslow.results.immutable import Immutable
 from fastslow.results.interpolation import hermite
 from fastslow.results.points import Corrector, Equilibrium
 
@@ -33,7 +34,7 @@ MOVED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class Pieces(Immutable):
     """Runs of rows over which the parameter does not turn; each begins where the last ends.
 
     Parameters

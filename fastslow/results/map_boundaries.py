@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.results.immutable import Immutable
+
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -17,7 +19,7 @@ Node = tuple[int, int, int]
 
 
 @dataclass(frozen=True, eq=False)
-class MapEdges:
+class MapEdges(Immutable):
     """Sides of the finest cells along which the label changes.
 
     Parameters
@@ -33,7 +35,7 @@ class MapEdges:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MapBoundary:
+class MapBoundary(Immutable):
     """One polyline between two labels.
 
     Parameters

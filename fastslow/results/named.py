@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from fastslow.errors import unknown_name
 from fastslow.formulas.grammar import normalised
+from fastslow.results.equality import content_hash, equal
 
 V = TypeVar("V")
 
@@ -38,10 +39,25 @@ class Named(Mapping[str, V], Generic[V]):
 
     __slots__ = ("_items", "kind")
 
+    kind: str
+    _items: dict[str, V]
+
     def __init__(self, kind: str, items: Mapping[str, V] | Iterable[tuple[str, V]] = ()) -> None:
-        self.kind = kind
         pairs = items.items() if isinstance(items, Mapping) else items
-        self._items: dict[str, V] = {normalised(str(key)): value for key, value in pairs}
+        object.__setattr__(self, "kind", kind)
+        object.__setattr__(self, "_items", {normalised(str(key)): value for key, value in pairs})
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"cannot set '{name}': a mapping of names cannot be changed")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"cannot delete '{name}': a mapping of names cannot be changed")
+
+    def __copy__(self) -> Named[V]:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Named, (self.kind, self._items)
 
     def __getitem__(self, key: object) -> V:
         try:
@@ -66,12 +82,17 @@ class Named(Mapping[str, V], Generic[V]):
         return "{" + ", ".join(f"{k}: {v}" for k, v in self._items.items()) + "}"
 
     def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
         if isinstance(other, Mapping):
-            return dict(self._items) == {str(k): v for k, v in other.items()}
+            given = {str(k): v for k, v in other.items()}
+            return self._items.keys() == given.keys() and all(
+                equal(value, given[key]) for key, value in self._items.items()
+            )
         return NotImplemented
 
     def __hash__(self) -> int:
-        return hash(tuple(self._items.items()))
+        return content_hash(self._items)
 
     def index(self, key: object) -> int:
         """Position of a name among the keys."""

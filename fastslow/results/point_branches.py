@@ -14,6 +14,7 @@ from fastslow.arguments import finite, formula, takes
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import column
 from fastslow.results.curve_levels import points_at
+from fastslow.results.immutable import ImmutableSequence
 from fastslow.results.markup import points_html
 from fastslow.results.meetings import intersections
 from fastslow.results.outcome import Outcome
@@ -221,7 +222,7 @@ class PointBranch(Table, Result):
         return "\n".join(lines)
 
 
-class PointCurves(tuple[PointBranch, ...]):
+class PointCurves(ImmutableSequence, tuple[PointBranch, ...]):
     """The curves of all special points of a diagram, each once.
 
     Attributes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import position, word
 from fastslow.errors import unknown_name
+from fastslow.results.immutable import Immutable, ImmutableSequence
 from fastslow.results.markup import points_html
 from fastslow.results.point_columns import columns_of_points
 from fastslow.results.point_types import POINT_TYPES, point_name
-from fastslow.results.result import LIVE, Result
+from fastslow.results.result import LIVE, Result, Saved
 from fastslow.results.tables import Table
 
 if TYPE_CHECKING:
@@ -161,6 +162,7 @@ class Equilibrium(_Point):
         )
         seat = "in" if self.admissible else "virtual, of"
         more = ", one of a continuum" if self.continuum else ""
+        more += ", interpolated" if self.interpolated else ""
         return f"Equilibrium({self._values()}; {seat} {self.region}; {kind}{more})"
 
 
@@ -168,31 +170,38 @@ class Equilibrium(_Point):
 Corrector = Callable[[str, NDArray[np.float64], float], Equilibrium | None]
 
 
-class Equilibria(list[Equilibrium]):
-    """The equilibria at one value, as a list that says how sure it is.
+class Equilibria(ImmutableSequence, tuple[Equilibrium, ...]):
+    """The equilibria at one value, as a tuple that says how sure it is.
 
     Attributes
     ----------
     coverage : str
-        ``"complete"`` when the list is proved to hold all of them, else ``"found"``.
+        ``"complete"`` when the tuple is proved to hold all of them, else ``"found"``.
     sets : tuple of EquilibriumSet
         Sets of equilibria within discontinuities (a block that sticks by dry friction);
-        their corners are in the list, with ``continuum=True``.
+        their corners are in the tuple, with ``continuum=True``.
     """
 
-    def __init__(
-        self,
-        items: list[Equilibrium] | None = None,
+    coverage: str
+    sets: tuple[EquilibriumSet, ...]
+
+    def __new__(
+        cls,
+        items: Iterable[Equilibrium] = (),
         coverage: str = "found",
         sets: Sequence[EquilibriumSet] = (),
-    ) -> None:
-        super().__init__(items or [])
-        self.coverage = coverage
-        self.sets = tuple(sets)
+    ) -> Equilibria:
+        made = super().__new__(cls, items)
+        made.coverage = coverage
+        made.sets = tuple(sets)
+        return made
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        return tuple(self), self.coverage, self.sets
 
 
 @dataclass(frozen=True, eq=False)
-class ClarkePath:
+class ClarkePath(Immutable):
     """The convex path q J₁ + (1 − q) J₂ between the Jacobians at a boundary equilibrium.
 
     Leine and Nijmeijer (2004): the eigenvalues of this path say what a
@@ -366,7 +375,7 @@ class SpecialPoint(_Point):
         return f"SpecialPoint({self.label}: {self.description})"
 
 
-class SpecialPoints(Table, Result, tuple[SpecialPoint, ...]):
+class SpecialPoints(Table, Saved, ImmutableSequence, tuple[SpecialPoint, ...]):
     """Special points in order along a branch or diagram; called with a code, those of that code.
 
     ``points["w"]`` is the column of a state or parameter, ``points[0]`` a point.

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import os
-from typing import Any
 
 from fastslow.arguments import path, takes
+from fastslow.results.immutable import Immutable
 
 #: Metadata of a field that lives only in this process, such as a model: dropped when kept.
 LIVE = {"live": True}
 
 
-class Result:
-    """A result that can be kept in a file."""
+class Saved:
+    """What can be kept in a file."""
 
     @takes(path=path)
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -52,9 +52,6 @@ class Result:
 
         write(self, path)
 
-    def __getstate__(self) -> dict[str, Any]:
-        # neither what was computed from the fields, nor what lives only in this process
-        fields = getattr(self, "__dataclass_fields__", {})
-        live = {name for name, field in fields.items() if field.metadata.get("live")}
-        kept = {name: value for name, value in self.__dict__.items() if name in fields}
-        return {name: None if name in live else value for name, value in kept.items()}
+
+class Result(Immutable, Saved):
+    """A result: it cannot be changed, is equal to others with its content, and can be saved."""

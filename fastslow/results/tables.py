@@ -42,31 +42,35 @@ class Table(ABC):
 
     @abstractmethod
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Every column as a plain array, by name, all of one length."""
+        """Every column as a plain (read-only) array, by name, all of one length."""
 
     def to_frame(self) -> pandas.DataFrame:
-        """The columns of `to_dict` as a pandas data frame (extra ``data``).
+        """A copy of the columns of `to_dict` as a pandas data frame (extra ``data``).
 
         Raises
         ------
         MissingPackageError
             When pandas is not installed.
         """
-        frame = extra("pandas").DataFrame(self.to_dict())
+        frame = extra("pandas").DataFrame(self._copied())
         frame.attrs = self._about()
         return frame
 
     def to_xarray(self) -> xarray.Dataset:
-        """The columns of `to_dict` as an xarray dataset (extra ``data``).
+        """A copy of the columns of `to_dict` as an xarray dataset (extra ``data``).
 
         Raises
         ------
         MissingPackageError
             When xarray is not installed.
         """
-        columns = {name: (self._row, values) for name, values in self.to_dict().items()}
+        columns = {name: (self._row, values) for name, values in self._copied().items()}
         places = {name: columns.pop(name) for name in self._places if name in columns}
         return extra("xarray").Dataset(columns, places, self._about())
+
+    def _copied(self) -> dict[str, NDArray[Any]]:
+        """The columns, the reader's own to change."""
+        return {name: np.array(values) for name, values in self.to_dict().items()}
 
     def _about(self) -> dict[str, Any]:
         """What holds for all rows: the equations, and the values of parameters."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.results.immutable import ImmutableSequence
 from fastslow.results.points import _Point
 
 
@@ -58,15 +60,21 @@ class Tangency(_Point):
         return f"Tangency({self._values()}; of {self.region} to {self.interface}; {kind}{more})"
 
 
-class Tangencies(list[Tangency]):
-    """The tangency points at given values, as a list that says how sure it is.
+class Tangencies(ImmutableSequence, tuple[Tangency, ...]):
+    """The tangency points at given values, as a tuple that says how sure it is.
 
     Attributes
     ----------
     coverage : str
-        ``"complete"`` when the list is proved to hold all of them, else ``"found"``.
+        ``"complete"`` when the tuple is proved to hold all of them, else ``"found"``.
     """
 
-    def __init__(self, items: list[Tangency] | None = None, coverage: str = "found") -> None:
-        super().__init__(items or [])
-        self.coverage = coverage
+    coverage: str
+
+    def __new__(cls, items: Iterable[Tangency] = (), coverage: str = "found") -> Tangencies:
+        made = super().__new__(cls, items)
+        made.coverage = coverage
+        return made
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        return tuple(self), self.coverage

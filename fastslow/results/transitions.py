@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import word
 from fastslow.results.delays import Delay, GapTransit
+from fastslow.results.immutable import Immutable, ImmutableSequence
 from fastslow.results.moments import Moment
 from fastslow.results.points import SpecialPoint
 
@@ -69,7 +70,7 @@ class StableSheet:
 
 
 @dataclass(frozen=True, eq=False)
-class Transition:
+class Transition(Immutable):
     """A leaving of the followed sheet, or the end of an oscillating phase, up to the next sheet.
 
     Parameters
@@ -193,7 +194,7 @@ class Transition:
         return bool(np.isfinite(self.predicted)) and not isinstance(self.law, GapTransit)
 
 
-class Transitions(tuple[Transition, ...]):
+class Transitions(ImmutableSequence, tuple[Transition, ...]):
     """Transitions in time; called with a kind, those of that kind.
 
     Examples

@@ -142,8 +142,8 @@ def test_what_is_in_a_file(results, tmp_path):
     assert tree["library"] == fs.__version__
     kept = tree["result"]["fields"]
     assert "x' = v\nv' = -v + w - (A + x**2)" in kept["equations"]
-    assert ["A", 41.67] in kept["parameters"]["mapping"]
-    assert ["rtol", 1e-9] in kept["settings"]["mapping"]
+    assert ["A", 41.67] in kept["parameters"]["entries"]
+    assert ["rtol", 1e-9] in kept["settings"]["entries"]
     results["diagram"].save(tmp_path / "gear.nc")
     with h5netcdf.File(tmp_path / "gear.nc") as file:
         group = file["branches/0"]
