@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import difflib
 import inspect
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from functools import wraps
 from types import FunctionType
 from typing import Any, ParamSpec, TypeVar
@@ -65,6 +66,8 @@ def takes(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
         open_ended = any(p.kind is inspect.Parameter.VAR_POSITIONAL for p in parameters.values())
 
         without_name = _without_name
+        # what is not in the function's own globals has to be in the closure
+        refuse = raise_misfit
 
         def checked(*args: Any, **kwargs: Any) -> Any:
             if len(args) > len(places) and not open_ended:
@@ -80,13 +83,13 @@ def takes(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
             if extra is not None:
                 rest = {n: v for n, v in kwargs.items() if n not in names}
                 kwargs |= checks[extra](extra, rest)
-            return function(*given, **kwargs)
+            try:
+                return function(*given, **kwargs)
+            except TypeError:
+                refuse(function, given, kwargs)
+                raise
 
-        # with the function's own globals, by which doctest knows where an example belongs
-        own = FunctionType(
-            checked.__code__, function.__globals__, function.__name__, None, checked.__closure__
-        )
-        return wraps(function)(own)
+        return like(function, checked)
 
     return decorate
 
@@ -107,20 +110,68 @@ def _without_name(
     return ArgumentError(f"{function} received {shown(value)} without a name; expected {wanted}")
 
 
+def like(function: Callable[P, R], wrapper: Callable[..., Any]) -> Callable[P, R]:
+    """A wrapper that looks like the function it calls; what it uses must be in its closure."""
+    # with the function's own globals, by which doctest knows where an example belongs
+    own = FunctionType(
+        wrapper.__code__, function.__globals__, function.__name__, None, wrapper.__closure__
+    )
+    return wraps(function)(own)
+
+
+def raise_misfit(function: Callable[..., Any], args: Sequence[Any], kwargs: Any) -> None:
+    """Raise TypeError where arguments do not fit a signature, in the words of the caller.
+
+    Python names the class in which a method is written; its callers know that of the object.
+    """
+    signature = inspect.signature(function)
+    try:
+        signature.bind(*args, **kwargs)
+    except TypeError as error:
+        names = list(signature.parameters)
+        call = function.__name__
+        if names[:1] in (["self"], ["cls"]) and args:
+            names, owner = names[1:], args[0]
+            owner = owner if isinstance(owner, type) else type(owner)
+            call = owner.__name__ if call == "__init__" else f"{owner.__name__}.{call}"
+        unknown = next((n for n in kwargs if n not in names), None)
+        near = difflib.get_close_matches(unknown or "", names, 1)
+        hint = f"; did you mean '{near[0]}'?" if near else ""
+        accepted = f"its arguments are {', '.join(names)}" if names else "it takes no argument"
+        raise TypeError(f"{call}() {error}{hint or f'; {accepted}'}") from None
+
+
 def shown(value: object) -> str:
     """What was received, as an error quotes it: a short value itself, else what it is.
 
     Examples
     --------
     >>> shown("omga"), shown(np.zeros((40, 3)))
-    ("'omga'", 'a ndarray of shape (40, 3)')
+    ("'omga'", 'an ndarray of shape (40, 3)')
     """
     if isinstance(value, np.ndarray) and value.size > 4:
         return f"a ndarray of shape {value.shape}"
     if isinstance(value, str):
         return quoted(value)
+        return f"an ndarray of shape {value.shape}"
     text = repr(value)
-    return f"a {type(value).__name__}" if len(text) > QUOTED or "\n" in text else text
+    return class_of(value) if len(text) > QUOTED or "\n" in text else text
+
+
+def class_of(value: object) -> str:
+    """The class of a value, as an error names it.
+
+    Examples
+    --------
+    >>> class_of(1.5), class_of(3)
+    ('a float', 'an int')
+    """
+    return with_article(type(value).__name__)
+
+
+def with_article(noun: str) -> str:
+    """A noun with its indefinite article."""
+    return f"an {noun}" if noun[:1].lower() in "aeio" or noun == "ndarray" else f"a {noun}"
 
 
 def refusal(name: str, value: object, expected: str) -> ArgumentError:
@@ -336,9 +387,8 @@ def instance(*kinds: type) -> Check:
 
     def check(name: str, value: Any) -> Any:
         if not isinstance(value, kinds):
-            received = shown(value) if value is None else f"a {type(value).__name__}"
-            article = "an" if names[0] in "AEIO" else "a"
-            raise ArgumentError(f"{name}: expected {article} {names}, received {received}")
+            received = shown(value) if value is None else class_of(value)
+            raise ArgumentError(f"{name}: expected {with_article(names)}, received {received}")
         return value
 
     return check

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from fastslow.arguments import class_of
 from fastslow.errors import ArgumentError
 from fastslow.interactive.tooltips import text_of
 from fastslow.plot.branches import DiagramDrawing
@@ -121,7 +122,7 @@ def curves_of(drawing: Any, result: Diagram | Trajectory | Overlay) -> tuple[Cur
     if isinstance(drawing, MotionDrawing) and isinstance(result, Trajectory) and not drawing.z:
         return tuple(_motion_curves(drawing, result))
     raise ArgumentError(
-        f"cannot pick in a {type(drawing).__name__} of a {type(result).__name__}; expected the "
+        f"cannot pick in {class_of(drawing)} of {class_of(result)}; expected the "
         "drawing of a diagram, a trajectory or an overlay in the plane, with what was drawn"
     )
 

@@ -163,8 +163,8 @@ def derive(model: Model, assume: Any = None, *, parameter: Any = None) -> Deriva
     slow = (*model.forcing, *model.slow_states)
     if slow:
         raise ArgumentError(
-            f"derive: {', '.join(slow)} still move in time; expected a frozen model: "
-            "derive(model.frozen())"
+            f"derive: {', '.join(slow)} still {'move' if len(slow) > 1 else 'moves'} in time; "
+            "expected a frozen model: derive(model.frozen())"
         )
     for name, rate in model.rates.items():
         if TIME in rate.free_symbols:

@@ -152,7 +152,7 @@ BY_PARAMETER = {
         ("x", Wrong, "samples"),
     ],
     "section": SYMBOL,
-    "continuation": [(3, Wrong, "continuation: expected a Continuation, received a int")],
+    "continuation": [(3, Wrong, "continuation: expected a Continuation, received an int")],
     "settle": [(-1, Wrong, "settle = -1"), ("5", Wrong, "settle = '5'; expected")],
     "since": [*NUMBER, (-5, Wrong, "since = -5 is outside the run, which is [0,")],
     "sheet": [*TEXT, ("S9", Unknown, "unknown sheet 'S9'")],

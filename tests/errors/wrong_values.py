@@ -68,5 +68,5 @@ def a(kind):
     return [
         (None, Wrong, f"expected {article} {kind}, received None"),
         ("omga", Wrong, f"expected {article} {kind}, received a str"),
-        (np.zeros(3), Wrong, f"expected {article} {kind}, received a ndarray"),
+        (np.zeros(3), Wrong, f"expected {article} {kind}, received an ndarray"),
     ]
