@@ -7,7 +7,7 @@ import sys
 import pytest
 
 #: Prints a digest of every result, computed in the order that is asked for.
-PROGRAM = '''
+PROGRAM = """
 import hashlib, json, sys
 import sympy as sp
 import fastslow as fs
@@ -57,7 +57,7 @@ for name in reversed(TASKS) if backwards else TASKS:
     found[name] = digest(TASKS[name]())
 for name in sorted(found):
     print(name, found[name])
-'''
+"""
 
 
 def digests(seed, order, threads):

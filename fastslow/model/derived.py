@@ -21,9 +21,9 @@ def partition_of(model: Model) -> Hashable:
     return model.partition
 
 
-def deciding(model: Model) -> Hashable:
-    """The same, with the values of those parameters that decide where regions are."""
-    return model.partition, _values(model, model.structure.deciding)
+def sloped(model: Model) -> Hashable:
+    """The same, with the values of those parameters that turn an interface."""
+    return model.partition, _values(model, model.structure.sloping)
 
 
 def timed(model: Model) -> Hashable:
@@ -43,7 +43,7 @@ def once(
     Parameters
     ----------
     content : callable
-        `partition_of`, `deciding` or `timed`: what the result depends on, and nothing else.
+        `partition_of`, `sloped` or `timed`: what the result depends on, and nothing else.
 
     Examples
     --------

@@ -179,6 +179,12 @@ class Structure:
         return tuple(sorted(s.name for s in used))
 
     @cached_property
+    def sloping(self) -> tuple[str, ...]:
+        """Names of all symbols in the slopes of the interfaces."""
+        slopes = (i.function.diff(z) for i in self.interfaces for z in self.moving)
+        return tuple(sorted({s.name for slope in slopes for s in slope.free_symbols}))
+
+    @cached_property
     def timed(self) -> tuple[str, ...]:
         """Names of all symbols in rates and laws that hold time."""
         written = (e.free_symbols for e in (*self.rates.values(), *self.forcing.values()))

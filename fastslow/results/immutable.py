@@ -19,6 +19,9 @@ from fastslow.arguments import like
 from fastslow.results.equality import content_hash, equal
 from fastslow.results.named import Named
 
+#: What cannot be changed anyway.
+PLAIN = frozenset({float, int, bool, str, type(None)})
+
 #: What is in the annotation of a method that hands out arrays.
 ARRAYS = ("Array", "Floats", "Integers", "Bits", "Any")
 
@@ -39,7 +42,7 @@ def fixed(name: str, value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value if _out_of_reach(value) else read_only(np.array(value))
     if isinstance(value, Mapping):
-        kept = {key: fixed(str(key), item) for key, item in value.items()}
+        kept = {k: v if type(v) in PLAIN else fixed(str(k), v) for k, v in value.items()}
         if isinstance(value, Named):
             same = all(kept[key] is item for key, item in value.items())
             return value if same else Named(value.kind, kept)
@@ -113,9 +116,8 @@ class Immutable(ReadOnly):
     def __post_init__(self) -> None:
         own = self.__dict__
         for name, value in own.items():
-            kept = fixed(name, value)
-            if kept is not value:
-                own[name] = kept
+            if type(value) not in PLAIN:
+                own[name] = fixed(name, value)
 
     def __copy__(self) -> Self:
         return self

@@ -44,8 +44,8 @@ class Named(Mapping[str, V], Generic[V]):
 
     def __init__(self, kind: str, items: Mapping[str, V] | Iterable[tuple[str, V]] = ()) -> None:
         pairs = items.items() if isinstance(items, Mapping) else items
-        object.__setattr__(self, "kind", kind)
-        object.__setattr__(self, "_items", {normalised(str(key)): value for key, value in pairs})
+        _set_kind(self, kind)
+        _set_items(self, {normalised(str(key)): value for key, value in pairs})
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"cannot set '{name}': a mapping of names cannot be changed")
@@ -98,3 +98,7 @@ class Named(Mapping[str, V], Generic[V]):
         """Position of a name among the keys."""
         self[key]
         return list(self._items).index(normalised(str(key)))
+
+
+# the slots themselves, past __setattr__
+_set_kind, _set_items = (vars(Named)[name].__set__ for name in ("kind", "_items"))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import finite, flag, instance, positive, takes, text
 from fastslow.compiled.generic import load_loop
 from fastslow.compiled.series import CompiledSeries, compile_series
-from fastslow.model.derived import deciding, once, partition_of, timed
+from fastslow.model.derived import once, partition_of, sloped, timed
 from fastslow.model.invariance import factor_states, states_together
 from fastslow.model.model import Model
 from fastslow.results.endings import outcome_of
@@ -82,7 +82,7 @@ _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
 #: Depth of the work space of the event search.
 STACK_ROWS = 46
 
-gap_of = once(deciding)(gap_regions)
+gap_of = once(sloped)(gap_regions)
 vanishing_of = once(partition_of)(factor_states)
 together_of = once(partition_of)(states_together)
 series_of = once(partition_of)(compile_series)
