@@ -150,10 +150,9 @@ def shown(value: object) -> str:
     ("'omga'", 'an ndarray of shape (40, 3)')
     """
     if isinstance(value, np.ndarray) and value.size > 4:
-        return f"a ndarray of shape {value.shape}"
+        return f"an ndarray of shape {value.shape}"
     if isinstance(value, str):
         return quoted(value)
-        return f"an ndarray of shape {value.shape}"
     text = repr(value)
     return class_of(value) if len(text) > QUOTED or "\n" in text else text
 

@@ -127,9 +127,10 @@ def test_places_are_counted_from_both_ends():
 
 def test_long_values_are_not_quoted():
     assert arguments.shown("a" * 58) == "'" + "a" * 58 + "'"
-    assert arguments.shown("a" * 59) == "a str"
+    assert arguments.shown("a" * 300) == "'" + "a" * 30 + "…' (300 characters)"
+    assert arguments.shown(["a" * 57]) == "a list"
     assert arguments.shown(np.zeros(4)) == "array([0., 0., 0., 0.])"
-    assert arguments.shown(np.zeros(5)) == "a ndarray of shape (5,)"
+    assert arguments.shown(np.zeros(5)) == "an ndarray of shape (5,)"
 
 
 def all_as_floats(name, values):
