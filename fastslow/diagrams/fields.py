@@ -294,8 +294,9 @@ class FrozenField:
             loop("pairs")(flat, found)
             return found.reshape(jacobian.shape[:-1])
         finite = np.asarray(np.isfinite(jacobian).all(axis=(-1, -2)))[..., None]
-        if jacobian.shape[-1] == 1:
-            return np.where(finite, jacobian[..., 0].astype(complex), np.nan)
+        if jacobian.shape[-1] < 2:
+            # one eigenvalue, or none where a motion slides in all directions
+            return np.where(finite, np.diagonal(jacobian, axis1=-2, axis2=-1) + 0j, np.nan)
         n = jacobian.shape[-1]
         flat = np.where(finite[..., None], jacobian, 0.0).reshape(-1, n, n)
         values = np.empty((len(flat), n), dtype=complex)

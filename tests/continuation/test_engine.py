@@ -95,9 +95,9 @@ def test_the_compiled_loop_tells_what_has_not_converged(steps):
     x, p = sp.symbols("x p")
     field = FrozenField(fs.Model({x: (x - 10**6) ** 2 + p}, parameters={p: 0}), "p")
     compiled = field.compiled
-    start, normal = np.array([1e6 + 1, 0.0]), np.array([0.0, 1.0])
-    u, _, _, converged = loop("refine")(
-        compiled.address, 0, field.values, start, np.ones(2), -1, normal, start,
+    u, normal = np.array([1e6 + 1, 0.0]), np.array([0.0, 1.0])
+    _, _, converged = loop("refine")(
+        compiled.address, 0, field.values, u, np.ones(2), -1, normal, u.copy(),
         compiled.size, compiled.m, steps,
     )  # fmt: skip
     assert converged == (steps == 50)

@@ -14,23 +14,35 @@ def in_place(values):
     return np.sort_complex(np.asarray(values))
 
 
+def pairs_of(matrices):
+    found = np.empty((len(matrices), 2), dtype=complex)
+    loop("pairs")(matrices, found)
+    return found
+
+
+def passed(points, scale, u, within):
+    """The chords, as the compiled loop numbers them."""
+    found = np.empty(len(points) - 1, dtype=np.int64)
+    return found[: passing(points, scale, u, within, found)]
+
+
 def test_eigenvalues_of_pairs_are_those_of_lapack():
     matrices = GENERATOR.normal(size=(200, 2, 2)) * 10.0 ** GENERATOR.integers(-3, 4, (200, 2, 2))
-    found = loop("pairs")(matrices)
+    found = pairs_of(matrices)
     for one, expected in zip(found, map(np.linalg.eigvals, matrices), strict=True):
         size = np.abs(expected).max()
         np.testing.assert_allclose(in_place(one), in_place(expected), atol=1e-12 * size)
-    triangular = loop("pairs")(np.array([[[3.0, 5.0], [0.0, 3.0]], [[2.0, 0.0], [1.0, -4.0]]]))
+    triangular = pairs_of(np.array([[[3.0, 5.0], [0.0, 3.0]], [[2.0, 0.0], [1.0, -4.0]]]))
     assert in_place(triangular[0]).tolist() == [3, 3]
     assert in_place(triangular[1]).tolist() == [-4, 2]
-    assert np.isnan(loop("pairs")(np.array([[[np.nan, 1.0], [0.0, 1.0]]]))).all()
+    assert np.isnan(pairs_of(np.array([[[np.nan, 1.0], [0.0, 1.0]]]))).all()
 
 
 @pytest.mark.parametrize("entries", [(1e8, 1.0, 1.0, 3e-9), (7, 1e-9, 1e-9, 0)])
 def test_small_eigenvalues_beside_large_ones_keep_their_digits(entries):
     """Where the large one stands first, to what the last digits of the entries make of them."""
     a, b, c, d = map(float, entries)
-    found = loop("pairs")(np.array([[[a, b], [c, d]]]))[0].real
+    found = pairs_of(np.array([[[a, b], [c, d]]]))[0].real
     with mpmath.workdps(40):
         half = (mpmath.mpf(a) - d) / 2
         root = mpmath.sqrt(half**2 + mpmath.mpf(b) * c)
@@ -71,8 +83,8 @@ def test_the_chords_of_a_curve_nearest_to_a_point():
     """Both arms of a hairpin pass the point, its turn does not; units count."""
     line = np.array([[0, 0], [1, 0], [2, 0], [3, 0.5], [2, 1], [1, 1], [0, 1]], dtype=float)
     ones = np.ones(2)
-    assert passing(line, ones, np.array([0.5, 0.4]), 0.7).tolist() == [0, 5]
-    assert passing(line, ones, np.array([0.5, 0.4]), 0.5).tolist() == [0]
-    assert passing(line, np.array([1.0, 10.0]), np.array([0.5, 0.4]), 0.05).tolist() == [0]
-    assert passing(line, ones, np.array([1.4, 0.0]), 1e-9).tolist() == [1]
-    assert passing(line, ones, np.array([9.0, 9.0]), 1.0).tolist() == []
+    assert passed(line, ones, np.array([0.5, 0.4]), 0.7).tolist() == [0, 5]
+    assert passed(line, ones, np.array([0.5, 0.4]), 0.5).tolist() == [0]
+    assert passed(line, np.array([1.0, 10.0]), np.array([0.5, 0.4]), 0.05).tolist() == [0]
+    assert passed(line, ones, np.array([1.4, 0.0]), 1e-9).tolist() == [1]
+    assert passed(line, ones, np.array([9.0, 9.0]), 1.0).tolist() == []

@@ -161,8 +161,8 @@ def test_a_crossing_at_the_edge_of_two_parts_counts_in_the_later_one():
     run = fs.simulate(model, [2, 0], t=(0, 4))
     assert [(c.interface, c.time) for c in run.crossings] == [("x", 1.0), ("y", 2.0)]
     for name, direction, time in (("x", -1, 1.0), ("y", 1, 2.0)):
-        assert run.hits(name, direction) == run.hits(name) == 1
-        assert run.hits(name, -direction) == 0
+        assert run.hits(name, direction=direction) == run.hits(name) == 1
+        assert run.hits(name, direction=-direction) == 0
         assert run.hits(name, until=time) == 0
         assert run.hits(name, since=time) == 1
     contacts = run.contacts(period=1)

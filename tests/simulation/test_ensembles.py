@@ -44,7 +44,7 @@ def assert_alike(many: Ensemble, i: int, run, since: float | None = None, tol=1e
             ]
             assert many.hits[i, j, k] == len(expected)
             if since is None and name in run.interfaces:
-                assert many.hits[i, j, k] == run.hits(name, direction)
+                assert many.hits[i, j, k] == run.hits(name, direction=direction)
     assert many.regime[i] == (run.regime or "")
 
 
