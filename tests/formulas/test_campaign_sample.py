@@ -11,8 +11,9 @@ def test_every_text_has_an_answer_or_one_of_our_errors():
     assert set(report.refused) >= {"ArgumentError", "ModelError", "UnknownNameError"}
 
 
-def test_what_is_right_is_answered():
+def test_what_is_right_is_answered(tmp_path, monkeypatch):
     """Every entry point takes some text."""
+    monkeypatch.chdir(tmp_path)
     known = entries()
     good = {
         "Model rate": "-x*D",
