@@ -66,7 +66,7 @@ def equilibria(
     Returns
     -------
     Equilibria
-        A list of Equilibrium, region by region.
+        A tuple of Equilibrium, region by region.
 
     Raises
     ------
