@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -118,7 +119,9 @@ def _rate(model: Any, name: str, time: float) -> sp.Expr:
     """The rate of a slow quantity, t from a time on."""
     law = model.forcing[name].diff(TIME) if name in model.forcing else model.rates[name]
     numbers = {n: sp.Float(v, DIGITS) for n, v in model.values.items()}
-    return law.xreplace({**numbers, TIME: sp.Float(time, DIGITS) + TIME})
+    # a time below the normal numbers is the rounding of 0, and has no decimals to be read again
+    later = sp.Float(time, DIGITS) if abs(time) >= sys.float_info.min else 0
+    return law.xreplace({**numbers, TIME: later + TIME})
 
 
 def _moving(slow: SlowQuantity, time: float) -> dict[sp.Symbol, sp.Expr]:

@@ -93,7 +93,7 @@ def along_steps(run: Trajectory, expression: object) -> StepPolynomials:
         )
     if text in run.columns:
         return _column(run, text)
-    return _Reading(run, text).polynomial()
+    return _Expansion(run, text).polynomial()
 
 
 def _column(run: Trajectory, name: str) -> StepPolynomials:
@@ -108,7 +108,7 @@ def _constant(run: Trajectory, value: float) -> StepPolynomials:
     return StepPolynomials(np.full((n, 1), value), np.full(n, abs(value)))
 
 
-class _Reading:
+class _Expansion:
     """One expression along one run."""
 
     def __init__(self, run: Trajectory, text: str) -> None:

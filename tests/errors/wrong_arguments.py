@@ -151,7 +151,7 @@ BY_FUNCTION = {
         ({}, BadModel, "at least one state"),
         ({"x": "omga"}, BadModel, "rate of x: unknown symbol 'omga'"),
         ({"x": None}, BadModel, "rate of x: expected an expression, received None"),
-        ({"x": "x +"}, BadModel, "rate of x: expected an expression, received 'x +'"),
+        ({"x": "x +"}, BadModel, "rate of x: 'x +' is no expression: it ends after '+'"),
     ],
     "Model.frozen.slow": [
         *MAPPING,

@@ -79,7 +79,7 @@ def test_runs_agree_with_the_independent_passages(folded):
             ramp, [0.9427182380145632, 0], t=(0, 0.42 / eps), integration=fs.Integration(rtol=1e-13)
         )
         for level, load in zip((0.25, -0.25), loads, strict=True):
-            assert run.section("x", level)["w"][0] == pytest.approx(load, abs=2e-13)
+            assert run.section("x", level=level)["w"][0] == pytest.approx(load, abs=2e-13)
 
 
 def test_the_corner_to_all_digits(corner):
