@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 #: Seconds from a signal to the exception, and how long an answer is waited for.
-BOUND, PATIENCE = 1.0, 60.0
+BOUND, PATIENCE = 1.0, 300.0
 
 #: A second signal follows so often, and so many seconds later at most.
 TWICE, APART = 0.25, 0.05
@@ -234,6 +235,8 @@ KINDS = [
 
 def child(folder):
     """Computes what it is told on standard input, and reports what comes out of each call."""
+    # a shell starts what runs in the background with interrupts ignored
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     calls = Calls(folder)
     known = {}
 
@@ -304,10 +307,16 @@ class _Process:
         self.answer()
 
     def answer(self):
+        # what computes on in spite of a signal would never answer
+        watch = threading.Timer(PATIENCE, self.process.kill)
+        watch.start()
         line = self.process.stdout.readline()
+        watch.cancel()
         if not line:
             self.errors.seek(0)
-            raise RuntimeError(f"the process ended:\n{self.errors.read()[-3000:]}")
+            raise RuntimeError(
+                f"the process ended, or was ended after {PATIENCE:g} s:\n{self.errors.read()[-3000:]}"
+            )
         return json.loads(line)
 
     def interrupt(self, kind, generator, comparing=True):

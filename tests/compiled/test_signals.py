@@ -22,6 +22,14 @@ class Passes(event.Listener):
         pass
 
 
+@pytest.fixture(autouse=True)
+def handler():
+    """Puts a handler in the place of that for Ctrl-C, which a shell's background ignores."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield lambda function: signal.signal(signal.SIGINT, function)
+    signal.signal(signal.SIGINT, before)
+
+
 def swallowing():
     try:
         signal.raise_signal(signal.SIGINT)
@@ -49,14 +57,6 @@ def test_a_compilation_ends_at_its_next_pass_and_begins_again():
     assert watching.count == 3
     assert not squared.overloads
     assert deferring_signals(squared, 3.0) == 9.0
-
-
-@pytest.fixture
-def handler():
-    """Puts a handler in the place of that for Ctrl-C."""
-    before = signal.getsignal(signal.SIGINT)
-    yield lambda function: signal.signal(signal.SIGINT, function)
-    signal.signal(signal.SIGINT, before)
 
 
 def test_an_exception_of_the_users_handler_comes_out_as_it_is(handler):
