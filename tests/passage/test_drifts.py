@@ -127,7 +127,7 @@ def test_without_a_model_only_the_rate_of_a_slow_state_is_known(tmp_path):
     run.save(tmp_path / "run.npz")
     loaded = fs.load(tmp_path / "run.npz")
     assert loaded.model is None
-    assert copy.deepcopy(run).model is None
+    assert copy.deepcopy(run).model is model
     drift = drift_at(slow_quantity(diagram, loaded), diagram.folds[0], 20.0)
     assert drift.rate == pytest.approx(-0.01 * float(run(20.0)[0]), rel=1e-9)
     assert not drift.complete
