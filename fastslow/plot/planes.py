@@ -213,7 +213,7 @@ def _columns(curve: PointBranch) -> dict[str, Any]:
 
 def _runs(curve: PointBranch) -> list[tuple[str, bool, str, slice]]:
     """Runs of one code and criticality, admissible or not; neighbours share their joint row."""
-    criticality = curve.criticality
+    criticality = curve.criticality.copy()
     known = np.flatnonzero((criticality != "") & (criticality != "degenerate"))
     if known.size:
         # a generalized Hopf point belongs to both sides
