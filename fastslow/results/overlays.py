@@ -351,14 +351,13 @@ class Overlay(Table, Result):
         yield from lost
 
     def _behind(self, label: str) -> str:
-        """The median lag behind a sheet, where most samples on it have one: to two digits, as it
-        is taken over the samples, whose places another processor's rounding moves.
-        """
+        """The median lag behind a sheet, where most samples on it have one."""
         numbers = [k for k, sheet in enumerate(self.sheets) if sheet.label == label]
         lags = self.lag[np.isin(self.followed, numbers)]
         known = lags[np.isfinite(lags)]
         if not len(known) or len(known) < LAGGING * len(lags):
             return ""
+        # where the samples are, and so the third digit, hangs on the processor's rounding
         return f", median lag {float(np.median(known)):.2g}"
 
     def _sticking(self) -> Iterator[str]:

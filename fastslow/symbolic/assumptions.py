@@ -8,7 +8,7 @@ from typing import Any
 import sympy as sp
 from sympy.core.relational import Relational
 
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import ArgumentError, ModelError, unknown_name
 from fastslow.model.structure import read_condition, real
 from fastslow.symbolic.signs import Signs, with_facts
 
@@ -87,7 +87,11 @@ def _positive_part(item: Any, values: Mapping[str, float]) -> sp.Expr:
     """Give the expression that an assumed strict inequality says is positive."""
     relation = item
     if isinstance(item, str):
-        relation = read_condition("assume", item, values, exact=True)
+        try:
+            relation = read_condition("assume", item, values, exact=True)
+        except ModelError as error:
+            # the text is an argument of derive, not a part of the model
+            raise ArgumentError(str(error)) from None
     if relation in (sp.true, sp.false):
         raise ArgumentError(f"assume: {item} is always {relation}; expected {EXPECTED}")
     if not isinstance(relation, Relational):

@@ -315,7 +315,8 @@ class _Process:
         if not line:
             self.errors.seek(0)
             raise RuntimeError(
-                f"the process ended, or was ended after {PATIENCE:g} s:\n{self.errors.read()[-3000:]}"
+                f"the process ended, at the latest after {PATIENCE:g} s:\n"
+                f"{self.errors.read()[-3000:]}"
             )
         return json.loads(line)
 

@@ -17,7 +17,7 @@ def gear(**values: float) -> Model:
     return Model(
         {x: v, v: w - v - (x**2 + A) * f},
         forcing={w: B + C * sp.sin(omega * t)},
-        parameters={A: 41.67, B: 2.372, C: 3.546, D: 0.25, omega: 0.01} | values,
+        parameters={"A": 41.67, "B": 2.372, "C": 3.546, "D": 0.25, "omega": 0.01} | values,
     )
 
 
