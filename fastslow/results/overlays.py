@@ -357,7 +357,7 @@ class Overlay(Table, Result):
         known = lags[np.isfinite(lags)]
         if not len(known) or len(known) < LAGGING * len(lags):
             return ""
-        # where the samples are, and so the third digit, hangs on the processor's rounding
+        # the places of the samples, and so the third digit, depend on the processor's rounding
         return f", median lag {float(np.median(known)):.2g}"
 
     def _sticking(self) -> Iterator[str]:
