@@ -80,7 +80,7 @@ def import_closure(source: str) -> set[str]:
     Examples
     --------
     >>> sorted(import_closure("from fastslow.compiled import special"))
-    ['fastslow.compiled', 'fastslow.compiled.parts', 'fastslow.compiled.special']
+    ['fastslow.compiled', 'fastslow.compiled.native', 'fastslow.compiled.special']
     """
     found: set[str] = set()
     new = set(imported(source))

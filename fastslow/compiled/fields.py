@@ -13,7 +13,7 @@ from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.pycode import PythonCodePrinter
 
 from fastslow.compiled.functions import refusal, teach_functions
-from fastslow.compiled.generated import compile_callback
+from fastslow.compiled.model_code import load_function
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
@@ -106,9 +106,7 @@ def _address(
                 "call frozen() on the model first"
             )
         bodies.append(_body(rows, n, rename))
-    from fastslow.compiled.pointers import SIGNATURE
-
-    return compile_callback(_source(bodies, unknowns, parameters), "field", SIGNATURE)
+    return load_function(_source(bodies, unknowns, parameters), "field")
 
 
 def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -> list[str]:
@@ -167,10 +165,7 @@ def _float(code: str) -> str:
 
 
 def _source(bodies: Sequence[list[str]], unknowns: int, parameters: int) -> str:
-    uses_special = any("special." in line for body in bodies for line in body)
     lines = [
-        "import math",
-        *(["from fastslow.compiled import special"] if uses_special else []),
         "def field(region, u, p, out):",
         *(f"    u{k} = u[{k}]" for k in range(unknowns)),
         *(f"    p{k} = p[{k}]" for k in range(parameters)),

@@ -48,43 +48,43 @@ ELEMENTARY = {
 
 #: Special functions whose derivatives lead back to functions of these two tables.
 CLOSED = {
-    sp.erfi: "special.erfi({}, 0)",
-    sp.erfinv: "special.erfinv({}, 0)",
-    sp.erfcinv: "special.erfcinv({}, 0)",
+    sp.erfi: "special.erfi({})",
+    sp.erfinv: "special.erfinv({})",
+    sp.erfcinv: "special.erfcinv({})",
     sp.fresnels: "special.fresnel({}, 0)",
     sp.fresnelc: "special.fresnel({}, 1)",
     sp.airyai: "special.airy({}, 0)",
     sp.airyaiprime: "special.airy({}, 1)",
     sp.airybi: "special.airy({}, 2)",
     sp.airybiprime: "special.airy({}, 3)",
-    sp.Ei: "special.expi({}, 0)",
-    sp.li: "special.expi(math.log({}), 0)",
-    sp.Ci: "special.sine_cosine_integral({}, 1)",
-    sp.Chi: "special.hyperbolic_integral({}, 1)",
+    sp.Ei: "special.expi({})",
+    sp.li: "special.expi(math.log({}))",
+    sp.Ci: "special.sici({}, 1)",
+    sp.Chi: "special.shichi({}, 1)",
     sp.LambertW: "special.lambertw({}, {})",
-    sp.expint: "special.expn({}, {}, 0)",
-    sp.uppergamma: "special.gammaincc({0}, {1}, 0) * special.gamma({0}, 0)",
-    sp.lowergamma: "special.gammainc({0}, {1}, 0) * special.gamma({0}, 0)",
+    sp.expint: "special.expn({}, {})",
+    sp.uppergamma: "special.gammaincc({0}, {1}) * special.gamma({0})",
+    sp.lowergamma: "special.gammainc({0}, {1}) * special.gamma({0})",
 }
 
 #: Special functions whose derivatives lead ever farther, or are quotients at a zero of both.
 OPEN = {
-    sp.gamma: "special.gamma({}, 0)",
-    sp.loggamma: "special.loggamma({}, 0)",
+    sp.gamma: "special.gamma({})",
+    sp.loggamma: "special.loggamma({})",
     sp.polygamma: "special.polygamma({}, {})",
-    sp.beta: "special.beta({}, {}, 0)",
-    sp.factorial: "special.gamma(1.0 + ({}), 0)",
-    sp.zeta: "1.0 + special.zetac({}, 0)",
-    sp.besselj: "special.jv({}, {}, 0)",
-    sp.bessely: "special.yv({}, {}, 0)",
-    sp.besseli: "special.iv({}, {}, 0)",
-    sp.besselk: "special.kv({}, {}, 0)",
-    sp.elliptic_k: "special.ellipk({}, 0)",
-    sp.elliptic_f: "special.ellipkinc({}, {}, 0)",
-    sp.elliptic_e: "special.ellipe({}, 0)",
+    sp.beta: "special.beta({}, {})",
+    sp.factorial: "special.gamma(1.0 + ({}))",
+    sp.zeta: "1.0 + special.zetac({})",
+    sp.besselj: "special.jv({}, {})",
+    sp.bessely: "special.yv({}, {})",
+    sp.besseli: "special.iv({}, {})",
+    sp.besselk: "special.kv({}, {})",
+    sp.elliptic_k: "special.ellipk({})",
+    sp.elliptic_f: "special.ellipkinc({}, {})",
+    sp.elliptic_e: "special.ellipe({})",
     sp.sinc: "special.sinc({})",
-    sp.Si: "special.sine_cosine_integral({}, 0)",
-    sp.Shi: "special.hyperbolic_integral({}, 0)",
+    sp.Si: "special.sici({}, 0)",
+    sp.Shi: "special.shichi({}, 0)",
 }
 
 VALUES = ELEMENTARY | CLOSED | OPEN
@@ -104,7 +104,7 @@ _PRINTED = (sp.Abs, sp.sign, sp.Max, sp.Min, sp.Heaviside, sp.Piecewise)
 
 #: Two forms of one name in SymPy: arguments that are left out there, another function here.
 _DEFAULTS = {sp.LambertW: (sp.Integer(0),)}
-_OTHERWISE = {(sp.elliptic_e, 2): "special.ellipeinc({}, {}, 0)"}
+_OTHERWISE = {(sp.elliptic_e, 2): "special.ellipeinc({}, {})"}
 
 
 def value_code(expression: sp.Function, code_of: Callable[[sp.Expr], str]) -> str:

@@ -62,7 +62,7 @@ def _nearest(x: Lanes) -> tuple[Lanes, Lanes]:
 
 def _sine_and_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
     if x.steady:
-        return x.trace.one_by_one(_sine, x), x.trace.one_by_one(_cosine, x)
+        return x.trace.one_by_one("sin", x), x.trace.one_by_one("cos", x)
     quarters, shifted = _nearest(x * (2.0 / math.pi))
     rest = x
     for part in _QUARTER:
@@ -81,14 +81,6 @@ def _sine_and_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
 def _signed(x: Lanes, turned: Any) -> Lanes:
     """The negative in the third and fourth quarter of a turn."""
     return (x.bits ^ ((turned & 2) << 62)).number
-
-
-def _sine(x: float) -> float:
-    return math.sin(x)
-
-
-def _cosine(x: float) -> float:
-    return math.cos(x)
 
 
 def log2(x: Lanes) -> Lanes:
@@ -129,13 +121,4 @@ class Mathematics:
         return math.e
 
     def __getattr__(self, name: str) -> Callable[..., Lanes]:
-        function = _by_name(name)
-        return lambda *arguments: self.trace.one_by_one(function, *arguments)
-
-
-def _by_name(name: str) -> Callable[..., float]:
-    """A function of `math` in a form that Numba compiles."""
-    function = getattr(math, name)
-    if name in ("pow", "atan2"):
-        return lambda x, y: function(x, y)
-    return lambda x: function(x)
+        return lambda *arguments: self.trace.one_by_one(name, *arguments)

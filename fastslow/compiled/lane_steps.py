@@ -12,8 +12,11 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
+from llvmlite import ir
+
 from fastslow.compiled.lane_functions import Mathematics, exp2, log2
 from fastslow.compiled.lanes import Lanes, Mask, Trace, Workspace, added, polynomial
+from fastslow.compiled.native import ENTRY, WHOLE
 
 #: Rows that come after time and states, then those of the smallest and largest
 #: values of the states: by how much the time is late, the time that no step may
@@ -31,14 +34,17 @@ _SMALLEST, _LARGEST_TERM = 1e-250, 1e250
 
 
 def plain_steps(
+    module: ir.Module,
     regions: Sequence[Callable[..., None]],
     signs: Sequence[Sequence[int]],
     sizes: tuple[int, int, int, int],
-) -> Any:
-    """A function for Numba that takes the plain steps of several trajectories.
+) -> None:
+    """Add a function to a module that takes the plain steps of several trajectories.
 
     Parameters
     ----------
+    module : llvmlite.ir.Module
+        Its new function is called ``steps``.
     regions : sequence of callable
         Each fills a workspace from inputs and parameters, as the series does.
     signs : sequence of sequence of int
@@ -46,30 +52,18 @@ def plain_steps(
     sizes : tuple of int
         (n_states, n_forcing, n_parameters, order).
     """
-    from llvmlite import ir
-    from numba.extending import intrinsic
-
-    @intrinsic
-    def take(typingctx, mode, lanes, parameters, W):  # type: ignore[no-untyped-def]
-        from numba import types
-
-        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            end = builder.append_basic_block("end")
-            switch = builder.switch(args[0], end)
-            for number, region in enumerate(regions):
-                before = builder.append_basic_block("before")
-                step = builder.append_basic_block("step")
-                switch.add_case(ir.Constant(ir.IntType(64), number), before)
-                builder.position_at_end(step)
-                trace = Trace(context, ir.IRBuilder(before), builder)
-                _step(trace, region, signs[number], sizes, args[1:], (step, end))
-                trace.before.branch(step)
-            builder.position_at_end(end)
-            return context.get_dummy_value()
-
-        return types.void(mode, lanes, parameters, W), codegen
-
-    return take
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), ENTRY), "steps")
+    function.attributes.add("nounwind")
+    mode, *pointers = function.args
+    start, end = (function.append_basic_block(name) for name in ("start", "end"))
+    switch = ir.IRBuilder(start).switch(mode, end)
+    for number, region in enumerate(regions):
+        before, step = (function.append_basic_block(name) for name in ("before", "step"))
+        switch.add_case(ir.Constant(WHOLE, number), before)
+        trace = Trace(ir.IRBuilder(before), ir.IRBuilder(step))
+        _step(trace, region, signs[number], sizes, pointers, (step, end))
+        trace.before.branch(step)
+    ir.IRBuilder(end).ret_void()
 
 
 def _step(

@@ -13,6 +13,8 @@ from typing import Any
 
 from llvmlite import ir
 
+from fastslow.compiled.native import elementary
+
 #: Trajectories side by side: enough to hide the latency of one by another.
 WIDTH = 8
 
@@ -202,14 +204,12 @@ class Trace:
 
     Parameters
     ----------
-    context
-        Numba's, to compile functions of single numbers.
     before, builder : llvmlite.ir.IRBuilder
         For what depends on steady numbers alone, and for everything else.
     """
 
-    def __init__(self, context: Any, before: Any, builder: Any) -> None:
-        self.context, self.before, self.builder = context, before, builder
+    def __init__(self, before: Any, builder: Any) -> None:
+        self.before, self.builder = before, builder
         #: Where what was traced holds: a lane in which one of these is false is not to be used.
         self.conditions: list[Mask] = []
         self._count = 0
@@ -245,18 +245,15 @@ class Trace:
         )
         return Lanes(self, builder.call(function, [n.value for n in numbers]), steady=steady)
 
-    def one_by_one(self, function: Callable[..., float], *arguments: Any) -> Lanes:
-        """A function of single numbers, compiled by Numba and called for every lane."""
-        from numba import types
-
+    def one_by_one(self, name: str, *arguments: Any) -> Lanes:
+        """A function of `math`, called for every lane."""
         numbers, builder, steady = self._place(arguments)
-        kind = types.float64(*[types.float64] * len(numbers))
+        function, _ = elementary(builder.module, name)
         value = ir.Constant(_VECTOR, ir.Undefined)
         for lane in range(WIDTH):
             place = ir.Constant(ir.IntType(32), lane)
             values = [builder.extract_element(number.value, place) for number in numbers]
-            result = self.context.compile_internal(builder, function, kind, values)
-            value = builder.insert_element(value, result, place)
+            value = builder.insert_element(value, builder.call(function, values), place)
         return Lanes(self, value, steady=steady)
 
     def comparison(self, sign: str, a: Any, b: Any) -> Mask:

@@ -14,7 +14,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.compiled.functions import without_recurrence
-from fastslow.compiled.generated import compile_callback
+from fastslow.compiled.model_code import load_function
 from fastslow.compiled.recurrences import Recurrences, scalar_code
 from fastslow.compiled.series_modes import (
     COLLOCATION,
@@ -28,8 +28,7 @@ from fastslow.model.motions import Motion, drift, motions_of, regions_of
 from fastslow.model.structure import TIME, real
 
 _HEADER = '''"""{what} for {modes} modes of {states} states."""
-import math
-{special}
+
 
 def series(mode, inputs, parameters, W):
     n = {order}
@@ -222,13 +221,10 @@ def _compile(
 ) -> CompiledSeries:
     parameters = equations.parameters
     source, n_rows = _source(equations.renamed(), len(parameters))
-    from fastslow.compiled.pointers import SIGNATURE
-
-    address = compile_callback(source, "series", SIGNATURE)
     m, q, p = (len(g) for g in (equations.states, equations.quantities, equations.interfaces))
     signs = np.array([mode.signs for mode in equations.modes], dtype=np.int64)
     return CompiledSeries(
-        address,
+        load_function(source, "series"),
         equations.order,
         parameters,
         m,
@@ -263,10 +259,8 @@ def _source(equations: Equations, n_parameters: int) -> tuple[str, int]:
         lines += [f"        {line}" for line in body]
     text = "\n".join(lines) + "\n"
     what = "Values and rates" if alone else f"Taylor coefficients of order {equations.order}"
-    special = "from fastslow.compiled import special\n" if "special." in text else ""
     header = _HEADER.format(
         what=what,
-        special=special,
         order=equations.order,
         modes=len(equations.modes),
         states=len(equations.states),

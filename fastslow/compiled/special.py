@@ -1,40 +1,67 @@
-"""Values of special functions for generated code.
+"""Special functions of generated code.
 
-Most are SciPy's own, called by their addresses: generated code that was read
-from the disk finds them under the names that are given to them when this
-module is imported.
+Most are SciPy's own, called by their addresses. The others are written here, in the
+Python that generated code may contain, and translated with it.
 """
 
 from __future__ import annotations
 
+import ast
 import ctypes
 import math
+from functools import cache
+from pathlib import Path
 from typing import Any
 
-import llvmlite.binding as llvm
-import numpy as np
-from numba import types
-from scipy.special import cython_special
+from scipy.special import cython_special, gamma, psi
 
-from fastslow.compiled.parts import part
+from fastslow.compiled.native import External, Names
+
+#: Functions of SciPy by their number of arguments; each returns a number.
+_VALUES = {
+    **dict.fromkeys(("gamma", "loggamma", "psi", "zetac"), 1),
+    **dict.fromkeys(("expi", "erfi", "erfinv", "erfcinv", "ellipk", "ellipe"), 1),
+    **dict.fromkeys(("jv", "yv", "iv", "kv", "expn", "ellipkinc", "ellipeinc"), 2),
+    **dict.fromkeys(("beta", "gammainc", "gammaincc"), 2),
+}
+
+#: Functions of one argument that fill several numbers; the last argument says which is meant:
+#: Ai, Ai', Bi, Bi'; Si, Ci; Shi, Chi; Fresnel's S, C.
+_SEVERAL = {"airy": 4, "sici": 2, "shichi": 2, "fresnel": 2}
+
+#: Cython's functions that may be overridden take a number that says whether to look for that.
+_DIRECT = 0
 
 
-def _external(name: str, arguments: int, results: int = 0) -> Any:
-    """A function of real numbers out of SciPy, which fills pointers if it has several results."""
-    capsules = cython_special.__pyx_capi__
-    if results:
-        kinds = ["double"] * arguments + ["double *"] * results
+def _external(name: str) -> External:
+    if name in _SEVERAL:
+        return External(f"scipy_{name}", 1, _SEVERAL[name])
+    return External(f"scipy_{name}", _VALUES[name], last=_DIRECT)
+
+
+@cache
+def addresses() -> dict[str, int]:
+    """Addresses of SciPy's functions by their symbols.
+
+    Raises
+    ------
+    ImportError
+        If this version of SciPy has one of them in another form.
+    """
+    return {_external(name).symbol: _address(name) for name in (*_VALUES, *_SEVERAL)}
+
+
+def _address(name: str) -> int:
+    if name in _SEVERAL:
+        kinds = ["double"] + ["double *"] * _SEVERAL[name]
         wanted = f"void ({', '.join(kinds)})"
-        kind = types.void(*[types.float64] * arguments, *[types.CPointer(types.float64)] * results)
     else:
-        wanted = f"double ({', '.join(['double'] * arguments)}, int __pyx_skip_dispatch)"
-        kind = types.float64(*[types.float64] * arguments, types.int32)
+        wanted = f"double ({'double, ' * _VALUES[name]}int __pyx_skip_dispatch)"
+    capsules = cython_special.__pyx_capi__
     # the number of a fused type differs between functions and between versions
     for known in (name, *(f"__pyx_fuse_{k}{name}" for k in range(3))):
         if known in capsules and _signature(capsules[known]) == wanted:
-            symbol = f"fastslow_{name}"
-            llvm.add_symbol(symbol, _address(capsules[known]))
-            return types.ExternalFunction(symbol, kind)
+            return _pointer(capsules[known])
     raise ImportError(f"scipy.special.cython_special has no {name} with the signature {wanted}")
 
 
@@ -44,67 +71,27 @@ def _signature(capsule: Any) -> str:
     return name_of(capsule).decode()
 
 
-def _address(capsule: Any) -> int:
+def _pointer(capsule: Any) -> int:
     pointer_of = ctypes.pythonapi.PyCapsule_GetPointer
     pointer_of.restype = ctypes.c_void_p
     pointer_of.argtypes = [ctypes.py_object, ctypes.c_char_p]
     return int(pointer_of(capsule, _signature(capsule).encode()))
 
 
-# each takes one more argument of no meaning, 0
-gamma = _external("gamma", 1)
-loggamma = _external("loggamma", 1)
-psi = _external("psi", 1)
-zetac = _external("zetac", 1)
-jv, yv = _external("jv", 2), _external("yv", 2)
-iv, kv = _external("iv", 2), _external("kv", 2)
-expi = _external("expi", 1)
-expn = _external("expn", 2)
-erfi = _external("erfi", 1)
-erfinv, erfcinv = _external("erfinv", 1), _external("erfcinv", 1)
-ellipk, ellipe = _external("ellipk", 1), _external("ellipe", 1)
-ellipkinc, ellipeinc = _external("ellipkinc", 2), _external("ellipeinc", 2)
-beta = _external("beta", 2)
-gammainc, gammaincc = _external("gammainc", 2), _external("gammaincc", 2)
-_airy = _external("airy", 1, 4)
-_sici, _shichi = _external("sici", 1, 2), _external("shichi", 1, 2)
-_fresnel = _external("fresnel", 1, 2)
+@cache
+def names() -> Names:
+    """What generated source may call as a special function, for its translation."""
+    tree = ast.parse(Path(__file__).read_text(encoding="utf-8"))
+    written = {f.__name__ for f in (sinc, polygamma, lambertw)}
+    functions = {n.name: n for n in tree.body if isinstance(n, ast.FunctionDef)}
+    return {
+        **{name: _external(name) for name in (*_VALUES, *_SEVERAL)},
+        **{name: functions[name] for name in written},
+        "_BERNOULLI": _BERNOULLI,
+    }
 
 
-@part
-def airy(x, which):
-    """Ai, Ai', Bi or Bi'."""
-    out = np.empty(4)
-    _airy(x, out.ctypes, out[1:].ctypes, out[2:].ctypes, out[3:].ctypes)
-    return out[which]
-
-
-@part
-def sine_cosine_integral(x, which):
-    """Si or Ci."""
-    out = np.empty(2)
-    _sici(x, out.ctypes, out[1:].ctypes)
-    return out[which]
-
-
-@part
-def hyperbolic_integral(x, which):
-    """Shi or Chi."""
-    out = np.empty(2)
-    _shichi(x, out.ctypes, out[1:].ctypes)
-    return out[which]
-
-
-@part
-def fresnel(x, which):
-    """Fresnel's S or C."""
-    out = np.empty(2)
-    _fresnel(x, out.ctypes, out[1:].ctypes)
-    return out[which]
-
-
-@part
-def sinc(x):
+def sinc(x: float) -> float:
     """Sine of x over x, also at 0."""
     return math.sin(x) / x if x != 0.0 else 1.0
 
@@ -121,14 +108,16 @@ _BERNOULLI = (
 )
 
 
-@part
-def polygamma(n, x):
+def polygamma(n: float, x: float) -> float:
     """The n-th derivative of digamma, by its sum with Euler and Maclaurin's remainder."""
     if n == 0.0:
-        return psi(x, 0)
+        return psi(x)
+    half = 0.5 * n
+    odd = half != math.floor(half)
     if x <= 0.0 and x == math.floor(x):
-        return math.inf if n % 2.0 == 1.0 else math.nan
-    s, total = n + 1.0, 0.0
+        return math.inf if odd else math.nan
+    s = n + 1.0
+    total = 0.0
     while x < 10.0 + n:
         total += math.pow(x, -s)
         x += 1.0
@@ -138,12 +127,11 @@ def polygamma(n, x):
     for j in range(len(_BERNOULLI)):
         total += _BERNOULLI[j] * factor
         factor *= (s + 2.0 * j + 1.0) * (s + 2.0 * j + 2.0) / (x * x)
-    sign = 1.0 if n % 2.0 == 1.0 else -1.0
-    return sign * gamma(n + 1.0, 0) * total
+    sign = 1.0 if odd else -1.0
+    return sign * gamma(n + 1.0) * total
 
 
-@part
-def lambertw(x, branch):
+def lambertw(x: float, branch: float) -> float:
     """The real branches 0 and -1 of W exp(W) = x, by Halley's method (Corless et al. 1996)."""
     if math.isnan(x) or x < -1.0 / math.e or (branch < 0.0 and x >= 0.0):
         below = 1.0 + math.e * x

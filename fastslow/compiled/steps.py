@@ -5,21 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fastslow.compiled.generated import compile_callback
+from llvmlite import ir
+
+from fastslow.compiled.lane_steps import plain_steps
+from fastslow.compiled.model_code import load_built
 from fastslow.compiled.series import Equations, equations_of, mode_source
 from fastslow.model.model import Model
-
-_HEADER = '''"""Plain steps of order {order} for {count} regions of {states} states."""
-from fastslow.compiled.lane_steps import plain_steps
-
-
-'''
-_ENTRY = """take = plain_steps(({regions}), {signs}, {sizes})
-
-
-def steps(mode, inputs, parameters, W):
-    take(mode, inputs, parameters, W)
-"""
 
 #: Larger models are not compiled: rows of all regions times the square of the order. The
 #: instructions are that many, and take half a minute per 100,000 to compile.
@@ -79,18 +70,20 @@ def _compile(equations: Equations) -> CompiledSteps:
     sources = [mode_source(new, mode) for mode in new.modes]
     if sum(rows for _, rows in sources) * order**2 > _LARGEST:
         return NO_STEPS
-    text = _HEADER.format(order=order, count=len(sources), states=len(new.states))
+    text = ""
     for number, (body, _) in enumerate(sources):
         text += f"def region_{number}(inputs, parameters, W, math):\n"
         lines = [f"n = {order}", *(f"p{i} = parameters[{i}]" for i in range(n)), *body]
         text += "".join(f"    {line}\n" for line in lines) + "\n\n"
     if "special." in text:
         return NO_STEPS
-    text += _ENTRY.format(
-        regions="".join(f"region_{i}, " for i in range(len(sources))),
-        signs=tuple(mode.signs for mode in new.modes),
-        sizes=(len(new.states), len(new.quantities), n, order),
-    )
-    from fastslow.compiled.pointers import SIGNATURE
+    signs = tuple(mode.signs for mode in new.modes)
+    sizes = (len(new.states), len(new.quantities), n, order)
 
-    return CompiledSteps(compile_callback(text, "steps", SIGNATURE), len(sources))
+    def build(module: ir.Module) -> None:
+        traced: dict[str, Any] = {}
+        exec(text, traced)
+        regions = [traced[f"region_{number}"] for number in range(len(sources))]
+        plain_steps(module, regions, signs, sizes)
+
+    return CompiledSteps(load_built(f"{signs} {sizes}\n{text}", "steps", build), len(sources))

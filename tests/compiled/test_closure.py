@@ -12,6 +12,7 @@ import pytest
 
 import fastslow
 from fastslow.compiled import closure as closures
+from fastslow.compiled import model_code
 
 ROOT = Path(fastslow.__file__).parent
 
@@ -27,9 +28,7 @@ FILES = {name_of(path): path for path in sorted(ROOT.rglob("*.py"))}
 KERNELS = sorted(
     name
     for name, path in FILES.items()
-    if re.search(
-        r"^@(njit|part|intrinsic)|\bSIGNATURE = types|^def plain_steps", path.read_text(), re.M
-    )
+    if re.search(r"^@(njit|part|intrinsic)|\bSIGNATURE = types", path.read_text(), re.M)
 )
 
 
@@ -42,9 +41,7 @@ def source(kernel):
 
 def test_the_kernels_are_found():
     loops = {
-        "fastslow.compiled.lane_steps",
         "fastslow.compiled.pointers",
-        "fastslow.compiled.special",
         "fastslow.continuation.engine",
         "fastslow.continuation.evaluation",
         "fastslow.continuation.isolation",
@@ -169,3 +166,10 @@ def test_closures_of_kernels_hold_no_model_and_no_result():
 def test_a_module_that_is_not_there_is_an_error():
     with pytest.raises(ModuleNotFoundError, match=r"no source of fastslow\.nothing"):
         closures.import_closure("from fastslow.nothing import anything")
+
+
+def test_the_key_of_models_holds_all_that_their_code_is_made_by():
+    makers = {"model_code", "lane_functions", "lane_steps", "lanes", "machine_code", "native"}
+    held = closures.import_closure(model_code._MAKERS)
+    assert {f"fastslow.compiled.{name}" for name in (*makers, "special", "store")} <= held
+    assert not any(name.startswith("fastslow.simulation") for name in held)

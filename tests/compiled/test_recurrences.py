@@ -102,7 +102,7 @@ def test_what_cannot_be_compiled_is_named(rate, said):
 def test_new_values_compile_nothing(tmp_path, monkeypatch):
     model = Model({x: -a * x}, parameters={a: 1})
     compiled = compile_series(model, ORDER)
-    monkeypatch.setattr("fastslow.compiled.series.compile_callback", None)
+    monkeypatch.setattr("fastslow.compiled.series.load_function", None)
     assert compile_series(model.with_parameters(a=2), ORDER) is compiled
 
 
