@@ -4,13 +4,33 @@ from __future__ import annotations
 
 import hashlib
 import pickle
+from contextlib import AbstractContextManager
 from typing import Any
 
+from numba.core import event
 from numba.core.compiler import Compiler, CompileResult
 from numba.core.serialize import dumps
 
 from fastslow.compiled import store
 from fastslow.compiled.signals import between_passes
+
+#: What Numba announces before and after each pass of its compiler.
+_PASS = "numba:run_pass"
+
+
+class _Passes(event.Listener):
+    """Handles signals between Numba's passes."""
+
+    def on_start(self, _: Any) -> None:
+        between_passes()
+
+    def on_end(self, _: Any) -> None:
+        pass
+
+
+def watched_passes() -> AbstractContextManager[None]:
+    """Let what Numba compiles meanwhile be interrupted between its passes."""
+    return event.install_listener(_PASS, _Passes())
 
 
 class KeptCompiler(Compiler):
@@ -30,7 +50,8 @@ class KeptCompiler(Compiler):
                 # by now another process may have compiled it
                 found = store.read(name)
                 if found is None:
-                    result = super().compile_extra(func)
+                    with watched_passes():
+                        result = super().compile_extra(func)
                     # addresses mean nothing to another process
                     if not result.library.has_dynamic_globals:
                         store.write(name, dumps(result._reduce()))

@@ -13,6 +13,8 @@ import llvmlite.binding as llvm
 import numpy as np
 from llvmlite import ir
 
+from fastslow.compiled.signals import between_passes
+
 #: How far LLVM optimises: the next level takes longer and gains nothing.
 _LEVEL = 2
 
@@ -68,14 +70,17 @@ def object_code(build: Callable[[ir.Module], None]) -> bytes:
     module = ir.Module("generated")
     module.triple, module.data_layout = machine.triple, str(machine.target.target_data)
     build(module)
+    between_passes()
     parsed = llvm.parse_assembly(str(module))
     parsed.verify()
+    between_passes()
     options = llvm.create_pipeline_tuning_options(speed_level=_LEVEL)
     options.loop_vectorization = options.slp_vectorization = False
     # the loops of series are short: unrolled they are no faster, and take three times as long here
     options.loop_unrolling = False
     builder = llvm.create_pass_builder(machine.target, options)
     builder.getModulePassManager().run(parsed, builder)
+    between_passes()
     return bytes(machine.target.emit_object(parsed))
 
 

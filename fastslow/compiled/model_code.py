@@ -17,6 +17,7 @@ from fastslow.compiled import store
 from fastslow.compiled.closure import digest_of_imports
 from fastslow.compiled.machine_code import load_object, object_code, platform_key
 from fastslow.compiled.native import translate
+from fastslow.compiled.signals import between_passes, deferring_signals
 
 #: Where everything is that code is made by.
 _MAKERS = "from fastslow.compiled import lane_steps, model_code, special"
@@ -69,14 +70,24 @@ def load_built(
     name = f"fastslow_{function}_{hashlib.sha256(key.encode()).hexdigest()[:24]}"
     with _lock:
         if name not in _addresses:
-            _addresses[name] = load_object(_code(name, build), function, symbols())
+            # what a handler of a signal raises in a finaliser would be lost
+            _addresses[name] = deferring_signals(_load, name, function, build, symbols)
         return _addresses[name]
+
+
+def _load(
+    name: str,
+    function: str,
+    build: Callable[[ir.Module], None],
+    symbols: Callable[[], Mapping[str, int]],
+) -> int:
+    return load_object(_code(name, build), function, symbols())
 
 
 def _code(name: str, build: Callable[[ir.Module], None]) -> bytes:
     code = store.read(name)
     if code is None:
-        with store.alone(name, lambda: None):
+        with store.alone(name, between_passes):
             # by now another process may have compiled it
             code = store.read(name)
             if code is None:

@@ -14,20 +14,15 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, TypeVar
 
-from numba.core import event
-
 R = TypeVar("R")
-
-#: What Numba announces before and after each pass of its compiler.
-_PASS = "numba:run_pass"
 
 
 class _PassStoppedError(BaseException):
     """Ends a compilation; no handler of exceptions in the compiler takes it for one of its own."""
 
 
-class _Deferral(event.Listener):
-    """Takes the place of the handlers of signals, and of a listener to Numba's passes."""
+class _Deferral:
+    """Takes the place of the handlers of signals."""
 
     def __init__(self) -> None:
         self.handlers: dict[int, Callable[[int, FrameType | None], Any]] = {}
@@ -73,28 +68,25 @@ class _Deferral(event.Listener):
             except BaseException as error:
                 self.raised = self.raised or error
 
-    def on_start(self, _: Any) -> None:
-        """Before a pass."""
+    def between_passes(self) -> None:
+        """Call the handlers, and end the compilation if one of them has raised."""
         if threading.current_thread() is threading.main_thread():
             self.handle()
             if self.raised is not None:
                 raise _PassStoppedError
-
-    def on_end(self, _: Any) -> None:
-        """After a pass."""
 
 
 _deferral: _Deferral | None = None
 
 
 def between_passes() -> None:
-    """Handle signals that have been kept, where a compilation waits for something else."""
+    """Handle signals that have been kept, where nothing of a compilation is half-done."""
     if _deferral is not None:
-        _deferral.on_start(None)
+        _deferral.between_passes()
 
 
 def deferring_signals(compiling: Callable[..., R], *arguments: Any) -> R:
-    """Call a function that compiles; signals are handled between its passes, or at its end.
+    """Call a function that compiles; signals are handled at its end, or `between_passes`.
 
     What a handler raises then ends the compilation and comes out as it is, whatever
     the compiler made of it. The next call compiles again what was not finished.
@@ -114,8 +106,7 @@ def deferring_signals(compiling: Callable[..., R], *arguments: Any) -> R:
     try:
         _deferral = deferral
         deferral.start()
-        with event.install_listener(_PASS, deferral):
-            result = compiling(*arguments)
+        result = compiling(*arguments)
     except BaseException as error:
         failure = error
     _deferral = None

@@ -17,6 +17,9 @@ from scipy.special import cython_special, gamma, psi
 
 from fastslow.compiled.native import External, Names
 
+#: What is translated is what was imported, even if the file changes after that.
+_TREE = ast.parse(Path(__file__).read_bytes())
+
 #: Functions of SciPy by their number of arguments; each returns a number.
 _VALUES = {
     **dict.fromkeys(("gamma", "loggamma", "psi", "zetac"), 1),
@@ -81,9 +84,8 @@ def _pointer(capsule: Any) -> int:
 @cache
 def names() -> Names:
     """What generated source may call as a special function, for its translation."""
-    tree = ast.parse(Path(__file__).read_text(encoding="utf-8"))
     written = {f.__name__ for f in (sinc, polygamma, lambertw)}
-    functions = {n.name: n for n in tree.body if isinstance(n, ast.FunctionDef)}
+    functions = {n.name: n for n in _TREE.body if isinstance(n, ast.FunctionDef)}
     return {
         **{name: _external(name) for name in (*_VALUES, *_SEVERAL)},
         **{name: functions[name] for name in written},

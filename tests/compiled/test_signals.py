@@ -4,6 +4,7 @@ import pytest
 from numba import njit
 from numba.core import event
 
+from fastslow.compiled.compiler import watched_passes
 from fastslow.compiled.signals import deferring_signals
 
 
@@ -52,7 +53,8 @@ def test_a_compilation_ends_at_its_next_pass_and_begins_again():
         return x * x
 
     watching = Passes(sending=3)
-    with event.install_listener("numba:run_pass", watching), pytest.raises(KeyboardInterrupt):
+    listening = event.install_listener("numba:run_pass", watching)
+    with listening, watched_passes(), pytest.raises(KeyboardInterrupt):
         deferring_signals(squared.compile, "float64(float64)")
     assert watching.count == 3
     assert not squared.overloads
