@@ -85,8 +85,7 @@ def _entry(p: Passage, t: Transition, left: StableSheet) -> float:
     number = p.sheets.index(left)
     course = next(c for c in p.m.courses if number in c.sheets)
     on = np.isin(p.followed, course.sheets)
-    row = max(int(np.searchsorted(p.m.time, t.leave.time)) - 1, 0)
-    away = np.flatnonzero(~on[: row + 1])
+    away = np.flatnonzero(~on[: np.searchsorted(p.m.time, t.leave.time)])
     if not len(away):
         return float(p.m.time[0])
     first = min(int(away[-1]) + 1, len(p.m.time) - 1)

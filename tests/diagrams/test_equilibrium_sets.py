@@ -289,6 +289,20 @@ def test_a_set_of_two_dimensions_whose_states_are_no_functions_of_the_weights():
         assert np.abs(pulls) == pytest.approx([1 / 2, 1 / 3], abs=1e-9)
 
 
+def test_a_set_that_ends_just_within_the_bounds_of_the_search_has_its_ranges():
+    """|a³ + a y| ≤ 22.2 for a = arsinh x: down to −9.9, where the search ends at −10."""
+    a = sp.asinh(x)
+    pull = sp.Rational(111, 5)
+    rates = {x: v, v: a**3 + a * y - pull * sp.sign(v), y: u, u: -y - y**3 - a * y - sp.sign(u) / 3}
+    (one,) = fs.equilibria(fs.Model(rates)).sets
+    low = one["x"][0]
+    assert -10 < low < -9.75
+    # where both weights are at an end of theirs
+    across = math.asinh(low)
+    up = (-22.2 - across**3) / across
+    assert -up - up**3 - across * up == pytest.approx(1 / 3, abs=1e-8)
+
+
 def test_products_of_signs_are_said_not_to_be_complete():
     """The origin is at rest, but no sliding motion is derived there."""
     rates = {x: -sp.sign(x) * (2 + sp.sign(y)), y: -sp.sign(y)}

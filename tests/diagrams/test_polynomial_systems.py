@@ -10,7 +10,9 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.continuation.polynomial_systems import solve_polynomials
-from fastslow.diagrams.critical import _exact_roots
+from fastslow.diagrams.critical import _exact_roots, critical_values
+from fastslow.diagrams.equations import region_equations
+from fastslow.diagrams.fields import FrozenField
 from tests.campaigns.polynomial_systems import campaign
 
 x, y, z, p, q = sp.symbols("x y z p q")
@@ -141,6 +143,15 @@ def test_planar_diagrams_with_poles_are_complete_and_have_each_branch_once(rates
         size = np.abs(listed).max(axis=0)
         for state in listed:
             assert (np.abs(drawn - state) / size).max(axis=1).min() < 1e-9
+
+
+def test_a_hyperbola_and_a_circle_meet_between_two_critical_values():
+    """x y = p touches x² + y² = 4 at p = ±2, and meets it in four points between."""
+    model = fs.Model({x: x**2 + y**2 - 4, y: x * y - p}, parameters={p: 0})
+    (equations,) = region_equations(FrozenField(model, "p"))
+    assert critical_values(equations, -3, 3) == pytest.approx([-2, 2], abs=1e-12)
+    assert critical_values(equations, -3, 1) == pytest.approx([-2], abs=1e-12)
+    assert critical_values(equations, -1, 1) == []
 
 
 def test_exact_roots_that_nearly_meet_are_in_different_intervals():

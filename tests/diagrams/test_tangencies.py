@@ -7,6 +7,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import fastslow as fs
+from fastslow.diagrams.modes import modes_of
+from fastslow.diagrams.tangency_points import Contact
 
 x, y, z, p, v, w = sp.symbols("x y z p v w")
 
@@ -135,6 +137,19 @@ def test_trouble():
     with pytest.raises(fs.FastSlowError, match="unknown parameter 'q'"):
         fs.tangencies(forced, q=1)
     assert [t["y"] for t in fs.tangencies(forced, w=0.5)] == [0.5, -1.5]
+
+
+def test_rounding_is_judged_alike_on_both_sides_of_zero():
+    contact = _contact(switched(x, (y**2 - 2, 1), (1, 0)))
+    for place in ([3.0, 4e6], [1e-3, 7.0]):
+        state = np.array(place)
+        sizes = [contact._terms(lambda a, b: [a * b, b**2], sign * state) for sign in (1, -1)]
+        np.testing.assert_allclose(*sizes, rtol=1e-6)
+
+
+def _contact(model):
+    region, across = (mode for mode in modes_of(model) if mode.sides is None)
+    return Contact(model, region, across, 0, {})
 
 
 def test_no_interface_and_an_invariant_one():

@@ -111,6 +111,18 @@ def test_a_click_selects_a_point_and_prints_the_call(explorer, mouse, capsys):
     assert names["point"].state.tolist() == fold.state.tolist()
 
 
+def test_the_run_is_laid_over_the_diagram_and_stands_beside_it(explorer, mouse):
+    run, lay = explorer.view.run, explorer.view.overlay
+    (main,) = [ax for ax in explorer.figure.axes if ax.get_xlabel() == "$w$"]
+    (series,) = [ax for ax in explorer.figure.axes if ax.get_xlabel() == "$t$"]
+    change = lay.transitions[0]
+    mouse("button_press_event", main, change.value, change.state[0])
+    assert explorer.selected.point is change
+    time = 0.37 * run.span[1]
+    mouse("button_press_event", series, time, run(time)[0])
+    assert explorer.selected.point.time == pytest.approx(time, rel=5e-3)
+
+
 def test_a_selected_point_belongs_to_the_view_it_was_selected_in(explorer, mouse):
     fold = explorer.view.diagram.folds[0]
     (main,) = [ax for ax in explorer.figure.axes if ax.get_xlabel() == "$w$"]

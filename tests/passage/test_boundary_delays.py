@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
+from fastslow.passage import boundary_delays
 from fastslow.passage.boundary_delays import boundary_delay, gap_transit
 
 
@@ -98,6 +99,21 @@ def test_a_level_that_is_not_reached(corner):
     assert math.isnan(law.delay)
     assert "does not reach the level" in law.validity
     assert "nan" in repr(law)
+
+
+def test_a_passage_through_more_regions_than_are_followed_ends_there(monkeypatch):
+    """Behind the corner at 0 the rate is p + x, and from x = 1/2 on p + 2 x − 1/2."""
+    x, p = sp.symbols("x p")
+    faster = sp.Piecewise((x - sp.Rational(1, 2), x > sp.Rational(1, 2)), (0, True))
+    model = fs.Model({x: p + sp.Abs(x) + faster}, parameters={p: -1})
+    points = fs.continue_equilibria(model, "p", over=(-1, 1)).boundary_equilibria
+    (point,) = (b for b in points if b["x"] == 0)
+    near, far = (boundary_delay(point, 0.01, level={"x": level}) for level in (0.5, 1))
+    assert near.delay < far.delay < near.delay + 0.01 * math.log(2)
+    monkeypatch.setattr(boundary_delays, "REGIONS", 1)
+    law = boundary_delay(point, 0.01, level={"x": 1})
+    assert math.isnan(law.delay)
+    assert "does not reach the level" in law.validity
 
 
 def test_a_level_on_the_interface(corner):

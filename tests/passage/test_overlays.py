@@ -15,6 +15,17 @@ def lay(gear):
     return fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=3))
 
 
+def test_a_state_at_rest_along_the_branch_has_the_unit_of_the_mode_there():
+    """y = w and x = 0; in the mode of rate −1 that moves y, x is exp(3 w) times as large."""
+    x, y, w, t = sp.symbols("x y w t")
+    rates = {x: -2 * x + sp.exp(3 * y) * (y - w), y: w - y}
+    model = fs.Model(rates, forcing={w: t / 100})
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(0, 2))
+    lay = fs.overlay(diagram, fs.simulate(model, [0, 0], t=(0, 200)))
+    value = diagram.branches[0]["w"][len(diagram.branches[0]) // 2]
+    assert lay.extent[0] == pytest.approx(np.exp(3 * value) * lay.extent[1], rel=1e-9)
+
+
 def test_the_gear_changes_sides_at_the_gap(lay):
     assert [(t.from_sheet, t.to_sheet) for t in lay.transitions] == [("S1", "S3"), ("S3", "S1")] * 3
     assert {t.kind for t in lay.transitions} == {"gap crossing"}

@@ -334,3 +334,8 @@ def test_a_branch_of_one_point_is_a_branch(results):
     assert isinstance(point, Branch)
     diagram = dataclasses.replace(results["crowd"], branches=(point,))
     assert len(fs.plot.diagram(diagram).lines) == 1
+
+
+def test_an_axis_that_is_no_quantity(s_curve):
+    with pytest.raises(fs.ArgumentError, match="y = 3; expected a name or an expression"):
+        fs.plot.diagram(s_curve, 3)
