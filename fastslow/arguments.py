@@ -65,13 +65,13 @@ def takes(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
         places = [n for n in names if parameters[n].kind in _BY_PLACE]
         open_ended = any(p.kind is inspect.Parameter.VAR_POSITIONAL for p in parameters.values())
 
-        without_name = _without_name
+        without_name, called = _without_name, _called
         # what is not in the function's own globals has to be in the closure
         refuse = raise_misfit
 
         def checked(*args: Any, **kwargs: Any) -> Any:
             if len(args) > len(places) and not open_ended:
-                raise without_name(function.__name__, parameters, args, args[len(places)])
+                raise without_name(called(function, args), parameters, args, args[len(places)])
             given = list(args)
             for k, value in enumerate(given):
                 name = names[k] if listed is None and k < len(names) else listed
@@ -92,6 +92,18 @@ def takes(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
         return like(function, checked)
 
     return decorate
+
+
+def settings(cls: type[R]) -> type[R]:
+    """A dataclass whose arguments, where they do not fit, are answered like those of a function."""
+    cls.__init__ = takes()(cls.__init__)  # type: ignore[method-assign]
+    return cls
+
+
+def _called(function: Callable[..., Any], args: Sequence[Any]) -> str:
+    """What a caller wrote to have a function called."""
+    name = function.__name__
+    return type(args[0]).__name__ if name == "__init__" and args else name
 
 
 def _without_name(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from fastslow.arguments import positive, whole
+from fastslow.arguments import positive, settings, whole
 from fastslow.errors import ArgumentError
 
 #: What is counted; everything else is measured.
@@ -16,6 +16,7 @@ COUNTS = {
 }
 
 
+@settings
 @dataclass(frozen=True)
 class Continuation:
     """How a branch is traced. Lengths are in scaled units: the parameter's range is 1.

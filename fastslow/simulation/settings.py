@@ -6,7 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fastslow.arguments import Check, flag, instance, items, real_number, refusal, tolerance, whole
+from fastslow.arguments import (
+    Check,
+    flag,
+    instance,
+    items,
+    real_number,
+    refusal,
+    settings,
+    tolerance,
+    whole,
+)
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.results.named import Named
@@ -15,6 +25,7 @@ from fastslow.results.named import Named
 MOST = 1_000_000
 
 
+@settings
 @dataclass(frozen=True, kw_only=True)
 class Integration:
     """How a trajectory is integrated: error control, method and limits.

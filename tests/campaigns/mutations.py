@@ -16,6 +16,7 @@ import multiprocessing
 import os
 import random
 import re
+import resource
 import shutil
 import signal
 import sys
@@ -39,14 +40,21 @@ TESTS = {
     "__init__": "tests/test_imports.py",
     "arguments": "tests/errors",
     "errors": "tests/errors",
-    "warming": "tests/test_warming.py",
+    "disk": "tests/test_disk.py",
+    "precompilation": "tests/test_precompilation.py",
 }
 
 #: Processor time that no test takes, in seconds, the compilation of every loop included.
 LIMIT = 150
 
+#: Processor time after which the tests of a layer are stopped, in seconds.
+SECONDS = 600
+
 #: Time after which the tests of a layer hang, in seconds, however busy the machine is.
 LONGEST = 3000
+
+#: Stands before the name of each test that begins.
+BEGINS = "begins: "
 
 #: Status of a process that could not import the changed module.
 NOT_IMPORTED = 77
@@ -96,6 +104,7 @@ class Report:
     hung: Counter[str] = field(default_factory=Counter)
     not_imported: Counter[str] = field(default_factory=Counter)
     survived: Counter[str] = field(default_factory=Counter)
+    stopped: Counter[str] = field(default_factory=Counter)
     equivalent: Counter[str] = field(default_factory=Counter)
     faults: list[str] = field(default_factory=list)
 
@@ -104,11 +113,12 @@ class Report:
         """Whether less than nine of ten were noticed, or one of the list was not."""
         named = any("of the list" in fault for fault in self.faults)
         caught = self.caught.total() + self.hung.total()
-        return named or caught < 9 * self.survived.total()
+        return named or caught < 9 * (self.survived.total() + self.stopped.total())
 
     def __str__(self) -> str:
-        columns = (self.caught, self.hung, self.survived, self.not_imported, self.equivalent)
-        lines = [f"{'':14}  caught  hung  survived  not importable  equivalent"]
+        columns = (self.caught, self.hung, self.survived, self.stopped)
+        columns += (self.not_imported, self.equivalent)
+        lines = [f"{'':14}  caught  hung  survived  stopped  not importable  equivalent"]
         for layer in sorted({name for column in columns for name in column}):
             counts = [column[layer] for column in columns]
             lines.append(_row(layer, counts))
@@ -117,7 +127,7 @@ class Report:
 
 
 def _row(name: str, counts: list[int]) -> str:
-    widths = (6, 6, 10, 16, 12)
+    widths = (6, 6, 10, 9, 16, 12)
     return f"{name:14}  " + "".join(f"{n:{w}}" for n, w in zip(counts, widths, strict=True))
 
 
@@ -180,7 +190,8 @@ def random_mutants(layer: str, count: int, seed: int) -> list[Mutant]:
 class Tree:
     """A copy of the project, in which one module at a time is changed."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, seconds: int = SECONDS) -> None:
+        self.seconds = seconds
         self.root = folder / "project"
         self.cache = folder / "cache"
         self.log = folder / "log"
@@ -192,19 +203,17 @@ class Tree:
         self.warm = Path(os.environ.get("FASTSLOW_CACHE", folder / "warm"))
         self.sound: dict[str, bool] = {}
 
-    def tests(self, mutant: Mutant) -> list[list[str]]:
-        """Files of the layer's tests: the related ones, and the others."""
+    def tests(self, mutant: Mutant) -> list[str]:
+        """Files of the layer's tests, the most closely related first."""
         folder = _test_folder(mutant.layer, self.root)
         if mutant.test:
-            return [[mutant.test]]
+            return [mutant.test]
         stem = Path(mutant.file).stem
         every = [folder] if folder.is_file() else sorted(folder.glob("test_*.py"))
         words = re.compile(rf"\b({'|'.join([*_names(mutant.source), stem])})\b")
         mentions = {path: len(words.findall(path.read_text(encoding="utf-8"))) for path in every}
         ordered = sorted(every, key=lambda p: (p.stem != f"test_{stem}", -mentions[p], p))
-        near = [p for p in ordered if p.stem == f"test_{stem}" or mentions[p]]
-        parts = [near, [p for p in ordered if p not in near]]
-        return [[str(p.relative_to(self.root)) for p in part] for part in parts if part]
+        return [str(p.relative_to(self.root)) for p in ordered]
 
     def meet(self, mutant: Mutant) -> tuple[str, str]:
         """Change a module, run tests until one fails, and restore it: what happened, and where."""
@@ -212,11 +221,7 @@ class Tree:
         original = path.read_text(encoding="utf-8")
         path.write_text(mutant.source, encoding="utf-8")
         try:
-            for files in self.tests(mutant):
-                found, where = self._run(files, mutant.file)
-                if found != "survived":
-                    return found, where
-            return "survived", ""
+            return self._run(self.tests(mutant), mutant.file)
         finally:
             path.write_text(original, encoding="utf-8")
 
@@ -232,7 +237,7 @@ class Tree:
             shutil.copytree(self.warm, self.cache)
         module = ".".join(Path(changed).with_suffix("").parts).removesuffix(".__init__")
         process = multiprocessing.get_context("fork").Process(
-            target=_pytest, args=(self.root, self.cache, self.log, module, tests)
+            target=_pytest, args=(self.root, self.cache, self.log, module, tests, self.seconds)
         )
         process.start()
         assert process.pid is not None
@@ -245,12 +250,15 @@ class Tree:
         if process.exitcode == NOT_IMPORTED:
             return "not importable", ""
         text = self.log.read_text(encoding="utf-8", errors="replace")
-        failed = re.search(r"^(?:FAILED|ERROR) (\S+)", text, re.MULTILINE)
+        began = re.findall(rf"^{BEGINS}(.*)$", text, re.MULTILINE)
+        where = began[-1] if began else tests[0]
         if hangs:
-            return "hung", text.strip().splitlines()[-1]
+            return "hung", where
+        if process.exitcode == -signal.SIGXCPU:
+            return "stopped", where
         if process.exitcode == 0:
             return "survived", ""
-        return "caught", failed[1] if failed else tests[0]
+        return "caught", where
 
 
 def _names(source: str) -> list[str]:
@@ -263,17 +271,20 @@ class _Limited:
     """Ends a process in which a test takes too long."""
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
-        print(f"\n{nodeid}", flush=True)
+        print(f"\n{BEGINS}{nodeid}", flush=True)
         signal.setitimer(signal.ITIMER_PROF, LIMIT)
 
 
-def _pytest(root: Path, cache: Path, log: Path, module: str, tests: list[str]) -> None:
+def _pytest(
+    root: Path, cache: Path, log: Path, module: str, tests: list[str], seconds: int
+) -> None:
     """Run tests in a copy of the project, in a process of its own."""
     os.setsid()
     with log.open("w") as file:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
     signal.setitimer(signal.ITIMER_PROF, LIMIT)
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, resource.RLIM_INFINITY))
     os.chdir(root)
     here = {str(ROOT), ""}
     sys.path[:] = [str(root), *(entry for entry in sys.path if entry not in here)]
@@ -304,16 +315,21 @@ def check(tree: Tree, mutant: Mutant, report: Report) -> None:
         "hung": report.hung,
         "not importable": report.not_imported,
         "survived": report.survived,
+        "stopped": report.stopped,
     }
     columns[found][mutant.layer] += 1
-    if found == "survived" or (mutant.test and found != "caught"):
+    if found in ("survived", "stopped") or (mutant.test and found != "caught"):
         report.faults.append(f"{'of the list, ' if mutant.test else ''}{found} {mutant}")
     seconds = time.monotonic() - began
     print(f"{found}, {seconds:.0f} s, {where}: {mutant}", file=sys.stderr, flush=True)
 
 
-def campaign(count: int = 100, seed: int = 1, layer: str = "") -> Report:
-    """The listed changes and random ones, of one layer or spread evenly over all."""
+def campaign(count: int = 100, seed: int = 1, layer: str = "", seconds: int = SECONDS) -> Report:
+    """The listed changes and random ones, of one layer or spread evenly over all.
+
+    The tests of a change that none of them has noticed after ``seconds`` of processor time are
+    stopped; that counts as one that nothing noticed.
+    """
     if layer and layer not in layers():
         raise ValueError(f"{layer} is no layer; those with tests are {', '.join(layers())}")
     for name in HEAVY:
@@ -325,7 +341,7 @@ def campaign(count: int = 100, seed: int = 1, layer: str = "") -> Report:
     for k, name in enumerate(chosen):
         mutants += random_mutants(name, len(range(k, count, len(chosen))), seed)
     with tempfile.TemporaryDirectory(prefix="mutations-") as folder:
-        tree = Tree(Path(folder))
+        tree = Tree(Path(folder), seconds)
         for mutant in mutants:
             if (mutant.file, mutant.original, mutant.mutated) in equivalent:
                 report.equivalent[mutant.layer] += 1

@@ -19,11 +19,24 @@ x, w, u, t = sp.symbols("x w u t")
         (lambda r: r["gap"].spectrum(), "its arguments are name, since, window, samples"),
         (lambda r: fs.simulate(r["gear"]), "simulate() missing a required argument: 'state'"),
         (lambda r: fs.Model(), "Model() missing a required argument: 'rates'"),
+        (lambda r: fs.Integration(rtoll=1e-3), "Integration() got an unexpected keyword argument"),
+        (lambda r: fs.Integration(rtoll=1e-3), "did you mean 'rtol'?"),
+        (lambda r: fs.Continuation(stepsize=1), "did you mean 'step'?"),
+        (lambda r: fs.Continuation(rtol=1), "its arguments are step, smallest_step, largest_step"),
     ],
 )
 def test_arguments_that_do_not_fit(call, message):
     with pytest.raises(TypeError, match=re.escape(message)):
         call(results())
+
+
+def test_settings_without_a_name():
+    with pytest.raises(
+        fs.ArgumentError, match=r"^Integration received 0.001 without a name; .* rt"
+    ):
+        fs.Integration(1e-3)
+    with pytest.raises(fs.ArgumentError, match=r"^Continuation received 7 without a name"):
+        fs.Continuation(*[1e-3] * 9, 7)
 
 
 def test_an_error_inside_a_function_is_not_taken_for_a_misfit():
