@@ -9,6 +9,7 @@ from itertools import chain
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.pycode import PythonCodePrinter
 
@@ -84,6 +85,29 @@ def compile_field(
     address = _address(rows_of, len(model.states), tuple(rename.items()), len(names), len(others))
     n, m = len(model.states), max((len(f) for _, f in modes), default=0)
     return CompiledField(address, others, n, m, len(varying))
+
+
+def compile_function(
+    expression: sp.Expr, unknowns: Sequence[sp.Symbol]
+) -> tuple[int, NDArray[np.float64]]:
+    """Compile an expression with its derivatives by the unknowns, its numbers as parameters.
+
+    Expressions that differ by their numbers alone share their code.
+
+    Returns
+    -------
+    address : int
+        Of ``void(int64, double* unknowns, double* parameters, double* out)``, which fills the
+        value and its derivatives.
+    parameters : ndarray
+    """
+    numbers = sorted(expression.atoms(sp.Float))
+    names = {number: sp.Symbol(f"(number {k})") for k, number in enumerate(numbers)}
+    renaming = {s: sp.Symbol(f"u{k}") for k, s in enumerate(unknowns)}
+    renaming |= {name: sp.Symbol(f"p{k}") for k, name in enumerate(names.values())}
+    row = expression.xreplace(names)
+    address = _address(((row,),), 1, tuple(renaming.items()), len(unknowns), len(numbers))
+    return address, np.array([float(n) for n in numbers])
 
 
 @lru_cache(maxsize=256)

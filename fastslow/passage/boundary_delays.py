@@ -229,10 +229,12 @@ def _behind(
     site: Site, drift: Drift, way: Approach, stop: Event, slowest: float
 ) -> tuple[Place, str, bool]:
     """Where the passage behind an interface ends, why it does not, and whether it is linear."""
-    place, reason, linear = _linear_legs(site, drift, way, stop)
-    if linear:
-        return place, reason, True
-    span = 40.0 * slowest + 4.0 * (abs(place.time) if not reason else 0.0)
+    span = 40.0 * slowest
+    if site.affine(way.behind) and not drift.law:
+        place, reason, linear = _linear_legs(site, drift, way, stop)
+        if linear:
+            return place, reason, True
+        span += 4.0 * (abs(place.time) if not reason else 0.0)
     start = Place(way.behind, way.z[: site.n + 1], way.time)
     place, reason = follow(site, drift, start, stop, span=span)
     return place, reason and NOT_REACHED, False
@@ -241,7 +243,7 @@ def _behind(
 def _linear_legs(site: Site, drift: Drift, way: Approach, stop: Event) -> tuple[Place, str, bool]:
     """The passage behind an interface in closed form; False where it is not linear."""
     field, n, count = site.field, site.n, len(site.field.interfaces)
-    region, z, linear = way.behind, way.z, not drift.law
+    region, z, linear = way.behind, way.z, True
     for _ in range(REGIONS):
         linear &= site.affine(region)
         flow = _flow(site, drift, region)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -52,7 +54,7 @@ def drift_at(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift | No
     model = run.model
     try:
         if name in run.forcing and model is not None:
-            return drift_of_law(_rate(model, name, time), {})
+            return _of_a_forcing(model, slow, time)
         if slow.laws and slow.dense and model is not None:
             return _on_a_path(slow, point, time)
         if slow.laws or not slow.dense:
@@ -92,10 +94,84 @@ def _along_the_run(slow: SlowQuantity, time: float) -> Drift:
     return Drift((after - before) / (2.0 * step), change=change, complete=False)
 
 
+def _of_a_forcing(model: Any, slow: SlowQuantity, time: float) -> Drift:
+    """From the derivatives of a forcing at a time."""
+    rate = model.forcing[slow.name].diff(TIME)
+    return _drift_of(model, rate, {}, time, ())
+
+
 def _of_a_slow_state(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift:
     """From the rate of a slow state, its gradient at the special point, and what else moves."""
-    law = _rate(slow.run.model, slow.name, time).xreplace(_moving(slow, time))
-    return drift_of_law(law, {n: point[n] for n in (*slow.states, slow.name)})
+    model, names = slow.run.model, (*slow.states, slow.name)
+    others = [n for n in slow.run.columns if n not in names]
+    rate = model.rates[slow.name]
+    if any(symbol.name in others for symbol in rate.free_symbols):
+        law = _rate(model, slow.name, time).xreplace(_moving(slow, time))
+        return drift_of_law(law, {n: point[n] for n in names})
+    here = {n: float(point[n]) for n in names}
+    return _drift_of(model, rate, here, time, names)
+
+
+def _drift_of(
+    model: Any, rate: sp.Expr, here: Mapping[str, float], time: float, names: tuple[str, ...]
+) -> Drift:
+    """As `drift_of_law` of a rate in the parameters of a model, by functions that are made once.
+
+    Parameters
+    ----------
+    model : Model
+    rate : Expr
+    here : mapping
+        Values of the states and the slow quantity at the special point.
+    time : float
+        When it is passed.
+    names : tuple of str
+        Of ``here``, in order; the slow quantity is the last.
+    """
+    known = {n: sp.Float(v, DIGITS) for n, v in model.values.items() if n in rate.free_symbols}
+    arguments = (*known, *map(real, names), TIME)
+    values = _values(rate, arguments, (*map(real, names), TIME))
+    given = [*map(float, known.values()), *(here[n] for n in names), time]
+    try:
+        value, *slopes, change = map(float, values(*given))
+    except (TypeError, ValueError, NameError, ArithmeticError):
+        value, slopes, change = math.nan, [], math.nan
+    if not all(map(math.isfinite, (value, *slopes, change))):
+        # what these functions cannot tell, SymPy may
+        return drift_of_law(rate.xreplace({**known, TIME: _later(time)}), here)
+    text = ""
+    if not _linear(rate, arguments[len(known) :]):
+        moved = rate.xreplace(known)
+        if not _linear(moved, arguments[len(known) :]):
+            text = str(moved.xreplace({TIME: _later(time)}))
+    *states, last = [*names] or [""]
+    by = dict(zip(names, slopes, strict=True))
+    return Drift(
+        value,
+        change=change,
+        by_value=by.get(last, 0.0),
+        by_state={n: by[n] for n in states},
+        law=text,
+    )
+
+
+@lru_cache(maxsize=128)
+def _values(
+    rate: sp.Expr, arguments: tuple[sp.Symbol, ...], moving: tuple[sp.Symbol, ...]
+) -> Callable[..., Any]:
+    """A rate and its slopes as a function of numbers."""
+    slopes = [rate.diff(s) if s in rate.free_symbols else sp.Integer(0) for s in moving]
+    function: Callable[..., Any] = sp.lambdify(arguments, [rate, *slopes], "math")
+    return function
+
+
+@lru_cache(maxsize=256)
+def _linear(law: sp.Expr, moving: tuple[sp.Symbol, ...]) -> bool:
+    """Whether a rate is linear, or at least affine, in what moves."""
+    inside = [s for s in moving if s in law.free_symbols]
+    return not law.has(sp.Piecewise) and all(
+        sp.expand(law.diff(s).diff(other)) == 0 for s in inside for other in inside
+    )
 
 
 def _on_a_path(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift:
@@ -119,9 +195,13 @@ def _rate(model: Any, name: str, time: float) -> sp.Expr:
     """The rate of a slow quantity, t from a time on."""
     law = model.forcing[name].diff(TIME) if name in model.forcing else model.rates[name]
     numbers = {n: sp.Float(v, DIGITS) for n, v in model.values.items()}
-    # a time below the normal numbers is the rounding of 0, and has no decimals to be read again
-    later = sp.Float(time, DIGITS) if abs(time) >= sys.float_info.min else 0
-    return law.xreplace({**numbers, TIME: later + TIME})
+    return law.xreplace({**numbers, TIME: _later(time)})
+
+
+def _later(time: float) -> sp.Expr:
+    """The time from a time on."""
+    # one below the normal numbers is the rounding of 0, and has no decimals to be read again
+    return TIME + (sp.Float(time, DIGITS) if abs(time) >= sys.float_info.min else 0)
 
 
 def _moving(slow: SlowQuantity, time: float) -> dict[sp.Symbol, sp.Expr]:
@@ -159,9 +239,7 @@ def drift_of_law(law: sp.Expr, here: Mapping[str, float]) -> Drift:
     at: dict[sp.Symbol, Any] = {TIME: 0.0, **{real(n): float(v) for n, v in here.items()}}
     moving = [s for s in at if s in law.free_symbols]
     slopes = {s: law.diff(s) for s in moving}
-    linear = not law.has(sp.Piecewise) and all(
-        sp.expand(slope.diff(s)) == 0 for slope in slopes.values() for s in moving
-    )
+    linear = _linear(law, tuple(moving))
     values = {s.name: _number(slope, at) for s, slope in slopes.items()}
     *states, name = [*here] or [""]
     return Drift(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,19 @@ Array = NDArray[np.float64]
 
 #: A step resolves the fastest motion; after this many it doubles at every further tenth of them.
 FINE = 2000
+COARSER = FINE // 10
 
 #: Steps in all: the last ones are 2^90 times the first.
 STEPS = 20_000
+
+#: Steps that are taken at once.
+BLOCK = 64
+
+#: Evaluations for the place of a root within a step.
+TRIALS = 100
+
+#: A matrix is brought below this by halving before its exponential is summed, in so many terms.
+HALVED, TERMS = 0.5, 16
 
 #: Fixed-point and Newton steps for the slow manifold: it converges by the ratio of time scales.
 ITERATIONS = 60
@@ -92,8 +101,6 @@ class LinearFlow:
 
     def slow_motion(self, manifold: Array, time: float) -> Array:
         """Give z on the slow manifold at a time, with μ = 0 at t = 0."""
-        from scipy.linalg import expm
-
         along, in_time, offset = manifold
         whole = np.zeros((3, 3))
         whole[0] = [
@@ -102,7 +109,7 @@ class LinearFlow:
             self.rate + self.feedback @ offset,
         ]
         whole[1, 2] = 1.0
-        mu = float((expm(whole * time) @ np.array([0.0, 0.0, 1.0]))[0])
+        mu = float(exponential(whole * time)[0, 2])
         return np.concatenate([along * mu + in_time * time + offset, [mu, time, 1.0]])
 
     def slow_crossing(self, manifold: Array, row: Array) -> float:
@@ -121,9 +128,7 @@ class LinearFlow:
 
     def at(self, start: Array, time: float) -> Array:
         """Give z at a time after it was ``start``."""
-        from scipy.linalg import expm
-
-        return np.asarray(expm(self.matrix * time) @ start)
+        return np.asarray(exponential(self.matrix * time) @ start)
 
     def _height(self, row: Array, start: Array, time: float) -> float:
         return float(row @ self.at(start, time))
@@ -144,32 +149,81 @@ class LinearFlow:
         row : int
             −1 if never.
         """
-        from scipy.linalg import expm
-
         speed = float(np.abs(np.linalg.eigvals(self.jacobian)).max(initial=0.0))
         step = 0.1 / max(speed, 1e-300)
-        through = expm(self.matrix * step)
-        z, time = start, 0.0
-        for count in range(1, STEPS + 1):
-            with np.errstate(over="ignore", invalid="ignore"):
-                following = through @ z
-            if not np.isfinite(following).all():
-                break
-            passed = np.flatnonzero(rows @ following < 0.0)
-            if len(passed):
-                part, row = min((self._root(rows[k], z, step), int(k)) for k in passed)
-                return time + part, row
-            z, time = following, time + step
-            if count >= FINE and count % (FINE // 10) == 0:
-                step *= 2.0
-                with np.errstate(over="ignore", invalid="ignore"):
-                    through = through @ through
+        with np.errstate(over="ignore", invalid="ignore"):
+            through = exponential(self.matrix * step)
+            powers = _powers(through)
+            z, time, count = start, 0.0, 0
+            while count < STEPS:
+                following = powers @ z
+                lost = ~np.isfinite(following).all(axis=1)
+                passed = (following @ rows.T < 0.0) & ~np.logical_or.accumulate(lost)[:, None]
+                if passed.any():
+                    k = int(np.argmax(passed.any(axis=1)))
+                    z = following[k - 1] if k else z
+                    part, row = min(
+                        (self._root(rows[j], z, step), int(j)) for j in np.flatnonzero(passed[k])
+                    )
+                    return time + k * step + part, row
+                if lost.any():
+                    break
+                z, time, count = following[-1], time + BLOCK * step, count + BLOCK
+                if count >= FINE:
+                    for _ in range((count - FINE) // COARSER - (count - BLOCK - FINE) // COARSER):
+                        step, through = 2.0 * step, through @ through
+                    powers = _powers(through)
         return math.nan, -1
 
     def _root(self, row: Array, start: Array, step: float) -> float:
         """When row·z turns negative within a step."""
-        from scipy.optimize import brentq
-
-        if float(row @ start) <= 0.0:
+        low, high = 0.0, step
+        left, right = float(row @ start), self._height(row, start, step)
+        if left <= 0.0:
             return 0.0
-        return float(brentq(partial(self._height, row, start), 0.0, step, xtol=1e-15 * step))
+        side = 0
+        for _ in range(TRIALS):
+            if not high - low > 1e-15 * step:
+                break
+            # regula falsi, the value at the end that stays halved (Illinois)
+            middle = (low * right - high * left) / (right - left) if right < left else low
+            if not low < middle < high:
+                middle = 0.5 * (low + high)
+            value = self._height(row, start, middle)
+            if value > 0.0:
+                right = 0.5 * right if side > 0 else right
+                low, left, side = middle, value, 1
+            else:
+                left = 0.5 * left if side < 0 else left
+                high, right, side = middle, value, -1
+                low = low if value < 0.0 else middle
+        return high
+
+
+def exponential(matrix: Array) -> Array:
+    """The exponential of a small matrix, by its series and by squaring.
+
+    Examples
+    --------
+    >>> turn = exponential(np.array([[0.0, -10.0], [10.0, 0.0]]))
+    >>> np.allclose(turn, [[np.cos(10), -np.sin(10)], [np.sin(10), np.cos(10)]], atol=1e-13)
+    True
+    """
+    size = float(np.abs(matrix).sum(axis=1).max(initial=0.0))
+    halvings = max(0, math.ceil(math.log2(size / HALVED))) if 0.0 < size < math.inf else 0
+    scaled = matrix * 0.5**halvings
+    unit = np.eye(len(matrix))
+    result = unit + scaled / TERMS
+    for k in range(TERMS - 1, 0, -1):
+        result = unit + scaled @ result / k
+    for _ in range(halvings):
+        result = result @ result
+    return np.asarray(result)
+
+
+def _powers(matrix: Array) -> Array:
+    """A matrix to the powers 1, 2, …, `BLOCK`."""
+    found = matrix[None]
+    while len(found) < BLOCK:
+        found = np.concatenate([found, found[-1] @ found])
+    return found

@@ -5,36 +5,101 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from functools import cache, cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.model.structure import read_expression, real
+from fastslow.compiled.generic import load_loop
+from fastslow.passage.drift_laws import NODES, DriftLaw, drift_law
 from fastslow.passage.sites import TURN, Site
 from fastslow.results.drifts import Drift
 
 Array = NDArray[np.float64]
 
-#: Relative error of the integration: a law is wrong by more, and LSODA reaches no less.
-RTOL = 1e-11
-
-#: Error allowed in what is small, by the unit of a state and the way that the parameter goes.
-ATOL = 1e-14
-
-#: Error of the integrated passage, relative: that of LSODA over some thousand steps.
+#: Error of the integrated passage, relative: ten thousand times what it is found to be.
 NUMERICAL = 1e-7
 
 #: A law is off by no more than this many times what separates it from the integrated passage.
 SAFETY = 1.25
 
-#: Halvings of a step to where an event is.
-BISECTIONS = 60
-
 #: Regions that are gone through at most on the way to a level.
 REGIONS = 12
+
+#: Why a passage does not end, as its integration tells.
+TOO_LONG, FAILED = "it takes longer than expected", "the integration failed"
+
+_NONE, _NO_SUMS = np.empty(0), np.empty((0, NODES))
+
+
+class Motion(NamedTuple):
+    """The motion within a region, for compiled code.
+
+    Parameters
+    ----------
+    address, region : int
+        Of the frozen model's compiled function.
+    parameters : ndarray
+    width : int
+        Of the function's output.
+    point : ndarray, shape (n + 1,)
+        The special point (x*, w*).
+    signs : ndarray
+        Of the interface functions within the region.
+    """
+
+    address: int
+    region: int
+    parameters: Array
+    width: int
+    point: Array
+    signs: Array
+
+
+class Law(NamedTuple):
+    """w' of a drift, for compiled code: the sum of what is given.
+
+    Parameters
+    ----------
+    rate, change : float
+    gradient : ndarray, shape (n + 1,)
+    breaks, coefficients : ndarray
+        A table over time, empty for none.
+    address : int
+        Of a compiled function, 0 for none.
+    numbers : ndarray
+        Its parameters.
+    """
+
+    rate: float
+    change: float
+    gradient: Array
+    breaks: Array = _NONE
+    coefficients: Array = _NO_SUMS
+    address: int = 0
+    numbers: Array = _NONE
+
+
+class End(NamedTuple):
+    """What ends a passage, for compiled code.
+
+    Parameters
+    ----------
+    kind : int
+        0 an interface only, 1 that w passes w*, 2 a turn of w, 3 a level.
+    number : int
+        Of the state that reaches a level.
+    height : float
+        Of the level above the point.
+    way : float
+        Direction of the drift.
+    """
+
+    kind: int
+    number: int
+    height: float
+    way: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,27 +122,33 @@ class LocalDrift:
         return np.array([*(self.drift.by_state.get(n, 0.0) for n in names), self.drift.by_value])
 
     @cached_property
-    def _law(self) -> Callable[..., Any] | None:
-        if not self.drift.law:
-            return None
-        names = [*self.site.field.model.states, self.site.field.parameter, "t"]
-        expression = read_expression("law of the drift", self.drift.law, names)
-        return sp.lambdify([real(n) for n in names], expression, "numpy")
+    def _law(self) -> DriftLaw | None:
+        names = (*self.site.field.model.states, self.site.field.parameter)
+        return drift_law(self.drift.law, names) if self.drift.law else None
 
     def __call__(self, z: Array, time: float) -> float:
         """Rate w' at z = (x − x*, w − w*)."""
         if self._law is not None:
-            return float(self._law(*(self.site.u + z), time))
+            return self._law.at(self.site.u + z, time)
         return float(self.drift.rate + self.drift.change * time + self.gradient @ z)
 
     def on_a_path(self, states: Array) -> Array:
         """Rate w' at states (N, n) with w = w* and t = 0, shape (N,)."""
-        here = float(self.site.u[-1])
         if self._law is not None:
-            values = self._law(*states.T, np.full(len(states), here), np.zeros(len(states)))
-            return np.broadcast_to(np.asarray(values, dtype=float), len(states)).copy()
+            here = np.full(len(states), float(self.site.u[-1]))
+            return self._law.along(np.column_stack([states, here]), np.zeros(len(states)))
         rate = self.drift.rate + (states - self.site.u[:-1]) @ self.gradient[:-1]
         return np.asarray(rate, dtype=float)
+
+    def numbers(self, start: float, stop: float) -> Law:
+        """For compiled code, from one time to another."""
+        law, none = self._law, np.zeros(len(self.gradient))
+        if law is None:
+            return Law(self.drift.rate, self.drift.change, self.gradient)
+        if law.in_time:
+            return Law(0.0, 0.0, none, *law.table(start, stop))
+        address, numbers = law.compiled
+        return Law(0.0, 0.0, none, address=address, numbers=numbers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,60 +268,45 @@ def _legs(
 def _leg(
     site: Site, speed: LocalDrift, start: Place, stop: Event | None, way: float, final: float
 ) -> tuple[Place, int, str]:
-    """Integrate within one region: where it ends, by which interface (−1: the event), and why not.
-
-    The steps of LSODA one by one: its interpolant does not join them to rounding, so that a
-    change of sign between steps is found by bisection that needs none at their ends.
-    """
-    from scipy.integrate import LSODA
-
-    region, field, n = start.region, site.field, site.n
+    """Integrate within one region: where it ends, by which interface (−1: the event), why not."""
+    field, n = site.field, site.n
     count = len(field.interfaces)
-    allowed = ATOL * np.append(site.unit, abs(start.z[n]) or abs(speed.drift.rate * final))
+    reach = abs(float(start.z[n])) or abs(speed.drift.rate * final)
+    motion = Motion(
+        field.compiled.address,
+        start.region,
+        field.values,
+        field.compiled.size,
+        site.u,
+        np.ascontiguousarray(field.signs[start.region, :count]),
+    )
+    z, time, met, status = _passes()(
+        motion,
+        speed.numbers(start.time, final),
+        _end(stop, way),
+        np.array(start.z, dtype=float),
+        (float(start.time), float(final)),
+        np.append(site.unit, reach),
+    )
+    return Place(start.region, z, time), met, ("", TOO_LONG, FAILED)[status]
 
-    def rates(t: float, z: Array) -> Array:
-        values, _, _, _ = field.at(region, site.u + z)
-        return np.append(values, speed(z, t))
 
-    def slopes(t: float, z: Array) -> Array:
-        _, table, _, _ = field.at(region, site.u + z)
-        return np.vstack([table[:, : n + 1], speed.gradient])
+def _end(stop: Event | None, way: float) -> End:
+    """What ends a passage, in numbers."""
+    if stop is None:
+        return End(1, 0, 0.0, way)
+    if stop.level == TURN:
+        return End(2, 0, 0.0, way)
+    if isinstance(stop.level, tuple):
+        return End(3, stop.level[0], float(stop.level[1]), way)
+    return End(0, 0, 0.0, way)
 
-    def signs(t: float, z: Array) -> Array:
-        _, _, heights, _ = field.at(region, site.u + z)
-        if stop is None:
-            end = way * float(z[n])
-        elif stop.level == TURN:
-            end = way * speed(z, t)
-        elif isinstance(stop.level, tuple):
-            end = float(z[stop.level[0]] - stop.level[1])
-        else:
-            end = 1.0
-        return np.append(field.signs[region, :count] * heights[:count], end)
 
-    before = signs(start.time, start.z)
-    # the interface that was just crossed is met to rounding
-    floor = np.append(np.minimum(before[:count], 0.0), 0.0)
-    ending = math.copysign(1.0, before[count])
-    sense = np.append(np.ones(count), ending)
-    with np.errstate(all="ignore"):
-        solver = LSODA(rates, start.time, start.z, final, rtol=RTOL, atol=allowed, jac=slopes)
-        while solver.status == "running":
-            solver.step()
-            if solver.status == "failed" or not np.isfinite(solver.y).all():
-                return Place(region, solver.y, solver.t), -1, "the integration failed"
-            passed = np.flatnonzero(sense * signs(solver.t, solver.y) < floor)
-            if not len(passed):
-                continue
-            inside, low, high = solver.dense_output(), solver.t_old, solver.t
-            for _ in range(BISECTIONS):
-                middle = 0.5 * (low + high)
-                over = np.flatnonzero(sense * signs(middle, inside(middle)) < floor)
-                low, high = (low, middle) if len(over) else (middle, high)
-                passed = over if len(over) else passed
-            met = -1 if count in passed else int(passed[0])
-            return Place(region, np.asarray(inside(high)), high), met, ""
-    return Place(region, solver.y, solver.t), -1, "it takes longer than expected"
+@cache
+def _passes() -> Callable[..., Any]:
+    """The compiled loop over steps."""
+    arguments = ("motion", "law", "end", "start", "times", "unit")
+    return load_loop("fastslow.passage.radau_passages", "pass_through", arguments)
 
 
 def reached_delay(

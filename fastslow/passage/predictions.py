@@ -38,7 +38,7 @@ def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
         if exits:
             found.append(replace(t, law=exit_law(p, t, point, modes)))
             continue
-        passed = _passing(p, point, t.time)
+        passed = p.passing(point, t.time)
         drift = None if passed is None else drift_at(p.slow, point, passed)
         where: str | dict[str, float] | None = None
         if t.kind == "jump":
@@ -51,18 +51,6 @@ def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
             law = with_memory(p, t, transitions, law, drift, passed)
         found.append(replace(t, law=law))
     return found
-
-
-def _passing(p: Passage, point: SpecialPoint, until: float) -> float | None:
-    """When the slow quantity last passed a special point before a time."""
-    value, time = point[p.diagram.parameter], p.m.time
-    row = int(np.searchsorted(time, until, side="right"))
-    passed = np.flatnonzero(np.diff(p.m.slow[:row] > value))
-    if not len(passed):
-        return None
-    before = int(passed[-1])
-    rising = p.m.slow[before] <= value
-    return p.first(float(time[before]), float(time[before + 1]), lambda w, _: (w > value) == rising)
 
 
 def _law(

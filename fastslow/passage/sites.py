@@ -84,20 +84,25 @@ class Site:
 
     def affine(self, region: int) -> bool:
         """Whether a region's rates and all interfaces are affine in states and parameter."""
-        moving = [real(n) for n in (*self.field.model.states, self.field.parameter)]
-        functions = [*self.field.rates(region), *self.field.modes[region].rows]
-        return all(
-            sp.expand(f.diff(a)).free_symbols.isdisjoint(moving)
-            for f in functions
-            for a in moving
-            if a in f.free_symbols
-        )
+        return _affine(self.field, region)
 
     @property
     def _numbers(self) -> dict[sp.Symbol, float]:
         names = (*self.field.model.states, self.field.parameter)
         values = self.field.model.values
         return {**values, **{real(n): float(v) for n, v in zip(names, self.u, strict=True)}}
+
+
+@lru_cache(maxsize=256)
+def _affine(field: FrozenField, region: int) -> bool:
+    moving = [real(n) for n in (*field.model.states, field.parameter)]
+    functions = [*field.rates(region), *field.modes[region].rows]
+    return all(
+        sp.expand(f.diff(a)).free_symbols.isdisjoint(moving)
+        for f in functions
+        for a in moving
+        if a in f.free_symbols
+    )
 
 
 def site_of(point: SpecialPoint, parameter: object, model: Model | None) -> Site:

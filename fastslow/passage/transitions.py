@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +32,13 @@ RETURN = 1e-3
 
 #: A turn between samples is bracketed 16 times closer so often before a parabola is put through it.
 CLOSER = 4
+
+#: Rounding of a number of size one.
+EPSILON = float(np.finfo(float).eps)
+
+#: Places between two times, and about where a condition is expected to begin to hold.
+EVEN = np.linspace(0.0, 1.0, 17)
+NEARBY = np.concatenate([-(10.0 ** -np.arange(1, 13)), [0.0], 10.0 ** -np.arange(1, 13)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,16 +86,21 @@ class Passage:
         start, stop : float
             Times; at the second the condition holds.
         over : callable
-            (slow (N,), state (N, n)) -> bool (N,).
+            (slow (N,), state (N, n)) -> (N,), not negative where it holds.
         """
-        while stop - start > 4.0 * np.finfo(float).eps * max(abs(start), abs(stop)):
-            times = np.linspace(start, stop, 33)
-            holds = np.asarray(over(*self.slow.at(times)), dtype=bool)
-            holds[0], holds[-1] = False, True
+        guess = 0.5 * (start + stop)
+        while stop - start > 4.0 * EPSILON * max(abs(start), abs(stop)):
+            times = np.concatenate([start + (stop - start) * EVEN, guess + (stop - start) * NEARBY])
+            times = np.sort(np.clip(times, start, stop))
+            value = np.asarray(over(*self.slow.at(times)))
+            holds = value >= 0.0
+            holds[times <= start], holds[times >= stop] = False, True
             k = int(np.argmax(holds))
             if not times[k] - times[k - 1] < stop - start:
                 break
             start, stop = float(times[k - 1]), float(times[k])
+            rows = slice(max(k - 2, 0), k + 2)
+            guess = zero_between(times[rows], value[rows], start, stop)
         return stop
 
     def left(self, stay: Stay, rival: int | None) -> Moment:
@@ -98,12 +112,12 @@ class Passage:
 
         def away(slow: Array, state: Array) -> Array:
             scaled = state / self.m.extent
-            far = ~self.m.beside(stay.course, slow, scaled)
+            far = -self.m.nearness(stay.course, slow, scaled)
             if other is not None:
                 old, new = (c.state(slow) / self.m.extent for c in (course, other))
                 way = way_done(scaled, old, new, self.m.periods)
-                far |= other.present(slow) & (way > WAY)
-            return np.asarray(far)
+                far = np.where(other.present(slow), np.maximum(far, way - WAY), far)
+            return far
 
         return self.moment(self.first(float(time[stay.stop - 1]), float(time[stay.stop]), away))
 
@@ -112,13 +126,39 @@ class Passage:
         time, course = self.m.time, self.m.courses[stay.course]
 
         def near(slow: Array, state: Array) -> Array:
-            beside = self.m.beside(stay.course, slow, state / self.m.extent)
-            return np.asarray(course.present(slow) & beside)
+            beside = self.m.nearness(stay.course, slow, state / self.m.extent)
+            return np.where(course.present(slow), beside, -1.0)
 
         since = max(float(time[max(stay.start - 1, 0)]), not_before)
         if since >= time[stay.start]:
             return self.moment(since)
-        return self.moment(self.first(since, float(time[stay.start]), near))
+        if (stay, since) not in self._landings:
+            found = self.moment(self.first(since, float(time[stay.start]), near))
+            self._landings[stay, since] = found
+        return self._landings[stay, since]
+
+    @cached_property
+    def _landings(self) -> dict[tuple[Stay, float], Moment]:
+        return {}
+
+    def passing(self, point: SpecialPoint, until: float) -> float | None:
+        """When the slow quantity last passed a special point before the sample after a time."""
+        value, time = point[self.diagram.parameter], self.m.time
+        stop = int(np.searchsorted(time, until, side="right"))
+        passed = np.flatnonzero(np.diff(self.m.slow[:stop] > value))
+        if not len(passed):
+            return None
+        row = int(passed[-1])
+        if (value, row) not in self._passings:
+            way = 1.0 if self.m.slow[row] <= value else -1.0
+            self._passings[value, row] = self.first(
+                float(time[row]), float(time[row + 1]), lambda w, _: way * (w - value)
+            )
+        return self._passings[value, row]
+
+    @cached_property
+    def _passings(self) -> dict[tuple[float, int], float]:
+        return {}
 
     def two_thirds(self, old: Stay, new: Stay) -> Moment | None:
         """Where two thirds of the way from one course to another are done."""
@@ -134,7 +174,7 @@ class Passage:
             unit = self.m.extent
             places = one.state(slow) / unit, other.state(slow) / unit
             way = way_done(state / unit, *places, self.m.periods)
-            return np.asarray(other.present(slow) & (way > WAY))
+            return np.where(other.present(slow), way - WAY, -1.0)
 
         return self.moment(self.first(float(self.m.time[row - 1]), float(self.m.time[row]), done))
 
@@ -196,20 +236,37 @@ class Passage:
     def slope(self, point: SpecialPoint | None, until: float) -> float:
         """|dw/dt| where the slow quantity last passed a special point before a time, or then."""
         time = self.m.time
-        row = max(int(np.searchsorted(time, until, side="right")) - 1, 0)
-        if point is not None:
-            value = point[self.diagram.parameter]
-            change = np.flatnonzero(np.diff(self.m.slow[: row + 1] > value))
-            if len(change):
-                row = int(change[-1])
-                rising = self.m.slow[row] <= value
-                until = self.first(
-                    float(time[row]), float(time[row + 1]), lambda w, _: (w > value) == rising
-                )
+        passed = None if point is None else self.passing(point, until)
+        until = until if passed is None else passed
         step = 1e-5 * float(time[-1] - time[0])
         pair = np.clip([until - step, until + step], time[0], time[-1])
         first, second = self.slow.at(pair)[0]
         return float(abs(second - first) / (pair[1] - pair[0])) if pair[1] > pair[0] else 0.0
+
+
+def zero_between(times: Array, values: Array, start: float, stop: float) -> float:
+    """Where values at up to four times vanish, between two of these, by inverse interpolation.
+
+    The middle where the values do not rise.
+
+    Examples
+    --------
+    >>> t = np.array([0.0, 1.0, 2.0, 3.0])
+    >>> round(zero_between(t, (t + 1) ** 3 - 10, 1.0, 2.0), 3)
+    1.155
+    """
+    for used in (slice(None), (times >= start) & (times <= stop)):
+        t, v = times[used].tolist(), values[used].tolist()
+        if not all(b > a for a, b in pairwise(v)):
+            continue
+        # Neville's scheme for the time as a function of the value
+        for level in range(1, len(t)):
+            for k in range(len(t) - level):
+                a, b = v[k], v[k + level]
+                t[k] = (b * t[k] - a * t[k + 1]) / (b - a)
+        if start < t[0] < stop:
+            return float(t[0])
+    return 0.5 * (start + stop)
 
 
 def passages_within(p: Passage, stay: Stay) -> list[Transition]:
@@ -224,7 +281,7 @@ def passages_within(p: Passage, stay: Stay) -> list[Transition]:
         low, high = course.ranges[course.sheets.index(int(p.followed[row]))]
 
         def entering(slow: Array, state: Array, low: float = low, high: float = high) -> Array:
-            return np.asarray((slow >= low) & (slow <= high))
+            return np.minimum(slow - low, high - slow)
 
         here = p.moment(p.first(float(p.m.time[row - 1]), float(p.m.time[row]), entering))
         kind, note = "crossing", ""

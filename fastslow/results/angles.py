@@ -44,7 +44,7 @@ def nearest_copy(values: ArrayLike, target: ArrayLike, periods: ArrayLike) -> Ar
 def apart(one: ArrayLike, other: ArrayLike, periods: ArrayLike) -> Array:
     """Difference of two states, modulo the periods."""
     difference = np.asarray(one, dtype=float) - np.asarray(other, dtype=float)
-    return nearest_copy(difference, 0.0, periods)
+    return nearest_copy(difference, 0.0, periods) if np.any(periods) else difference
 
 
 def copies(value: float, low: float, high: float, period: float) -> list[float]:

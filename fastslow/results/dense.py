@@ -46,10 +46,13 @@ def evaluate(
     """All columns at offsets into given steps, shape (n + n_forcing, N)."""
     assert run.series is not None
     if len(row) < len(run.series):
-        value = run.series[row, :, -1].T
-        for k in range(run.series.shape[2] - 2, -1, -1):
-            value = value * offset + run.series[row, :, k].T
-        return np.ascontiguousarray(value)
+        # the coefficients of one power side by side
+        taken = np.ascontiguousarray(run.series[row].transpose(2, 1, 0))
+        value = taken[-1]
+        for power in taken[-2::-1]:
+            value *= offset
+            value += power
+        return value
     # many times: coefficients of one power side by side, each step's as often as it is needed
     powers = run.series.transpose(2, 1, 0)
     ordered = bool((row[1:] >= row[:-1]).all())

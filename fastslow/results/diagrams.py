@@ -314,7 +314,13 @@ class Diagram(Table, Result):
             For a number below one.
         """
         self._warn("bistable()")
-        return stretches.multistable(self.branches, at_least)
+        if at_least not in self._multistable:
+            self._multistable[at_least] = stretches.multistable(self.branches, at_least)
+        return self._multistable[at_least].copy()
+
+    @cached_property
+    def _multistable(self) -> dict[int, NDArray[np.float64]]:
+        return {}
 
     def nearest(self, **values: float) -> Equilibrium:
         """The point of any branch nearest to some values; see `Branch.nearest`."""

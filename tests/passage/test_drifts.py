@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.passage.drifts import drift_at
+from fastslow.passage.drifts import _rate, drift_at, drift_of_law
 from fastslow.passage.slow_quantities import slow_quantity
 
 x, v, w, z, t = sp.symbols("x v w z t")
@@ -153,3 +153,23 @@ def test_drifts_are_read():
     assert not drift.constant
     assert fs.Drift(1).constant
     assert fs.Drift(-2).way == -1.0
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        sp.cos(t / 50) / 3,
+        t / 100 - t**2 / 20000,
+        sp.Piecewise((t / 100, t < 30), (sp.Rational(3, 10) + (t - 30) / 200, True)),
+        sp.exp(-t / 40) * sp.Symbol("a"),
+    ],
+)
+def test_functions_that_are_made_once_give_the_drift_that_sympy_gives(law):
+    model = fs.Model({x: w - x}, forcing={w: law}, parameters={"a": 2})
+    slow = slow_quantity(
+        fs.continue_equilibria(model.frozen(), "w", over=(-1, 3)),
+        fs.simulate(model, [0.0], t=(0, 40)),
+    )
+    for time in (7.3, 33.1):
+        found = drift_at(slow, None, time)
+        assert found == drift_of_law(_rate(model, "w", time), {})

@@ -5,6 +5,8 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.passage.slow_quantities import slow_quantity
+from fastslow.passage.transitions import Passage
 
 x, v, w, t, omega = sp.symbols("x v w t omega")
 
@@ -226,3 +228,30 @@ def test_two_clearances_are_crossed_each_by_its_law():
         assert t_.duration == pytest.approx(t_.law.transit_time, rel=1e-4)
     words = " ".join(lay.bursting.evidence)
     assert "symmetric" not in words
+
+
+def test_the_first_time_of_a_condition_is_found_to_rounding_in_few_evaluations():
+    """x' = w − x passes 1/2 once, twice or at a jump of the condition."""
+    model = fs.Model({x: w - x}, forcing={w: sp.sin(t / 10)})
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(-1, 1))
+    run = fs.simulate(model, [0.0], t=(0, 60))
+    p = Passage(diagram, slow_quantity(diagram, run), None, (), None, None)
+    count = 0
+
+    def counted(condition):
+        def over(slow, state):
+            nonlocal count
+            count += 1
+            return condition(slow, state)
+
+        return over
+
+    found = p.first(0.0, 15.0, counted(lambda w, _: w - 0.5))
+    assert found == pytest.approx(10 * np.arcsin(0.5), rel=1e-15)
+    assert count <= 5
+    # the first of three passages, and a condition that jumps
+    assert p.first(0.0, 35.0, lambda w, _: np.abs(w) - 0.5) == pytest.approx(found, rel=1e-15)
+    count = 0
+    stepped = p.first(0.0, 15.0, counted(lambda w, _: np.where(w > 0.5, 1.0, -1.0)))
+    assert stepped == pytest.approx(found, rel=1e-15)
+    assert count <= 16

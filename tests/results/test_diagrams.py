@@ -105,3 +105,23 @@ def test_outcomes(gear_diagram):
     assert branch.outcome.success
     assert bool(branch.outcome)
     assert "6" in str(branch.outcomes[1])
+
+
+def test_stability_is_computed_once(gear_diagram, monkeypatch):
+    branch = gear_diagram.branches[0]
+    assert branch.stable is branch.stable
+    assert branch.stability is branch.stability
+    with pytest.raises(ValueError, match="read-only"):
+        branch.stable[0] = False
+    known, intervals = gear_diagram.bistable(1), branch.stable_intervals()
+
+    def again(*_):
+        raise AssertionError("computed again")
+
+    monkeypatch.setattr("fastslow.results.stretches.multistable", again)
+    monkeypatch.setattr("fastslow.results.stretches.stable_intervals", again)
+    assert np.array_equal(gear_diagram.bistable(1), known)
+    assert np.array_equal(branch.stable_intervals(), intervals)
+    # what is given belongs to who asked for it
+    gear_diagram.bistable(1)[:] = 0.0
+    assert np.array_equal(gear_diagram.bistable(1), known)

@@ -1,0 +1,367 @@
+"""A passage of a special point by Radau IIA steps, compiled.
+
+The motion is that of one region, z = (x - x*, w - w*) with x' = F(x, w) by the
+compiled function of a frozen model, and w' by a drift. The steps are those of
+`fastslow.simulation.radau` (Hairer and Wanner 1996, section IV.8), which hold on to a
+slow manifold however stiff the motion towards it is. What ends a passage is where a step
+of another length ends, so that it is as accurate as the steps are.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from fastslow.compiled.parts import part
+from fastslow.compiled.pointers import call_address
+from fastslow.simulation.matrices import factorise_in_place, solve_in_place
+from fastslow.simulation.polynomials import EPSILON
+from fastslow.simulation.radau import BETWEEN, INTO, OUT_OF, POWERS, STAGES, VALUES, WITHIN, C
+
+#: Error allowed within a step, where it is of order STAGES + 1. At its end it is of order
+#: 2 STAGES: over a whole passage some 1e-11 (Hairer and Wanner 1996, section IV.8).
+TOLERANCE = 5e-10
+
+#: A deviation below this part of a state's unit need not be known as well.
+SMALL = 1e-3
+
+#: Newton's method goes on until a state changes by less than this part of its scale.
+SOLVED = 1e-13
+
+#: What is left when it stands still is rounding, below this part of the scale.
+ROUNDING = 1e-8
+
+#: Iterations of Newton's method, and steps in all.
+ITERATIONS, STEPS = 16, 200_000
+
+#: Between two steps the length grows by no more than this factor.
+GROWTH = 4.0
+
+#: What ends a passage, beside an interface: nothing, that w passes w*, its turn, a level.
+INTERFACES, PASSING, TURNING, LEVEL = range(4)
+
+#: How it went.
+ENDED, TOO_LONG, FAILED = range(3)
+
+
+@njit(error_model="numpy", fastmath={"contract"})
+def pass_through(motion, law, end, start, times, unit):
+    """Integrate within one region until something ends the passage.
+
+    Parameters
+    ----------
+    motion : Motion
+    law : Law
+    end : End
+    start : ndarray, shape (n + 1,)
+        z = (x - x*, w - w*).
+    times : (float, float)
+        At the start, and the latest one.
+    unit : ndarray, shape (n + 1,)
+        Of z.
+
+    Returns
+    -------
+    z : ndarray, shape (n + 1,)
+        The last one.
+    time : float
+    met : int
+        Number of the interface that ended it, -1 where it was not an interface.
+    status : int
+        ENDED, TOO_LONG or FAILED.
+    """
+    size, count = start.shape[0], motion.signs.shape[0]
+    space = (
+        np.empty(motion.width),
+        np.empty(size + 1),
+        np.empty(size + 2),
+        np.empty((size, size)),
+        np.empty((VALUES.shape[0], size, size + 1), dtype=np.complex128),
+        np.empty(size, dtype=np.complex128),
+        np.empty((VALUES.shape[0], size), dtype=np.complex128),
+        np.empty((STAGES, size)),
+        np.empty((3, size)),
+    )
+    z, scale, rates = start.copy(), np.empty(size), np.empty(size)
+    Z, kept = np.zeros((STAGES, size)), np.zeros((STAGES, size))
+    heights, here, floor = np.empty((STAGES, count + 1)), np.empty(count + 1), np.empty(count + 1)
+    t, final = times
+    rates_at(motion, law, t, z, space, rates)
+    heights_of(motion, end, z, rates, space, 1.0, here)
+    first = space[0].shape[0] - (space[0].shape[0] // (size + 1) - size + 1) * size
+    for k in range(count):
+        noise = 0.0
+        for i in range(size):
+            noise += abs(space[0][first + k * size + i] * (motion.point[i] + z[i]))
+        # the interface that was just crossed is met to rounding
+        floor[k] = min(here[k], 0.0) - 4.0 * EPSILON * noise
+    floor[count] = 0.0
+    sense = math.copysign(1.0, here[count])
+    here[count] *= sense
+    h = final - t
+    for i in range(size):
+        if rates[i] != 0.0:
+            h = min(h, 0.01 * (abs(z[i]) + SMALL * unit[i]) / abs(rates[i]))
+    last, beyond = 0.0, np.empty(count + 1)
+    # between low and high, lengths of steps that end before and behind what ends the passage, by
+    # the values left and right of the height that is met
+    low = high = left = right = 0.0
+    met, side = -1, 0
+    for _ in range(STEPS):
+        if met < 0:
+            if not t < final:
+                return z, t, -1, TOO_LONG
+            h = min(h, final - t)
+            if not t + 1e-3 * h > t:
+                return z, t, -1, FAILED
+            for i in range(size):
+                noise = 64.0 * EPSILON * abs(motion.point[i]) / TOLERANCE
+                scale[i] = max(abs(z[i]) + SMALL * unit[i], noise)
+            continued(kept, last, h, Z)
+        else:
+            h = between(low, high, left, right)
+            if not t + low < t + h < t + high:
+                other = another(beyond, floor, met)
+                if other < 0:
+                    for i in range(size):
+                        z[i] += kept[STAGES - 1, i]
+                    return z, t + high, met if met < count else -1, ENDED
+                met, side, low = other, 0, 0.0
+                left, right = here[met] - floor[met], beyond[met] - floor[met]
+                h = between(low, high, left, right)
+            for j in range(STAGES):
+                for i in range(size):
+                    Z[j, i] = kept[j, i] * h / high
+        error = step(motion, law, end, t, z, h, scale, sense, space, Z, heights)
+        if met >= 0:
+            if not error < np.inf:
+                return z, t, -1, FAILED
+            # regula falsi, the value at the end that stays halved (Illinois)
+            value = heights[STAGES - 1, met] - floor[met]
+            if value <= 0.0:
+                left = 0.5 * left if side > 0 else left
+                high, right, side = h, value, 1
+                low = low if value < 0.0 else h
+                kept[:] = Z
+                beyond[:] = heights[STAGES - 1]
+            else:
+                right = 0.5 * right if side < 0 else right
+                low, left, side = h, value, -1
+            continue
+        if not error <= 1.0:
+            known = error < np.inf
+            h *= max(0.1, 0.9 * error ** (-1.0 / (STAGES + 1))) if known else 0.25
+            last = last if known else 0.0
+            continue
+        stage = first_below(heights, floor)
+        if stage < STAGES - 1:
+            # a step that ends there comes first
+            h *= C[stage]
+            continue
+        kept[:] = Z
+        if stage < STAGES:
+            beyond[:] = heights[stage]
+            met = another(beyond, floor, -1)
+            low, high, side = 0.0, h, 0
+            left, right = here[met] - floor[met], beyond[met] - floor[met]
+            continue
+        for i in range(size):
+            z[i] += Z[STAGES - 1, i]
+            if not abs(z[i]) < np.inf:
+                return z, t, -1, FAILED
+        here[:] = heights[STAGES - 1]
+        t = t + h
+        last = h
+        h *= min(GROWTH, 0.9 * error ** (-1.0 / (STAGES + 1))) if error > 0.0 else GROWTH
+    return z, t, -1, FAILED
+
+
+@part
+def first_below(heights, floor):
+    """The first stage at which any is, STAGES if none."""
+    for j in range(STAGES):
+        if another(heights[j], floor, -1) >= 0:
+            return j
+    return STAGES
+
+
+@part
+def another(heights, floor, met):
+    """A height below its floor beside one of them, -1 if none."""
+    found = -1
+    for k in range(floor.shape[0]):
+        if k != met and heights[k] < floor[k]:
+            found = k
+    return found
+
+
+@part
+def between(low, high, left, right):
+    """Where the straight line through two values vanishes, or the middle."""
+    found = (low * right - high * left) / (right - left) if right < left else low
+    return found if low < found < high else 0.5 * (low + high)
+
+
+@part
+def continued(kept, last, h, Z):
+    """The increments of the last step, continued, as a first guess of those of the next."""
+    # far beyond the last step its polynomial is no guide
+    known = last > 0.0 and h <= 2.5 * last
+    for i in range(Z.shape[1]):
+        for j in range(STAGES):
+            Z[j, i] = 0.0
+        if not known:
+            continue
+        for k in range(STAGES - 1, -1, -1):
+            coefficient = 0.0
+            for m in range(STAGES):
+                coefficient += POWERS[k, m] * kept[m, i]
+            for j in range(STAGES):
+                s = 1.0 + C[j] * h / last
+                Z[j, i] += coefficient * (s ** (k + 1) - 1.0)
+
+
+@part
+def rates_at(motion, law, t, z, space, rates):
+    """The rates at a place; the output of the compiled function is in the first of the space."""
+    out, inputs, slopes = space[0], space[1], space[2]
+    size = z.shape[0]
+    for i in range(size):
+        inputs[i] = motion.point[i] + z[i]
+    call_address(motion.address, motion.region, inputs, motion.parameters, out)
+    for i in range(size - 1):
+        rates[i] = out[i]
+    speed = law.rate + law.change * t
+    for i in range(size):
+        speed += law.gradient[i] * z[i]
+    if law.breaks.shape[0] > 1:
+        speed += by_table(law.breaks, law.coefficients, t)
+    if law.address != 0:
+        inputs[size] = t
+        call_address(law.address, 0, inputs, law.numbers, slopes)
+        speed += slopes[0]
+    rates[size - 1] = speed
+
+
+@part
+def by_table(breaks, coefficients, t):
+    """A sum of Chebyshev polynomials, other ones between every two breaks (Clenshaw)."""
+    low, high = 0, breaks.shape[0] - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if breaks[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    s = (2.0 * t - breaks[low] - breaks[low + 1]) / (breaks[low + 1] - breaks[low])
+    one = other = 0.0
+    for k in range(coefficients.shape[1] - 1, 0, -1):
+        one, other = 2.0 * s * one - other + coefficients[low, k], one
+    return s * one - other + coefficients[low, 0]
+
+
+@part
+def heights_of(motion, end, z, rates, space, sense, heights):
+    """Interface functions, not negative within the region, and what the event is told by."""
+    out, size, count = space[0], z.shape[0], motion.signs.shape[0]
+    first = (size - 1) * (size + 1)
+    for k in range(count):
+        heights[k] = motion.signs[k] * out[first + k]
+    value = 1.0
+    if end.kind == PASSING:
+        value = end.way * z[size - 1]
+    elif end.kind == TURNING:
+        value = end.way * rates[size - 1]
+    elif end.kind == LEVEL:
+        value = z[end.number] - end.height
+    heights[count] = sense * value if end.kind != INTERFACES else 1.0
+
+
+@part
+def step(motion, law, end, t, z, h, scale, sense, space, Z, heights):
+    """One step: increments at its stages from a guess of them, and the heights there.
+
+    Returns
+    -------
+    float
+        Its error in units of what is allowed, infinite where the equations are not solved.
+    """
+    out, slopes, jacobian, factors, given, moved, F = (
+        space[0], space[2], space[3], space[4], space[5], space[6], space[7],
+    )  # fmt: skip
+    start, place, rates = space[8][0], space[8][1], space[8][2]
+    size, half = z.shape[0], VALUES.shape[0]
+    rates_at(motion, law, t, z, space, start)
+    n = size - 1
+    for i in range(n):
+        for k in range(size):
+            jacobian[i, k] = out[n + i * size + k]
+    for k in range(size):
+        jacobian[n, k] = law.gradient[k] + (slopes[1 + k] if law.address != 0 else 0.0)
+    for m in range(half):
+        for i in range(size):
+            for k in range(size):
+                factors[m, i, k] = -jacobian[i, k]
+            factors[m, i, i] += VALUES[m] / h
+        if not factorise_in_place(factors[m], size):
+            return np.inf
+    before, done = np.inf, False
+    for turn in range(ITERATIONS):
+        for j in range(STAGES):
+            for i in range(size):
+                place[i] = z[i] + Z[j, i]
+            rates_at(motion, law, t + C[j] * h, place, space, F[j])
+            if done:
+                heights_of(motion, end, place, F[j], space, sense, heights[j])
+        if done:
+            break
+        for m in range(half):
+            for i in range(size):
+                value = 0.0j
+                for j in range(STAGES):
+                    value += INTO[m, j] * (F[j, i] - VALUES[m] / h * Z[j, i])
+                given[i] = value
+            solve_in_place(factors[m], given, moved[m], size)
+        largest = 0.0
+        for i in range(size):
+            for j in range(STAGES):
+                change = 0.0
+                for m in range(half):
+                    change += (OUT_OF[j, m] * moved[m, i]).real
+                # the rates may not be defined there
+                if not abs(change) < np.inf:
+                    return np.inf
+                Z[j, i] += change
+                largest = max(largest, abs(change) / scale[i])
+        done = largest <= SOLVED or (largest <= ROUNDING and largest > 0.3 * before)
+        if not done and turn > 1 and not largest <= 0.9 * before:
+            return np.inf
+        before = largest
+    if not done:
+        return np.inf
+    # the defects of the rates where they are largest, filtered by the method
+    error = 0.0
+    for which in range(2):
+        s = BETWEEN if which == 1 else 0.0
+        for i in range(size):
+            value = slope = 0.0
+            for k in range(STAGES - 1, -1, -1):
+                coefficient = 0.0
+                for j in range(STAGES):
+                    coefficient += POWERS[k, j] * Z[j, i]
+                value = (value + coefficient) * s
+                slope = slope * s + (k + 1) * coefficient
+            place[i], given[i] = z[i] + value, -slope / h
+        if which == 1:
+            rates_at(motion, law, t + s * h, place, space, rates)
+        for i in range(size):
+            given[i] += rates[i] if which == 1 else start[i]
+        solve_in_place(factors[0], given, moved[0], size)
+        for i in range(size):
+            share = abs(moved[0, i].real) * (1.0 if which == 1 else WITHIN)
+            if not share < np.inf:
+                return np.inf
+            error = max(error, share / (TOLERANCE * max(scale[i], abs(z[i] + Z[STAGES - 1, i]))))
+    return error
