@@ -121,8 +121,8 @@ def pass_through(motion, law, end, start, times, unit):
                 scale[i] = max(abs(z[i]) + SMALL * unit[i], noise)
             continued(kept, last, h, Z)
         else:
-            h = between(low, high, left, right)
-            if not t + low < t + h < t + high:
+            fine = EPSILON * max(abs(t), abs(t + high))
+            if not high - low > 2.0 * fine:
                 other = another(beyond, floor, met)
                 if other < 0:
                     for i in range(size):
@@ -130,7 +130,9 @@ def pass_through(motion, law, end, start, times, unit):
                     return z, t + high, met if met < count else -1, ENDED
                 met, side, low = other, 0, 0.0
                 left, right = here[met] - floor[met], beyond[met] - floor[met]
-                h = between(low, high, left, right)
+                continue
+            # one that rounds to an end is put beside it, so that the other end comes there
+            h = min(max(between(low, high, left, right), low + fine), high - fine)
             for j in range(STAGES):
                 for i in range(size):
                     Z[j, i] = kept[j, i] * h / high

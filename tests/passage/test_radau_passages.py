@@ -130,3 +130,13 @@ def test_a_table_follows_a_law_with_a_kink():
     exact = np.where(times < 3, 1.0, np.cos(times - 3))
     assert np.abs(found - exact).max() < 1e-13
     assert len(sums) < 200
+
+
+def test_a_level_is_reached_to_rounding_wherever_it_is():
+    """x' = x: the level c is reached at t = ln(c/c₀)."""
+    here = site(fs.Model({x: x + p}, parameters={p: 0}), [0.0])
+    place = Place(0, np.array([0.01, 0.0]), 0.0)
+    levels = np.linspace(0.05, 2.0, 40)
+    found = [follow(here, fs.Drift(1e-12), place, Event((0, c)), span=1e3)[0] for c in levels]
+    assert [q.z[0] for q in found] == pytest.approx(levels, rel=2e-15)
+    assert [q.time for q in found] == pytest.approx(np.log(levels / 0.01), rel=1e-9)
