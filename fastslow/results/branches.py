@@ -43,12 +43,6 @@ class Sheet:
     region: str
 
 
-def _kept(values: NDArray[Any]) -> NDArray[Any]:
-    """Values that are computed once for all who ask, so that nobody writes to them."""
-    values.setflags(write=False)
-    return values
-
-
 @dataclass(frozen=True, eq=False)
 class Branch(Table, Result):
     """A curve of equilibria, row by row along its arclength.
@@ -130,15 +124,15 @@ class Branch(Table, Result):
 
     @cached_property
     def stability(self) -> NDArray[np.str_]:
-        """``"stable"``, ``"unstable"`` or ``"neutral"``, shape (N,); not to be written to."""
+        """``"stable"``, ``"unstable"`` or ``"neutral"``, shape (N,)."""
         if self.known_stability is not None:
             return self.known_stability
-        return _kept(stability_of(self.eigenvalues))
+        return stability_of(self.eigenvalues)
 
     @cached_property
     def stable(self) -> NDArray[np.bool_]:
-        """Whether each row is stable, shape (N,); not to be written to."""
-        return _kept(self.stability == "stable")
+        """Whether each row is stable, shape (N,)."""
+        return self.stability == "stable"
 
     @property
     def outcome(self) -> Outcome:
@@ -273,7 +267,7 @@ class Branch(Table, Result):
         One for each stable stretch along the branch, in order; where a special
         point ends it, the interval ends exactly there.
         """
-        return self._stable_intervals.copy()
+        return self._stable_intervals
 
     @cached_property
     def _stable_intervals(self) -> NDArray[np.float64]:

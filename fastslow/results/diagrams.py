@@ -316,7 +316,7 @@ class Diagram(Table, Result):
         self._warn("bistable()")
         if at_least not in self._multistable:
             self._multistable[at_least] = stretches.multistable(self.branches, at_least)
-        return self._multistable[at_least].copy()
+        return self._multistable[at_least]
 
     @cached_property
     def _multistable(self) -> dict[int, NDArray[np.float64]]:
