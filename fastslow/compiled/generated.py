@@ -15,7 +15,7 @@ from typing import Any
 from fastslow.compiled.closure import digest_of_imports
 
 #: How functions are compiled; what changes here changes the key.
-_CALLBACK: dict[str, Any] = {"error_model": "numpy"}
+_CALLBACK: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _LOOP: dict[str, Any] = {"nogil": True}
 
 _compiled: dict[str, Any] = {}
@@ -53,8 +53,10 @@ def compile_callback(source: str, function: str, signature: Any) -> int:
     return int(_once(source, function, compiled))
 
 
-def compile_loop(source: str, function: str) -> Callable[..., Any]:
-    """Prepare a function for calls from Python, compiled when its arguments are known.
+def compile_loop(
+    source: str, function: str, types: tuple[Any, ...] | None = None
+) -> Callable[..., Any]:
+    """Prepare a function for calls from Python.
 
     Parameters
     ----------
@@ -62,11 +64,14 @@ def compile_loop(source: str, function: str) -> Callable[..., Any]:
         Source of a module.
     function : str
         Name of the function in it.
+    types : tuple, optional
+        Those of its arguments to Numba, for which it is compiled here. No others are then
+        taken, nothing can be allocated, and the caller is to keep the arrays.
 
     Returns
     -------
     callable
-        Compiled when it is called, or read from the disk where it is there already.
+        Compiled here, or when it is called, or read from the disk where it is there already.
     """
 
     def compiled(python: Callable[..., Any]) -> Any:
@@ -75,9 +80,13 @@ def compile_loop(source: str, function: str) -> Callable[..., Any]:
         from fastslow.compiled.compiler import KeptCompiler
         from fastslow.compiled.signals import deferring_signals
 
-        made: Any = njit(pipeline_class=KeptCompiler, **_LOOP)(python)
+        options = _LOOP if types is None else {**_LOOP, "_nrt": False}
+        made: Any = njit(pipeline_class=KeptCompiler, **options)(python)
         # what Numba calls for arguments of types that are new to it
         made.compile = partial(deferring_signals, made.compile)
+        if types is not None:
+            made.compile(types)
+            made.disable_compile()
         return made
 
     loop: Callable[..., Any] = _once(source, function, compiled)

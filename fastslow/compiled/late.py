@@ -8,32 +8,32 @@ interrupt is as any other, and the loop goes on with its address.
 from __future__ import annotations
 
 from functools import cache
-from importlib import import_module
 
 from fastslow.compiled.generated import compile_callback
 
 _ENTRY = '''"""Entry to {function} of {module}."""
-from {module} import {function} as called
+from {module} import {record}, {function} as called
+from fastslow.compiled.pointers import loader
+
+load = loader({record})
 
 
-def {function}({arguments}):
-    return called({arguments})
+def {function}(pointer):
+    return called(load(pointer))
 '''
 
 
 @cache
-def address_of(module: str, function: str) -> int:
-    """The address of a compiled function.
+def address_of(module: str, function: str, record: str) -> int:
+    """The address of a function of one record, compiled for `call_with`.
 
     Parameters
     ----------
-    module, function : str
-        Where the function is; ``SIGNATURE`` of that module is its type.
+    module, function, record : str
+        Where the function and the type of its argument are, e.g.
+        ``"fastslow.simulation.radau"``, ``"radau_step"`` and ``"RadauStep"``.
     """
-    kind = import_module(module).SIGNATURE
-    text = _ENTRY.format(
-        module=module,
-        function=function,
-        arguments=", ".join(f"a{k}" for k in range(len(kind.args))),
-    )
-    return compile_callback(text, function, kind)
+    from numba import types
+
+    text = _ENTRY.format(module=module, function=function, record=record)
+    return compile_callback(text, function, types.float64(types.voidptr))

@@ -13,7 +13,10 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.errors import TypingError
 from numba.extending import intrinsic
+
+from fastslow.compiled.records import type_of
 
 DOUBLES = types.CPointer(types.float64)
 
@@ -45,21 +48,29 @@ def call_address(  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def call_number(typingctx, address, arguments):  # type: ignore[no-untyped-def]
-    """Call the function at an address with numbers and arrays, given to it by their pointers.
-
-    The arguments are a tuple of int64, float64 and arrays of float64; the result is a float64.
-    """
-    signature = types.float64(types.int64, arguments)
+def call_with(typingctx, address, record):  # type: ignore[no-untyped-def]
+    """Call the function at an address with a record, which it loads; the result is a float64."""
+    if record != type_of(record.instance_class):
+        raise TypingError(f"{record}; expected {type_of(record.instance_class)}")
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        values = []
-        for k, kind in enumerate(sig.args[1]):
-            value = builder.extract_value(args[1], k)
-            if isinstance(kind, types.Array):
-                value = cgutils.create_struct_proxy(kind)(context, builder, value=value).data
-            values.append(value)
-        function = ir.FunctionType(ir.DoubleType(), [value.type for value in values])
-        return builder.call(builder.inttoptr(args[0], function.as_pointer()), values)
+        place = builder.bitcast(cgutils.alloca_once_value(builder, args[1]), cgutils.voidptr_t)
+        kind = ir.FunctionType(ir.DoubleType(), [cgutils.voidptr_t])
+        return builder.call(builder.inttoptr(args[0], kind.as_pointer()), [place])
 
-    return signature, codegen
+    return types.float64(types.int64, record), codegen
+
+
+def loader(record: type) -> Any:
+    """A function for Numba that loads the record that `call_with` was given."""
+    kind = type_of(record)
+
+    @intrinsic
+    def load(typingctx, pointer):  # type: ignore[no-untyped-def]
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            place = context.get_value_type(sig.return_type).as_pointer()
+            return builder.load(builder.bitcast(args[0], place))
+
+        return kind(types.voidptr), codegen
+
+    return load

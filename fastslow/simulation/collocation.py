@@ -9,13 +9,13 @@ the step before, and takes the place of the series: rows of coefficients in time
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from numba import types
-from numba.extending import register_jitable
-from numba.np.numpy_support import carray
 
 from fastslow.compiled.parts import part
-from fastslow.compiled.pointers import DOUBLES, call_address
+from fastslow.compiled.pointers import call_address
+from fastslow.compiled.records import Matrix, Vector, zeros
 from fastslow.simulation.lobatto import (
     AT_F,
     HIGHEST,
@@ -28,6 +28,7 @@ from fastslow.simulation.lobatto import (
     F,
 )
 from fastslow.simulation.polynomials import EPSILON
+from fastslow.simulation.problems import Problem, Run
 from fastslow.simulation.scales import NOW
 
 #: Most iterations of one attempt, and most attempts for one step.
@@ -37,28 +38,88 @@ ITERATIONS, ATTEMPTS = 40, 100
 SHARE, LEFT = 0.5, 0.02
 
 
-@register_jitable
-def memory_size(n_states: int, order: int) -> int:
-    """Numbers to carry: whether the last step was such a one, its place, lengths and rates."""
-    return 5 + n_states * min(order, HIGHEST)
+class Collocation(NamedTuple):
+    """What collocation goes on from, and its work space.
+
+    Parameters
+    ----------
+    memory : float64 array
+        Whether the last step was such a one, the length to try next, its own length, its time
+        and mode, then its rates; zeros at the beginning of a run.
+    start, scale : float64 arrays, shape (n_rates,)
+        Values at the beginning and inverse sizes of what rates are known of: the states and
+        the interface functions.
+    rates : float64 array, shape (n_rates, n)
+    defect : float64 array, shape (n_rates, n + 1)
+    values : float64 array, shape (n_forcing + n_bounds, n + 2)
+    point : float64 array, shape (1 + n_states + n_forcing,)
+    out : float64 array
+        As large as the series.
+    states : float64 array, shape (n, n_states)
+    work : float64 array, shape (n + 2,)
+    """
+
+    memory: Vector
+    start: Vector
+    scale: Vector
+    rates: Matrix
+    defect: Matrix
+    values: Matrix
+    point: Vector
+    out: Vector
+    states: Matrix
+    work: Vector
+
+
+def collocation_for(
+    n_states: int, n_forcing: int, n_interfaces: int, order: int, n_rows: int
+) -> Collocation:
+    """Work space for a model of these sizes, whose series fills so many rows."""
+    n = min(order, HIGHEST)
+    n_rates = n_states + n_interfaces
+    # each interface may be slid along, between two bounds
+    n_bounds = min(2 * n_interfaces, n_rows - n_rates - n_forcing)
+    return zeros(
+        Collocation,
+        5 + n_states * n,
+        *(n_rates, n_rates),
+        (n_rates, n),
+        (n_rates, n + 1),
+        (n_forcing + n_bounds, n + 2),
+        1 + n_states + n_forcing,
+        n_rows * (order + 1),
+        (n, n_states),
+        n + 2,
+    )
+
+
+class CollocationStep(NamedTuple):
+    """What `collocate` is given; see `modes.expand`."""
+
+    problem: Problem
+    run: Run
+    mode: int
+    longest: float
+    W: Vector
+    scales: Matrix
+    space: Collocation
+    going_on: bool
 
 
 @part
-def collocate(address, layout, mode, inputs, parameters, tol, scales, room, W, memory):
+def collocate(step):
     """Replace the values and rates in ``W`` by collocation polynomials; see `modes.expand`."""
-    n_states, n_forcing, n_interfaces, _, order = layout
-    columns = order + 1
+    problem, run, mode, W, scales = step.problem, step.run, step.mode, step.W, step.scales
+    space, memory, inputs = step.space, step.space.memory, step.run.inputs
+    n_states, n_forcing, tol = problem.n_states, problem.n_forcing, problem.tol
+    n_interfaces, columns = problem.n_interfaces, problem.order + 1
     first_h = n_states + n_forcing
     drift = first_h + n_interfaces
-    n = min(order, HIGHEST)
+    n = min(problem.order, HIGHEST)
     table = n - LOWEST
-    # rates are known of the states and of the interface functions
     n_rates = n_states + n_interfaces
-    start, scale = np.empty(n_rates), np.empty(n_rates)
-    rates, defect = np.empty((n_rates, n)), np.empty((n_rates, n + 1))
-    # each interface may be slid along, between two bounds
-    n_bounds = min(2 * n_interfaces, W.shape[0] // columns - drift)
-    values = np.empty((n_forcing + n_bounds, n + 2))
+    start, scale, rates, values = space.start, space.scale, space.rates, space.values
+    n_bounds = values.shape[0] - n_forcing
     finite = 0.0
     for i in range(n_rates):
         row = columns * (i if i < n_states else i + n_forcing)
@@ -70,24 +131,19 @@ def collocate(address, layout, mode, inputs, parameters, tol, scales, room, W, m
         finite += 0.0 * W[(n_states + k) * columns]
     if finite != 0.0:
         return np.nan
-    point, out = np.empty(inputs.shape[0]), np.zeros(W.shape[0])
-    if memory.shape[0] > 0 and memory[1] > 0.0:
-        h = min(room, memory[1])
+    for k in range(space.out.shape[0]):
+        space.out[k] = 0.0
+    h = step.longest
+    if step.going_on and memory[1] > 0.0:
+        h = min(h, memory[1])
     else:
-        h = min(
-            room,
-            first_length(
-                address, layout, mode, inputs, parameters, tol, scale, room, W, point, out
-            ),
-        )
+        h = min(h, first_length(problem, run, mode, h, W, space))
     done = False
     for _ in range(ATTEMPTS):
         if inputs[0] + h == inputs[0]:
             return np.nan
-        predict(memory, inputs[0], mode, h, n, n_states, rates)
-        taken = iterate(
-            address, layout, mode, inputs, parameters, tol, h, start, scale, rates, point, out
-        )
+        predict(problem, inputs[0], mode, h, step.going_on, space)
+        taken = iterate(problem, run, mode, h, space)
         if taken == 0:
             h *= 0.4
             continue
@@ -101,22 +157,7 @@ def collocate(address, layout, mode, inputs, parameters, tol, scales, room, W, m
                         total += TO_C[table, j, k] * rates[i, k]
                     change = max(change, abs(h * total))
                 scale[i] = 1.0 / change if change > 0.0 else 0.0
-        error = check(
-            address,
-            layout,
-            mode,
-            inputs,
-            parameters,
-            h,
-            start,
-            scale,
-            rates,
-            defect,
-            values,
-            scales,
-            point,
-            out,
-        )
+        error = check(problem, run, mode, h, scales, space)
         if not error < np.inf:
             h *= 0.4
             continue
@@ -134,7 +175,7 @@ def collocate(address, layout, mode, inputs, parameters, tol, scales, room, W, m
     for k in range(drift + n_bounds):
         for j in range(2 if k < n_states else 1, columns):
             W[k * columns + j] = 0.0
-    work = np.empty(n + 1)
+    work = space.work
     for i in range(n_rates):
         row = columns * (i if i < n_states else i + n_forcing)
         to_powers(rates[i], C[table], n, work)
@@ -149,7 +190,7 @@ def collocate(address, layout, mode, inputs, parameters, tol, scales, room, W, m
         for k in range(n + 1):
             W[row + k] = work[k] * power
             power /= h
-    if memory.shape[0] > 0:
+    if step.going_on:
         memory[0], memory[1], memory[2], memory[3], memory[4] = 1.0, growth * h, h, inputs[0], mode
         for i in range(n_states):
             for k in range(n):
@@ -158,18 +199,18 @@ def collocate(address, layout, mode, inputs, parameters, tol, scales, room, W, m
 
 
 @part
-def first_length(address, layout, mode, inputs, parameters, tol, scale, room, W, point, out):
+def first_length(problem, run, mode, longest, W, space):
     """A length to try first, from the rates and how they change (Hairer et al. 1993, II.4)."""
-    n_states, order = layout[0], layout[4]
-    columns = order + 1
+    n_states, order, inputs = problem.n_states, problem.order, run.inputs
+    scale, point, out, columns = space.scale, space.point, space.out, order + 1
     rate = 0.0
     for i in range(n_states):
         rate = max(rate, abs(W[i * columns + 1]) * scale[i])
-    short = min(1e-3 / rate, room) if rate > 0.0 else 1e-3 * room
+    short = min(1e-3 / rate, longest) if rate > 0.0 else 1e-3 * longest
     point[0] = inputs[0] + short
     for i in range(n_states):
         point[1 + i] = inputs[1 + i] + short * W[i * columns + 1]
-    call_address(address, mode, point, parameters, out)
+    call_address(problem.series, mode, point, run.parameters, out)
     change = 0.0
     for i in range(n_states):
         difference = abs(out[i * columns + 1] - W[i * columns + 1]) / short
@@ -177,14 +218,16 @@ def first_length(address, layout, mode, inputs, parameters, tol, scale, room, W,
     most = max(rate, change)
     length = 100.0 * short
     if most > 0.0:
-        length = min(length, tol ** (1.0 / (min(order, HIGHEST) + 1)) / most)
+        length = min(length, problem.tol ** (1.0 / (min(order, HIGHEST) + 1)) / most)
     return length if length > 0.0 else short
 
 
 @part
-def predict(memory, t, mode, h, n, n_states, rates):
+def predict(problem, t, mode, h, going_on, space):
     """Rates at the points of a step, continued from the step before or constant."""
-    known = memory.shape[0] > 0 and memory[2] > 0.0 and memory[4] == mode
+    n_states, memory, rates = problem.n_states, space.memory, space.rates
+    n = rates.shape[1]
+    known = going_on and memory[2] > 0.0 and memory[4] == mode
     offset = t - memory[3] if known else 0.0
     # far beyond the step before its polynomial is no guide
     known = known and offset + h <= 2.5 * memory[2]
@@ -206,7 +249,7 @@ def predict(memory, t, mode, h, n, n_states, rates):
 
 
 @part
-def iterate(address, layout, mode, inputs, parameters, tol, h, start, scale, rates, point, out):
+def iterate(problem, run, mode, h, space):
     """Iterate the rates at the points of a step until the states there stand still.
 
     Returns
@@ -214,10 +257,11 @@ def iterate(address, layout, mode, inputs, parameters, tol, h, start, scale, rat
     int
         How often, 0 where they do not.
     """
-    n_states, n_forcing, _, _, order = layout
-    columns, n = order + 1, rates.shape[1]
+    n_states, n_forcing, inputs = problem.n_states, problem.n_forcing, run.inputs
+    start, scale, rates, states = space.start, space.scale, space.rates, space.states
+    point, out = space.point, space.out
+    columns, n = problem.order + 1, rates.shape[1]
     table = n - LOWEST
-    states = np.empty((n, n_states))
     last = np.inf
     for count in range(ITERATIONS):
         change = 0.0
@@ -231,7 +275,7 @@ def iterate(address, layout, mode, inputs, parameters, tol, h, start, scale, rat
                     change = max(change, abs(value - states[j, i]) * scale[i])
                 states[j, i] = value
         if count > 0:
-            if change <= max(LEFT * tol, 4.0 * EPSILON):
+            if change <= max(LEFT * problem.tol, 4.0 * EPSILON):
                 return count
             if not change < np.inf or (count > 2 and change > 0.9 * last):
                 return 1 if change <= 64.0 * EPSILON else 0
@@ -240,7 +284,7 @@ def iterate(address, layout, mode, inputs, parameters, tol, h, start, scale, rat
             point[0] = inputs[0] + C[table, j] * h
             for i in range(n_states):
                 point[1 + i] = states[j, i]
-            call_address(address, mode, point, parameters, out)
+            call_address(problem.series, mode, point, run.parameters, out)
             for i in range(rates.shape[0]):
                 row = columns * (i if i < n_states else i + n_forcing)
                 rates[i, j] = out[row + 1]
@@ -248,22 +292,7 @@ def iterate(address, layout, mode, inputs, parameters, tol, h, start, scale, rat
 
 
 @part
-def check(
-    address,
-    layout,
-    mode,
-    inputs,
-    parameters,
-    h,
-    start,
-    scale,
-    rates,
-    defect,
-    values,
-    scales,
-    point,
-    out,
-):
+def check(problem, run, mode, h, scales, space):
     """Evaluate the rates between the points of a step, slow quantities and bounds of sliding.
 
     Returns
@@ -272,8 +301,10 @@ def check(
         The largest integral of the difference between the rates and the derivatives of
         the polynomials, relative to the sizes of the rows, not finite where the rates are not.
     """
-    n_states, n_forcing, n_interfaces, _, order = layout
-    columns, n = order + 1, rates.shape[1]
+    n_states, n_forcing, n_interfaces = problem.n_states, problem.n_forcing, problem.n_interfaces
+    start, scale, rates, defect = space.start, space.scale, space.rates, space.defect
+    values, point, out, inputs = space.values, space.point, space.out, run.inputs
+    columns, n = problem.order + 1, rates.shape[1]
     table = n - LOWEST
     drift = n_states + n_forcing + n_interfaces
     error = finite = 0.0
@@ -288,7 +319,7 @@ def check(
                 for k in range(n):
                     total += TO_F[table, j, k] * rates[i, k]
             point[1 + i] = start[i] + h * total
-        call_address(address, mode, point, parameters, out)
+        call_address(problem.series, mode, point, run.parameters, out)
         for k in range(values.shape[0]):
             row = n_states + k if k < n_forcing else drift + k - n_forcing
             values[k, j] = out[row * columns]
@@ -310,7 +341,7 @@ def check(
             error = max(error, abs(h * total) * scale[i])
     for k in range(n_forcing):
         # slow quantities depend on time alone: the states at that place play no part
-        between = newton(values[k], F[table], n + 1, WORST[table])
+        between = newton(values[k], F[table], n + 1, WORST[table], space.work)
         difference = abs(between - values[k, n + 1])
         size = max(scales[NOW, n_states + k], abs(values[k, n // 2]))
         if size > 0.0:
@@ -319,9 +350,8 @@ def check(
 
 
 @part
-def newton(data, points, count, s):
+def newton(data, points, count, s, work):
     """Value at one place of the polynomial through data at points (Neville)."""
-    work = np.empty(count)
     for k in range(count):
         work[k] = data[k]
     for level in range(1, count):
@@ -348,48 +378,3 @@ def to_powers(data, points, count, work):
         # multiply what stands above by s - points[k]
         for j in range(k, count - 1):
             work[j] -= points[k] * work[j + 1]
-
-
-@part
-def step_by_collocation(
-    address,
-    n_states,
-    n_forcing,
-    n_interfaces,
-    n_modes,
-    order,
-    mode,
-    inputs,
-    parameters,
-    tol,
-    scales,
-    room,
-    W,
-    size,
-    memory,
-    carried,
-):
-    """`collocate` with pointers for arrays."""
-    return collocate(
-        address,
-        (n_states, n_forcing, n_interfaces, n_modes, order),
-        mode,
-        carray(inputs, 1 + n_states + n_forcing),
-        carray(parameters, 1),
-        tol,
-        carray(scales, (2, n_states + n_forcing + n_interfaces)),
-        room,
-        carray(W, size),
-        carray(memory, carried),
-    )
-
-
-#: Type of `step_by_collocation`.
-SIGNATURE = types.float64(
-    *[types.int64] * 7,
-    *[DOUBLES] * 2,
-    types.float64,
-    DOUBLES,
-    types.float64,
-    *[DOUBLES, types.int64] * 2,
-)

@@ -13,6 +13,8 @@ from fastslow.simulation.implicit_steps import (
     PAYS,
     RADAU,
     WAIT,
+    Lengths,
+    Series,
     long_step,
     settled,
 )
@@ -24,11 +26,20 @@ from fastslow.simulation.modes import (
     across,
     choose_mode,
     expand,
+    expanded,
     interface_noise,
     leaves,
 )
 from fastslow.simulation.polynomials import ZERO, horner, sample
-from fastslow.simulation.rooms import (
+from fastslow.simulation.scales import (
+    REACHED,
+    SUDDEN,
+    flush,
+    raise_sizes,
+    remember_sizes,
+    step_length,
+)
+from fastslow.simulation.workspace import (
     CALM,
     CHOOSING,
     COLLOCATED_WORK,
@@ -53,14 +64,6 @@ from fastslow.simulation.rooms import (
     USUAL,
     WANTED,
     WORK,
-)
-from fastslow.simulation.scales import (
-    REACHED,
-    SUDDEN,
-    flush,
-    raise_sizes,
-    remember_sizes,
-    step_length,
 )
 
 #: How the loop ended.
@@ -88,33 +91,7 @@ TANGENTIAL = 1e-6
 
 
 @part
-def drive(
-    late_code,
-    address,
-    layout,
-    sizes,
-    signs,
-    continuous,
-    parameters,
-    span,
-    tol,
-    rules,
-    times,
-    samples,
-    since,
-    limits,
-    steps,
-    crossings,
-    store,
-    extremes,
-    hits,
-    seen,
-    room,
-    inputs,
-    carried,
-    counted,
-    handed,
-):
+def drive(problem, run, record, workspace, handed):
     """Follow one trajectory to its end, until others may take its next step, or to a pause.
 
     Every step and every crossing is put into a table, or, where there are
@@ -122,55 +99,13 @@ def drive(
 
     Parameters
     ----------
-    late_code : tuple of int
-        Addresses of the steps by collocation and of those of Radau, 0 where they are not there.
-    address : int
-        Of the compiled series.
-    layout : tuple of int
-        (n_states, n_forcing, n_interfaces, n_modes, order).
-    sizes : tuple of int
-        (number of rows that the series fills, work space for the event search,
-        number of fast states, or 0 for no implicit steps).
-    signs : int64 array, shape (n_modes, n_interfaces)
-    continuous : bool array, shape (n_interfaces,)
-    parameters : float64 array
-    span : tuple of float
-        Start and end of time.
-    tol : float
-    rules : float64 array, shape (2, n_states + n_forcing + n_interfaces)
-        From `rules_of`: in what sizes errors are measured.
-    times : float64 array
-        Increasing times of the samples, within the span.
-    samples : float64 array, shape (n_rows, n_times)
-        The first rows at those times, as far as they are reached; filled here.
-    since : float
-        Time from which extremes and hits count.
-    limits : tuple of int
-        Largest numbers of steps and crossings.
-    steps : float64 array, shape (room, 4)
-        Begin, length, mode and kind of every step, filled here; without rows where steps and
-        crossings are to be summed up.
-    crossings : float64 array, shape (room, 6 + n_states)
-        Time, interface, direction, mode before, mode after, near-tangential and state of
-        every crossing, filled here.
-    store : float64 array
-        The coefficients of states and slow quantities, step by step, filled here; empty where
-        they are not to be kept.
-    extremes : float64 array, shape (2, n_states)
-        Smallest and largest value of every state, widened here; without rows
-        where steps and crossings are listed.
-    hits : int64 array, shape (n_interfaces, 2)
-        Crossings upwards and downwards, counted here unless they are listed.
-    seen : float64 array, shape (n_modes,)
-        When each mode was last left, set here unless steps are listed.
-    room : tuple of arrays
-        From `room_for`; after a pause the one that the run paused in.
-    inputs : float64 array, shape (1 + n_states + n_forcing,)
-        Time and state, changed here.
-    carried : float64 array, shape (SIZES + n_states + n_forcing + n_interfaces,)
-    counted : int64 array, shape (14,)
-        What is carried from step to step, at first that of `beginnings`; changed here.
-        The work up to the next pause is to be set, in steps of the series.
+    problem : Problem
+    run : Run
+        Changed here.
+    record : Record
+        Filled here.
+    workspace : Workspace
+        From `workspace_for`; after a pause the one that the run paused in.
     handed : int
         After a plain step in one of so many first modes the run is handed over.
 
@@ -180,16 +115,24 @@ def drive(
         How it ended, `HANDED_OVER`, or why it pauses. Nothing but a number is returned: to make
         an array Numba runs Python, in which an interrupt would be raised and lost.
     """
-    n_states, n_forcing, n_interfaces, n_modes, order = layout
+    address, n_states, n_modes, tol = problem.series, problem.n_states, problem.n_modes, problem.tol
+    n_interfaces, n_fast, order = problem.n_interfaces, problem.n_fast, problem.order
+    signs, continuous, rules = problem.signs, problem.continuous, problem.rules
+    parameters, inputs, carried, counted = run.parameters, run.inputs, run.carried, run.counted
+    times, steps, crossings, store = record.times, record.steps, record.crossings, record.store
+    extremes, hits, seen, since = record.extremes, record.hits, record.seen, run.since
+    W, work, scales = workspace.W, workspace.work, workspace.scales
+    search, collocation = workspace.search, workspace.collocation
+    implicit, memory = workspace.implicit, workspace.collocation.memory
+    right, poly, phase = implicit.right, implicit.poly, implicit.radau.phase
+    on, hit, rests, side, noise = search.on, search.hit, search.rests, search.side, search.noise
+    gradient, offsets = search.gradient, workspace.offsets
     columns = order + 1
-    kept = n_states + n_forcing
+    kept = n_states + problem.n_forcing
     stride = kept * columns
-    t, late, stop = inputs[0], carried[LATE], span[1]
-    whole = stop - span[0]
-    work, W, b, d, stack, gradient, noise, on, hit, rests, side, offsets = room[:12]
-    right, poly, matrices, vectors, memory, scales, rigid = room[12:]
+    t, late, stop = inputs[0], carried[LATE], run.stop
+    whole = stop - run.begin
     n_rows = kept + n_interfaces
-    n_fast = sizes[2]
     listing, dense = extremes.shape[0] == 0, store.shape[0] > 0
     n_steps, n_crossings = counted[STEPS], counted[CROSSINGS]
     n_samples, crowd = counted[SAMPLES], counted[CROWDED]
@@ -208,7 +151,8 @@ def drive(
         choosing, touched = counted[CHOOSING] > 0, counted[TOUCHED] > 0
         fresh = counted[FRESH] > 0
     else:
-        memory[:] = 0.0
+        for i in range(memory.shape[0]):
+            memory[i] = 0.0
         for i in range(n_rows):
             scales[REACHED, i] = carried[SIZES + i]
         for j in range(n_interfaces):
@@ -231,7 +175,7 @@ def drive(
                 inputs[1 + i] = W[i * columns]
             others = ZERO
             for j in range(n_interfaces):
-                noise[j] = interface_noise(address, n_modes, j, inputs, parameters, gradient)
+                noise[j] = interface_noise(problem, run, j, gradient)
                 if j == interface:
                     noise[j] = max(noise[j], floor)
                 on[j] = hit[j] or abs(gradient[0]) <= noise[j]
@@ -241,27 +185,10 @@ def drive(
                 mode != before
                 and others == 0
                 and continuous[interface]
-                and leaves(W, layout, interface, signs[mode, interface], tol, scales, whole, noise)
+                and leaves(problem, W, interface, signs[mode, interface], whole, scales, noise)
             )
             if not ahead:
-                mode = choose_mode(
-                    late_code,
-                    address,
-                    layout,
-                    signs,
-                    continuous,
-                    inputs,
-                    parameters,
-                    tol,
-                    scales,
-                    whole,
-                    on,
-                    side,
-                    before,
-                    work,
-                    b,
-                    noise,
-                )
+                mode = choose_mode(problem, run, before, whole, work, scales, search, collocation)
             if mode < 0:
                 code = NO_WAY_ON
                 if mode == MANY_MODES:
@@ -288,7 +215,7 @@ def drive(
                     else:
                         hits[j, 0 if turn > 0 else 1] += turn != 0 and t >= since
                     n_crossings += 1
-            if n_crossings >= limits[1]:
+            if n_crossings >= problem.max_crossings:
                 code = TOO_MANY_CROSSINGS
                 break
             choosing = touched = False
@@ -298,27 +225,17 @@ def drive(
         remaining = (stop - t) - late
         if not remaining > 0.0:
             break
-        if n_steps == limits[0]:
+        if n_steps == problem.max_steps:
             code = TOO_MANY_STEPS
             break
         if in_a_row > 0:
             # an implicit step has left the first coefficients of the series at its end
             W, right = right, W
         else:
-            longest = expand(
-                late_code,
-                address,
-                layout,
-                mode,
-                inputs,
-                parameters,
-                tol,
-                scales,
-                remaining,
-                W,
-                memory,
-                ahead,
-            )
+            if ahead:
+                longest = expanded(problem, run, mode, remaining, W, scales, collocation, True)
+            else:
+                longest = expand(problem, run, mode, remaining, W, scales, collocation, True)
             ahead = raised = False
             if longest == MISSING:
                 code = NEEDS_COLLOCATION
@@ -340,39 +257,21 @@ def drive(
         for i in range(n_states, kept):
             inputs[1 + i] = W[i * columns]
         calm -= 1
-        if n_fast > 0 and calm <= 0 and (in_a_row > 0 or settled(W, layout, longest, tol, scales)):
+        if n_fast > 0 and calm <= 0 and (in_a_row > 0 or settled(problem, W, longest, scales)):
             if in_a_row == 0:
                 wanted = 1.25 * longest
-                rigid[0] = 0.0
+                phase[0] = 0.0
             left -= IMPLICIT_WORK + n_fast * n_fast // 8
+            least = (1.1 if in_a_row < DAMPING else PAYS) * longest
             taken, growth = long_step(
-                late_code,
-                address,
-                layout,
-                n_fast,
-                signs,
+                problem,
+                run,
                 mode,
-                inputs,
-                parameters,
-                tol,
+                Lengths(wanted, least, longest, remaining),
+                Series(W, right, poly, work),
                 scales,
-                wanted,
-                (1.1 if in_a_row < DAMPING else PAYS) * longest,
-                longest,
-                remaining,
-                W,
-                right,
-                poly,
-                work,
-                matrices,
-                vectors,
-                rigid,
-                on,
-                rests,
-                noise,
-                b,
-                stack,
-                gradient,
+                search,
+                implicit,
             )
             if taken == MISSING:
                 code = NEEDS_RADAU
@@ -393,20 +292,7 @@ def drive(
                 calm = pause
                 if in_a_row > 0:
                     in_a_row = ZERO
-                    longest = expand(
-                        late_code,
-                        address,
-                        layout,
-                        mode,
-                        inputs,
-                        parameters,
-                        tol,
-                        scales,
-                        remaining,
-                        W,
-                        memory,
-                        False,
-                    )
+                    longest = expand(problem, run, mode, remaining, W, scales, collocation, True)
                     if longest == MISSING:
                         code = NEEDS_COLLOCATION
                         calm += 1
@@ -423,29 +309,14 @@ def drive(
                 code = STEP_TOO_SMALL
                 break
             while True:
-                s, interface, touched, depth, floor = find_event(
-                    address,
-                    layout,
-                    signs,
-                    mode,
-                    inputs,
-                    parameters,
-                    W,
-                    h,
-                    on,
-                    rests,
-                    noise,
-                    b,
-                    stack,
-                    gradient,
-                )
+                s, interface, touched, depth, floor = find_event(problem, run, mode, W, h, search)
                 taken = s * h if interface >= 0 else h
                 # where a step grew much its last terms may be small by accident
                 doubtful = taken > 2.0 * usual or longest > 4.0 * remaining
                 if (
                     h == 0.0
                     or not doubtful
-                    or holds(address, layout, mode, inputs, parameters, W, taken, tol, scales, work)
+                    or holds(problem, run, mode, W, taken, scales, work, search)
                 ):
                     break
                 h, final = (t + 0.25 * taken) - t, False
@@ -467,13 +338,13 @@ def drive(
             remember_sizes(rules, scales)
             if listing:
                 steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, taken, mode
-                kind = RADAU if rigid[0] > 0.0 else IMPLICIT
+                kind = RADAU if phase[0] > 0.0 else IMPLICIT
                 steps[n_steps, 3] = kind if long else memory[0]
             else:
                 seen[mode] = t
                 if t > since:
                     unused = (since - begin) - lag
-                    widen_extremes(W, n_states, order, unused, taken, extremes, b, d, stack)
+                    widen_extremes(W, order, unused, taken, extremes, search)
             if dense:
                 for i in range(stride):
                     store[n_steps * stride + i] = W[i]
@@ -483,7 +354,7 @@ def drive(
                 offsets[n_samples] = (times[n_samples] - begin) - lag
                 n_samples += 1
             if n_samples > first:
-                sample(W, columns, samples.shape[0], offsets[first:n_samples], samples, first)
+                sample(W, columns, offsets[first:n_samples], record.samples, first)
             for i in range(kept):
                 inputs[1 + i] = horner(W, i * columns, i * columns + order, taken)
             flush(rules, inputs, n_states)
@@ -495,7 +366,7 @@ def drive(
             choosing = choosing or rests[j]
         if interface >= 0:
             hit[interface] = choosing = True
-        put_on_all(address, n_modes, hit, inputs, parameters, gradient, n_states)
+        put_on_all(problem, run, search)
         left -= 1
         if interface >= 0:
             crowd = crowd + 1 if t - last_event <= 1e-13 * max(abs(t), whole) else 0
@@ -513,7 +384,7 @@ def drive(
     if code < HANDED_OVER:
         if in_a_row > 0:
             # the arrays have changed their places
-            held_W, held_right = room[1], room[12]
+            held_W, held_right = workspace.W, implicit.right
             for i in range(W.shape[0]):
                 work[i] = right[i]
             for i in range(W.shape[0]):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import finite, flag, instance, mapping, takes, text, whole
-from fastslow.compiled.generic import load_loop
+from fastslow.compiled.generic import load_loop_of_records
 from fastslow.compiled.series import CompiledSeries
 from fastslow.compiled.steps import CompiledSteps, compile_steps
 from fastslow.model.derived import once, partition_of
@@ -30,7 +30,7 @@ from fastslow.results.regimes import (
 )
 from fastslow.simulation.driver import OUT_OF_WORK, REACHED_END
 from fastslow.simulation.grouping import alike
-from fastslow.simulation.lanes import LEFT, pool_for
+from fastslow.simulation.lanes import LEFT, Pool, Runs, pool_for
 from fastslow.simulation.many_arguments import (
     periods_of,
     spans_of,
@@ -38,9 +38,9 @@ from fastslow.simulation.many_arguments import (
     threads_of,
     times_of,
 )
-from fastslow.simulation.pauses import Pace, late_code, provide
+from fastslow.simulation.pauses import Pace, provide, with_late_code
+from fastslow.simulation.problems import Problem
 from fastslow.simulation.remembering import notes_on_noise
-from fastslow.simulation.rooms import MODE, STEPS, beginnings, room_for
 from fastslow.simulation.settings import (
     DEFAULT,
     Integration,
@@ -51,45 +51,16 @@ from fastslow.simulation.settings import (
 from fastslow.simulation.trajectories import (
     error_rules,
     gap_of,
-    layout_of,
+    problem_of,
     series_of,
-    sizes_of,
     together_of,
     vanishing_of,
 )
+from fastslow.simulation.workspace import MODE, STEPS, Workspace, beginnings, workspace_for
 
 Floats = NDArray[np.float64]
 
 steps_of = once(partition_of)(compile_steps)
-
-_ARGUMENTS = (
-    "bounds",
-    "late_code",
-    "address",
-    "lanes",
-    "layout",
-    "sizes",
-    "signs",
-    "continuous",
-    "tol",
-    "rules",
-    "limits",
-    "parameters",
-    "spans",
-    "since",
-    "times",
-    "samples",
-    "extremes",
-    "hits",
-    "seen",
-    "places",
-    "carried",
-    "counted",
-    "codes",
-    "pool",
-    "room",
-)
-
 
 #: Trajectories that a thread takes at a time, at most.
 _CHUNK = 512
@@ -217,13 +188,12 @@ def simulate_many(
     with _bar(count, progress) as bar:
         for (one, chosen, compiled, lanes), between in zip(groups, gaps, strict=True):
             values = _parameter_table(compiled, one, swept, chosen)
+            rules = error_rules(one, resolved, compiled)
             run = _run(
                 compiled,
                 lanes,
-                resolved,
-                error_rules(one, resolved, compiled),
+                problem_of(model, compiled, resolved, rules),
                 threads,
-                sizes_of(model, compiled, resolved.implicit),
                 (values, starts[chosen], spans[chosen], since[chosen]),
                 times if len(times) == 1 else times[chosen],
                 columns if times.size else 0,
@@ -331,13 +301,12 @@ def arrivals(
     samples = np.empty((count, n, grid.shape[1]))
     for one, chosen in alike(model, swept, count):
         compiled = series_of(one, resolved.order)
+        problem = problem_of(model, compiled, resolved, error_rules(one, resolved, compiled))
         run = _run(
             compiled,
             steps_of(one, resolved.order),
-            resolved,
-            error_rules(one, resolved, compiled),
+            problem,
             threads,
-            sizes_of(model, compiled, resolved.implicit),
             (
                 _parameter_table(compiled, one, swept, chosen),
                 starts[chosen],
@@ -457,10 +426,8 @@ class _Kept:
 def _run(
     compiled: CompiledSeries,
     lanes: CompiledSteps,
-    resolved: Resolved,
-    rules: Floats,
+    problem: Problem,
     threads: int,
-    sizes: tuple[int, int, int],
     rows: tuple[Floats, Floats, Floats, Floats],
     times: Floats,
     n_columns: int,
@@ -479,13 +446,14 @@ def _run(
     )
     hits = np.zeros((count, compiled.n_interfaces, 2), dtype=np.int64)
     seen = np.full((count, len(compiled.modes)), -np.inf)
-    places, carried, whole = beginnings(spans[:, 0], starts, compiled.n_forcing, rules)
+    places, carried, whole = beginnings(spans[:, 0], starts, compiled.n_forcing, problem.rules)
     codes = np.empty(count, dtype=np.int64)
     samples = np.full((count, n_columns, times.shape[1]), np.nan)
-    layout = layout_of(compiled)
     many = _many_loop()
-
     stops = spans.copy()
+    runs = Runs(
+        values, stops, since, times, samples, extremes, hits, seen, places, carried, whole, codes
+    )
     kept = _Kept(ending, spans, starts, lanes.regions) if ending is not None else None
     stopping = threading.Event()
 
@@ -499,38 +467,13 @@ def _run(
                 kept.after(stop, chunk, places, seen, codes)
 
     def advance(chunk: tuple[int, int]) -> Iterator[int]:
-        pool = pool_for(layout, lanes.regions, values.shape[1], count)
-        room = room_for(layout, sizes, times.shape[1])
+        pool = pool_for(problem, lanes.regions, values.shape[1], count)
+        workspace = workspace_for(problem, compiled.n_rows, times.shape[1])
         pace = Pace(compiled.n_rows, compiled.order)
         while True:
-            pool[-1][LEFT] = pace.begin()
-            code = many(
-                chunk,
-                late_code(sizes[2]),
-                compiled.address,
-                (lanes.address, lanes.regions),
-                layout,
-                sizes,
-                compiled.signs,
-                compiled.continuous,
-                resolved.rtol,
-                rules,
-                resolved.limits,
-                values,
-                stops,
-                since,
-                times,
-                samples,
-                extremes,
-                hits,
-                seen,
-                places,
-                carried,
-                whole,
-                codes,
-                pool,
-                room,
-            )
+            pool.progress[LEFT] = pace.begin()
+            given = with_late_code(problem)
+            code = many(given, lanes.address, lanes.regions, runs, pool, workspace, *chunk)
             if code == REACHED_END:
                 return
             if stopping.is_set():
@@ -546,7 +489,7 @@ def _run(
     if min(threads, len(chunks)) == 1:
         for following, number in under_way.items():
             for code in following:
-                provide(code, sizes[2])
+                provide(code, problem.n_fast)
             report(number)
     else:
         executor = ThreadPoolExecutor(min(threads, len(chunks)))
@@ -559,7 +502,7 @@ def _run(
                     if needed is None:
                         report(under_way[following])
                     else:
-                        provide(needed, sizes[2])
+                        provide(needed, problem.n_fast)
                         waiting[executor.submit(next, following, None)] = following
         finally:
             stopping.set()
@@ -578,4 +521,5 @@ def _bar(count: int, shown: bool) -> Any:
 
 def _many_loop() -> Callable[..., Any]:
     """The compiled loop over trajectories."""
-    return load_loop("fastslow.simulation.lanes", "drive_many", _ARGUMENTS)
+    arguments = (Problem, int, int, Runs, Pool, Workspace, int, int)
+    return load_loop_of_records("fastslow.simulation.lanes", "drive_many", arguments)

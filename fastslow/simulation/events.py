@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import NamedTuple
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
+from fastslow.compiled.records import Flags, Integers, Matrix, Vector, zeros
 from fastslow.simulation.modes import (
     BEGINNING,
     bounds_of,
@@ -27,11 +28,63 @@ from fastslow.simulation.polynomials import (
 )
 from fastslow.simulation.scales import NOW
 
+#: Rows of the stack in which intervals are halved.
+STACK_ROWS = 46
+
+
+class Search(NamedTuple):
+    """Work space for events, and what is known of every interface.
+
+    Parameters
+    ----------
+    on, hit, rests : bool array, shape (n_interfaces,)
+        Whether a step begins on it, has ended on it, or begins on it and does not leave.
+    side : int64 array, shape (n_interfaces,)
+        Sign of h.
+    noise : float64 array, shape (n_interfaces,)
+        Size of h that is rounding error.
+    gradient : float64 array, shape (2 + n_states,)
+    b, d : float64 arrays, shape (order + 1,)
+    stack : float64 array, shape (STACK_ROWS, order + 4)
+    ahead : float64 array, shape (1 + n_states + n_forcing,)
+    rates : float64 array, shape (n_states,)
+    basis : float64 array, shape (n_interfaces, n_states)
+    move : float64 array, shape (n_states,)
+    """
+
+    on: Flags
+    hit: Flags
+    rests: Flags
+    side: Integers
+    noise: Vector
+    gradient: Vector
+    b: Vector
+    d: Vector
+    stack: Matrix
+    ahead: Vector
+    rates: Vector
+    basis: Matrix
+    move: Vector
+
+
+def search_for(n_states: int, n_forcing: int, n_interfaces: int, order: int) -> Search:
+    """Work space for the events of a model of these sizes."""
+    columns, n = order + 1, n_states
+    return zeros(
+        Search,
+        *[n_interfaces] * 5,
+        2 + n,
+        *(columns, columns),
+        (STACK_ROWS, columns + 3),
+        1 + n + n_forcing,
+        n,
+        (n_interfaces, n),
+        n,
+    )
+
 
 @part
-def find_event(
-    address, layout, signs, mode, inputs, parameters, W, h, on, rests, noise, b, stack, gradient
-):
+def find_event(problem, run, mode, W, h, search):
     """The first time in a step at which its motion ends, as a part of the step.
 
     Fills ``rests``: the interfaces that it began on and does not leave.
@@ -49,8 +102,10 @@ def find_event(
     floor : float
         Size of h that is rounding error there.
     """
-    n_states, n_forcing, n_interfaces, n_modes, order = layout
-    first_h = n_states + n_forcing
+    signs, n_interfaces, order = problem.signs, problem.n_interfaces, problem.order
+    on, rests, noise, b = search.on, search.rests, search.noise, search.b
+    stack, gradient = search.stack, search.gradient
+    first_h = problem.n_states + problem.n_forcing
     drift = first_h + n_interfaces
     best, interface, touched, depth, floor = 2.0, ZERO - 1, False, 1.0, 0.0
     for j in range(n_interfaces):
@@ -91,7 +146,7 @@ def find_event(
             return 0.0, j, False, 1.0, 0.0
         if excluded(b, start, order):
             continue
-        small = interface_noise(address, n_modes, j, inputs, parameters, gradient)
+        small = interface_noise(problem, run, j, gradient)
         small = max(small, 8.0 * EPSILON * total)
         s, touch = first_root(b, start, order, small, stack)
         if s <= 1.0 and not touch:
@@ -103,19 +158,19 @@ def find_event(
 
 
 @part
-def holds(address, layout, mode, inputs, parameters, W, taken, tol, scales, work):
+def holds(problem, run, mode, W, taken, scales, work, search):
     """Whether the rates at the end of a step are the derivatives of its series.
 
     As far as rounding of the states lets them be known: where they differ, the rates are
     evaluated again at states that differ by it.
     """
-    n_states, order = layout[0], layout[4]
+    n_states, order, tol = problem.n_states, problem.order, problem.tol
     columns = order + 1
-    ahead, rates = np.empty(inputs.shape[0]), np.empty(n_states)
-    ahead[0] = inputs[0] + taken
+    ahead, rates = search.ahead, search.rates
+    ahead[0] = run.inputs[0] + taken
     for i in range(n_states):
         ahead[1 + i] = horner(W, i * columns, i * columns + order, taken)
-    call_address(address, mode, ahead, parameters, work)
+    call_address(problem.series, mode, ahead, run.parameters, work)
     for i in range(n_states):
         rates[i] = work[i * columns + 1]
     looked = False
@@ -129,7 +184,7 @@ def holds(address, layout, mode, inputs, parameters, W, taken, tol, scales, work
             if not looked:
                 for k in range(n_states):
                     ahead[1 + k] *= 1.0 + (2 - k % 2) * EPSILON
-                call_address(address, mode, ahead, parameters, work)
+                call_address(problem.series, mode, ahead, run.parameters, work)
                 looked = True
             if not defect <= allowed + 100.0 * abs(work[row + 1] - rate) * taken:
                 return False
@@ -161,9 +216,10 @@ def undoing(b, order, s, size):
 
 
 @part
-def put_on(address, n_modes, j, inputs, parameters, gradient, n_states):
+def put_on(problem, run, j, gradient):
     """Move the state onto an interface, by Newton along its gradient."""
-    call_address(address, n_modes + j, inputs, parameters, gradient)
+    inputs, n_states = run.inputs, problem.n_states
+    call_address(problem.series, problem.n_modes + j, inputs, run.parameters, gradient)
     square = 0.0
     for i in range(n_states):
         square += gradient[2 + i] * gradient[2 + i]
@@ -173,11 +229,12 @@ def put_on(address, n_modes, j, inputs, parameters, gradient, n_states):
 
 
 @part
-def put_on_all(address, n_modes, hit, inputs, parameters, gradient, n_states):
-    """Move the state onto every interface that is marked, by the least-norm Newton step.
+def put_on_all(problem, run, search):
+    """Move the state onto every interface that is hit, by the least-norm Newton step.
 
     Of interfaces that coincide, or whose gradients depend on one another, the first decide.
     """
+    hit, gradient, n_states = search.hit, search.gradient, problem.n_states
     count = ZERO
     for j in range(hit.shape[0]):
         count += hit[j]
@@ -186,16 +243,18 @@ def put_on_all(address, n_modes, hit, inputs, parameters, gradient, n_states):
     if count == 1:
         for j in range(hit.shape[0]):
             if hit[j]:
-                put_on(address, n_modes, j, inputs, parameters, gradient, n_states)
+                put_on(problem, run, j, gradient)
         return
     # gradients made orthogonal one after the other (Gram and Schmidt), each with what is
     # left of its function's value once the moves along those before are made
-    basis, move = np.zeros((count, n_states)), np.zeros(n_states)
+    basis, move = search.basis, search.move
+    for i in range(n_states):
+        move[i] = 0.0
     kept = ZERO
     for j in range(hit.shape[0]):
         if not hit[j]:
             continue
-        call_address(address, n_modes + j, inputs, parameters, gradient)
+        call_address(problem.series, problem.n_modes + j, run.inputs, run.parameters, gradient)
         value = whole = left = 0.0
         value = gradient[0]
         for i in range(n_states):
@@ -216,4 +275,4 @@ def put_on_all(address, n_modes, hit, inputs, parameters, gradient, n_states):
                 move[i] -= value * basis[kept, i] / left
             kept += 1
     for i in range(n_states):
-        inputs[1 + i] += move[i]
+        run.inputs[1 + i] += move[i]

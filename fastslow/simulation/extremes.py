@@ -17,25 +17,24 @@ from fastslow.simulation.polynomials import (
 
 
 @part
-def widen_extremes(W, n_states, order, begin, taken, extremes, b, d, stack):
+def widen_extremes(W, order, begin, taken, extremes, search):
     """Widen the extremes of every state by those within a step, from an offset into it.
 
     Parameters
     ----------
     W : float64 array
         Coefficients of the step, row by row.
-    n_states, order : int
+    order : int
     begin, taken : float
         The part of the step that counts, as offsets in time.
     extremes : float64 array, shape (2, n_states)
         Smallest and largest values so far, changed here.
-    b, d : float64 arrays, shape (order + 1,)
+    search : Search
         Work space.
-    stack : float64 array
-        Work space, as for `first_root`.
     """
     columns = order + 1
-    for i in range(n_states):
+    b, d = search.b, search.d
+    for i in range(extremes.shape[1]):
         first = i * columns
         low, high = extremes[0, i], extremes[1, i]
         if begin <= 0.0:
@@ -59,7 +58,7 @@ def widen_extremes(W, n_states, order, begin, taken, extremes, b, d, stack):
         for k in range(order):
             d[k] = (k + 1) * b[k + 1]
         if not excluded(d, ZERO, order - 1):
-            low, high = turning_values(b, d, order, low, high, stack)
+            low, high = turning_values(b, d, order, low, high, search.stack)
         extremes[0, i], extremes[1, i] = low, high
 
 

@@ -15,18 +15,26 @@ same coefficients at both ends takes the place of the series of the step.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.compiled.parts import part
-from fastslow.compiled.pointers import call_address, call_number
+from fastslow.compiled.pointers import call_address, call_with
+from fastslow.compiled.records import Matrix, Tensor, Vector, zeros
 from fastslow.compiled.series_modes import SHORT
 from fastslow.simulation.events import find_event
-from fastslow.simulation.matrices import factorise_in_place, forgotten_in, solve_in_place
+from fastslow.simulation.matrices import (
+    Spectrum,
+    factorise_in_place,
+    forgotten_in,
+    solve_in_place,
+    spectrum_for,
+)
 from fastslow.simulation.modes import MISSING
 from fastslow.simulation.polynomials import EPSILON
-from fastslow.simulation.radau import STAGES, accept
+from fastslow.simulation.radau import STAGES, Radau, RadauStep, accept, radau_for
 from fastslow.simulation.scales import NOW, REACHED, ratio_of
 
 #: Taylor coefficients that are matched at the beginning and at the end of a step.
@@ -105,58 +113,108 @@ _QUOTIENT = _quotient()
 _BINOMIAL = np.array([[float(math.comb(k, i)) for i in range(P + 1)] for k in range(P + 1)])
 
 
+class Implicit(NamedTuple):
+    """Work space of implicit steps.
+
+    Parameters
+    ----------
+    right, poly : float64 arrays
+        As large as the series: the short series at the end of a step, and its polynomials.
+    slopes : float64 array, shape (n_states, n_states + 1)
+    jacobian : float64 array, shape (n_states, n_states)
+    derivatives : float64 array, shape (Q, n_states, n_states)
+    ahead : float64 array, shape (1 + n_states + n_forcing,)
+    start, residual, moved, least : float64 arrays, shape (n_states,)
+    rest : float64 array, shape (Q + 1,)
+    spectrum : Spectrum
+    radau : Radau
+    """
+
+    right: Vector
+    poly: Vector
+    slopes: Matrix
+    jacobian: Matrix
+    derivatives: Tensor
+    ahead: Vector
+    start: Vector
+    residual: Vector
+    moved: Vector
+    least: Vector
+    rest: Vector
+    spectrum: Spectrum
+    radau: Radau
+
+
+def implicit_for(n_states: int, n_forcing: int, n_interfaces: int, size: int) -> Implicit:
+    """Work space for a model of these sizes, whose series is so large."""
+    n = n_states
+    return zeros(
+        Implicit,
+        *(size, size),
+        (n, n + 1),
+        (n, n),
+        (Q, n, n),
+        1 + n + n_forcing,
+        *(n, n, n, n),
+        Q + 1,
+        spectrum_for(n),
+        radau_for(n, n_forcing, n_interfaces, size),
+    )
+
+
+class Lengths(NamedTuple):
+    """Lengths of an implicit step.
+
+    Parameters
+    ----------
+    wanted, least : float
+        The one to try first, and the least that is worth while.
+    longest : float
+        That of the series.
+    remaining : float
+        Time that is left.
+    """
+
+    wanted: float
+    least: float
+    longest: float
+    remaining: float
+
+
+class Series(NamedTuple):
+    """Coefficients that an implicit step begins with, and those that it fills.
+
+    Parameters
+    ----------
+    left : float64 array
+        The series at its beginning, of which the first coefficients are used.
+    right, poly : float64 arrays
+        Filled: the short series at the end, and the polynomials of the step.
+    work : float64 array
+        As large; work space.
+    """
+
+    left: Vector
+    right: Vector
+    poly: Vector
+    work: Vector
+
+
 @part
-def long_step(
-    late,
-    address,
-    layout,
-    n_fast,
-    signs,
-    mode,
-    inputs,
-    parameters,
-    tol,
-    scales,
-    wanted,
-    least,
-    longest,
-    remaining,
-    W,
-    right,
-    poly,
-    work,
-    matrices,
-    vectors,
-    carried,
-    on,
-    rests,
-    noise,
-    b,
-    stack,
-    gradient,
-):
+def long_step(problem, run, mode, lengths, series, scales, search, space):
     """An implicit step that pays and that ends before anything happens.
 
     Parameters
     ----------
-    n_fast : int
-        The first states, those of the fast subsystem.
-    wanted, least, longest : float
-        The length to try first, the least that is worth while, and that of the series.
-    remaining : float
-        Time that is left.
-    W, right, poly : float64 arrays
-        The series at the beginning, of which the first coefficients are used;
-        filled: the short series at the end, and the polynomials of the step.
-    work : float64 array
-        As large; work space.
+    problem : Problem
+    run : Run
+    mode : int
+    lengths : Lengths
+    series : Series
     scales : float64 array, shape (2, rows)
         In which errors are measured, those now at the beginning.
-    matrices : float64 array, shape (2 + Q, n_states, n_states + 1)
-    vectors : float64 array, shape (6, 1 + n_states + n_forcing or 1 + order, the larger)
-        Work space.
-    carried : float64 array
-        See `radau_step`; the first number is 0 at the beginning of a phase.
+    search : Search
+    space : Implicit
 
     Returns
     -------
@@ -165,6 +223,9 @@ def long_step(
     growth : float
         How much longer the next one may be.
     """
+    inputs, on, signs = run.inputs, search.on, problem.signs
+    wanted, least, longest, remaining = lengths
+    poly, phase = series.poly, space.radau.phase
     for j in range(on.shape[0]):
         if on[j] or signs[mode, j] == 0:
             return 0.0, 1.0
@@ -175,41 +236,14 @@ def long_step(
         if h < remaining:
             h = (inputs[0] + h) - inputs[0]
         error, power = -1.0, -1.0 / (P + Q)
-        rigid = carried[0] > 0.0 or h > RIGID * longest
+        rigid = phase[0] > 0.0 or h > RIGID * longest
         if not rigid:
             error = implicit_step(
-                address,
-                layout,
-                n_fast,
-                mode,
-                inputs,
-                parameters,
-                tol,
-                scales,
-                CONTRACTION / longest,
-                h,
-                W,
-                right,
-                poly,
-                matrices,
-                vectors,
+                problem, run, mode, CONTRACTION / longest, h, series, scales, space
             )
         if rigid or (error < 0.0 and CONTRACTION * h > RESOLVED * longest):
             found = by_radau(
-                late,
-                address,
-                layout,
-                n_fast,
-                mode,
-                inputs,
-                parameters,
-                tol,
-                scales,
-                CONTRACTION / longest,
-                h,
-                right,
-                poly,
-                carried,
+                problem, run, mode, CONTRACTION / longest, h, series, scales, space.radau
             )
             if found == MISSING:
                 return MISSING, 1.0
@@ -217,14 +251,11 @@ def long_step(
                 rigid, error, power = True, found, -1.0 / (STAGES + 1)
         error = abs(error)
         if error <= 1.0:
-            s, j, _, _, _ = find_event(
-                address, layout, signs, mode, inputs, parameters, poly, h, on, rests, noise, b,
-                stack, gradient,
-            )  # fmt: skip
+            s, j, _, _, _ = find_event(problem, run, mode, poly, h, search)
             if j < 0:
                 if rigid:
-                    accept(address, layout, mode, inputs, parameters, h, poly, right, carried)
-                keep_forcing(address, layout, mode, inputs, parameters, tol, scales, h, poly, work)
+                    accept(problem, run, mode, h, poly, series.right, space.radau)
+                keep_forcing(problem, run, mode, h, series, scales)
                 return h, min(4.0, 0.8 * max(error, 1e-9) ** power)
             # the series goes through events; end a little before this one
             h *= 0.9 * s
@@ -234,62 +265,25 @@ def long_step(
 
 
 @part
-def by_radau(
-    late,
-    address,
-    layout,
-    n_fast,
-    mode,
-    inputs,
-    parameters,
-    tol,
-    scales,
-    rate,
-    h,
-    right,
-    poly,
-    carried,
-):
-    """Call `radau_by_pointers`."""
-    if late[1] == 0:
+def by_radau(problem, run, mode, rate, h, series, scales, space):
+    """Call `radau_step`."""
+    if problem.radau == 0:
         return MISSING
-    n_states, n_forcing, n_interfaces, n_modes, order = layout
-    return call_number(
-        late[1],
-        (
-            address,
-            n_states,
-            n_forcing,
-            n_interfaces,
-            n_modes,
-            order,
-            n_fast,
-            mode,
-            inputs,
-            parameters,
-            tol,
-            scales,
-            rate,
-            h,
-            right,
-            poly,
-            poly.shape[0],
-            carried,
-        ),
-    )
+    step = RadauStep(problem, run, mode, rate, h, series.right, series.poly, scales, space)
+    return call_with(problem.radau, step)
 
 
 @part
-def settled(W, layout, h, tol, scales):
+def settled(problem, W, h, scales):
     """Whether a step is limited by stability: its middle terms are small beside what is allowed.
 
     A motion exp(lambda t) of size a has the terms a z**k / k!, z = lambda h. Where
     accuracy limits the step the middle ones far exceed the last, which is the
     tolerance; on the edge of stability, |z| = order / e, all of them are near it.
     """
-    order = layout[4]
-    most = tol * math.exp(0.5 * order)
-    for i in range(layout[0] + layout[1] + layout[2]):
+    order = problem.order
+    most = problem.tol * math.exp(0.5 * order)
+    for i in range(problem.n_states + problem.n_forcing + problem.n_interfaces):
         row = i * (order + 1)
         allowed = most * scales[NOW, i]
         k = order // 2
@@ -300,47 +294,33 @@ def settled(W, layout, h, tol, scales):
 
 
 @part
-def implicit_step(
-    address,
-    layout,
-    n_fast,
-    mode,
-    inputs,
-    parameters,
-    tol,
-    scales,
-    rate,
-    h,
-    W,
-    right,
-    poly,
-    matrices,
-    vectors,
-):
+def implicit_step(problem, run, mode, rate, h, series, scales, space):
     """One implicit step, its polynomials put into ``poly``; returns its error in units of ``tol``.
 
     Infinite where the equation is not solved, and negative where it is not tried, because the
     fast states do not contract at the given rate: an implicit method would damp what grows.
     """
-    n, n_forcing, n_interfaces, n_modes, order = layout
-    columns = order + 1
-    short = n_modes + n_interfaces + mode
-    slopes, jacobian = matrices[0], matrices[1]
-    derivatives = matrices[2:]
-    ahead, start, residual, moved, rest, least = vectors
+    n, tol, inputs, parameters = problem.n_states, problem.tol, run.inputs, run.parameters
+    n_forcing, n_interfaces = problem.n_forcing, problem.n_interfaces
+    columns = problem.order + 1
+    short = problem.n_modes + n_interfaces + mode
+    W, right, poly = series.left, series.right, series.poly
+    slopes, jacobian, derivatives = space.slopes, space.jacobian, space.derivatives
+    ahead, start, residual, moved = space.ahead, space.start, space.residual, space.moved
+    rest, least = space.rest, space.least
     ahead[0] = inputs[0] + h
     for i in range(n):
         row = i * columns
         ahead[1 + i] = W[row] + h * (W[row + 1] + h * (W[row + 2] + h * W[row + 3]))
         start[i] = matched(W, row, h, _LEFT)
-    call_address(address, short, ahead, parameters, right)
+    call_address(problem.series, short, ahead, parameters, right)
     for i in range(n):
         residual[i] = matched(right, i * columns, -h, _RIGHT) - start[i]
     for k in range(n):
         kept = ahead[1 + k]
         ahead[1 + k] = kept + max(DIFFERENCE * max(scales[NOW, k], abs(kept)), TINY)
         step = ahead[1 + k] - kept
-        call_address(address, short, ahead, parameters, poly)
+        call_address(problem.series, short, ahead, parameters, poly)
         for i in range(n):
             row = i * columns
             slopes[i, k] = (matched(poly, row, -h, _RIGHT) - start[i] - residual[i]) / step
@@ -349,7 +329,7 @@ def implicit_step(
                 derivatives[j, i, k] = (poly[row + 1 + j] - right[row + 1 + j]) / step
         ahead[1 + k] = kept
     # also says no where something is not finite
-    unresolved = forgotten_in(jacobian, n_fast, rate) * h
+    unresolved = forgotten_in(jacobian, problem.n_fast, rate, space.spectrum) * h
     if unresolved > RESOLVED:
         # as an error of this order, so that the next attempt is as short as it must be
         return -((unresolved / RESOLVED) ** (P + Q))
@@ -370,7 +350,7 @@ def implicit_step(
             ahead[1 + i] -= moved[i]
             allowed = allowed_of(tol, W[i * columns], ahead[1 + i], scales[REACHED, i], least[i])
             size = max(size, ratio_of(moved[i], allowed))
-        call_address(address, short, ahead, parameters, right)
+        call_address(problem.series, short, ahead, parameters, right)
         # rounding, magnified by the condition of the equation, is where it cannot go on
         done = size <= ROUNDED
         if not done:
@@ -418,19 +398,20 @@ def allowed_of(tol, before, after, reached, least):
 
 
 @part
-def keep_forcing(address, layout, mode, inputs, parameters, tol, scales, h, poly, work):
+def keep_forcing(problem, run, mode, h, series, scales):
     """Let the slow quantities keep their own series where it holds throughout a step.
 
     They do not depend on the states, so that only the states need be implicit.
     """
-    n, n_forcing, _, _, order = layout
+    n, n_forcing, order = problem.n_states, problem.n_forcing, problem.order
+    poly, work = series.poly, series.work
     if n_forcing == 0:
         return
-    call_address(address, mode, inputs, parameters, work)
+    call_address(problem.series, mode, run.inputs, run.parameters, work)
     for i in range(n, n + n_forcing):
         row = i * (order + 1)
         left = max(abs(work[row + order]) * h, abs(work[row + order - 1])) * h ** (order - 1)
-        if left <= 1e-6 * tol * scales[NOW, i]:
+        if left <= 1e-6 * problem.tol * scales[NOW, i]:
             for k in range(order + 1):
                 poly[row + k] = work[row + k]
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fastslow.compiled.parts import part
-from fastslow.compiled.pointers import call_address, call_number
+from fastslow.compiled.pointers import call_address, call_with
+from fastslow.simulation.collocation import CollocationStep
 from fastslow.simulation.polynomials import EPSILON, ONE, ZERO, first_nonzero, first_strong
 from fastslow.simulation.scales import step_length
 
@@ -25,7 +24,7 @@ MISSING = -1.0
 
 
 @part
-def expand(late, address, layout, mode, inputs, parameters, tol, scales, room, W, memory, known):
+def expand(problem, run, mode, longest, W, scales, space, going_on):
     """Fill ``W`` with polynomials of time from a point on.
 
     The Taylor series where there is one; else, where its coefficients are not
@@ -33,20 +32,19 @@ def expand(late, address, layout, mode, inputs, parameters, tol, scales, room, W
 
     Parameters
     ----------
-    late, address, layout, mode, inputs, parameters
-        As for `drive`: the compiled functions, and where.
-    tol : float
-    scales : float64 array, shape (2, rows)
-        In which errors are measured, see `step_length`.
-    room : float
+    problem : Problem
+    run : Run
+        Where.
+    mode : int
+    longest : float
         Longest step that is of use.
     W : float64 array
         Rows of coefficients, filled here.
-    memory : float64 array
-        What is carried from one step of a run to the next: `memory_size` numbers, zeros at
-        its beginning, or none for a single step. The first is 1 after a collocation.
-    known : bool
-        Whether the series is there already.
+    scales : float64 array, shape (2, rows)
+        In which errors are measured, see `step_length`.
+    space : Collocation
+    going_on : bool
+        Whether this is a step of the run, which goes on from the last one by collocation.
 
     Returns
     -------
@@ -54,43 +52,29 @@ def expand(late, address, layout, mode, inputs, parameters, tol, scales, room, W
         How far the polynomials hold, NaN where the rates are not finite, `MISSING` where
         collocation is needed and is not there.
     """
-    if not known:
-        call_address(address, mode, inputs, parameters, W)
-    length = step_length(W, layout[0] + layout[1] + layout[2], layout[4], tol, scales)
-    if memory.shape[0] > 0:
-        memory[0] = 0.0
-    if length > 0.0:
-        return length
-    return instead(late, address, layout, mode, inputs, parameters, tol, scales, room, W, memory)
+    call_address(problem.series, mode, run.inputs, run.parameters, W)
+    return expanded(problem, run, mode, longest, W, scales, space, going_on)
 
 
 @part
-def instead(late, address, layout, mode, inputs, parameters, tol, scales, room, W, memory):
-    """Call `step_by_collocation`: apart, so that the common case stays short."""
-    if late[0] == 0:
+def expanded(problem, run, mode, longest, W, scales, space, going_on):
+    """`expand` where the series is there already."""
+    rows = problem.n_states + problem.n_forcing + problem.n_interfaces
+    length = step_length(W, rows, problem.order, problem.tol, scales)
+    if going_on:
+        space.memory[0] = 0.0
+    if length > 0.0:
+        return length
+    return instead(problem, run, mode, longest, W, scales, space, going_on)
+
+
+@part
+def instead(problem, run, mode, longest, W, scales, space, going_on):
+    """Call `collocate`: apart, so that the common case stays short."""
+    if problem.collocation == 0:
         return MISSING
-    n_states, n_forcing, n_interfaces, n_modes, order = layout
-    return call_number(
-        late[0],
-        (
-            address,
-            n_states,
-            n_forcing,
-            n_interfaces,
-            n_modes,
-            order,
-            mode,
-            inputs,
-            parameters,
-            tol,
-            scales,
-            room,
-            W,
-            W.shape[0],
-            memory,
-            memory.shape[0],
-        ),
-    )
+    step = CollocationStep(problem, run, mode, longest, W, scales, space, going_on)
+    return call_with(problem.collocation, step)
 
 
 @part
@@ -107,9 +91,9 @@ def scaled(W, row, order, h, b):
 
 
 @part
-def interface_noise(address, n_modes, j, inputs, parameters, gradient):
+def interface_noise(problem, run, j, gradient):
     """Size of h that is rounding error, from the moduli of its terms; fills the gradient."""
-    call_address(address, n_modes + j, inputs, parameters, gradient)
+    call_address(problem.series, problem.n_modes + j, run.inputs, run.parameters, gradient)
     return 8.0 * EPSILON * gradient[1]
 
 
@@ -126,15 +110,15 @@ def across(signs, mode, j):
 
 
 @part
-def leaves(W, layout, j, side, tol, scales, longest, noise):
+def leaves(problem, W, j, side, longest, scales, noise):
     """Whether a motion from an interface goes to one side at once, by its drift.
 
     Where the rates are continuous it does so in no other mode, as `choose_mode`
     would find by looking at them all.
     """
-    n_states, n_forcing, n_interfaces, _, order = layout
-    first_h = n_states + n_forcing
-    length = min(longest, step_length(W, first_h + n_interfaces, order, tol, scales))
+    first_h, order = problem.n_states + problem.n_forcing, problem.order
+    rows = first_h + problem.n_interfaces
+    length = min(longest, step_length(W, rows, order, problem.tol, scales))
     if not length > 0.0:
         return False
     drift = W[(first_h + j) * (order + 1) + 1]
@@ -159,58 +143,36 @@ def agreement(b, order, noise, side):
 
 
 @part
-def choose_mode(
-    late,
-    address,
-    layout,
-    signs,
-    continuous,
-    inputs,
-    parameters,
-    tol,
-    scales,
-    longest,
-    on,
-    side,
-    current,
-    W,
-    b,
-    noise,
-):
+def choose_mode(problem, run, current, longest, W, scales, search, space):
     """The mode in which the solution goes on.
 
     Parameters
     ----------
-    late : tuple of int
-        As for `drive`.
-    address : int
-        Of the compiled series.
-    layout : tuple of int
-        (n_states, n_forcing, n_interfaces, n_modes, order).
-    signs : int64 array, shape (n_modes, n_interfaces)
-    continuous : bool array, shape (n_interfaces,)
+    problem : Problem
         Where the rates are continuous there is one way on, and doubt is rounding.
-    inputs, parameters : float64 arrays
+    run : Run
         Where.
-    tol, scales, longest
-        The step over which rounding is judged: its tolerance, in which scales, and longest
-        length.
-    on : bool array, shape (n_interfaces,)
-        Interfaces on which the point lies.
-    side : int64 array, shape (n_interfaces,)
-        Sign of h for the others.
     current : int
         The mode before, preferred where the motion rests on the interface.
-    W, b, noise : float64 arrays
-        Work space; ``noise`` holds the rounding error of each h and grows here.
+    longest : float
+    scales : float64 array
+        The step over which rounding is judged: its longest length, and in which scales.
+    W : float64 array
+        Work space.
+    search : Search
+        ``on`` says on which interfaces the point lies, ``side`` the sign of h for the
+        others; ``noise`` holds the rounding error of each h and grows here.
+    space : Collocation
 
     Returns
     -------
     int
         The mode, `NO_MODE`, `MANY_MODES`, `NOT_DEFINED` or `UNKNOWN_MODE`.
     """
-    n_states, n_forcing, n_interfaces, n_modes, order = layout
-    first_h = n_states + n_forcing
+    n_interfaces, n_modes, order = problem.n_interfaces, problem.n_modes, problem.order
+    signs, continuous, on, b = problem.signs, problem.continuous, search.on, search.b
+    side, noise = search.side, search.noise
+    first_h = problem.n_states + problem.n_forcing
     drift = first_h + n_interfaces
     best, best_score, equals = NO_MODE, DISAGREES, 0
     broken, certain = False, True
@@ -219,7 +181,6 @@ def choose_mode(
     if certain:
         # even the worst is then only as wrong as rounding
         best_score = DISAGREES - 1
-    memory = np.empty(0)
     # two passes: every mode is judged over the same step, and by the largest rounding error
     shared = longest
     for judging in (False, True):
@@ -230,20 +191,7 @@ def choose_mode(
                     possible = False
             if not possible:
                 continue
-            length = expand(
-                late,
-                address,
-                layout,
-                mode,
-                inputs,
-                parameters,
-                tol,
-                scales,
-                longest,
-                W,
-                memory,
-                False,
-            )
+            length = expand(problem, run, mode, longest, W, scales, space, False)
             if length == MISSING:
                 return UNKNOWN_MODE
             if not length > 0.0:

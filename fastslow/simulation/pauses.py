@@ -12,6 +12,7 @@ import time
 
 from fastslow.compiled.late import address_of
 from fastslow.simulation.driver import NEEDS_COLLOCATION, NEEDS_RADAU
+from fastslow.simulation.problems import Problem
 
 #: Seconds between two pauses, about.
 SLICE = 0.02
@@ -51,18 +52,16 @@ class Pace:
 _late: dict[int, int] = {}
 
 
-def late_code(n_fast: int) -> tuple[int, int]:
-    """Addresses of the steps by collocation and of those of Radau, 0 where they are not there.
+def with_late_code(problem: Problem) -> Problem:
+    """A problem with the addresses of its steps by collocation and of Radau, as far as known.
 
     A step by collocation could not be taken again for want of the other: both, then, or none.
-
-    Parameters
-    ----------
-    n_fast : int
-        States that implicit steps may be tried for, 0 if none.
     """
     collocation, radau = _late.get(NEEDS_COLLOCATION, 0), _late.get(NEEDS_RADAU, 0)
-    return collocation if radau or not n_fast else 0, radau
+    collocation = collocation if radau or not problem.n_fast else 0
+    if (collocation, radau) == (problem.collocation, problem.radau):
+        return problem
+    return problem._replace(collocation=collocation, radau=radau)
 
 
 def provide(code: int, n_fast: int) -> None:
@@ -73,10 +72,11 @@ def provide(code: int, n_fast: int) -> None:
     code : int
         `NEEDS_COLLOCATION` or `NEEDS_RADAU`.
     n_fast : int
-        As for `late_code`.
+        States that implicit steps may be tried for, 0 if none.
     """
     if code == NEEDS_RADAU or n_fast:
-        _late[NEEDS_RADAU] = address_of("fastslow.simulation.radau", "radau_by_pointers")
+        module = "fastslow.simulation.radau"
+        _late[NEEDS_RADAU] = address_of(module, "radau_step", "RadauStep")
     if code == NEEDS_COLLOCATION:
         module = "fastslow.simulation.collocation"
-        _late[NEEDS_COLLOCATION] = address_of(module, "step_by_collocation")
+        _late[NEEDS_COLLOCATION] = address_of(module, "collocate", "CollocationStep")

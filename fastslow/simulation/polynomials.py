@@ -44,10 +44,10 @@ def horner(b, first, last, s):
 
 
 @part
-def sample(W, columns, rows, s, out, first):
+def sample(W, columns, s, out, first):
     """Evaluate rows of a step at the offsets s, into the columns of ``out`` from the first."""
     n = s.shape[0]
-    for i in range(rows):
+    for i in range(out.shape[0]):
         top = i * columns + columns - 1
         # four at a time, because each waits for its own last product
         for c in range(0, n - 3, 4):

@@ -11,18 +11,32 @@ linear systems are taken apart by the eigenvectors of the method (section IV.8).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from numba import types
-from numba.extending import register_jitable
-from numba.np.numpy_support import carray
 from numpy.polynomial import Polynomial, legendre
 from numpy.typing import NDArray
 
 from fastslow.compiled.parts import part
-from fastslow.compiled.pointers import DOUBLES, call_address
+from fastslow.compiled.pointers import call_address
+from fastslow.compiled.records import (
+    ComplexMatrix,
+    ComplexTensor,
+    ComplexVector,
+    Matrix,
+    Vector,
+    zeros,
+)
 from fastslow.compiled.series_modes import DIRECTIONAL, RATES
-from fastslow.simulation.matrices import factorise_in_place, solve_in_place
+from fastslow.simulation.matrices import (
+    Spectrum,
+    eigenvalues_of,
+    factorise_in_place,
+    solve_in_place,
+    spectrum_for,
+)
 from fastslow.simulation.polynomials import EPSILON
+from fastslow.simulation.problems import Problem, Run
 from fastslow.simulation.scales import NOW, REACHED, ratio_of
 
 #: Number of stages, and order at the end of a step.
@@ -94,42 +108,112 @@ VALUES, OUT_OF, INTO = _modes()
 BETWEEN, WITHIN = _interpolation()
 
 
-@register_jitable
-def carried_size(n_states: int) -> int:
-    """Numbers carried within a phase: length of the last step, eigenvalues at both ends."""
-    return 1 + 4 * n_states
-
-
-@part
-def radau_step(
-    address, layout, n_fast, mode, inputs, parameters, tol, scales, rate, h, right, poly, carried
-):
-    """One step; its polynomials are put into ``poly``; returns its error in units of ``tol``.
+class Radau(NamedTuple):
+    """What a phase of such steps goes on from, and the work space of a step.
 
     Parameters
     ----------
-    n_fast : int
-        The first states, whose modes must decay or be followed.
+    phase : float64 array, shape (1 + 4 n_states,)
+        Length of the last step, 0 at the beginning of a phase, and eigenvalues at both ends.
+    jacobian : float64 array, shape (n_states, n_states)
+    start, least, allowed : float64 arrays, shape (n_states,)
+    increments, rates : float64 arrays, shape (STAGES, n_states)
+    held : float64 array, shape (n_states + n_forcing + n_interfaces, STAGES + 1)
+    point : float64 array, shape (1 + n_states + n_forcing,)
+    out : float64 array
+        As large as the series.
+    given : complex array, shape (n_states,)
+    moved : complex array, shape (pairs, n_states)
+    factors : complex array, shape (pairs, n_states, n_states + 1)
+    spectrum : Spectrum
+    """
+
+    phase: Vector
+    jacobian: Matrix
+    start: Vector
+    least: Vector
+    allowed: Vector
+    increments: Matrix
+    rates: Matrix
+    held: Matrix
+    point: Vector
+    out: Vector
+    given: ComplexVector
+    moved: ComplexMatrix
+    factors: ComplexTensor
+    spectrum: Spectrum
+
+
+def radau_for(n_states: int, n_forcing: int, n_interfaces: int, size: int) -> Radau:
+    """Work space for a model of these sizes, whose series is so large."""
+    n, pairs = n_states, len(VALUES)
+    return zeros(
+        Radau,
+        1 + 4 * n,
+        (n, n),
+        *(n, n, n),
+        *((STAGES, n), (STAGES, n)),
+        (n + n_forcing + n_interfaces, STAGES + 1),
+        1 + n + n_forcing,
+        size,
+        n,
+        (pairs, n),
+        (pairs, n, n + 1),
+        spectrum_for(n),
+    )
+
+
+class RadauStep(NamedTuple):
+    """What `radau_step` is given.
+
+    Parameters
+    ----------
+    problem : Problem
+    run : Run
+    mode : int
     rate : float
         Modes that decay faster are forgotten whatever the length of the step.
     h : float
     right : float64 array
-        The polynomials of the last step, where the first number carried is its length.
-    carried : float64 array
-        `carried_size` numbers, the eigenvalues at the end filled here; see `accept`.
+        The polynomials of the last step of the phase.
+    poly : float64 array
+        Filled with those of this one.
+    scales : float64 array
+    space : Radau
+        The eigenvalues at the end are filled in; see `accept`.
+    """
+
+    problem: Problem
+    run: Run
+    mode: int
+    rate: float
+    h: float
+    right: Vector
+    poly: Vector
+    scales: Matrix
+    space: Radau
+
+
+@part
+def radau_step(step):
+    """One step; its polynomials are put into ``poly``; returns its error in units of ``tol``.
 
     Returns
     -------
     float
         Infinite where the equations are not solved.
     """
-    n, n_forcing, n_interfaces, n_modes, order = layout
-    columns = order + 1
-    number = n_modes + n_interfaces
-    rows = n + n_forcing + n_interfaces
+    problem, run, mode, rate, h, right, poly, scales, space = step
+    series, parameters, inputs = problem.series, run.parameters, run.inputs
+    n, n_forcing, n_fast, tol = problem.n_states, problem.n_forcing, problem.n_fast, problem.tol
+    columns = problem.order + 1
+    number = problem.n_modes + problem.n_interfaces
+    rows = n + n_forcing + problem.n_interfaces
     half = VALUES.shape[0]
-    jacobian, start = np.empty((n, n)), np.empty(n)
-    Z, F = np.zeros((STAGES, n)), np.empty((STAGES, n))
+    jacobian, start, Z, F = space.jacobian, space.start, space.increments, space.rates
+    point, out, held, carried = space.point, space.out, space.held, space.phase
+    least, allowed_in = space.least, space.allowed
+    factors, given, moved = space.factors, space.given, space.moved
     last = carried[0]
     if last > 0.0:
         # the last polynomial, continued
@@ -142,17 +226,18 @@ def radau_step(
                     there = (there + right[row + k]) * s
                     here = (here + right[row + k]) * last
                 Z[j, i] = there - here
-    point = inputs.copy()
-    out = np.empty(poly.shape[0])
-    jacobian_at(address, layout, mode, point, parameters, out, jacobian)
-    call_address(address, RATES * number + mode, point, parameters, out)
-    held = np.empty((rows, STAGES + 1))
-    least, allowed_in = np.empty(n), np.empty(n)
+    else:
+        for j in range(STAGES):
+            for i in range(n):
+                Z[j, i] = 0.0
+    for i in range(inputs.shape[0]):
+        point[i] = inputs[i]
+    jacobian_at(problem, run, mode, space)
+    call_address(series, RATES * number + mode, point, parameters, out)
     for i in range(rows):
         held[i, 0] = out[i * columns]
     for i in range(n):
         start[i] = out[i * columns + 1]
-    factors = np.empty((half, n, n + 1), dtype=np.complex128)
     for m in range(half):
         for i in range(n):
             for k in range(n):
@@ -160,8 +245,6 @@ def radau_step(
             factors[m, i, i] += VALUES[m] / h
         if not factorise_in_place(factors[m], n):
             return np.inf
-    given = np.empty(n, dtype=np.complex128)
-    moved = np.empty((half, n), dtype=np.complex128)
     # no state is known better than rounding of the terms of the rates lets it be
     for i in range(n):
         noise = 0.0
@@ -178,7 +261,7 @@ def radau_step(
             point[0] = inputs[0] + C[j] * h
             for i in range(n):
                 point[1 + i] = inputs[1 + i] + Z[j, i]
-            call_address(address, RATES * number + mode, point, parameters, out)
+            call_address(series, RATES * number + mode, point, parameters, out)
             for i in range(n):
                 F[j, i] = out[i * columns + 1]
             for i in range(rows):
@@ -234,7 +317,7 @@ def radau_step(
             point[0] = inputs[0] + place * h
             for i in range(n):
                 point[1 + i] = value_at(poly, i * columns, place * h)
-            call_address(address, RATES * number + mode, point, parameters, out)
+            call_address(series, RATES * number + mode, point, parameters, out)
             for i in range(n):
                 start[i] = out[i * columns + 1]
             for i in range(n, rows):
@@ -262,9 +345,9 @@ def radau_step(
     now, then = carried[1 : 1 + 2 * n], carried[1 + 2 * n :]
     if n_fast > 0:
         if not last > 0.0:
-            eigenvalues_of(jacobian, n_fast, now)
-        jacobian_at(address, layout, mode, point, parameters, out, jacobian)
-        eigenvalues_of(jacobian, n_fast, then)
+            in_order(jacobian, n_fast, now, space.spectrum)
+        jacobian_at(problem, run, mode, space)
+        in_order(jacobian, n_fast, then, space.spectrum)
         unresolved = in_doubt(now, then, n_fast, rate, h) * h
         if not unresolved <= FOLLOWED:
             # as an error of this order, so that the next attempt is as short as it must be
@@ -273,17 +356,19 @@ def radau_step(
 
 
 @part
-def accept(address, layout, mode, inputs, parameters, h, poly, right, carried):
+def accept(problem, run, mode, h, poly, right, space):
     """Go on from a step: values and rates at its end are put into ``right``."""
-    n, _, n_interfaces, n_modes, order = layout
-    point = inputs.copy()
-    point[0] = inputs[0] + h
+    n, point = problem.n_states, space.point
+    for i in range(run.inputs.shape[0]):
+        point[i] = run.inputs[i]
+    point[0] += h
     for i in range(n):
-        point[1 + i] = value_at(poly, i * (order + 1), h)
-    call_address(address, RATES * (n_modes + n_interfaces) + mode, point, parameters, right)
-    carried[0] = h
+        point[1 + i] = value_at(poly, i * (problem.order + 1), h)
+    rates = RATES * (problem.n_modes + problem.n_interfaces) + mode
+    call_address(problem.series, rates, point, run.parameters, right)
+    space.phase[0] = h
     for i in range(2 * n):
-        carried[1 + i] = carried[1 + 2 * n + i]
+        space.phase[1 + i] = space.phase[1 + 2 * n + i]
 
 
 @part
@@ -305,31 +390,26 @@ def slope_at(poly, row, s):
 
 
 @part
-def jacobian_at(address, layout, mode, point, parameters, out, jacobian):
-    """The derivatives of the rates by the states, column by column."""
-    n, _, n_interfaces, n_modes, order = layout
-    columns = order + 1
+def jacobian_at(problem, run, mode, space):
+    """The derivatives of the rates by the states at a point, column by column."""
+    n, columns, out = problem.n_states, problem.order + 1, space.out
+    directional = DIRECTIONAL * (problem.n_modes + problem.n_interfaces) + mode
     for k in range(n):
         for i in range(n):
             out[i * columns + 1] = 1.0 if i == k else 0.0
-        call_address(address, DIRECTIONAL * (n_modes + n_interfaces) + mode, point, parameters, out)
+        call_address(problem.series, directional, space.point, run.parameters, out)
         for i in range(n):
-            jacobian[i, k] = 2.0 * out[i * columns + 2]
+            space.jacobian[i, k] = 2.0 * out[i * columns + 2]
 
 
 @part
-def eigenvalues_of(jacobian, n, found):
+def in_order(jacobian, n, found, spectrum):
     """Real parts of the eigenvalues, in descending order, then their moduli, NaN where unknown."""
-    matrix = np.empty((n, n), dtype=np.complex128)
-    finite = 0.0
-    for i in range(n):
-        for j in range(n):
-            matrix[i, j] = jacobian[i, j]
-            finite += 0.0 * jacobian[i, j]
-    if finite != 0.0:
-        found[:] = np.nan
+    if not eigenvalues_of(jacobian, n, spectrum):
+        for i in range(found.shape[0]):
+            found[i] = np.nan
         return
-    values = np.linalg.eigvals(matrix)
+    values = spectrum.values
     for i in range(n):
         place = i
         while place > 0 and found[place - 1] < values[i].real:
@@ -349,7 +429,7 @@ def in_doubt(now, then, n, rate, h):
     Parameters
     ----------
     now, then : float64 arrays, shape (2 n,)
-        From `eigenvalues_of`, at the beginning and end of the step.
+        From `in_order`, at the beginning and end of the step.
     """
     largest = 0.0
     for k in range(n):
@@ -368,55 +448,3 @@ def in_doubt(now, then, n, rate, h):
         if not (-real * h >= FOLLOWED and erased):
             followed = max(followed, modulus)
     return followed
-
-
-@part
-def radau_by_pointers(
-    address,
-    n_states,
-    n_forcing,
-    n_interfaces,
-    n_modes,
-    order,
-    n_fast,
-    mode,
-    inputs,
-    parameters,
-    tol,
-    scales,
-    rate,
-    h,
-    right,
-    poly,
-    size,
-    carried,
-):
-    """`radau_step` with pointers for arrays."""
-    return radau_step(
-        address,
-        (n_states, n_forcing, n_interfaces, n_modes, order),
-        n_fast,
-        mode,
-        carray(inputs, 1 + n_states + n_forcing),
-        carray(parameters, 1),
-        tol,
-        carray(scales, (2, n_states + n_forcing + n_interfaces)),
-        rate,
-        h,
-        carray(right, size),
-        carray(poly, size),
-        carray(carried, carried_size(n_states)),
-    )
-
-
-#: Type of `radau_by_pointers`.
-SIGNATURE = types.float64(
-    *[types.int64] * 8,
-    *[DOUBLES] * 2,
-    types.float64,
-    DOUBLES,
-    *[types.float64] * 2,
-    *[DOUBLES] * 2,
-    types.int64,
-    DOUBLES,
-)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import finite, flag, instance, positive, takes, text
-from fastslow.compiled.generic import load_loop
+from fastslow.compiled.generic import load_loop_of_records
 from fastslow.compiled.series import CompiledSeries, compile_series
 from fastslow.model.derived import once, partition_of, sloped, timed
 from fastslow.model.invariance import factor_states, states_together
@@ -27,18 +27,10 @@ from fastslow.simulation.arguments import (
 )
 from fastslow.simulation.driver import OUT_OF_WORK, TABLE_FULL
 from fastslow.simulation.implicit_steps import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
-from fastslow.simulation.pauses import Pace, late_code, provide
+from fastslow.simulation.pauses import Pace, provide, with_late_code
+from fastslow.simulation.problems import Problem, Record, Run
 from fastslow.simulation.radau import RADAU_ORDER
 from fastslow.simulation.remembering import with_noise
-from fastslow.simulation.rooms import (
-    CROSSINGS,
-    MODE,
-    SAMPLES,
-    STEPS,
-    WORK,
-    beginnings,
-    room_for,
-)
 from fastslow.simulation.scales import FORGETTING, rules_of
 from fastslow.simulation.settings import (
     DEFAULT,
@@ -47,40 +39,19 @@ from fastslow.simulation.settings import (
     integration_settings,
     resolve,
 )
-
-_ARGUMENTS = (
-    "late_code",
-    "address",
-    "layout",
-    "sizes",
-    "signs",
-    "continuous",
-    "parameters",
-    "span",
-    "tol",
-    "rules",
-    "times",
-    "samples",
-    "since",
-    "limits",
-    "steps",
-    "crossings",
-    "store",
-    "extremes",
-    "hits",
-    "seen",
-    "room",
-    "inputs",
-    "carried",
-    "counted",
-    "handed",
+from fastslow.simulation.workspace import (
+    CROSSINGS,
+    MODE,
+    SAMPLES,
+    STEPS,
+    WORK,
+    Workspace,
+    beginnings,
+    workspace_for,
 )
 
 #: No extremes, hits and times of modes: steps and crossings are listed instead.
 _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
-
-#: Depth of the work space of the event search.
-STACK_ROWS = 46
 
 gap_of = once(sloped)(gap_regions)
 vanishing_of = once(partition_of)(factor_states)
@@ -180,40 +151,26 @@ def simulate(
     rows = compiled.n_states if dense else kept
     sampled = np.empty((rows, len(times)))
     rules = error_rules(model, resolved, compiled)
-    layout, sizes = layout_of(compiled), sizes_of(model, compiled, resolved.implicit)
+    problem = problem_of(model, compiled, resolved, rules)
     (place,), (carried,), (counted,) = beginnings(
         np.array([span[0]]), begin[None], compiled.n_forcing, rules
     )
-    constant = (
-        compiled.address,
-        layout,
-        sizes,
-        compiled.signs,
-        compiled.continuous,
-        compiled.parameter_array(model),
-        span,
-        resolved.rtol,
-        rules,
-        times,
-        sampled,
-        span[0],
-        resolved.limits,
-    )
-    room = room_for(layout, sizes, len(times))
+    parameters = compiled.parameter_array(model)
+    run = Run(span[0], span[1], span[0], parameters, place, carried, counted)
+    workspace = workspace_for(problem, compiled.n_rows, len(times))
     stride = kept * (compiled.order + 1) if dense else 0
     tables = _memory.taken(compiled.n_states, stride)
     loop, pace = drive_loop(), Pace(compiled.n_rows, compiled.order)
     while True:
         counted[WORK] = pace.begin()
-        code = loop(
-            late_code(sizes[2]), *constant, *tables, *_LISTED, room, place, carried, counted, 0
-        )
+        record = Record(times, sampled, *tables, *_LISTED)
+        code = loop(with_late_code(problem), run, record, workspace, 0)
         if code == OUT_OF_WORK:
             pace.end()
         elif code == TABLE_FULL:
             tables = tables.with_space(counted, compiled.n_interfaces, stride)
         elif code < 0:
-            provide(code, sizes[2])
+            provide(code, problem.n_fast)
         else:
             break
     steps, crossings, store = _memory.given_back(tables, counted, stride)
@@ -362,21 +319,27 @@ def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
     return ", ".join(words)
 
 
-def layout_of(compiled: CompiledSeries) -> tuple[int, int, int, int, int]:
-    """The numbers that the stepping loop needs of a compiled series."""
-    return (
+def problem_of(
+    model: Model, compiled: CompiledSeries, resolved: Resolved, rules: NDArray[np.float64]
+) -> Problem:
+    """What the stepping loops need of a model, its series, and the errors allowed."""
+    settling = resolved.implicit and compiled.order >= DEGREE and not compiled.values_only
+    return Problem(
+        compiled.address,
+        0,
+        0,
         compiled.n_states,
         compiled.n_forcing,
         compiled.n_interfaces,
         len(compiled.modes),
         compiled.order,
+        len(model.states) if settling else 0,
+        *resolved.limits,
+        resolved.rtol,
+        compiled.signs,
+        compiled.continuous,
+        rules,
     )
-
-
-def sizes_of(model: Model, compiled: CompiledSeries, implicit: bool) -> tuple[int, int, int]:
-    """Rows of the series, of the event search, and fast states if implicit steps are wanted."""
-    settling = implicit and compiled.order >= DEGREE and not compiled.values_only
-    return compiled.n_rows, STACK_ROWS, len(model.states) if settling else 0
 
 
 def error_rules(model: Model, resolved: Resolved, compiled: CompiledSeries) -> NDArray[np.float64]:
@@ -395,4 +358,6 @@ def error_rules(model: Model, resolved: Resolved, compiled: CompiledSeries) -> N
 
 def drive_loop() -> Callable[..., Any]:
     """The compiled stepping loop."""
-    return load_loop("fastslow.simulation.driver", "drive", _ARGUMENTS)
+    return load_loop_of_records(
+        "fastslow.simulation.driver", "drive", (Problem, Run, Record, Workspace, int)
+    )

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.simulation.collocation import memory_size
-from fastslow.simulation.implicit_steps import WAIT, Q
-from fastslow.simulation.radau import carried_size
+from fastslow.compiled.records import Matrix, Vector, zeros
+from fastslow.simulation.collocation import Collocation, collocation_for
+from fastslow.simulation.events import Search, search_for
+from fastslow.simulation.implicit_steps import WAIT, Implicit, implicit_for
+from fastslow.simulation.problems import Problem
 from fastslow.simulation.scales import FIXED
 
 #: Numbers carried from step to step: by how much the time is late, the usual length of a
@@ -67,31 +69,41 @@ def beginnings(
     return places, carried, counted
 
 
-def room_for(
-    layout: tuple[int, int, int, int, int], sizes: tuple[int, int, int], n_times: int
-) -> tuple[NDArray[Any], ...]:
-    """Work space of `drive`, for one run after the other; one that paused goes on in its own."""
-    n_states, n_forcing, n_interfaces, _, order = layout
-    columns = order + 1
-    settling = sizes[0] * columns if sizes[2] > 0 else 0
-    return (
-        np.empty(sizes[0] * columns),
-        np.empty(sizes[0] * columns),
-        np.empty(columns),
-        np.empty(columns),
-        np.empty((sizes[1], columns + 3)),
-        np.empty(2 + n_states),
-        np.empty(n_interfaces),
-        np.empty(n_interfaces, dtype=np.bool_),
-        np.empty(n_interfaces, dtype=np.bool_),
-        np.empty(n_interfaces, dtype=np.bool_),
-        np.empty(n_interfaces, dtype=np.int64),
-        np.empty(n_times),
-        np.empty(settling),
-        np.empty(settling),
-        np.empty((2 + Q, n_states, n_states + 1)),
-        np.empty((6, max(1 + n_states + n_forcing, columns))),
-        np.zeros(memory_size(n_states, order)),
-        np.zeros((2, n_states + n_forcing + n_interfaces)),
-        np.zeros(carried_size(n_states)),
+class Workspace(NamedTuple):
+    """Work space of `drive`, for one run after the other; one that paused goes on in its own.
+
+    Parameters
+    ----------
+    W, work : float64 arrays
+        As large as the series.
+    scales : float64 array, shape (2, n_states + n_forcing + n_interfaces)
+    offsets : float64 array, shape (n_times,)
+    search : Search
+    collocation : Collocation
+    implicit : Implicit
+    """
+
+    W: Vector
+    work: Vector
+    scales: Matrix
+    offsets: Vector
+    search: Search
+    collocation: Collocation
+    implicit: Implicit
+
+
+def workspace_for(problem: Problem, n_rows: int, n_times: int) -> Workspace:
+    """Work space for runs of a problem, whose series fills so many rows, with so many samples."""
+    n, forcing, interfaces = problem.n_states, problem.n_forcing, problem.n_interfaces
+    size = n_rows * (problem.order + 1)
+    fast = problem.n_fast > 0
+    return zeros(
+        Workspace,
+        *(size, size),
+        (2, n + forcing + interfaces),
+        n_times,
+        search_for(n, forcing, interfaces, problem.order),
+        collocation_for(n, forcing, interfaces, problem.order, n_rows),
+        # states without a fast one take no such steps
+        implicit_for(n if fast else 0, forcing, interfaces, size if fast else 0),
     )

@@ -1,0 +1,115 @@
+"""Records of what compiled functions take together: named tuples, which cost them nothing.
+
+The fields say their types, so that those of the whole record are known without one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from typing import Annotated, Any, TypeVar, cast, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+R = TypeVar("R")
+
+#: Arrays, contiguous in the order of C, with the name of their type and the number of axes.
+Vector = Annotated[NDArray[np.float64], "float64", 1]
+Matrix = Annotated[NDArray[np.float64], "float64", 2]
+Tensor = Annotated[NDArray[np.float64], "float64", 3]
+ComplexVector = Annotated[NDArray[np.complex128], "complex128", 1]
+ComplexMatrix = Annotated[NDArray[np.complex128], "complex128", 2]
+ComplexTensor = Annotated[NDArray[np.complex128], "complex128", 3]
+Integers = Annotated[NDArray[np.int64], "int64", 1]
+IntegerMatrix = Annotated[NDArray[np.int64], "int64", 2]
+IntegerTensor = Annotated[NDArray[np.int64], "int64", 3]
+Flags = Annotated[NDArray[np.bool_], "boolean", 1]
+
+_TYPES: dict[str, Any] = {
+    "float64": np.float64,
+    "complex128": np.complex128,
+    "int64": np.int64,
+    "boolean": np.bool_,
+}
+
+
+@cache
+def _kinds(record: type) -> tuple[Any, ...]:
+    """What each field is: a record, a number, or name and axes of an array."""
+    hints = get_type_hints(record, include_extras=True).values()
+    return tuple(h.__metadata__ if get_origin(h) is Annotated else h for h in hints)
+
+
+def zeros(record: type[R], *fields: Any) -> R:
+    """A record of arrays of zeros.
+
+    Parameters
+    ----------
+    record : type
+    *fields
+        The shape of every array, or its length; a record within this one as it is.
+    """
+    kinds: Any = _kinds(cast(Any, record))
+    made = (
+        field if hasattr(kind, "_fields") else np.zeros(field, _TYPES[kind[0]])
+        for kind, field in zip(kinds, fields, strict=True)
+    )
+    return record(*made)
+
+
+def type_of(kind: Any) -> Any:
+    """The type to Numba of a record, of a number, or of an array by its name and axes."""
+    from numba import types
+
+    plain = {int: types.int64, float: types.float64, bool: types.boolean}
+    if kind in plain:
+        return plain[kind]
+    if hasattr(kind, "_fields"):
+        return types.NamedTuple([type_of(field) for field in _kinds(kind)], kind)
+    name, axes = kind
+    return types.Array(getattr(types, name), axes, "C")
+
+
+def types_within(record: type) -> list[Any]:
+    """The types to Numba of all fields of a record and of those within it; of a number its own."""
+    from numba import types
+
+    def within(kind: Any) -> list[Any]:
+        if isinstance(kind, types.NamedTuple):
+            return [inner for field in kind for inner in within(field)]
+        return [kind]
+
+    return within(type_of(record))
+
+
+def records_within(record: type) -> list[type]:
+    """A record, and those within it; none for a number."""
+    if not hasattr(record, "_fields"):
+        return []
+    return [record, *(r for kind in _kinds(record) for r in records_within(kind))]
+
+
+def construction(record: type, names: Iterator[str]) -> str:
+    """Source that makes a record from names, one for each field of it and of those within it.
+
+    Examples
+    --------
+    >>> from typing import NamedTuple
+    >>> Pair = NamedTuple("Pair", [("first", int), ("second", float)])
+    >>> construction(Pair, iter("ab"))
+    'Pair(a, b)'
+    """
+    if not hasattr(record, "_fields"):
+        return next(names)
+    fields = ", ".join(construction(kind, names) for kind in _kinds(record))
+    return f"{record.__name__}({fields})"
+
+
+def flattened(record: Any, into: list[Any]) -> None:
+    """Append the fields of a record, and of those within it, to a list."""
+    for value in record:
+        if isinstance(value, tuple):
+            flattened(value, into)
+        else:
+            into.append(value)
