@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any
 
 from fastslow.compiled.generated import compile_loop
-from fastslow.compiled.records import construction, flattened, records_within, types_within
+from fastslow.compiled.records import construction, records_within, types_within
 
 _SOURCE = '''"""Entry to {function} of {module}."""
 {imports}from {module} import {function} as loop
@@ -47,10 +47,10 @@ def load_loop(module: str, function: str, arguments: tuple[str, ...]) -> Callabl
 def load_loop_of_records(
     module: str, function: str, arguments: tuple[type, ...]
 ) -> Callable[..., Any]:
-    """The compiled form of a Numba function of records and numbers.
+    """The compiled form of a Numba function of records and numbers, given all of their fields.
 
     Numba takes long to find the type of a record that comes from Python, so that the entry is
-    given its fields, and makes it again.
+    given its fields in the order of `flattened`, and makes it again.
 
     Parameters
     ----------
@@ -75,11 +75,4 @@ def load_loop_of_records(
         arguments=", ".join(names),
         given=given,
     )
-    entry = compile_loop(source, function, tuple(types))
-
-    def loop(*records: Any) -> Any:
-        fields: list[Any] = []
-        flattened(records, fields)
-        return entry(*fields)
-
-    return loop
+    return compile_loop(source, function, tuple(types))

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import cached_property
 from inspect import isfunction
+from operator import is_
 from typing import Any, Self
 
 import numpy as np
@@ -39,18 +40,22 @@ def fixed(name: str, value: Any) -> Any:
     >>> fixed("state", kept) is kept
     True
     """
+    kind = type(value)
+    if kind in PLAIN:
+        return value
     if isinstance(value, np.ndarray):
         return value if _out_of_reach(value) else read_only(np.array(value))
+    if kind in (list, tuple):
+        items = [item if type(item) in PLAIN else fixed(name, item) for item in value]
+        same = kind is tuple and all(map(is_, items, value))
+        return value if same else tuple(items)
+    if kind is Named:
+        kept = {k: v if type(v) in PLAIN else fixed(k, v) for k, v in value.items()}
+        same = all(kept[key] is item for key, item in value.items())
+        return value if same else Named(value.kind, kept)
     if isinstance(value, Mapping):
         kept = {k: v if type(v) in PLAIN else fixed(str(k), v) for k, v in value.items()}
-        if isinstance(value, Named):
-            same = all(kept[key] is item for key, item in value.items())
-            return value if same else Named(value.kind, kept)
         return Named(name.replace("_", " ").removesuffix("s"), kept)
-    if type(value) in (list, tuple):
-        items = [fixed(name, item) for item in value]
-        same = type(value) is tuple and all(a is b for a, b in zip(items, value, strict=True))
-        return value if same else tuple(items)
     return value
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import ItemsView, Iterable, Iterator, Mapping
 from typing import Any, Generic, TypeVar
 
 from fastslow.errors import unknown_name
@@ -64,6 +64,10 @@ class Named(Mapping[str, V], Generic[V]):
             return self._items[normalised(str(key))]
         except KeyError:
             raise unknown_name(self.kind, key, self._items) from None
+
+    def items(self) -> ItemsView[str, V]:
+        """Names and values in order."""
+        return self._items.items()
 
     def get(self, key: object, default: V | None = None) -> V | None:  # type: ignore[override]
         """The value of a name, or the default."""

@@ -126,7 +126,7 @@ def drive(problem, run, record, workspace, handed):
     implicit, memory = workspace.implicit, workspace.collocation.memory
     right, poly, phase = implicit.right, implicit.poly, implicit.radau.phase
     on, hit, rests, side, noise = search.on, search.hit, search.rests, search.side, search.noise
-    gradient, offsets = search.gradient, workspace.offsets
+    gradient, offsets = search.gradient, record.offsets
     columns = order + 1
     kept = n_states + problem.n_forcing
     stride = kept * columns

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import finite, flag, instance, mapping, takes, text, whole
 from fastslow.compiled.generic import load_loop_of_records
+from fastslow.compiled.records import flattened
 from fastslow.compiled.series import CompiledSeries
 from fastslow.compiled.steps import CompiledSteps, compile_steps
 from fastslow.model.derived import once, partition_of
@@ -467,13 +468,14 @@ def _run(
                 kept.after(stop, chunk, places, seen, codes)
 
     def advance(chunk: tuple[int, int]) -> Iterator[int]:
-        pool = pool_for(problem, lanes.regions, values.shape[1], count)
-        workspace = workspace_for(problem, compiled.n_rows, times.shape[1])
+        pool = pool_for(problem, lanes.regions, values.shape[1], times.shape[1], count)
+        space: list[Any] = []
+        flattened(workspace_for(problem, compiled.n_rows), space)
         pace = Pace(compiled.n_rows, compiled.order)
         while True:
             pool.progress[LEFT] = pace.begin()
-            given = with_late_code(problem)
-            code = many(given, lanes.address, lanes.regions, runs, pool, workspace, *chunk)
+            given = (*with_late_code(problem), lanes.address, lanes.regions)
+            code = many(*given, *runs, *pool, *space, *chunk)
             if code == REACHED_END:
                 return
             if stopping.is_set():

@@ -96,6 +96,8 @@ class Pool(NamedTuple):
         What the loop goes on from after a pause, and the work up to the next one.
     table : float64 array, shape (0, 0)
     nothing : float64 array, shape (0,)
+    offsets : float64 array, shape (n_times,)
+        Work space.
     """
 
     rows: Matrix
@@ -109,10 +111,11 @@ class Pool(NamedTuple):
     progress: Integers
     table: Matrix
     nothing: Vector
+    offsets: Vector
 
 
-def pool_for(problem: Problem, regions: int, n_values: int, count: int) -> Pool:
-    """An empty pool for so many runs, with so many parameters."""
+def pool_for(problem: Problem, regions: int, n_values: int, n_times: int, count: int) -> Pool:
+    """An empty pool for so many runs, with so many parameters and samples."""
     n, n_forcing, order = problem.n_states, problem.n_forcing, problem.order
     rows = n + n_forcing + problem.n_interfaces
     under_way = min(UNDER_WAY, count)
@@ -129,6 +132,7 @@ def pool_for(problem: Problem, regions: int, n_values: int, count: int) -> Pool:
         LEFT + 1,
         (0, 0),
         0,
+        n_times,
     )
 
 
@@ -193,6 +197,7 @@ def drive_many(problem, steps, regions, runs, pool, workspace, first, last):
             )
             record = Record(
                 times[min(i, times.shape[0] - 1)],
+                pool.offsets,
                 runs.samples[i],
                 pool.table,
                 pool.table,
@@ -345,7 +350,7 @@ def copy_into_the_rest(held, rows, given):
 def report(problem, runs, pool, workspace, lane, i):
     """Add the samples and the extremes within the last step of a lane."""
     n, order, rows, times = problem.n_states, problem.order, pool.rows, runs.times
-    W, offsets, extremes, counted = workspace.W, workspace.offsets, runs.extremes, runs.counted
+    W, offsets, extremes, counted = workspace.W, pool.offsets, runs.extremes, runs.counted
     began, length = rows[1 + n + step.BEGAN, lane], rows[1 + n + step.LENGTH, lane]
     for k in range(pool.series.shape[0]):
         W[k] = pool.series[k, lane]

@@ -46,10 +46,30 @@ def horner(b, first, last, s):
 @part
 def sample(W, columns, s, out, first):
     """Evaluate rows of a step at the offsets s, into the columns of ``out`` from the first."""
-    n = s.shape[0]
-    for i in range(out.shape[0]):
+    n, rows = s.shape[0], out.shape[0]
+    # eight values at a time, because each waits for its own last product
+    for i in range(0, rows - 1, 2):
         top = i * columns + columns - 1
-        # four at a time, because each waits for its own last product
+        for c in range(0, n - 3, 4):
+            s0, s1, s2, s3 = s[c], s[c + 1], s[c + 2], s[c + 3]
+            v0 = v1 = v2 = v3 = W[top]
+            w0 = w1 = w2 = w3 = W[top + columns]
+            for k in range(1, columns):
+                coefficient, below = W[top - k], W[top + columns - k]
+                v0 = v0 * s0 + coefficient
+                v1 = v1 * s1 + coefficient
+                v2 = v2 * s2 + coefficient
+                v3 = v3 * s3 + coefficient
+                w0 = w0 * s0 + below
+                w1 = w1 * s1 + below
+                w2 = w2 * s2 + below
+                w3 = w3 * s3 + below
+            place = first + c
+            out[i, place], out[i, place + 1], out[i, place + 2], out[i, place + 3] = v0, v1, v2, v3
+            j = i + 1
+            out[j, place], out[j, place + 1], out[j, place + 2], out[j, place + 3] = w0, w1, w2, w3
+    if rows % 2 == 1:
+        top = rows * columns - 1
         for c in range(0, n - 3, 4):
             s0, s1, s2, s3 = s[c], s[c + 1], s[c + 2], s[c + 3]
             v0 = v1 = v2 = v3 = W[top]
@@ -59,12 +79,11 @@ def sample(W, columns, s, out, first):
                 v1 = v1 * s1 + coefficient
                 v2 = v2 * s2 + coefficient
                 v3 = v3 * s3 + coefficient
-            out[i, first + c] = v0
-            out[i, first + c + 1] = v1
-            out[i, first + c + 2] = v2
-            out[i, first + c + 3] = v3
+            i, place = rows - 1, first + c
+            out[i, place], out[i, place + 1], out[i, place + 2], out[i, place + 3] = v0, v1, v2, v3
+    for i in range(rows):
         for c in range(n - n % 4, n):
-            out[i, first + c] = horner(W, top - columns + 1, top, s[c])
+            out[i, first + c] = horner(W, i * columns, i * columns + columns - 1, s[c])
 
 
 @part

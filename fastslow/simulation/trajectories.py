@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,11 +14,13 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import finite, flag, instance, positive, takes, text
 from fastslow.compiled.generic import load_loop_of_records
+from fastslow.compiled.records import flattened
 from fastslow.compiled.series import CompiledSeries, compile_series
-from fastslow.model.derived import once, partition_of, sloped, timed
+from fastslow.model.derived import KEPT, once, partition_of, sloped, timed
 from fastslow.model.invariance import factor_states, states_together
 from fastslow.model.model import Model
 from fastslow.results.endings import outcome_of
+from fastslow.results.immutable import fixed, read_only
 from fastslow.results.trajectories import Trajectory
 from fastslow.simulation.arguments import (
     gap_regions,
@@ -140,31 +144,25 @@ def simulate(
     >>> run(sp.pi).round(10) + 0.0
     array([-1.,  0.])
     """
-    require_values(model)
+    prepared = prepared_run(model, integration, gap)
+    compiled, problem, names = prepared.compiled, prepared.problem, prepared.names
     begin = initial_state(model, state)
-    span, period = time_span(t, periods, start, period, lambda: period_of(model))
+    span, period = time_span(t, periods, start, period, lambda: prepared.period)
     times = sample_times(samples, span)
-    resolved = resolve(integration, model, implicit=True)
-    between = gap_of(model, gap)
-    compiled = series_of(model, resolved.order)
     kept = compiled.n_states + compiled.n_forcing
     rows = compiled.n_states if dense else kept
     sampled = np.empty((rows, len(times)))
-    rules = error_rules(model, resolved, compiled)
-    problem = problem_of(model, compiled, resolved, rules)
-    (place,), (carried,), (counted,) = beginnings(
-        np.array([span[0]]), begin[None], compiled.n_forcing, rules
-    )
-    parameters = compiled.parameter_array(model)
-    run = Run(span[0], span[1], span[0], parameters, place, carried, counted)
-    workspace = workspace_for(problem, compiled.n_rows, len(times))
+    run = prepared.run(begin, span)
+    place, counted = run.inputs, run.counted
     stride = kept * (compiled.order + 1) if dense else 0
     tables = _memory.taken(compiled.n_states, stride)
+    workspace = _memory.workspace(prepared)
+    offsets = np.empty(len(times))
     loop, pace = drive_loop(), Pace(compiled.n_rows, compiled.order)
     while True:
         counted[WORK] = pace.begin()
-        record = Record(times, sampled, *tables, *_LISTED)
-        code = loop(with_late_code(problem), run, record, workspace, 0)
+        record = (times, offsets, sampled, *tables, *_LISTED)
+        code = loop(*with_late_code(problem), *run, *record, *workspace, 0)
         if code == OUT_OF_WORK:
             pace.end()
         elif code == TABLE_FULL:
@@ -173,10 +171,10 @@ def simulate(
             provide(code, problem.n_fast)
         else:
             break
+    _memory.workspaces[prepared.shape] = workspace
     steps, crossings, store = _memory.given_back(tables, counted, stride)
-    end, reached = place[: 1 + compiled.n_states].copy(), counted[SAMPLES]
+    end, reached = place[: 1 + compiled.n_states].copy(), int(counted[SAMPLES])
     n_steps, mode = int(counted[STEPS]), int(counted[MODE])
-    names = (*model.states, *model.slow_states)
     outcome = outcome_of(
         code,
         mode,
@@ -184,11 +182,11 @@ def simulate(
         n_steps,
         float(np.abs(begin).max()),
         compiled.modes,
-        resolved.limits,
+        prepared.resolved.limits,
         compiled.undecided,
     )
     series = store.reshape(len(steps), kept, compiled.order + 1) if dense else None
-    vanishing, together = vanishing_of(model), together_of(model)
+    vanishing, together = prepared.vanishing, prepared.together
     if vanishing or together:
         if series is not None:
             table, known = steps, series[:, :, 0]
@@ -202,29 +200,115 @@ def simulate(
         columns = dict(zip((*names, *model.forcing), ends.T, strict=True))
         whole = np.vstack([table, [end[0], 0.0, mode, 0.0]])
         outcome = with_noise(
-            outcome, model, resolved, vanishing, together, whole, columns, compiled.modes
+            outcome, model, prepared.resolved, vanishing, together, whole, columns, compiled.modes
         )
+    if reached < len(times):
+        times, sampled = times[:reached], sampled[:, :reached].copy()
     return Trajectory(
         names,
-        tuple(model.forcing),
-        tuple(model.interfaces),
-        tuple(model.regions),
-        dict(model.parameters),
+        *prepared.described,
         period,
-        between,
+        prepared.gap,
         outcome,
         (span[0], float(end[0])),
-        end,
+        read_only(end),
         _method(compiled, steps),
         steps,
         compiled.modes,
         crossings,
         series,
-        (times[:reached], sampled[:, :reached]) if samples is not None else None,
-        equations=model.equations,
-        settings=resolved.recorded(),
-        periods=dict(model.periodic),
+        (times, read_only(sampled)) if samples is not None else None,
+        **prepared.recorded,
         model=model,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What all runs of a model with the same settings share.
+
+    Parameters
+    ----------
+    model : Model
+    names : tuple of str
+        States and slow states.
+    compiled : CompiledSeries
+    resolved : Resolved
+    problem : Problem
+    gap : tuple of str or None
+    vanishing, together : tuple
+        See `with_noise`.
+    """
+
+    model: Model
+    names: tuple[str, ...]
+    compiled: CompiledSeries
+    resolved: Resolved
+    problem: Problem
+    gap: tuple[str, str, str] | None
+    vanishing: tuple[str, ...]
+    together: tuple[tuple[str, ...], ...]
+
+    @cached_property
+    def period(self) -> float | None:
+        """The common period of the forcing."""
+        return period_of(self.model)
+
+    @cached_property
+    def described(self) -> tuple[Any, ...]:
+        """Slow quantities, interfaces, regions and parameters, as a run keeps them."""
+        model = self.model
+        named = (tuple(group) for group in (model.forcing, model.interfaces, model.regions))
+        return (*named, fixed("parameters", dict(model.parameters)))
+
+    @cached_property
+    def recorded(self) -> dict[str, Any]:
+        """Equations, settings and periods of states, as a run keeps them."""
+        return {
+            "equations": self.model.equations,
+            "settings": fixed("settings", self.resolved.recorded()),
+            "periods": fixed("periods", dict(self.model.periodic)),
+        }
+
+    @cached_property
+    def shape(self) -> tuple[int, ...]:
+        """What the work space depends on."""
+        problem = self.problem
+        sizes = (problem.n_states, problem.n_forcing, problem.n_interfaces, problem.order)
+        return (*sizes, problem.n_fast, self.compiled.n_rows)
+
+    @cached_property
+    def _beginning(self) -> tuple[NDArray[Any], ...]:
+        """Parameters, and what a run carries at its beginning."""
+        (_,), (carried,), (counted,) = beginnings(
+            np.zeros(1), np.zeros((1, len(self.names))), 0, self.problem.rules
+        )
+        return self.compiled.parameter_array(self.model), carried, counted
+
+    def run(self, state: NDArray[np.float64], span: tuple[float, float]) -> Run:
+        """A run at its beginning."""
+        parameters, carried, counted = self._beginning
+        place = np.zeros(1 + len(state) + self.compiled.n_forcing)
+        place[0], place[1 : 1 + len(state)] = span[0], state
+        return Run(*span, span[0], parameters, place, carried.copy(), counted.copy())
+
+
+@lru_cache(maxsize=KEPT)
+def prepared_run(model: Model, integration: Integration, gap: str | None) -> Prepared:
+    """What a run needs of its model, with every parameter given, and its settings."""
+    require_values(model)
+    resolved = resolve(integration, model, implicit=True)
+    between = gap_of(model, gap)
+    compiled = series_of(model, resolved.order)
+    return Prepared(
+        model,
+        (*model.states, *model.slow_states),
+        compiled,
+        resolved,
+        problem_of(model, compiled, resolved, error_rules(model, resolved, compiled)),
+        between,
+        vanishing_of(model),
+        together_of(model),
     )
 
 
@@ -275,6 +359,17 @@ class _Memory(threading.local):
 
     def __init__(self) -> None:
         self.free = [np.empty(0) for _ in _Tables._fields]
+        self.workspaces: dict[tuple[int, ...], list[Any]] = {}
+
+    def workspace(self, prepared: Prepared) -> list[Any]:
+        """The fields of a work space, which a run gives back under its shape."""
+        found = self.workspaces.pop(prepared.shape, None)
+        if found is None:
+            # of other models there may be many
+            self.workspaces.clear()
+            found = []
+            flattened(workspace_for(prepared.problem, prepared.compiled.n_rows), found)
+        return found
 
     def taken(self, n_states: int, stride: int) -> _Tables:
         """Tables for a run, its own until they are given back: a signal handler may simulate."""
@@ -297,7 +392,9 @@ class _Memory(threading.local):
             if table.size <= _LARGE:
                 self.free[k] = table.reshape(-1)
                 rows = rows.copy()
-            kept.append(rows)
+            else:
+                read_only(table)
+            kept.append(read_only(rows))
         return tuple(kept)
 
 
@@ -306,6 +403,8 @@ _memory = _Memory()
 
 def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
     """How a run was stepped, in words."""
+    if not steps[:, 3].any():
+        return compiled.method
     words = [compiled.method]
     collocated, implicit, stiff = (
         int(np.count_nonzero(steps[:, 3] == k)) for k in (1, IMPLICIT, RADAU)

@@ -77,7 +77,6 @@ class Workspace(NamedTuple):
     W, work : float64 arrays
         As large as the series.
     scales : float64 array, shape (2, n_states + n_forcing + n_interfaces)
-    offsets : float64 array, shape (n_times,)
     search : Search
     collocation : Collocation
     implicit : Implicit
@@ -86,14 +85,13 @@ class Workspace(NamedTuple):
     W: Vector
     work: Vector
     scales: Matrix
-    offsets: Vector
     search: Search
     collocation: Collocation
     implicit: Implicit
 
 
-def workspace_for(problem: Problem, n_rows: int, n_times: int) -> Workspace:
-    """Work space for runs of a problem, whose series fills so many rows, with so many samples."""
+def workspace_for(problem: Problem, n_rows: int) -> Workspace:
+    """Work space for runs of a problem, whose series fills so many rows."""
     n, forcing, interfaces = problem.n_states, problem.n_forcing, problem.n_interfaces
     size = n_rows * (problem.order + 1)
     fast = problem.n_fast > 0
@@ -101,7 +99,6 @@ def workspace_for(problem: Problem, n_rows: int, n_times: int) -> Workspace:
         Workspace,
         *(size, size),
         (2, n + forcing + interfaces),
-        n_times,
         search_for(n, forcing, interfaces, problem.order),
         collocation_for(n, forcing, interfaces, problem.order, n_rows),
         # states without a fast one take no such steps
