@@ -218,8 +218,8 @@ def simulate(
         crossings,
         series,
         (times, read_only(sampled)) if samples is not None else None,
-        **prepared.recorded,
-        model=model,
+        *prepared.recorded,
+        model,
     )
 
 
@@ -262,13 +262,13 @@ class Prepared:
         return (*named, fixed("parameters", dict(model.parameters)))
 
     @cached_property
-    def recorded(self) -> dict[str, Any]:
+    def recorded(self) -> tuple[Any, ...]:
         """Equations, settings and periods of states, as a run keeps them."""
-        return {
-            "equations": self.model.equations,
-            "settings": fixed("settings", self.resolved.recorded()),
-            "periods": fixed("periods", dict(self.model.periodic)),
-        }
+        return (
+            self.model.equations,
+            fixed("settings", self.resolved.recorded()),
+            fixed("periods", dict(self.model.periodic)),
+        )
 
     @cached_property
     def shape(self) -> tuple[int, ...]:

@@ -12,7 +12,12 @@ from numba import njit
 
 from fastslow.model.model import Model
 from fastslow.simulation.implicit_steps import DEGREE, P, Q, join, weights
-from fastslow.simulation.matrices import contracts, factorise_in_place, solve_in_place
+from fastslow.simulation.matrices import (
+    contracts,
+    factorise_in_place,
+    solve_in_place,
+    spectrum_for,
+)
 from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
@@ -21,8 +26,8 @@ a, b, c, k, omega = sp.symbols("a b c k omega")
 
 
 @njit
-def _contracts(matrix, n, rate):
-    return contracts(matrix, n, rate)
+def _contracts(matrix, n, rate, space):
+    return contracts(matrix, n, rate, space)
 
 
 @njit
@@ -97,7 +102,7 @@ def test_contraction_is_that_of_the_eigenvalues(entries, rate):
     assume(abs(largest + rate) > 1e-6)
     padded = np.zeros((n, n + 1))
     padded[:, :n] = matrix
-    assert _contracts(padded, n, rate) == (largest < -rate)
+    assert _contracts(padded, n, rate, spectrum_for(n)) == (largest < -rate)
 
 
 @given(st.integers(1, 6), st.integers(0, 2**32 - 1))
