@@ -45,6 +45,8 @@ def fixed(name: str, value: Any) -> Any:
         return value
     if isinstance(value, np.ndarray):
         return value if _out_of_reach(value) else read_only(np.array(value))
+    if kind is tuple and PLAIN.issuperset(map(type, value)):
+        return value
     if kind in (list, tuple):
         items = [item if type(item) in PLAIN else fixed(name, item) for item in value]
         same = kind is tuple and all(map(is_, items, value))
