@@ -54,7 +54,7 @@ def test_a_loop_of_known_types_cannot_allocate():
     from numba import types
     from numba.core.errors import NumbaError
 
-    with pytest.raises((NumbaError, RuntimeError), match="empty|NRT"):
+    with pytest.raises((NumbaError, RuntimeError), match=r"empty|NRT"):
         generated.compile_loop(ALLOCATING + "# typed\n", "allocating", (types.int64,))
 
 
