@@ -95,9 +95,7 @@ def reason(error: BaseException) -> str:
 
 
 def _replace(target: Path, content: bytes) -> None:
-    """Put new content in the place of a file that is no link."""
-    if target.is_symlink():
-        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
+    """Put new content in the place of a file; what is still a link leads in a circle."""
     old: os.stat_result | None = None
     with contextlib.suppress(FileNotFoundError):
         old = target.stat()

@@ -3,6 +3,7 @@
 import ast
 import errno
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -198,6 +199,25 @@ def test_an_interrupt_leaves_the_old_file(tmp_path, monkeypatch):
         spectrum(400).save(path)
     assert path.read_bytes() == before
     assert names_in(tmp_path) == ["a.npz"]
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGUSR1"), reason="signals of POSIX")
+def test_an_exception_of_a_handler_is_no_failure_of_the_disk(tmp_path, monkeypatch):
+    """A TimeoutError is an OSError, as those of the disk are."""
+
+    def late(number, frame):
+        raise TimeoutError("the user's own")
+
+    write_file(tmp_path / "a", b"old")
+    monkeypatch.setattr(os, "fsync", lambda handle: signal.raise_signal(signal.SIGUSR1))
+    before = signal.signal(signal.SIGUSR1, late)
+    try:
+        with pytest.raises(TimeoutError, match="the user's own"):
+            write_file(tmp_path / "a", b"new")
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    assert (tmp_path / "a").read_bytes() == b"old"
+    assert names_in(tmp_path) == ["a"]
 
 
 #: Writes every kind of file where the system refuses more than so many bytes of a file.

@@ -12,6 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 
 import fastslow as fs
@@ -512,10 +513,10 @@ def test_overtones_against_a_quadrature():
     times = np.linspace(end * 2 / 3, end, 200001)
     x = case.run(times)[0]
     angle = p["omega"] * times
-    mean = np.trapezoid(x, angle) / (2 * np.pi)
-    parts = [np.trapezoid(x * f(angle), angle) / np.pi for f in (np.cos, np.sin)]
+    mean = trapezoid(x, angle) / (2 * np.pi)
+    parts = [trapezoid(x * f(angle), angle) / np.pi for f in (np.cos, np.sin)]
     first = parts[0] ** 2 + parts[1] ** 2
-    total = np.trapezoid((x - mean) ** 2, angle) / np.pi
+    total = trapezoid((x - mean) ** 2, angle) / np.pi
     assert gap_effects.overtones(case) == pytest.approx(math.sqrt(total / first - 1), rel=2e-3)
     # a gear without clearance is nearly linear: x = w/A − (w/A)³/A, an overtone of C³/(4 A⁴)
     expected = p["C"] ** 3 / 4 / p["A"] ** 4 / (p["C"] / p["A"])

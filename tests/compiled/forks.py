@@ -9,7 +9,7 @@ import warnings
 from numba import cfunc
 from numba.core.compiler import Compiler
 
-from fastslow.compiled import store
+from fastslow.compiled import model_code, store
 from fastslow.compiled.generated import _compiled, compile_callback
 from fastslow.compiled.pointers import SIGNATURE
 
@@ -29,7 +29,15 @@ def use(number=1):
     return out[0] - 6.0
 
 
-original = Compiler.compile_extra
+def use_model(number=1):
+    """The same of code as models have it, made without Numba."""
+    model_code._addresses.clear()
+    inputs, out = (ctypes.c_double * 1)(2.0), (ctypes.c_double * 1)()
+    CALL(model_code.load_function(source(number), "field"))(0, inputs, None, out)
+    return out[0] - 6.0
+
+
+original, original_code = Compiler.compile_extra, model_code.object_code
 
 
 def counted(self, func):
@@ -37,10 +45,15 @@ def counted(self, func):
     return original(self, func)
 
 
+def counted_code(build):
+    compiled_here.append("field")
+    return original_code(build)
+
+
 def prepare():
     """Compile once, as the first time takes long, and count what is compiled from then on."""
     cfunc(SIGNATURE)(lambda mode, inputs, parameters, W: None)
-    Compiler.compile_extra = counted
+    Compiler.compile_extra, model_code.object_code = counted, counted_code
 
 
 class Child:

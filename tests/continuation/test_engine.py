@@ -104,6 +104,19 @@ def test_the_compiled_loop_tells_what_has_not_converged(steps):
     assert abs(u[0] - 1e6) < (1e-6 if converged else 1e-3)
 
 
+def test_newton_s_method_does_not_converge_where_the_slope_vanishes():
+    """x³ − 5 x² has a double root at 0, where a start is left alone, and one at 5."""
+    x, p = sp.symbols("x p")
+    field = FrozenField(fs.Model({x: x**3 - 5 * x**2 + p}, parameters={p: 0}), "p")
+    compiled = field.compiled
+    starts, converged = np.array([[0.0], [4.9]]), np.zeros(2, dtype=bool)
+    loop("newton_from")(
+        compiled.address, 0, field.values, starts, converged, 0.0, np.ones(1), compiled.size, 100
+    )
+    assert converged.tolist() == [False, True]
+    np.testing.assert_allclose(starts, [[0.0], [5.0]], atol=1e-12)
+
+
 def spiral(u):
     """Linear focus with eigenvalues p ± 2i."""
     x, y, p = u
@@ -140,6 +153,36 @@ def test_transcritical_branch_point():
 def test_settings_are_checked(wrong, message):
     with pytest.raises(fs.FastSlowError, match=message):
         fs.Continuation(**wrong)
+
+
+@pytest.mark.parametrize("gap", [1e-8, 1e-10, 1e-12])
+def test_curves_that_nearly_cross_are_not_mixed_up(gap):
+    """x² = (p/100)² + gap: both turn by a fiftieth at p = 0, within less than a step."""
+    x, p = sp.symbols("x p")
+    model = fs.Model({x: x**2 - p**2 / 10000 - gap}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, "p", over=(-1, 1))
+    assert len(diagram.branches) == 2
+    for branch in diagram.branches:
+        assert len(np.unique(np.sign(branch["x"]))) == 1
+        assert np.ptp(branch["p"]) == 2
+
+
+def test_a_cubic_that_falls_and_then_rises_may_dip_below_zero():
+    """Against its values at many places, also where it is a parabola."""
+    generator = np.random.default_rng(5)
+    places = np.linspace(0, 1, 4001)
+    seen = set()
+    for k in range(400):
+        h0, h1 = 10.0 ** generator.uniform(-4, 0, 2)
+        s0, s1 = -generator.uniform(0, 3), generator.uniform(0, 3)
+        if k % 4 == 0:
+            h1 = h0 + (s0 + s1) / 2
+        a, b = 2 * (h0 - h1) + s0 + s1, 3 * (h1 - h0) - 2 * s0 - s1
+        least = (((a * places + b) * places + s0) * places + h0).min()
+        if abs(least) > 1e-5 and h1 > 0:
+            assert engine._dips.py_func(h0, s0, h1, s1) == (least < 0)
+            seen.add((bool(least < 0), k % 4 == 0))
+    assert len(seen) == 4
 
 
 def test_two_crossings_of_an_interface_within_one_step_are_seen():

@@ -6,7 +6,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fastslow.continuation.polynomial_systems import solve_polynomials
+from fastslow.continuation import polynomial_systems
+from fastslow.continuation.polynomial_systems import _merged, solve_polynomials
 
 
 def times(one, other):
@@ -68,3 +69,19 @@ def test_a_double_root_is_a_cluster():
     np.testing.assert_allclose(found.simple, [[-1.0]], atol=1e-9)
     assert found.clusters.shape[1:] == (2, 1)
     assert found.clusters[:, 0].min() <= 2 <= found.clusters[:, 1].max()
+
+
+def test_boxes_that_touch_but_for_rounding_are_one():
+    boxes = [[[0.0], [1.0]], [[3.000003], [4.0]], [[1.0 + 5e-10], [2.0]], [[2.0], [3.0]]]
+    for size in (1.0, 1e-8):
+        found = _merged([size * np.array(box) for box in boxes], np.array([size]))
+        np.testing.assert_allclose(found[:, :, 0] / size, [[3.000003, 4.0], [0.0, 3.0]])
+
+
+def test_the_budget_holds_over_pauses(monkeypatch):
+    """A pause after every box: a budget of three boxes ends the search all the same."""
+    monkeypatch.setattr(polynomial_systems, "WORK", 1)
+    equations = [with_roots((-3, 1, 7), 0, 2), with_roots((2, 5), 1, 2)]
+    assert solve_polynomials(equations).complete
+    monkeypatch.setattr(polynomial_systems, "BUDGET", 3 * 2 * 12)
+    assert not solve_polynomials(equations).complete

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 import sympy as sp
-from scipy.integrate import solve_ivp
+from scipy.integrate import solve_ivp, trapezoid
 
 import fastslow as fs
 
@@ -26,7 +26,7 @@ def bernoulli(time, start=1e-3):
         return -s + EPS * s * s / 2
 
     s, step = np.linspace(0, time, 400_001, retstep=True)
-    tail = np.trapezoid(np.exp(2 * (exponent(s) - exponent(time))), s, dx=step)
+    tail = trapezoid(np.exp(2 * (exponent(s) - exponent(time))), s, dx=step)
     # log u, as u itself reaches 1e50
     decayed = -2 * math.log(start) - 2 * exponent(time)
     return 1 / math.sqrt(math.exp(decayed) + 2 * tail)

@@ -338,6 +338,14 @@ def test_nearest_in_one_column(swing):
         swing.nearest()
 
 
+def test_the_nearest_copy_of_an_angle():
+    """Turned by t and asked modulo a turn: at every turn, and at one time where t is asked too."""
+    turning = fs.simulate(fs.Model({x: 1, v: -v}, periodic={x: 2}), [0, 1], t=(0, 9.3))
+    assert turning.nearest(x=-1.6)["x"] % 2 == pytest.approx(0.4, abs=1e-12)
+    assert turning.nearest(x=0.4, t=6.5).time == pytest.approx(6.4, abs=0.05)
+    assert turning.nearest(x=0.4, v=0).time == pytest.approx(8.4, abs=1e-2)
+
+
 def test_nearest_without_dense_output(few):
     found = few.nearest(x=np.cos(2.02), v=-np.sin(2.02), t=2)
     assert found.time == pytest.approx(2.02, abs=1e-2)

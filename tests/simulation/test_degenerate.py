@@ -130,6 +130,17 @@ def test_limits_return_what_was_computed(gear):
     assert np.isfinite(run(run.span[1])).all()
 
 
+def test_what_began_large_has_not_blown_up():
+    """From 10⁵ the state may grow to 10¹¹, whatever the other one is."""
+    model = Model({x: x, y: -y})
+    few = Integration(max_steps=6)
+    run = simulate(model, [1e5, 0], t=(0, 1000), integration=few)
+    assert 1e7 < run["x"][-1] < 1e11
+    assert run.outcome.code == "too many steps"
+    more = simulate(model, [1e5, 0], t=(0, 1000), integration=Integration(max_steps=60))
+    assert more.outcome.code == "blow-up"
+
+
 def test_interface_that_depends_on_the_state_nonlinearly():
     # a rotation leaves the circle |z| < 1 nowhere and meets x y = 1/4 where sin 2 t = 1/2
     model = Model({x: -y, y: x}, interfaces={"hyperbola": x * y - sp.Rational(1, 4)})
