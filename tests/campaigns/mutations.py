@@ -191,6 +191,8 @@ class Tree:
     """A copy of the project, in which one module at a time is changed."""
 
     def __init__(self, folder: Path, seconds: int = SECONDS) -> None:
+        # some tests run as another user, who has to read the copy
+        folder.chmod(0o755)
         self.seconds = seconds
         self.root = folder / "project"
         self.cache = folder / "cache"

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from llvmlite import ir
 
 from fastslow.compiled.lane_functions import Mathematics, exp2, log2
+from fastslow.compiled.lane_steps import _by_bernstein, _by_moduli
 from fastslow.compiled.lanes import WIDTH, Trace, Workspace, added, polynomial
 from fastslow.compiled.machine_code import load_object, object_code
 from fastslow.compiled.native import ENTRY
@@ -156,3 +157,31 @@ def test_what_is_steady_is_computed_before():
         return value * x + Mathematics(trace).cos(0.0)
 
     assert compiled(constant)([1.0, -2.0]).tolist() == [8, -13]
+
+
+@pytest.mark.parametrize("rule", [_by_moduli, _by_bernstein])
+def test_what_bounds_the_change_of_a_polynomial(rule):
+    """Its values are within; of Bernstein coefficients the bounds are the extreme ones."""
+    generator = np.random.default_rng(3)
+    rows = generator.normal(size=(4, 400)) * np.array([[1.0], [2.0], [1.0], [0.5]])
+    h = generator.uniform(0.1, 1.5, 400)
+    least, most, single = (
+        compiled(lambda trace, *r, part=part: part(rule(r[:-1], r[-1])), 5)(*rows, h)
+        for part in (
+            lambda found: found[0],
+            lambda found: found[1],
+            lambda found: found[2].choose(1.0, 0.0),
+        )
+    )
+    places = h * np.linspace(0, 1, 201)[:, None]
+    change = sum(rows[k] * places**k for k in (1, 2, 3))
+    assert (change >= least - 1e-12).all()
+    assert (change <= most + 1e-12).all()
+    one_way = (np.diff(change, axis=0) > 0).all(axis=0) | (np.diff(change, axis=0) < 0).all(axis=0)
+    assert 20 < single.sum() <= one_way.sum() < 400
+    assert one_way[single == 1].all()
+    if rule is _by_bernstein:
+        shares = [[math.comb(j, k) / math.comb(3, k) for k in (1, 2, 3)] for j in range(4)]
+        values = np.array(shares) @ np.array([rows[k] * h**k for k in (1, 2, 3)])
+        np.testing.assert_allclose(least, values.min(axis=0), atol=1e-13)
+        np.testing.assert_allclose(most, values.max(axis=0), atol=1e-13)
