@@ -267,6 +267,8 @@ def units(
     count = len(equations)
     unknowns = len(next(iter(equations[0])))
     free = [m for m in range(unknowns) if m not in ranges]
+    if count == unknowns == len(free) == 1:
+        return _units_of_one(equations[0])
     rows: list[Array] = []
     values: list[Array] = []
     for k, terms in enumerate(equations):
@@ -302,6 +304,19 @@ def units(
         )
         sizes.append(Fraction(2) ** -round(largest))
     return scales, sizes
+
+
+def _units_of_one(terms: Terms) -> tuple[list[Fraction], list[Fraction]]:
+    """The same for one equation in one unknown: the line through logarithms over exponents."""
+    powers = [e for (e,) in terms]
+    logs = [_log2(c) for c in terms.values()]
+    power, log = sum(powers) / len(powers), sum(logs) / len(logs)
+    spread = sum((e - power) ** 2 for e in powers)
+    slope = sum((e - power) * (v - log) for e, v in zip(powers, logs, strict=True))
+    unit = -slope / spread if spread else -log * power / (power**2 + 1.0)
+    exponent = round(unit)
+    largest = max(v + e * exponent for e, v in zip(powers, logs, strict=True))
+    return [Fraction(2) ** exponent], [Fraction(2) ** -round(largest)]
 
 
 def at_value(terms: Terms, unknown: int, value: Fraction) -> Terms:
@@ -342,6 +357,8 @@ def _arrays(terms: Mapping[tuple[int, ...], float]) -> tuple[NDArray[np.int64], 
 def _polished(system: Sequence[tuple[NDArray[np.int64], Array]], point: Array) -> Array:
     """Newton's last digits at a simple solution."""
     count = len(point)
+    if count == 1:
+        return _polished_root(*system[0], point)
     best, least = point, np.inf
     for _ in range(20):
         value, slopes = np.empty(count), np.empty((count, count))
@@ -362,6 +379,28 @@ def _polished(system: Sequence[tuple[NDArray[np.int64], Array]], point: Array) -
         best, least = point + step, size
         point = best
     return best
+
+
+def _polished_root(exponents: NDArray[np.int64], coefficients: Array, point: Array) -> Array:
+    """The same of one polynomial, by Horner's scheme."""
+    powers = [0.0] * (1 + int(exponents.max()))
+    for exponent, coefficient in zip(exponents[:, 0].tolist(), coefficients.tolist(), strict=True):
+        powers[exponent] = coefficient
+    best = x = float(point[0])
+    least = math.inf
+    for _ in range(20):
+        value = slope = 0.0
+        for coefficient in reversed(powers):
+            slope = slope * x + value
+            value = value * x + coefficient
+        if slope == 0.0:
+            break
+        step = -value / slope
+        if not abs(step) < least:
+            break
+        best, least = x + step, abs(step)
+        x = best
+    return np.array([best])
 
 
 def _distinct(points: Sequence[Array], floor: Array, within: float) -> Array:

@@ -188,27 +188,23 @@ def _dips(test: Array, along: Array) -> list[int]:
     The chords of both neighbouring steps are extended into the step: where the
     modulus is convex they lie below it.
     """
-    size, sign, length = np.abs(test), np.sign(test), np.diff(along)
-    found = []
-    for k in np.flatnonzero(sign[1:] * sign[:-1] > 0):
-        step, left, right = length[k], size[k], size[k + 1]
-        falls = rises = np.inf
-        if k > 0 and sign[k - 1] == sign[k] and length[k - 1] > 0:
-            falls = (size[k - 1] - left) / length[k - 1]
-        if k + 2 < len(test) and sign[k + 2] == sign[k] and length[k + 1] > 0:
-            rises = (size[k + 2] - right) / length[k + 1]
-        if falls <= 0 or rises <= 0 or np.isinf(min(falls, rises)):
-            continue
-        if np.isinf(falls):
-            least = right - rises * step
-        elif np.isinf(rises):
-            least = left - falls * step
-        else:
-            # where the two lines meet, within the step or at its nearer end
-            meet = float(np.clip((left - right + rises * step) / (falls + rises), 0.0, step))
-            least = max(left - falls * meet, right - rises * (step - meet))
-        if least < DIP * min(left, right):
-            found.append(int(k))
+    size, length = np.abs(test), np.diff(along)
+    kept = np.sign(test[1:]) * np.sign(test[:-1]) > 0
+    left, right = size[:-1], size[1:]
+    with np.errstate(all="ignore"):
+        # how fast the modulus falls on the step before, and rises on the one after
+        slopes = np.where(kept & (length > 0), np.diff(size) / length, np.nan)
+        falls = np.append(np.nan, -slopes[:-1])[: len(kept)]
+        rises = np.append(slopes[1:], np.nan)[: len(kept)]
+        # where the two lines meet, within the step or at its nearer end
+        meet = np.clip((left - right + rises * length) / (falls + rises), 0.0, length)
+        least = np.maximum(left - falls * meet, right - rises * (length - meet))
+        least = np.where(np.isnan(falls), right - rises * length, least)
+        least = np.where(np.isnan(rises), left - falls * length, least)
+        falling = (falls > 0) | (np.isnan(falls) & (rises > 0))
+        rising = (rises > 0) | (np.isnan(rises) & (falls > 0))
+        low = least < DIP * np.minimum(left, right)
+    found: list[int] = np.flatnonzero(kept & falling & rising & low).tolist()
     return found
 
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import sympy as sp
+from sympy.polys.domains import QQ
+from sympy.polys.rings import PolyElement, ring
 
 from fastslow.continuation.polynomial_systems import (
     FARTHEST,
@@ -20,6 +23,9 @@ from fastslow.continuation.polynomial_systems import (
 )
 from fastslow.diagrams.equations import RegionEquations, real_roots, terms_of
 from fastslow.model.structure import real
+
+#: Polynomials in one unknown and the parameter.
+_PLANE = ring("x, p", QQ)[0]
 
 #: Degree in the unknown up to which discriminants and resultants are formed.
 DEGREE = 8
@@ -77,99 +83,96 @@ def critical_values(
                 return None
             values |= set(found)
         return sorted(values)
-    left = equations.elimination
     if equations.impossible:
         return []
-    alone = [e for e in left.remaining if not e.has(*left.unknowns)] if left.unknowns else []
-    alone = list(left.remaining) if not left.unknowns else alone
-    p = real(equations.field.parameter)
-    if not all(e.is_polynomial(p) for e in alone):
+    left = equations.polynomials
+    if left is None:
         return None
-    if len(alone) == len(left.remaining) and (alone or left.unknowns):
-        return _values(alone, p, lower, upper)
+    count = len(equations.unknowns)
+    alone = [q for q in left if not any(any(e[:-1]) for e in q)]
+    if len(alone) == len(left) and (alone or count):
+        return _values([_in_parameter(q) for q in alone], lower, upper)
     if alone:
         return None
-    bounds = _along(equations, [*equations.bounds, *edges])
-    if bounds is None:
+    bounds, further = equations.edge_polynomials, equations.along(edges) if edges else []
+    if bounds is None or further is None:
         return None
+    bounds = [*bounds, *further]
     conditions = _resultants(equations, bounds)
-    if conditions is not None and all(sp.degree(c, p) <= ROOTS for c in conditions):
-        return _values(conditions, p, lower, upper)
+    if conditions is not None and all(len(c) <= ROOTS + 1 for c in conditions):
+        return _values(conditions, lower, upper)
     return _isolated(equations, bounds, lower, upper)
 
 
+def _in_parameter(terms: Terms) -> list[Fraction]:
+    """Coefficients of a polynomial in the parameter alone, the highest first."""
+    powers = {e[-1]: c for e, c in terms.items()}
+    return [powers.get(k, Fraction(0)) for k in range(max(powers, default=-1), -1, -1)]
+
+
 def _values(
-    conditions: Sequence[sp.Expr], p: sp.Symbol, lower: float, upper: float
+    conditions: Iterable[Sequence[Fraction]], lower: float, upper: float
 ) -> list[float] | None:
     """Real roots in a range of polynomials in the parameter; None if one vanishes identically."""
     values: set[float] = set()
     for condition in conditions:
-        polynomial = sp.Poly(condition, p)
-        if polynomial.is_zero:
+        if not any(condition):
             return None
-        size = max(abs(c) for c in polynomial.all_coeffs())
-        coefficients = np.array([float(c / size) for c in polynomial.all_coeffs()])
+        size = max(abs(c) for c in condition)
+        coefficients = np.array([float(c / size) for c in condition])
         values |= {v for v in real_roots(coefficients) if lower < v < upper}
     return sorted(values)
 
 
-def _along(equations: RegionEquations, bounds: Sequence[sp.Expr]) -> list[sp.Expr] | None:
-    """Functions of the states along equilibria, over unknowns and parameter; None if no polynomial.
-
-    A denominator has been shown not to vanish, or is a zero of the rates' own.
-    """
-    left = equations.elimination
-    p = real(equations.field.parameter)
-    solved = {real(n): e for n, e in left.solved.items()}
-    found = []
-    for bound in bounds:
-        h = bound.subs(solved)
-        if not h.is_polynomial(p, *left.unknowns):
-            h = sp.together(h).as_numer_denom()[0]
-        if not h.is_polynomial(p, *left.unknowns):
-            return None
-        found.append(sp.expand(h))
+def _resultants(equations: RegionEquations, edges: Sequence[Terms]) -> list[list[Fraction]] | None:
+    """Polynomials in the parameter, for at most one unknown and a low degree."""
+    if not equations.unknowns:
+        return [_in_parameter(edge) for edge in edges]
+    assert equations.polynomials is not None
+    if len(equations.unknowns) > 1:
+        return None
+    (equation,) = equations.polynomials
+    degree = max(e for e, _ in equation)
+    if degree > DEGREE:
+        return None
+    polynomial = _PLANE.from_dict(_rational(equation))
+    found = [_in_parameter({e: c for e, c in equation.items() if e[0] == degree})]
+    if degree > 1:
+        found.append(_powers(polynomial.discriminant()))
+    for edge in edges:
+        if any(e for e, _ in edge):
+            found.append(_powers(polynomial.resultant(_PLANE.from_dict(_rational(edge)))))
+        else:
+            found.append(_in_parameter(edge))
     return found
 
 
-def _resultants(equations: RegionEquations, edges: Sequence[sp.Expr]) -> list[sp.Expr] | None:
-    """Polynomials in the parameter, for at most one unknown and a low degree."""
-    left = equations.elimination
-    p = real(equations.field.parameter)
-    if not left.unknowns:
-        return list(edges)
-    equation = left.remaining[0]
-    if len(left.unknowns) > 1 or not equation.is_polynomial(*left.unknowns, p):
-        return None
-    (x,) = left.unknowns
-    if sp.degree(equation, x) > DEGREE:
-        return None
-    polynomial = sp.Poly(equation, x)
-    found = [polynomial.LC()]
-    if polynomial.degree() > 1:
-        found.append(sp.discriminant(equation, x))
-    for edge in edges:
-        found.append(sp.resultant(equation, edge, x) if edge.has(x) else edge)
-    return [sp.expand(f) for f in found]
+def _rational(terms: Terms) -> dict[tuple[int, ...], Any]:
+    return {e: QQ(c.numerator, c.denominator) for e, c in terms.items()}
+
+
+def _powers(polynomial: PolyElement) -> list[Fraction]:
+    """Coefficients of a polynomial in the parameter, the highest first."""
+    return _in_parameter(
+        {e: Fraction(int(c.numerator), int(c.denominator)) for e, c in polynomial.items()}
+    )
 
 
 def _isolated(
-    equations: RegionEquations, bounds: Sequence[sp.Expr], lower: float, upper: float
+    equations: RegionEquations, bounds: Sequence[Terms], lower: float, upper: float
 ) -> list[float] | None:
     """Values at which systems in unknowns and parameter have solutions."""
-    if equations.system is None:
+    if not equations.isolated:
         return None
-    unknowns = equations.elimination.unknowns
-    p = real(equations.field.parameter)
-    symbols = [*unknowns, p]
-    rates = list(equations.elimination.remaining)
-    if not all(r.is_polynomial(*symbols) for r in rates):
-        return None
+    unknowns = equations.unknowns
+    symbols = [*unknowns, real(equations.field.parameter)]
+    rates = [_polynomial(q, symbols).as_expr() for q in equations.polynomials or ()]
     # as polynomials the determinant is expanded while it is formed
     slopes = [[sp.Poly(r, *symbols).diff(x) for x in unknowns] for r in rates]
     values: set[float] = set()
     determinant = _determinant(slopes).as_expr()
-    for condition in (None, determinant, *bounds):
+    edges = [_polynomial(q, symbols).as_expr() for q in bounds]
+    for condition in (None, determinant, *edges):
         found = _meetings(equations, condition, lower, upper)
         if found is None and condition is determinant:
             found = _double_roots(equations, lower, upper)
@@ -191,21 +194,20 @@ def _meetings(
     equations: RegionEquations, condition: sp.Expr | None, lower: float, upper: float
 ) -> list[float] | None:
     """Values at which a function vanishes at an equilibrium, or without one those at infinity."""
-    unknowns = equations.elimination.unknowns
+    unknowns, base = equations.unknowns, equations.polynomials
     p = real(equations.field.parameter)
-    symbols = [*unknowns, p]
-    base = terms_of(equations.elimination.remaining, symbols)
     if base is None:
         return None
     if condition is None:
         systems = _at_infinity(base, {len(unknowns): (lower, upper)})
     elif condition.has(*unknowns) or condition == 0:
-        extra = terms_of([condition], symbols)
+        extra = terms_of([condition], [*unknowns, p])
         if extra is None:
             return None
         systems = [[*base, *extra]]
     else:
-        return _values([condition], p, lower, upper)
+        alone = terms_of([condition], [p])
+        return None if alone is None else _values(map(_in_parameter, alone), lower, upper)
     values: set[float] = set()
     for system in systems:
         if len(system) == 1:
@@ -238,9 +240,8 @@ def _double_roots(equations: RegionEquations, lower: float, upper: float) -> lis
         None for more unknowns, a resultant that is too large (see `LARGEST`), or one with a
         multiple factor, which has double roots everywhere.
     """
-    unknowns = equations.elimination.unknowns
+    unknowns, terms = equations.unknowns, equations.polynomials
     p = real(equations.field.parameter)
-    terms = terms_of(equations.elimination.remaining, [*unknowns, p])
     if len(unknowns) > 2 or terms is None:
         return None
     rates = [_polynomial(one, [*unknowns, p]).as_expr() for one in terms]
@@ -277,12 +278,11 @@ def _on_edge(
     list of float or None
         None for more than two unknowns, or a function that is not linear in one of two.
     """
-    unknowns = equations.elimination.unknowns
+    unknowns, terms = equations.unknowns, equations.polynomials
     p = real(equations.field.parameter)
-    terms = terms_of([edge, *equations.elimination.remaining], [*unknowns, p])
     if terms is None or len(unknowns) > 2:
         return None
-    edge, *rates = (_polynomial(one, [*unknowns, p]).as_expr() for one in terms)
+    rates = [_polynomial(one, [*unknowns, p]).as_expr() for one in terms]
     (along, *others) = [x for x in unknowns if edge.has(x)]
     if others or (len(unknowns) > 1 and sp.degree(edge, along) > 1):
         return None

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from itertools import product
@@ -13,12 +13,28 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
+from sympy.polys.domains import QQ
+from sympy.polys.rings import ring
 
 from fastslow.continuation.loops import blocks, loop
 from fastslow.continuation.ordering import in_order
-from fastslow.continuation.polynomial_systems import FARTHEST, Terms, solve_polynomials
+from fastslow.continuation.polynomial_systems import (
+    FARTHEST,
+    Terms,
+    at_value,
+    solve_polynomials,
+)
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.modes import Sides
+from fastslow.diagrams.parametric import (
+    STATES,
+    Answers,
+    ParametricElimination,
+    Parts,
+    eliminations_of,
+    parts_of,
+    specialised,
+)
 from fastslow.model.rational import exact
 from fastslow.model.structure import real
 from fastslow.results.angles import apart
@@ -73,6 +89,9 @@ MOVED = 1e-6
 #: Unknowns up to which the roots of a polynomial system are isolated.
 UNKNOWNS = 3
 
+#: Polynomials in the parameter.
+_RING = ring("p", QQ)[0]
+
 #: Choices of a factor of every rate, up to which each is solved by itself.
 CHOICES = 32
 
@@ -86,10 +105,14 @@ class RegionEquations:
     field : FrozenField
     region : int
         Number of the region.
+    answers : Answers, optional
+        With it the other parameters are symbols, and this says which expressions vanish.
     """
 
     field: FrozenField
     region: int
+    _: KW_ONLY
+    answers: Answers | None = None
 
     @cached_property
     def numbers(self) -> dict[sp.Symbol, sp.Rational]:
@@ -105,13 +128,81 @@ class RegionEquations:
         return dict(zip(states, rates, strict=True))
 
     def _number(self, expression: sp.Expr) -> sp.Expr:
-        """An expression with exact numbers for the other parameters."""
-        return exact(expression).subs(self.numbers)
+        """An expression with exact numbers for the other parameters, or for those that are 0."""
+        if self.answers is None:
+            return exact(expression).subs(self.numbers)
+        zero = {s: v for s, v in self.numbers.items() if v == 0}
+        return exact(expression).subs(zero)
+
+    @cached_property
+    def general(self) -> ParametricElimination | None:
+        """The elimination for all values of the other parameters, if one unknown is left at most.
+
+        Which one it is depends on these values alone, not on those that came before.
+        """
+        moving = {s: v for s, v in self.numbers.items() if v != 0}
+        if not moving or self.field.n > STATES:
+            return None
+        zero = tuple(s.name for s, v in self.numbers.items() if v == 0)
+        known = eliminations_of(self.field.model, self.field.parameter, self.region, zero)
+        kind = type(self)
+        return known.at(moving, lambda a: kind(self.field, self.region, answers=a)._open())
+
+    def _open(self) -> ParametricElimination | None:
+        """The elimination with symbols for those parameters that are not 0, if it is of use."""
+        assert self.answers is not None
+        left, parameters = self.elimination, tuple(self.answers.values)
+        symbols = [*left.unknowns, real(self.field.parameter)]
+        if len(left.unknowns) > 1:
+            return None
+
+        def read(expressions: Sequence[sp.Expr]) -> tuple[Parts, ...] | None:
+            found = [parts_of(e, symbols, parameters) for e in expressions]
+            return None if None in found else tuple(f for f in found if f is not None)
+
+        inserted = {real(n): e for n, e in left.solved.items()}
+        bounds = [sp.together(h.subs(inserted)).as_numer_denom()[0] for h in self.bounds]
+        whole = [sp.together(s).as_numer_denom() for s in left.state({}, self.field.model.states)]
+        remaining = read([sp.together(e).as_numer_denom()[0] for e in left.remaining])
+        edges = read([sp.expand(h) for h in bounds])
+        above, below = read([n for n, _ in whole]), read([d for _, d in whole])
+        if remaining is None or edges is None or above is None or below is None:
+            return None
+        solved = tuple(zip(above, below, strict=True))
+        return ParametricElimination(left, parameters, remaining, edges, solved)
+
+    @cached_property
+    def _values(self) -> list[Fraction]:
+        """Exact values of the parameters of `general`."""
+        assert self.general is not None
+        return [_fraction(self.numbers[s]) for s in self.general.parameters]
 
     @cached_property
     def elimination(self) -> Elimination:
         """Of the rates with every other parameter a number, so that its sign is known."""
-        return eliminate(self.equations, tuple(self.equations))
+        if self.answers is None and self.general is not None:
+            return self.general.general.at(self.numbers)
+        return self._eliminated()
+
+    def _eliminated(self) -> Elimination:
+        return eliminate(self.equations, tuple(self.equations), nonzero=self.answers)
+
+    @cached_property
+    def unknowns(self) -> tuple[sp.Symbol, ...]:
+        """The states that were not solved for."""
+        return (self.elimination if self.general is None else self.general.general).unknowns
+
+    @cached_property
+    def polynomials(self) -> list[Terms] | None:
+        """What remains, if it is polynomials in unknowns and parameter."""
+        if self.general is not None:
+            found = (specialised(parts, self._values) for parts in self.general.remaining)
+            return [terms for terms in found if terms]
+        return terms_of(self.elimination.remaining, self._symbols)
+
+    @property
+    def _symbols(self) -> list[sp.Symbol]:
+        return [*self.unknowns, real(self.field.parameter)]
 
     @property
     def bounds(self) -> list[sp.Expr]:
@@ -119,24 +210,50 @@ class RegionEquations:
         return [self._number(i.function) for i in self.field.model.interfaces.values()]
 
     @cached_property
-    def polynomial(self) -> sp.Poly | None:
-        """The one remaining equation as a polynomial in its unknown, if it is one."""
-        left = self.elimination
-        if not (left.is_univariate and left.is_polynomial):
-            return None
-        polynomial = sp.Poly(left.remaining[0], left.unknowns[0])
-        return polynomial if polynomial.degree() <= DEGREE else None
+    def edge_polynomials(self) -> list[Terms] | None:
+        """The `bounds` along equilibria as polynomials in unknowns and parameter, if they are."""
+        if self.general is not None:
+            return [specialised(parts, self._values) for parts in self.general.bounds]
+        return self.along(self.bounds)
+
+    def along(self, functions: Sequence[sp.Expr]) -> list[Terms] | None:
+        """Functions of the states along equilibria, over unknowns and parameter.
+
+        None if one is no polynomial. A denominator has been shown not to vanish, or is a zero of
+        the rates' own.
+        """
+        solved = {real(n): e for n, e in self.elimination.solved.items()}
+        found = []
+        for function in functions:
+            h = function.subs(solved)
+            if not h.is_polynomial(*self._symbols):
+                h = sp.together(h).as_numer_denom()[0]
+            if not h.is_polynomial(*self._symbols):
+                return None
+            found.append(sp.expand(h))
+        return terms_of(found, self._symbols)
 
     @cached_property
-    def system(self) -> tuple[sp.Poly, ...] | None:
-        """The remaining equations as polynomials in few unknowns, if they are."""
+    def univariate(self) -> bool:
+        """Whether one polynomial in one unknown remains, of a degree that can be trusted."""
+        if len(self.unknowns) != 1:
+            return False
+        if self.polynomials is not None:
+            left = self.polynomials
+            return len(left) == 1 and max(e for e, _ in left[0]) <= DEGREE
         left = self.elimination
-        square = len(left.remaining) == len(left.unknowns)
-        if not (square and 1 <= len(left.unknowns) <= UNKNOWNS and left.is_polynomial):
-            return None
-        if len(left.unknowns) == 1 and self.polynomial is None:
-            return None
-        return tuple(sp.Poly(e, *left.unknowns) for e in left.remaining)
+        whole = left.is_univariate and left.is_polynomial
+        return bool(whole and sp.degree(left.remaining[0], left.unknowns[0]) <= DEGREE)
+
+    @cached_property
+    def isolated(self) -> bool:
+        """Whether as many polynomials in few unknowns remain, so that all roots are found."""
+        count = len(self.unknowns)
+        if count == 1:
+            return self.univariate
+        left = self.elimination
+        square = len(left.remaining) == count
+        return square and 1 < count <= UNKNOWNS and left.is_polynomial
 
     @cached_property
     def factors(self) -> tuple[FactorEquations, ...]:
@@ -146,7 +263,7 @@ class RegionEquations:
         solved by itself: of lower degree, and regular where two equilibria meet at x = 0.
         Empty where there is one choice, or no finite number of solutions for one of them.
         """
-        if len(self.elimination.unknowns) < 2 or self.impossible:
+        if len(self.unknowns) < 2 or self.impossible:
             return ()
         states = tuple(map(real, self.equations))
         choices = [state_factors(e, states) for e in self.equations.values()]
@@ -161,10 +278,18 @@ class RegionEquations:
 
     @cached_property
     def _coefficients(self) -> list[list[tuple[tuple[int, ...], Any]]]:
-        """Exponents in every equation of the system, and their coefficients over the parameter."""
-        assert self.system is not None
+        """Exponents in every equation, and their coefficients over the parameter."""
         p = real(self.field.parameter)
-        return [[(e, _function_of(c, p)) for e, c in q.terms()] for q in self.system]
+        system = [sp.Poly(e, *self.unknowns) for e in self.elimination.remaining]
+        return [[(e, _function_of(c, p)) for e, c in q.terms()] for q in system]
+
+    def _terms_at(self, value: float) -> list[Terms]:
+        """The polynomials in the unknowns at a value of the parameter."""
+        if self.polynomials is not None:
+            count, exactly = len(self.unknowns), Fraction(value)
+            return [at_value(q, count, exactly) for q in self.polynomials]
+        found = [{e: c(value) for e, c in q} for q in self._coefficients]
+        return [{e: c for e, c in q.items() if c} for q in found]
 
     @cached_property
     def _formula(self) -> Any:
@@ -173,25 +298,41 @@ class RegionEquations:
         states = left.state({}, self.field.model.states)
         return sp.lambdify((p, *left.unknowns), [sp.N(s, 17) for s in states], "math")
 
+    @cached_property
+    def _quotients(self) -> list[tuple[Terms, Terms]] | None:
+        """Every state as a quotient of polynomials, if its denominator does not vanish."""
+        if self.general is None:
+            return None
+        return [
+            (specialised(above, self._values), specialised(below, self._values))
+            for above, below in self.general.solved
+        ]
+
     def _whole(self, value: float, *unknowns: float) -> list[Array]:
         """The full state at values of the unknowns; none outside the domain of the formulas."""
         try:
-            return [np.array(self._formula(value, *unknowns), dtype=float)]
+            if self._quotients is None:
+                return [np.array(self._formula(value, *unknowns), dtype=float)]
+            place = [*map(Fraction, unknowns), Fraction(value)]
+            return [np.array([float(_at(n, place) / _at(d, place)) for n, d in self._quotients])]
         except (ArithmeticError, ValueError, TypeError):
             return []
 
     @property
     def impossible(self) -> bool:
         """Whether an equation without states can never hold, as where a rate is a constant."""
+        if self.polynomials is not None:
+            return any(len(q) == 1 and not any(next(iter(q))) for q in self.polynomials)
         return any(e.is_number and e.is_nonzero for e in self.elimination.remaining)
 
     @cached_property
-    def _conditions(self) -> list[sp.Expr] | None:
-        """Equations without unknowns, where nothing else is left: a continuum or nothing."""
-        left = self.elimination
-        if left.unknowns and all(not e.has(*left.unknowns) for e in left.remaining):
-            return list(left.remaining)
-        return None
+    def _undetermined(self) -> bool:
+        """Whether equations without unknowns remain and nothing else: a continuum or nothing."""
+        if not self.unknowns:
+            return False
+        if self.polynomials is not None:
+            return all(not any(e[:-1]) for q in self.polynomials for e in q)
+        return all(not e.has(*self.unknowns) for e in self.elimination.remaining)
 
     def solutions(
         self, value: float, bounds: Mapping[str, float] | None = None
@@ -213,21 +354,22 @@ class RegionEquations:
 
     def _known(self, value: float, bounds: Mapping[str, float]) -> tuple[list[Array], bool]:
         """What is found without a search, and whether these are all."""
-        if not self.elimination.unknowns:
-            return self._holding(value, self._whole(value)), True
-        if self._conditions is not None or self.impossible:
+        if not self.unknowns:
+            states = self._whole(value) if self._conditions_hold(value) else []
+            return self._polished(value, states), True
+        if self._undetermined or self.impossible:
             return [], True
-        return self._isolated(value, bounds) if self.system is not None else ([], False)
+        return self._isolated(value, bounds) if self.isolated else ([], False)
 
     def _isolated(self, value: float, bounds: Mapping[str, float]) -> tuple[list[Array], bool]:
         """All solutions of the system, and whether none is missing or undecided."""
-        names = [str(x) for x in self.elimination.unknowns]
+        names = [str(x) for x in self.unknowns]
         try:
-            terms = [{e: c(value) for e, c in q} for q in self._coefficients]
+            terms = self._terms_at(value)
         except (ArithmeticError, ValueError, TypeError):
             return [], False
         solved = solve_polynomials(
-            [{e: c for e, c in q.items() if c} for q in terms],
+            terms,
             bounds={m: bounds[name] for m, name in enumerate(names) if name in bounds},
         )
         states: list[Array] = []
@@ -259,58 +401,67 @@ class RegionEquations:
 
     def continuum(self, value: float) -> bool:
         """Whether the region's equilibria at this value form a continuum."""
-        if self._conditions is None or self.impossible:
-            return False
-        return all(self._vanishes(e, value) for e in self._conditions)
+        return self._undetermined and not self.impossible and self._conditions_hold(value)
 
-    def _vanishes(self, condition: sp.Expr, value: float) -> bool:
-        """Whether a condition on the parameter alone holds, up to rounding in its terms.
+    def _conditions_hold(self, value: float) -> bool:
+        """Whether equations in the parameter alone hold, up to rounding in their terms.
 
-        They are those at the parameter's natural unit where its value is below that.
+        The terms are those at the parameter's natural unit where its value is below that.
         """
         p = real(self.field.parameter)
         largest = max(abs(value), self._parameter_unit(0.0))
-        terms = sum(abs(float(e.subs(p, largest))) for e in sp.Add.make_args(sp.expand(condition)))
-        return abs(float(condition.subs(p, value))) <= VANISHING * terms
+        if self.polynomials is not None:
+            for q in self.polynomials:
+                terms = sum(abs(float(c)) * largest ** e[-1] for e, c in q.items())
+                if abs(float(_at(q, [Fraction(value)] * len(next(iter(q)))))) > VANISHING * terms:
+                    return False
+            return True
+        for e in self.elimination.remaining:
+            parts = sp.Add.make_args(sp.expand(e))
+            terms = sum(abs(float(part.subs(p, largest))) for part in parts)
+            if abs(float(e.subs(p, value))) > VANISHING * terms:
+                return False
+        return True
 
     def continua(self) -> list[float]:
         """Parameter values at which the equilibria of the region form a continuum."""
-        p = real(self.field.parameter)
-        if self._conditions is not None:
-            forms = self._conditions
-        elif self.polynomial is not None and self.polynomial.degree() > 0:
-            forms = self.polynomial.all_coeffs()
-        else:
+        if self.polynomials is None or not (self._undetermined or self.univariate):
             return []
-        common = sp.Integer(0)
+        forms = list(self.polynomials)
+        if not self._undetermined:
+            (polynomial,) = forms
+            powers = {e[0] for e in polynomial}
+            forms = [{(k,): c for (i, k), c in polynomial.items() if i == j} for j in powers]
+        common = _RING.zero
         for form in forms:
-            if not form.is_polynomial(p):
-                return []
-            common = sp.gcd(common, form)
-        if not common.has(p):
-            return []
-        coefficients = np.array([float(c) for c in sp.Poly(common, p).all_coeffs()])
-        return real_roots(coefficients)
+            over = {(e[-1],): QQ(c.numerator, c.denominator) for e, c in form.items()}
+            common = common.gcd(_RING.from_dict(over))
+        powers = range(common.degree(), -1, -1) if common else ()
+        return real_roots(np.array([float(common.get((k,), 0)) for k in powers]))
 
     def edges(self, value: float) -> list[Array]:
         """Where a one-parameter continuum of equilibria meets an interface, or its middle."""
-        unknowns = self.elimination.unknowns
-        if len(unknowns) != 1:
-            return self._whole(value, *([0.0] * len(unknowns)))
+        if len(self.unknowns) != 1:
+            return self._whole(value, *([0.0] * len(self.unknowns)))
         ends = []
-        p = real(self.field.parameter)
-        solved = {real(n): e.subs(self.numbers) for n, e in self.elimination.solved.items()}
-        for bound in self.bounds:
-            line = sp.together(bound.subs(solved).subs(p, value)).as_numer_denom()[0]
-            if line.is_polynomial(*unknowns) and line.has(*unknowns):
-                coefficients = np.array(sp.Poly(line, *unknowns).all_coeffs(), dtype=float)
-                ends += [s for root in real_roots(coefficients) for s in self._whole(value, root)]
+        for line in self._lines(value):
+            degree = max((e for (e,) in line), default=0)
+            coefficients = [float(line.get((k,), Fraction(0))) for k in range(degree, -1, -1)]
+            if degree > 0:
+                roots = real_roots(np.array(coefficients))
+                ends += [s for root in roots for s in self._whole(value, root)]
         return ends or self._whole(value, 0.0)
 
-    def _holding(self, value: float, states: list[Array]) -> list[Array]:
-        """Those states at which equations without unknowns hold too."""
-        holds = all(self._vanishes(e, value) for e in self.elimination.remaining)
-        return self._polished(value, states) if holds else []
+    def _lines(self, value: float) -> Iterator[Terms]:
+        """The `bounds` along equilibria at a value as polynomials in the unknown, if they are."""
+        if self.edge_polynomials is not None:
+            yield from (at_value(q, 1, Fraction(value)) for q in self.edge_polynomials)
+            return
+        p = real(self.field.parameter)
+        solved = {real(n): e for n, e in self.elimination.solved.items()}
+        for bound in self.bounds:
+            line = sp.together(bound.subs(solved).subs(p, value)).as_numer_denom()[0]
+            yield from terms_of([line], list(self.unknowns)) or []
 
     def _polished(self, value: float, states: Sequence[Array]) -> list[Array]:
         """Newton's last digits at fixed parameter; what does not converge was no root."""
@@ -484,6 +635,16 @@ def _function_of(coefficient: sp.Expr, p: sp.Symbol) -> Any:
     return lambda value: Fraction(float(function(value)))
 
 
+def _at(terms: Terms, place: Sequence[Fraction]) -> Fraction:
+    """The value of a polynomial at a place."""
+    total = Fraction(0)
+    for powers, coefficient in terms.items():
+        for value, power in zip(place, powers, strict=True):
+            coefficient = coefficient * value**power if power else coefficient
+        total += coefficient
+    return total
+
+
 def _fraction(number: sp.Expr) -> Fraction:
     """A number as a fraction, exact or to 40 digits."""
     rational = number if number.is_Rational else sp.Rational(sp.N(number, 40))
@@ -521,14 +682,17 @@ class FactorEquations(RegionEquations):
         return dict(zip(self.field.model.states, self.lowered, strict=True))
 
     @cached_property
+    def general(self) -> None:
+        return None
+
+    @cached_property
     def factors(self) -> tuple[FactorEquations, ...]:
         return ()
 
 
 def _finite(equations: RegionEquations) -> bool:
     """Whether finitely many solutions can be isolated."""
-    left = equations.elimination
-    return equations.impossible or not left.unknowns or equations.system is not None
+    return equations.impossible or not equations.unknowns or equations.isolated
 
 
 def state_factors(rate: sp.Expr, states: Sequence[sp.Symbol]) -> list[sp.Expr]:
@@ -555,8 +719,7 @@ class SlidingEquations(RegionEquations):
     which one equation depends on the others (a, b are the drifts of h).
     """
 
-    @cached_property
-    def elimination(self) -> Elimination:
+    def _eliminated(self) -> Elimination:
         whole = self._with_share
         if len(whole.unknowns) <= 1 and whole.is_polynomial:
             return whole
@@ -595,7 +758,7 @@ class SlidingEquations(RegionEquations):
 
     @cached_property
     def _with_share(self) -> Elimination:
-        return eliminate(self.equations, tuple(self.equations))
+        return eliminate(self.equations, tuple(self.equations), nonzero=self.answers)
 
     @cached_property
     def _without_share(self) -> Elimination | None:
@@ -604,9 +767,11 @@ class SlidingEquations(RegionEquations):
         crossed = [b * f - a * g for f, g in self._fields]
         for k, name in enumerate(states):
             # sum of ∂h/∂x times these vanishes: one with ∂h/∂x ≠ 0 may be left out
-            if h.diff(real(name)).is_nonzero:
+            slope = h.diff(real(name))
+            if slope.is_nonzero if self.answers is None else self.answers(slope):
                 crossed[k] = h
-                return eliminate(dict(zip(states, crossed, strict=True)), states)
+                rates = dict(zip(states, crossed, strict=True))
+                return eliminate(rates, states, nonzero=self.answers)
         return None
 
     @cached_property

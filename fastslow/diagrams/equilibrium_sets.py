@@ -650,7 +650,7 @@ def covered(field: FrozenField, lower: float, upper: float) -> set[int]:
         if mode.sides is not None:
             if mode.name in names:
                 found |= {equations.region, equations.region + 1}
-        elif not equations.elimination.unknowns:
+        elif not equations.unknowns:
             values = np.linspace(lower, upper, 7)
             points = [(s, v) for v in values for s in equations.solutions(v)[0][:1]]
             inside = [in_a_set(field, np.append(s, v), np.abs(s).max()) for s, v in points]

@@ -7,7 +7,6 @@ of a matrix from the singular ones by the matrix's rows.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -182,7 +181,14 @@ def resolved(field: FrozenField, piece: Piece, window: Window) -> tuple[Piece, R
     tests = tests_at(field, piece, window)
     low, high = unstable_range(tests.eigenvalues)
     known = np.flatnonzero(low == high)
-    waiting = [(int(a), int(b)) for a, b in pairwise(known)][::-1]
+    # where nothing changes and the branch does not turn there is nothing to explain
+    turning = np.isin(
+        np.arange(len(low)), [k for pair in sign_changes(tests.turning) for k in pair]
+    )
+    turned = np.append(0, np.cumsum(turning))
+    first, last = known[:-1], known[1:]
+    open_steps = (low[first] != low[last]) | (turned[last + 1] - turned[first] > 1)
+    waiting = list(zip(first[open_steps].tolist(), last[open_steps].tolist(), strict=True))[::-1]
     added = 0
     while waiting:
         first, last = waiting.pop()

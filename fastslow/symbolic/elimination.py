@@ -86,6 +86,17 @@ class Elimination:
         solved = {n: e.xreplace(whole) for n, e in self.solved.items()}
         return tuple(sp.sympify(solved.get(n, whole.get(real(n)))) for n in names)
 
+    def at(self, values: Mapping[sp.Symbol, sp.Expr]) -> Elimination:
+        """With values of parameters at which no divisor vanishes."""
+        remaining = (sp.expand(e.subs(values)) for e in self.remaining)
+        solved = {n: e.subs(values) for n, e in self.solved.items()}
+        return Elimination(
+            tuple(e for e in remaining if e != 0),
+            self.unknowns,
+            Named(self.solved.kind, solved),
+            tuple(d.subs(values) for d in self.divisors if d.free_symbols - set(values)),
+        )
+
 
 def eliminate(
     rates: Mapping[str, sp.Expr], states: Sequence[str], *, nonzero: Nonzero | None = None

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from fastslow.errors import ArgumentError
+from fastslow.model.derived import once, partition_of
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.named import Named
@@ -80,10 +82,8 @@ def free_directions(model: Model) -> tuple[FreeDirection, ...]:
     states = [real(n) for n in model.states]
     if not 1 < len(states) <= STATES:
         return ()
-    rows = [r.rates[n] for r in model.regions.values() for n in model.states]
-    rows += [i.function for i in model.interfaces.values()]
     values = {real(n): v for n, v in model.parameters.items()}
-    shifts = _shifts(rows, states, values)
+    shifts = constant_null_space(_slopes_of(model), states, values)
     if not shifts:
         return ()
     combinations = _reduced(model, states, values)
@@ -98,6 +98,14 @@ def free_directions(model: Model) -> tuple[FreeDirection, ...]:
     )
 
 
+@once(partition_of)
+def _slopes_of(model: Model) -> list[list[sp.Expr]]:
+    """Slopes of all rates and interface functions, by the states."""
+    functions = [r.rates[n] for r in model.regions.values() for n in model.states]
+    functions += [i.function for i in model.interfaces.values()]
+    return _slopes(functions, [real(n) for n in model.states])
+
+
 def _reduced(
     model: Model, states: Sequence[sp.Symbol], values: Mapping[sp.Symbol, float]
 ) -> Named[sp.Expr]:
@@ -106,7 +114,7 @@ def _reduced(
     rates = {s: model.rates[s.name] for s in states}
     while True:
         smooth = [b for e in rates.values() for b in _branches(e)]
-        shifts = _shifts(smooth, list(rates), values)
+        shifts = constant_null_space(_slopes(smooth, list(rates)), list(rates), values)
         if not shifts:
             break
         taken = {s.name for s in (*states, *rates)} | {s.name for s in values}
@@ -137,12 +145,8 @@ def _branches(expression: sp.Expr) -> list[sp.Expr]:
     return found
 
 
-def _shifts(
-    functions: Sequence[sp.Expr], states: Sequence[sp.Symbol], values: Mapping[sp.Symbol, float]
-) -> list[list[sp.Expr]]:
-    """Constant vectors that every function is constant along."""
-    slopes = [[f.diff(s) for s in states] for f in functions]
-    return constant_null_space(slopes, states, values)
+def _slopes(functions: Sequence[sp.Expr], states: Sequence[sp.Symbol]) -> list[list[sp.Expr]]:
+    return [[f.diff(s) for s in states] for f in functions]
 
 
 def constant_null_space(
@@ -166,8 +170,7 @@ def constant_null_space(
     >>> constant_null_space([[k * x * y, -x * y]], [x, y], {k: 2})
     [[1, k]]
     """
-    distinct = list(dict.fromkeys(map(tuple, rows)))
-    distinct = [row for row in distinct if any(e != 0 for e in row)]
+    distinct = tuple(row for row in dict.fromkeys(map(tuple, rows)) if any(e != 0 for e in row))
     if not distinct:
         return []
     numbers = _numbers(distinct, states, values)
@@ -215,14 +218,22 @@ def _few(slopes: Sequence[Sequence[sp.Expr]], columns: Sequence[int]) -> list[Se
     return sorted(inside, key=lambda row: sum(sp.count_ops(row[k]) for k in columns))[:12]
 
 
+@lru_cache(maxsize=64)
+def _function_of(
+    slopes: tuple[tuple[sp.Expr, ...], ...],
+) -> tuple[list[sp.Symbol], Callable[..., Any]]:
+    """The symbols in slopes, and the slopes as a function of these."""
+    symbols = sorted(set().union(*(e.free_symbols for r in slopes for e in r)), key=str)
+    return symbols, sp.lambdify(symbols, [list(r) for r in slopes], "numpy")
+
+
 def _numbers(
-    slopes: Sequence[Sequence[sp.Expr]],
+    slopes: tuple[tuple[sp.Expr, ...], ...],
     states: Sequence[sp.Symbol],
     values: Mapping[sp.Symbol, float],
 ) -> np.ndarray:
     """The slopes at a few states, each row scaled to its largest entry."""
-    symbols = sorted(set().union(*(e.free_symbols for r in slopes for e in r)), key=str)
-    function = sp.lambdify(symbols, [list(r) for r in slopes], "numpy")
+    symbols, function = _function_of(slopes)
     rows = []
     for k in range(max(POINTS, -(-2 * len(states) // len(slopes)))):
         # quotients of primes, in the states' and free parameters' own order
