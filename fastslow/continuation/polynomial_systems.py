@@ -17,7 +17,7 @@ from fastslow.continuation.ordering import in_order
 Array = NDArray[np.float64]
 
 #: Exponents of the unknowns to the coefficient of their product.
-Terms = Mapping[tuple[int, ...], Fraction]
+Terms = Mapping[tuple[int, ...], Fraction | int]
 
 #: Solutions are looked for up to this multiple of each unknown's unit (see `units`), and
 #: farther where coefficients differ by many decades.
@@ -320,21 +320,24 @@ def _units_of_one(terms: Terms) -> tuple[list[Fraction], list[Fraction]]:
 
 
 def at_value(terms: Terms, unknown: int, value: Fraction) -> Terms:
-    """The equation with a number in place of an unknown.
+    """The equation with a number in place of an unknown, times a positive whole number.
 
     Examples
     --------
-    >>> at_value({(1, 2): Fraction(3), (0, 1): Fraction(1)}, 0, Fraction(2))
-    {(2,): Fraction(6, 1), (1,): Fraction(1, 1)}
+    >>> at_value({(1, 2): 3, (0, 1): 1}, 0, Fraction(1, 2))
+    {(2,): 3, (1,): 2}
     """
-    found: dict[tuple[int, ...], Fraction] = {}
+    most = max((powers[unknown] for powers in terms), default=0)
+    numerator, denominator = value.numerator, value.denominator
+    table = [numerator**k * denominator ** (most - k) for k in range(most + 1)]
+    found: dict[tuple[int, ...], Fraction | int] = {}
     for powers, coefficient in terms.items():
         rest = (*powers[:unknown], *powers[unknown + 1 :])
-        found[rest] = found.get(rest, Fraction(0)) + coefficient * value ** powers[unknown]
+        found[rest] = found.get(rest, 0) + coefficient * table[powers[unknown]]
     return {powers: c for powers, c in found.items() if c != 0}
 
 
-def _log2(value: Fraction) -> float:
+def _log2(value: Fraction | int) -> float:
     return math.log2(abs(value.numerator)) - math.log2(value.denominator)
 
 
@@ -342,10 +345,20 @@ def _scaled(
     terms: Terms, scales: Sequence[Fraction], size: Fraction
 ) -> dict[tuple[int, ...], float]:
     """An equation in the units, rounded only here."""
-    return {
-        powers: float(c * size * math.prod(s**p for s, p in zip(scales, powers, strict=True)))
-        for powers, c in terms.items()
-    }
+    shifts = [_log2_of_unit(s) for s in scales]
+    shift = _log2_of_unit(size)
+    found = {}
+    for powers, c in terms.items():
+        moved = shift + sum(s * p for s, p in zip(shifts, powers, strict=True))
+        n, d = c.numerator, c.denominator
+        # true division rounds once
+        found[powers] = (n << moved) / d if moved >= 0 else n / (d << -moved)
+    return found
+
+
+def _log2_of_unit(unit: Fraction) -> int:
+    """Of a power of two."""
+    return unit.numerator.bit_length() - unit.denominator.bit_length()
 
 
 def _arrays(terms: Mapping[tuple[int, ...], float]) -> tuple[NDArray[np.int64], Array]:

@@ -72,12 +72,8 @@ class Search:
         u = self.piece.u
         for before, after in sign_changes(test):
             yield Bracket(before, (u[before], u[after]), (test[before], test[after]))
-        for row in _dips(test, self._arclength()):
+        for row in _dips(test, self.piece.chords(self.window.scale)):
             yield from self._dip(row, test)
-
-    def _arclength(self) -> Array:
-        chords = np.linalg.norm(np.diff(self.piece.u, axis=0) / self.window.scale, axis=1)
-        return np.append(0.0, np.cumsum(chords))
 
     def _dip(self, row: int, test: Array) -> Iterator[Bracket]:
         """Two changes of sign around a minimum of the modulus after a row, if there are."""
@@ -182,20 +178,22 @@ def sign_changes(test: Array) -> list[tuple[int, int]]:
     return [(before, after) for before, after in pairs if after - before <= 2]
 
 
-def _dips(test: Array, along: Array) -> list[int]:
+def _dips(test: Array, length: Array) -> list[int]:
     """Rows after which a test that keeps its sign may reach zero and turn back.
 
     The chords of both neighbouring steps are extended into the step: where the
     modulus is convex they lie below it.
     """
-    size, length = np.abs(test), np.diff(along)
+    if len(test) < 3:
+        return []
+    size = np.abs(test)
     kept = np.sign(test[1:]) * np.sign(test[:-1]) > 0
     left, right = size[:-1], size[1:]
     with np.errstate(all="ignore"):
         # how fast the modulus falls on the step before, and rises on the one after
         slopes = np.where(kept & (length > 0), np.diff(size) / length, np.nan)
-        falls = np.append(np.nan, -slopes[:-1])[: len(kept)]
-        rises = np.append(slopes[1:], np.nan)[: len(kept)]
+        falls = np.append(np.nan, -slopes[:-1])
+        rises = np.append(slopes[1:], np.nan)
         # where the two lines meet, within the step or at its nearer end
         meet = np.clip((left - right + rises * length) / (falls + rises), 0.0, length)
         least = np.maximum(left - falls * meet, right - rises * (length - meet))

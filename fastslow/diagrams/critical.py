@@ -9,9 +9,8 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
 import sympy as sp
-from sympy.polys.domains import QQ
+from sympy.polys.domains import ZZ
 from sympy.polys.rings import PolyElement, ring
 
 from fastslow.continuation.polynomial_systems import (
@@ -21,11 +20,11 @@ from fastslow.continuation.polynomial_systems import (
     solve_polynomials,
     units,
 )
-from fastslow.diagrams.equations import RegionEquations, real_roots, terms_of
+from fastslow.diagrams.equations import RegionEquations, ratios, real_roots, terms_of
 from fastslow.model.structure import real
 
 #: Polynomials in one unknown and the parameter.
-_PLANE = ring("x, p", QQ)[0]
+_PLANE = ring("x, p", ZZ)[0]
 
 #: Degree in the unknown up to which discriminants and resultants are formed.
 DEGREE = 8
@@ -104,27 +103,27 @@ def critical_values(
     return _isolated(equations, bounds, lower, upper)
 
 
-def _in_parameter(terms: Terms) -> list[Fraction]:
+def _in_parameter(terms: Terms) -> list[Fraction | int]:
     """Coefficients of a polynomial in the parameter alone, the highest first."""
     powers = {e[-1]: c for e, c in terms.items()}
-    return [powers.get(k, Fraction(0)) for k in range(max(powers, default=-1), -1, -1)]
+    return [powers.get(k, 0) for k in range(max(powers, default=-1), -1, -1)]
 
 
 def _values(
-    conditions: Iterable[Sequence[Fraction]], lower: float, upper: float
+    conditions: Iterable[Sequence[Fraction | int]], lower: float, upper: float
 ) -> list[float] | None:
     """Real roots in a range of polynomials in the parameter; None if one vanishes identically."""
     values: set[float] = set()
     for condition in conditions:
         if not any(condition):
             return None
-        size = max(abs(c) for c in condition)
-        coefficients = np.array([float(c / size) for c in condition])
-        values |= {v for v in real_roots(coefficients) if lower < v < upper}
+        values |= {v for v in real_roots(ratios(condition)) if lower < v < upper}
     return sorted(values)
 
 
-def _resultants(equations: RegionEquations, edges: Sequence[Terms]) -> list[list[Fraction]] | None:
+def _resultants(
+    equations: RegionEquations, edges: Sequence[Terms]
+) -> list[list[Fraction | int]] | None:
     """Polynomials in the parameter, for at most one unknown and a low degree."""
     if not equations.unknowns:
         return [_in_parameter(edge) for edge in edges]
@@ -135,27 +134,25 @@ def _resultants(equations: RegionEquations, edges: Sequence[Terms]) -> list[list
     degree = max(e for e, _ in equation)
     if degree > DEGREE:
         return None
-    polynomial = _PLANE.from_dict(_rational(equation))
+    polynomial = _PLANE.from_dict(_whole(equation))
     found = [_in_parameter({e: c for e, c in equation.items() if e[0] == degree})]
     if degree > 1:
         found.append(_powers(polynomial.discriminant()))
     for edge in edges:
         if any(e for e, _ in edge):
-            found.append(_powers(polynomial.resultant(_PLANE.from_dict(_rational(edge)))))
+            found.append(_powers(polynomial.resultant(_PLANE.from_dict(_whole(edge)))))
         else:
             found.append(_in_parameter(edge))
     return found
 
 
-def _rational(terms: Terms) -> dict[tuple[int, ...], Any]:
-    return {e: QQ(c.numerator, c.denominator) for e, c in terms.items()}
+def _whole(terms: Terms) -> dict[tuple[int, ...], Any]:
+    return {e: ZZ(int(c)) for e, c in terms.items()}
 
 
-def _powers(polynomial: PolyElement) -> list[Fraction]:
+def _powers(polynomial: PolyElement) -> list[Fraction | int]:
     """Coefficients of a polynomial in the parameter, the highest first."""
-    return _in_parameter(
-        {e: Fraction(int(c.numerator), int(c.denominator)) for e, c in polynomial.items()}
-    )
+    return _in_parameter({e: int(c) for e, c in polynomial.items()})
 
 
 def _isolated(

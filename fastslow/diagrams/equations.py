@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
-from sympy.polys.domains import QQ
+from sympy.polys.domains import ZZ
 from sympy.polys.rings import ring
 
 from fastslow.continuation.loops import blocks, loop
@@ -30,10 +30,10 @@ from fastslow.diagrams.parametric import (
     STATES,
     Answers,
     ParametricElimination,
-    Parts,
+    ParametricPolynomials,
     eliminations_of,
-    parts_of,
-    specialised,
+    exactly,
+    polynomials_of,
 )
 from fastslow.model.rational import exact
 from fastslow.model.structure import real
@@ -90,7 +90,7 @@ MOVED = 1e-6
 UNKNOWNS = 3
 
 #: Polynomials in the parameter.
-_RING = ring("p", QQ)[0]
+_RING = ring("p", ZZ)[0]
 
 #: Choices of a factor of every rate, up to which each is solved by itself.
 CHOICES = 32
@@ -156,26 +156,25 @@ class RegionEquations:
         if len(left.unknowns) > 1:
             return None
 
-        def read(expressions: Sequence[sp.Expr]) -> tuple[Parts, ...] | None:
-            found = [parts_of(e, symbols, parameters) for e in expressions]
-            return None if None in found else tuple(f for f in found if f is not None)
-
         inserted = {real(n): e for n, e in left.solved.items()}
-        bounds = [sp.together(h.subs(inserted)).as_numer_denom()[0] for h in self.bounds]
-        whole = [sp.together(s).as_numer_denom() for s in left.state({}, self.field.model.states)]
-        remaining = read([sp.together(e).as_numer_denom()[0] for e in left.remaining])
-        edges = read([sp.expand(h) for h in bounds])
-        above, below = read([n for n, _ in whole]), read([d for _, d in whole])
-        if remaining is None or edges is None or above is None or below is None:
+        edges = [sp.expand(_numerator(h.subs(inserted))) for h in self.bounds]
+        remaining = polynomials_of([_numerator(e) for e in left.remaining], symbols, parameters)
+        bounds = polynomials_of(edges, symbols, parameters)
+        solved: list[ParametricPolynomials] = []
+        for state in left.state({}, self.field.model.states):
+            quotient = sp.together(state).as_numer_denom()
+            if (read := polynomials_of(quotient, symbols, parameters)) is None:
+                return None
+            solved.append(read)
+        if remaining is None or bounds is None:
             return None
-        solved = tuple(zip(above, below, strict=True))
-        return ParametricElimination(left, parameters, remaining, edges, solved)
+        return ParametricElimination(left, parameters, remaining, bounds, tuple(solved))
 
     @cached_property
     def _values(self) -> list[Fraction]:
         """Exact values of the parameters of `general`."""
         assert self.general is not None
-        return [_fraction(self.numbers[s]) for s in self.general.parameters]
+        return exactly({s: self.numbers[s] for s in self.general.parameters})
 
     @cached_property
     def elimination(self) -> Elimination:
@@ -196,8 +195,7 @@ class RegionEquations:
     def polynomials(self) -> list[Terms] | None:
         """What remains, if it is polynomials in unknowns and parameter."""
         if self.general is not None:
-            found = (specialised(parts, self._values) for parts in self.general.remaining)
-            return [terms for terms in found if terms]
+            return [terms for terms in self.general.remaining.at(self._values) if terms]
         return terms_of(self.elimination.remaining, self._symbols)
 
     @property
@@ -213,7 +211,7 @@ class RegionEquations:
     def edge_polynomials(self) -> list[Terms] | None:
         """The `bounds` along equilibria as polynomials in unknowns and parameter, if they are."""
         if self.general is not None:
-            return [specialised(parts, self._values) for parts in self.general.bounds]
+            return self.general.bounds.at(self._values)
         return self.along(self.bounds)
 
     def along(self, functions: Sequence[sp.Expr]) -> list[Terms] | None:
@@ -299,14 +297,11 @@ class RegionEquations:
         return sp.lambdify((p, *left.unknowns), [sp.N(s, 17) for s in states], "math")
 
     @cached_property
-    def _quotients(self) -> list[tuple[Terms, Terms]] | None:
+    def _quotients(self) -> list[list[Terms]] | None:
         """Every state as a quotient of polynomials, if its denominator does not vanish."""
         if self.general is None:
             return None
-        return [
-            (specialised(above, self._values), specialised(below, self._values))
-            for above, below in self.general.solved
-        ]
+        return [quotient.at(self._values) for quotient in self.general.solved]
 
     def _whole(self, value: float, *unknowns: float) -> list[Array]:
         """The full state at values of the unknowns; none outside the domain of the formulas."""
@@ -314,7 +309,8 @@ class RegionEquations:
             if self._quotients is None:
                 return [np.array(self._formula(value, *unknowns), dtype=float)]
             place = [*map(Fraction, unknowns), Fraction(value)]
-            return [np.array([float(_at(n, place) / _at(d, place)) for n, d in self._quotients])]
+            values = (_at(quotient, place) for quotient in self._quotients)
+            return [np.array([above / below for above, below in values])]
         except (ArithmeticError, ValueError, TypeError):
             return []
 
@@ -392,7 +388,7 @@ class RegionEquations:
 
         A zero of the numerators on a pole is none of the rates: rounding of the state makes them.
         """
-        natural = self._size(value, self.unit(value))
+        natural = self._natural(value)
         slopes = [self.field.curve(self.region, np.append(s, value))[1] for s in states]
         with np.errstate(all="ignore"):
             terms = [np.abs(a[:, :-1]) @ np.abs(s) for a, s in zip(slopes, states, strict=True)]
@@ -412,8 +408,9 @@ class RegionEquations:
         largest = max(abs(value), self._parameter_unit(0.0))
         if self.polynomials is not None:
             for q in self.polynomials:
-                terms = sum(abs(float(c)) * largest ** e[-1] for e, c in q.items())
-                if abs(float(_at(q, [Fraction(value)] * len(next(iter(q)))))) > VANISHING * terms:
+                total = sum(c * Fraction(value) ** e[-1] for e, c in q.items())
+                terms = sum(abs(c) * Fraction(largest) ** e[-1] for e, c in q.items())
+                if abs(total) > Fraction(VANISHING) * terms:
                     return False
             return True
         for e in self.elimination.remaining:
@@ -434,10 +431,10 @@ class RegionEquations:
             forms = [{(k,): c for (i, k), c in polynomial.items() if i == j} for j in powers]
         common = _RING.zero
         for form in forms:
-            over = {(e[-1],): QQ(c.numerator, c.denominator) for e, c in form.items()}
+            over = {(e[-1],): ZZ(int(c)) for e, c in form.items()}
             common = common.gcd(_RING.from_dict(over))
         powers = range(common.degree(), -1, -1) if common else ()
-        return real_roots(np.array([float(common.get((k,), 0)) for k in powers]))
+        return real_roots(ratios([int(common.get((k,), 0)) for k in powers]))
 
     def edges(self, value: float) -> list[Array]:
         """Where a one-parameter continuum of equilibria meets an interface, or its middle."""
@@ -446,9 +443,8 @@ class RegionEquations:
         ends = []
         for line in self._lines(value):
             degree = max((e for (e,) in line), default=0)
-            coefficients = [float(line.get((k,), Fraction(0))) for k in range(degree, -1, -1)]
             if degree > 0:
-                roots = real_roots(np.array(coefficients))
+                roots = real_roots(ratios([line.get((k,), 0) for k in range(degree, -1, -1)]))
                 ends += [s for root in roots for s in self._whole(value, root)]
         return ends or self._whole(value, 0.0)
 
@@ -476,6 +472,16 @@ class RegionEquations:
     def unit(self, value: float) -> Array:
         """Natural unit of each state where the parameter has a value."""
         return self.field.units_at(abs(value))[: self.field.n]
+
+    @cached_property
+    def _naturally(self) -> dict[float, Array]:
+        return {}
+
+    def _natural(self, value: float) -> Array:
+        """Size of each rate where the states have their natural units, kept for every value."""
+        if value not in self._naturally:
+            self._naturally[value] = self._size(value, self.unit(value))
+        return self._naturally[value]
 
     def _parameter_unit(self, value: float) -> float:
         """Size of the parameter, its natural unit where it is zero."""
@@ -510,7 +516,7 @@ class RegionEquations:
         rates, slopes = self.field.curve(self.region, found.u)
         # not of the unit where a state is far below it: a slope that is large because another
         # state is far away would forgive any residual
-        natural, terms = self._size(value, unit), np.abs(slopes[:, :-1]) @ np.abs(solved)
+        natural, terms = self._natural(value), np.abs(slopes[:, :-1]) @ np.abs(solved)
         small = np.abs(rates) <= RESIDUAL * (natural + terms)
         if np.any(np.abs(rates) > RESIDUAL * natural):
             # steep slopes forgive a residual only where they determine the state
@@ -597,9 +603,7 @@ def _determined(slopes: Array, terms: Array, scale: Array) -> bool:
 
 def _multiple_root(terms: Terms, near: float) -> float:
     """The root of the derivative next to a multiple root, where it is simple and well known."""
-    powers = np.zeros(1 + max(e for (e,) in terms))
-    for (exponent,), coefficient in terms.items():
-        powers[exponent] = float(coefficient)
+    powers = ratios([terms.get((k,), 0) for k in range(1 + max(e for (e,) in terms))])
     roots: NDArray[Any] = np.polynomial.Polynomial(powers).deriv().roots()
     roots = roots.real[np.abs(roots - near) < 1e-3 * abs(near)]
     return float(roots[np.argmin(np.abs(roots - near))]) if len(roots) else near
@@ -635,14 +639,30 @@ def _function_of(coefficient: sp.Expr, p: sp.Symbol) -> Any:
     return lambda value: Fraction(float(function(value)))
 
 
-def _at(terms: Terms, place: Sequence[Fraction]) -> Fraction:
-    """The value of a polynomial at a place."""
-    total = Fraction(0)
-    for powers, coefficient in terms.items():
-        for value, power in zip(place, powers, strict=True):
-            coefficient = coefficient * value**power if power else coefficient
-        total += coefficient
-    return total
+def _at(polynomials: Sequence[Terms], place: Sequence[Fraction]) -> list[Any]:
+    """Values of polynomials at a place, all times the same positive number, whole."""
+    powers = []
+    for k, at in enumerate(place):
+        most = max((e[k] for terms in polynomials for e in terms), default=0)
+        n, d = at.numerator, at.denominator
+        powers.append([n**j * d ** (most - j) for j in range(most + 1)])
+    return [
+        sum(
+            c * math.prod(table[j] for table, j in zip(powers, e, strict=True))
+            for e, c in terms.items()
+        )
+        for terms in polynomials
+    ]
+
+
+def _numerator(expression: sp.Expr) -> sp.Expr:
+    return sp.together(expression).as_numer_denom()[0]
+
+
+def ratios(numbers: Sequence[Fraction | int]) -> Array:
+    """Numbers in units of the largest, each rounded once."""
+    largest = max(map(abs, numbers), default=0) or 1
+    return np.array([float(Fraction(number) / largest) for number in numbers])
 
 
 def _fraction(number: sp.Expr) -> Fraction:
@@ -652,13 +672,18 @@ def _fraction(number: sp.Expr) -> Fraction:
 
 
 def terms_of(expressions: Sequence[sp.Expr], symbols: Sequence[sp.Symbol]) -> list[Terms] | None:
-    """Polynomials by exponents of symbols; None where one is no polynomial in them."""
+    """Polynomials by exponents of symbols, each with whole coefficients up to a positive factor.
+
+    None where one is no polynomial in the symbols.
+    """
     found: list[Terms] = []
     for expression in expressions:
         if not expression.is_polynomial(*symbols):
             return None
-        polynomial = sp.Poly(expression, *symbols)
-        found.append({e: _fraction(c) for e, c in polynomial.terms() if c != 0})
+        terms = sp.Poly(expression, *symbols).terms() if symbols else [((), expression)]
+        exact_ones = {e: _fraction(c) for e, c in terms if c != 0}
+        common = math.lcm(1, *(c.denominator for c in exact_ones.values()))
+        found.append({e: int(c * common) for e, c in exact_ones.items()})
     return found
 
 

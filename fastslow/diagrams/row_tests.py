@@ -68,6 +68,8 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     n = values.shape[-1]
     if n < 2:
         return np.zeros(values.shape[:-1])
+    if n == 2:
+        return _sum_of_two(values[..., 0], values[..., 1], rounding)
     finite = np.isfinite(values).all(axis=-1)
     values = np.where(finite[..., None], values, 1.0)
     modulus = np.abs(values)
@@ -98,6 +100,18 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     count = real.sum(axis=-1)
     known = pair.sum(axis=-1) + count * (count - 1) // 2 - left_out.sum(axis=-1) > 0
     return np.where(known & finite, np.where(negative % 2 == 1, -least, least), 0.0)
+
+
+def _sum_of_two(one: Complex, other: Complex, rounding: float) -> Array:
+    """Relative sum of two eigenvalues; 0 to rounding, or where they are no pair or not finite."""
+    with np.errstate(invalid="ignore"):
+        total, sizes = (one + other).real, (np.abs(one), np.abs(other))
+        noise = rounding * 2.0 * np.maximum(*sizes)
+        # of a complex pair the noise is that of the real part
+        real = (one.imag == 0) & (other.imag == 0)
+        kept = np.isfinite(one) & np.isfinite(other) & (total != 0)
+        kept &= np.abs(total) >= np.where(real, noise, 2.0 * noise)
+        return np.where(kept, total / (sizes[0] + sizes[1]), 0.0)
 
 
 def product_of_pair(eigenvalues: Complex, rounding: float = ROUNDING) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import lru_cache
 from itertools import product
@@ -33,6 +34,7 @@ from fastslow.diagrams.solving import point_at
 from fastslow.diagrams.starts import Starts, starts_of
 from fastslow.diagrams.walking import Piece, Window, beside, on_interface, walk
 from fastslow.errors import ArgumentError
+from fastslow.model.derived import once, partition_of
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.angles import apart, copies, periods_of
@@ -490,18 +492,41 @@ def _labelled(branches: list[Branch], name: str, window: Window) -> tuple[Branch
     return tuple(done)
 
 
-@lru_cache(maxsize=64)
 def _interface_values(field: FrozenField) -> dict[str, tuple[str, float]]:
     """Interfaces that are a constant value of one state, for drawing them as lines."""
-    values = {}
-    model = field.model
+    values = field.model.values
+    found = {}
+    zero = tuple(s for s, v in values.items() if v == 0)
+    for name, state, parameters, level in _levels(field.model, field.parameter, zero):
+        try:
+            at = float(level(*(values[p] for p in parameters)))
+        except (ArithmeticError, ValueError, TypeError):
+            continue
+        if math.isfinite(at):
+            found[name] = (state, at)
+    return found
+
+
+@once(partition_of)
+def _levels(
+    model: Model, parameter: str, zero: tuple[sp.Symbol, ...]
+) -> list[tuple[str, str, list[sp.Symbol], Callable[..., float]]]:
+    """Interfaces h = a x + b with a state x and no varying parameter, and −b/a as a function.
+
+    With some parameters zero.
+    """
+    found = []
     for name, interface in model.interfaces.items():
-        h = sp.sympify(interface.function).subs(model.values)
-        for state in model.states:
-            symbol = real(state)
-            if h.free_symbols == {symbol} and h.diff(symbol).is_number:
-                values[name] = (state, float(-h.subs(symbol, 0) / h.diff(symbol)))
-    return values
+        h = sp.sympify(interface.function).subs(dict.fromkeys(zero, 0))
+        states = [n for n in model.states if h.has(real(n))]
+        if len(states) != 1 or h.has(real(parameter)):
+            continue
+        slope = h.diff(real(states[0]))
+        if not slope.has(real(states[0])):
+            level = -h.subs(real(states[0]), 0) / slope
+            symbols = sorted(level.free_symbols, key=str)
+            found.append((name, states[0], symbols, sp.lambdify(symbols, level, "math")))
+    return found
 
 
 def _corrector(field: FrozenField) -> Corrector:

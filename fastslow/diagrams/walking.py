@@ -76,6 +76,11 @@ class Piece:
     u: Array
     tangents: Array
 
+    def chords(self, scale: Array) -> Array:
+        """Lengths of the steps in units of the scale."""
+        steps = np.diff(self.u, axis=0) / scale
+        return np.asarray(np.sqrt((steps * steps).sum(axis=1)))
+
     def reversed(self) -> Piece:
         return Piece(self.region, self.u[::-1].copy(), -self.tangents[::-1])
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from fastslow.model.interfaces import Region
 from fastslow.model.structure import real
@@ -68,15 +70,82 @@ def natural_units(
     >>> natural_units(["x", "w"], [region], [], {})
     {'x': 1048576.0, 'w': 1099511627776.0}
     """
-    sums = _Sums({real(n): n for n in names if real(n) not in values}, values)
-    for region in regions:
-        for rate in (*region.rates.values(), *region.forcing.values()):
-            sums.magnitude(rate)
-    for function in functions:
-        sums.magnitude(function)
-    logs = sums.solved()
-    known = {str(s): math.log2(abs(v)) for s, v in values.items() if v}
-    return {n: _power(logs.get(n, known.get(n, 0.0))) for n in names}
+    rates = (r for region in regions for r in (*region.rates.values(), *region.forcing.values()))
+    expressions = (*rates, *functions)
+    unknowns = tuple(n for n in names if real(n) not in values)
+    gone = frozenset(s for s, v in values.items() if _constant(v) is None)
+    fixed = tuple((s, values[s]) for s in _in_exponents(expressions) if s in values)
+    equations = _equations(expressions, unknowns, tuple(values), gone, fixed)
+    known = {s: math.log2(abs(v)) for s, v in values.items() if v}
+    logs = equations.solved(np.array([0.0 if s in gone else known[s] for s in values]))
+    return {n: _power(logs.get(n, known.get(real(n), 0.0))) for n in names}
+
+
+@dataclass(frozen=True, eq=False)
+class _Equations:
+    """Linear equations for the logarithms of units, with those of the parameters' sizes given.
+
+    Parameters
+    ----------
+    columns : tuple of str
+        What is solved for.
+    matrix : ndarray, shape (E, columns)
+    right : ndarray, shape (E, 1 + P)
+        Constants, and coefficients of the logarithms of P parameters.
+    """
+
+    columns: tuple[str, ...]
+    matrix: NDArray[np.float64]
+    right: NDArray[np.float64]
+
+    def solved(self, logs: NDArray[np.float64]) -> dict[str, float]:
+        """Least-squares solution of least norm."""
+        if not self.columns:
+            return {}
+        normal = self.matrix.T @ self.matrix
+        normal[np.diag_indices_from(normal)] += _UNDETERMINED * len(self.matrix)
+        right = -(self.right[:, 0] + self.right[:, 1:] @ logs)
+        found = np.linalg.solve(normal, self.matrix.T @ right)
+        return dict(zip(self.columns, found.tolist(), strict=True))
+
+
+@lru_cache(maxsize=256)
+def _in_exponents(expressions: tuple[sp.Expr, ...]) -> tuple[sp.Symbol, ...]:
+    """Symbols in exponents, by name."""
+    found = {s for e in expressions for p in e.atoms(sp.Pow) for s in p.exp.free_symbols}
+    return tuple(sorted(found, key=str))
+
+
+@lru_cache(maxsize=256)
+def _equations(
+    expressions: tuple[sp.Expr, ...],
+    unknowns: tuple[str, ...],
+    parameters: tuple[sp.Symbol, ...],
+    gone: frozenset[sp.Symbol],
+    fixed: tuple[tuple[sp.Symbol, float], ...],
+) -> _Equations:
+    """The equations for all values of the parameters but those in exponents.
+
+    ``gone`` are the parameters that are too small or too large to count.
+    """
+    sums = _Sums(
+        {real(n): n for n in unknowns},
+        {s: None if s in gone else {str(k): 1.0} for k, s in enumerate(parameters)},
+        dict(fixed),
+    )
+    for expression in expressions:
+        sums.magnitude(expression)
+    places = {str(k): 1 + k for k in range(len(parameters))} | {_CONSTANT: 0}
+    columns = tuple(sorted({k for e in sums.equations for k in e} - set(places)))
+    matrix = np.zeros((len(sums.equations), len(columns)))
+    right = np.zeros((len(sums.equations), 1 + len(parameters)))
+    for row, equation in enumerate(sums.equations):
+        for name, coefficient in equation.items():
+            if name in places:
+                right[row, places[name]] += coefficient
+            else:
+                matrix[row, columns.index(name)] += coefficient
+    return _Equations(columns, matrix, right)
 
 
 def _power(log: float) -> float:
@@ -84,7 +153,8 @@ def _power(log: float) -> float:
     return float(2.0 ** round(min(max(log, -500.0), 500.0)))
 
 
-#: A logarithm to base two as a linear form: unknown (or constant) to its coefficient.
+#: A logarithm to base two as a linear form: unknown, number of a parameter or constant to its
+#: coefficient.
 _Form = dict[str, float]
 
 
@@ -93,7 +163,8 @@ class _Sums:
     """The equations that the magnitudes of the terms of every sum obey."""
 
     unknowns: dict[sp.Symbol, str]
-    values: Mapping[sp.Symbol, float]
+    parameters: Mapping[sp.Symbol, _Form | None]
+    exponents: Mapping[sp.Symbol, float]
     equations: list[_Form] = field(default_factory=list)
     known: dict[sp.Expr, _Form | None] = field(default_factory=dict)
 
@@ -107,7 +178,7 @@ class _Sums:
         if e.is_Symbol:
             if e in self.unknowns:
                 return {self.unknowns[e]: 1.0}
-            return _constant(self.values[e]) if e in self.values else None
+            return self.parameters.get(e)
         if e.is_number:
             return _constant(e)
         if e.is_Mul:
@@ -115,7 +186,7 @@ class _Sums:
             known = [f for f in factors if f is not None]
             return _total(known) if len(known) == len(factors) else None
         if e.is_Pow:
-            base, exponent = self.magnitude(e.base), _number(e.exp, self.values)
+            base, exponent = self.magnitude(e.base), _number(e.exp, self.exponents)
             if exponent is None:
                 self._dimensionless(e.exp)
                 return {}
@@ -143,25 +214,6 @@ class _Sums:
         form = self.magnitude(e) if isinstance(e, sp.Expr) else None
         if form:
             self.equations.append(form)
-
-    def solved(self) -> dict[str, float]:
-        """Least-squares solution of least norm."""
-        columns = sorted({k for e in self.equations for k in e} - {_CONSTANT})
-        if not columns:
-            return {}
-        place = {name: k for k, name in enumerate(columns)}
-        matrix = np.zeros((len(self.equations), len(columns)))
-        right = np.zeros(len(self.equations))
-        for row, equation in enumerate(self.equations):
-            for name, coefficient in equation.items():
-                if name == _CONSTANT:
-                    right[row] -= coefficient
-                else:
-                    matrix[row, place[name]] += coefficient
-        normal = matrix.T @ matrix
-        normal[np.diag_indices_from(normal)] += _UNDETERMINED * len(matrix)
-        logs = np.linalg.solve(normal, matrix.T @ right)
-        return dict(zip(columns, logs.tolist(), strict=True))
 
 
 def _total(forms: Iterable[_Form]) -> _Form:
