@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 #: Exponents of the unknowns to the coefficient of their product.
 Terms = Mapping[tuple[int, ...], Fraction | int]
 
+#: The same with whole coefficients, as an equation has up to a factor.
+WholeTerms = Mapping[tuple[int, ...], int]
+
 #: Solutions are looked for up to this multiple of each unknown's unit (see `units`), and
 #: farther where coefficients differ by many decades.
 FARTHEST = 1e9

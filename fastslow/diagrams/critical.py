@@ -16,6 +16,7 @@ from sympy.polys.rings import PolyElement, ring
 from fastslow.continuation.polynomial_systems import (
     FARTHEST,
     Terms,
+    WholeTerms,
     at_value,
     solve_polynomials,
     units,
@@ -122,7 +123,7 @@ def _values(
 
 
 def _resultants(
-    equations: RegionEquations, edges: Sequence[Terms]
+    equations: RegionEquations, edges: Sequence[WholeTerms]
 ) -> list[list[Fraction | int]] | None:
     """Polynomials in the parameter, for at most one unknown and a low degree."""
     if not equations.unknowns:
@@ -146,8 +147,8 @@ def _resultants(
     return found
 
 
-def _whole(terms: Terms) -> dict[tuple[int, ...], Any]:
-    return {e: ZZ(int(c)) for e, c in terms.items()}
+def _whole(terms: WholeTerms) -> dict[tuple[int, ...], Any]:
+    return {e: ZZ(c) for e, c in terms.items()}
 
 
 def _powers(polynomial: PolyElement) -> list[Fraction | int]:
@@ -156,7 +157,7 @@ def _powers(polynomial: PolyElement) -> list[Fraction | int]:
 
 
 def _isolated(
-    equations: RegionEquations, bounds: Sequence[Terms], lower: float, upper: float
+    equations: RegionEquations, bounds: Sequence[WholeTerms], lower: float, upper: float
 ) -> list[float] | None:
     """Values at which systems in unknowns and parameter have solutions."""
     if not equations.isolated:
@@ -373,7 +374,7 @@ def _root_intervals(
     return [(float(lower + a * wide), float(lower + b * wide)) for a, b in found]
 
 
-def _at_infinity(rates: list[Terms], ranges: dict[int, tuple[float, float]]) -> list[list[Terms]]:
+def _at_infinity(rates: Sequence[Terms], ranges: dict[int, tuple[float, float]]) -> list[list[Terms]]:
     """Systems for the parameter at which an unknown has the largest size that is looked at."""
     count = len(rates)
     scales, _ = units(rates, ranges)

@@ -21,6 +21,7 @@ from fastslow.continuation.ordering import in_order
 from fastslow.continuation.polynomial_systems import (
     FARTHEST,
     Terms,
+    WholeTerms,
     at_value,
     solve_polynomials,
 )
@@ -192,7 +193,7 @@ class RegionEquations:
         return (self.elimination if self.general is None else self.general.general).unknowns
 
     @cached_property
-    def polynomials(self) -> list[Terms] | None:
+    def polynomials(self) -> list[WholeTerms] | None:
         """What remains, if it is polynomials in unknowns and parameter."""
         if self.general is not None:
             return [terms for terms in self.general.remaining.at(self._values) if terms]
@@ -208,13 +209,13 @@ class RegionEquations:
         return [self._number(i.function) for i in self.field.model.interfaces.values()]
 
     @cached_property
-    def edge_polynomials(self) -> list[Terms] | None:
+    def edge_polynomials(self) -> list[WholeTerms] | None:
         """The `bounds` along equilibria as polynomials in unknowns and parameter, if they are."""
         if self.general is not None:
             return self.general.bounds.at(self._values)
         return self.along(self.bounds)
 
-    def along(self, functions: Sequence[sp.Expr]) -> list[Terms] | None:
+    def along(self, functions: Sequence[sp.Expr]) -> list[WholeTerms] | None:
         """Functions of the states along equilibria, over unknowns and parameter.
 
         None if one is no polynomial. A denominator has been shown not to vanish, or is a zero of
@@ -237,8 +238,9 @@ class RegionEquations:
         if len(self.unknowns) != 1:
             return False
         if self.polynomials is not None:
-            left = self.polynomials
-            return len(left) == 1 and max(e for e, _ in left[0]) <= DEGREE
+            first = self.polynomials[:1]
+            alone = len(self.polynomials) == 1
+            return alone and all(e <= DEGREE for terms in first for e, _ in terms)
         left = self.elimination
         whole = left.is_univariate and left.is_polynomial
         return bool(whole and sp.degree(left.remaining[0], left.unknowns[0]) <= DEGREE)
@@ -297,7 +299,7 @@ class RegionEquations:
         return sp.lambdify((p, *left.unknowns), [sp.N(s, 17) for s in states], "math")
 
     @cached_property
-    def _quotients(self) -> list[list[Terms]] | None:
+    def _quotients(self) -> list[list[WholeTerms]] | None:
         """Every state as a quotient of polynomials, if its denominator does not vanish."""
         if self.general is None:
             return None
@@ -408,9 +410,10 @@ class RegionEquations:
         largest = max(abs(value), self._parameter_unit(0.0))
         if self.polynomials is not None:
             for q in self.polynomials:
-                total = sum(c * Fraction(value) ** e[-1] for e, c in q.items())
-                terms = sum(abs(c) * Fraction(largest) ** e[-1] for e, c in q.items())
-                if abs(total) > Fraction(VANISHING) * terms:
+                at, far = Fraction(value), Fraction(largest)
+                total = sum((c * at ** e[-1] for e, c in q.items()), Fraction(0))
+                size = sum((abs(c) * far ** e[-1] for e, c in q.items()), Fraction(0))
+                if abs(total) > Fraction(VANISHING) * size:
                     return False
             return True
         for e in self.elimination.remaining:
@@ -427,14 +430,14 @@ class RegionEquations:
         forms = list(self.polynomials)
         if not self._undetermined:
             (polynomial,) = forms
-            powers = {e[0] for e in polynomial}
-            forms = [{(k,): c for (i, k), c in polynomial.items() if i == j} for j in powers]
+            degrees = {e[0] for e in polynomial}
+            forms = [{(k,): c for (i, k), c in polynomial.items() if i == j} for j in degrees]
         common = _RING.zero
         for form in forms:
-            over = {(e[-1],): ZZ(int(c)) for e, c in form.items()}
+            over = {(e[-1],): ZZ(c) for e, c in form.items()}
             common = common.gcd(_RING.from_dict(over))
-        powers = range(common.degree(), -1, -1) if common else ()
-        return real_roots(ratios([int(common.get((k,), 0)) for k in powers]))
+        highest = common.degree() if common else -1
+        return real_roots(ratios([int(common.get((k,), 0)) for k in range(highest, -1, -1)]))
 
     def edges(self, value: float) -> list[Array]:
         """Where a one-parameter continuum of equilibria meets an interface, or its middle."""
@@ -639,7 +642,7 @@ def _function_of(coefficient: sp.Expr, p: sp.Symbol) -> Any:
     return lambda value: Fraction(float(function(value)))
 
 
-def _at(polynomials: Sequence[Terms], place: Sequence[Fraction]) -> list[Any]:
+def _at(polynomials: Sequence[WholeTerms], place: Sequence[Fraction]) -> list[int]:
     """Values of polynomials at a place, all times the same positive number, whole."""
     powers = []
     for k, at in enumerate(place):
@@ -661,8 +664,8 @@ def _numerator(expression: sp.Expr) -> sp.Expr:
 
 def ratios(numbers: Sequence[Fraction | int]) -> Array:
     """Numbers in units of the largest, each rounded once."""
-    largest = max(map(abs, numbers), default=0) or 1
-    return np.array([float(Fraction(number) / largest) for number in numbers])
+    largest = max((abs(Fraction(number)) for number in numbers), default=Fraction(0))
+    return np.array([float(number / (largest or 1)) for number in numbers])
 
 
 def _fraction(number: sp.Expr) -> Fraction:
@@ -671,12 +674,14 @@ def _fraction(number: sp.Expr) -> Fraction:
     return Fraction(int(rational.p), int(rational.q))
 
 
-def terms_of(expressions: Sequence[sp.Expr], symbols: Sequence[sp.Symbol]) -> list[Terms] | None:
+def terms_of(
+    expressions: Sequence[sp.Expr], symbols: Sequence[sp.Symbol]
+) -> list[WholeTerms] | None:
     """Polynomials by exponents of symbols, each with whole coefficients up to a positive factor.
 
     None where one is no polynomial in the symbols.
     """
-    found: list[Terms] = []
+    found: list[WholeTerms] = []
     for expression in expressions:
         if not expression.is_polynomial(*symbols):
             return None

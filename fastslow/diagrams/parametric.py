@@ -16,7 +16,7 @@ from typing import Any
 
 import sympy as sp
 
-from fastslow.continuation.polynomial_systems import Terms
+from fastslow.continuation.polynomial_systems import WholeTerms
 from fastslow.model.derived import once, partition_of
 from fastslow.model.model import Model
 from fastslow.symbolic.elimination import Elimination
@@ -45,7 +45,7 @@ class ParametricPolynomials:
     parts: tuple[Parts, ...]
     degrees: tuple[int, ...]
 
-    def at(self, values: Sequence[Fraction]) -> list[Terms]:
+    def at(self, values: Sequence[Fraction]) -> list[WholeTerms]:
         """At values of the parameters, all times the same positive number that makes them whole.
 
         Examples

@@ -1,6 +1,6 @@
 """Equilibria of the gear continued in its load, against other programs in the same run.
 
-Run with ``python tests/benchmarks/bench_continuation.py``. AUTO-07p, bice and
+AUTO-07p, bice and
 PyCont-Lite are measured where they are installed. They know no interfaces, so
 they follow the one smooth curve of the engaged gear, as fastslow does beside
 its diagrams of the whole gear. Every program looks for special points of each
@@ -16,7 +16,6 @@ import shutil
 import statistics
 import subprocess
 import tempfile
-import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
@@ -30,6 +29,7 @@ import numpy as np
 import sympy as sp
 
 import fastslow as fs
+from tests.benchmarks.measuring import Line, used
 
 A, D = 41.67, 0.25
 OVER = (-2.0, 6.0)
@@ -73,13 +73,13 @@ def engaged() -> fs.Model:
 
 
 def taken(function: Callable[[], Any], repeats: int) -> tuple[float, Any]:
-    """Median time of a call in seconds, and what the first one returned."""
+    """Median processor time of a call in seconds, and what the first one returned."""
     result = function()
     times = []
     for _ in range(repeats):
-        begin = time.perf_counter()
+        begin = used()
         function()
-        times.append(time.perf_counter() - begin)
+        times.append(used() - begin)
     return statistics.median(times), result
 
 
@@ -229,18 +229,15 @@ def pycont() -> Iterator[Row]:
         yield Row(task, f"PyCont-Lite, engaged gear, {label}", made, taken_by)
 
 
-def main() -> None:
+def lines() -> Iterator[Line]:
+    """Steps per second of every tool, beside the engaged gear of fastslow in the same block."""
     table = [row for tool in (fastslow, auto, bice, pycont) for row in tool()]
     for task in (SHORT, LONG):
-        print(f"\n{task}")
-        print(f"{'':62}{'steps':>9}{'ms':>10}{'steps/s':>11}{'/ fastslow':>12}")
-        lines = [row for row in table if row.task == task]
-        ours = [row for row in lines if row.tool.startswith("fastslow, engaged")]
-        for row in lines:
-            ratio = row.rate / ours[-1].rate
-            print(f"{row.tool:62}{row.steps:9d}{1e3 * row.time:10.2f}{row.rate:11.0f}{ratio:12.4g}")
-    print("\n/ fastslow: steps/s over those of fastslow's last line in the same block")
-
-
-if __name__ == "__main__":
-    main()
+        block = [row for row in table if row.task == task]
+        ours = [row for row in block if row.tool.startswith("fastslow, engaged")][-1]
+        for row in block:
+            peer = not row.tool.startswith("fastslow")
+            note = f"{row.steps} steps in {1e3 * row.time:.3g} ms"
+            yield Line(
+                task, row.tool, row.rate, "steps/s", ours.rate / row.rate if peer else None, note
+            )

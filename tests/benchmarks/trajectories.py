@@ -1,26 +1,27 @@
-"""One gear trajectory, three slow periods and 20 000 samples, against peers in the same run.
+"""One gear trajectory, three slow periods and 20,000 samples, against peers.
 
-Run with ``python tests/benchmarks/bench_simulation.py``. SciPy integrates the
-kinked rates and locates the crossings as events, as its users do it; heyoka,
-where it is installed, has an integrator for each region, which a terminal event
-at its edge ends.
+SciPy integrates the kinked rates and locates the crossings as events, as its users do
+it; heyoka, where it is installed, has an integrator for each region, which a terminal
+event at its edge ends; `gear.c` is written for this model.
 """
 
 from __future__ import annotations
 
 import importlib.util
-import statistics
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import sympy as sp
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
+from tests.benchmarks.measuring import Line, against, medians
+from tests.benchmarks.references import gear_in_c
 
 A, B, C, D, OMEGA = 41.67, 2.372, 3.546, 0.25, 0.01
 END = 6 * np.pi / OMEGA
+STIFF = (12152.8, 40.5, 60.55)
+TOL = 1e-9
 TIMES = np.linspace(0, END, 20_000)
 
 
@@ -91,48 +92,50 @@ def with_heyoka(A: float, B: float, C: float, tol: float) -> Callable[[], tuple[
     return run
 
 
-def median(function: Callable[[], object], repeats: int) -> float:
-    """Median time of a call, in ms."""
-    taken = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        function()
-        taken.append(time.perf_counter() - begin)
-    return 1e3 * statistics.median(taken)
+def in_c(A: float, B: float, C: float, tol: float) -> Callable[[], tuple[np.ndarray, int]] | None:
+    """The same by C written for this model; None without a compiler."""
+    library = gear_in_c()
+    if library is None:
+        return None
+
+    def run() -> tuple[np.ndarray, int]:
+        out = np.empty(len(TIMES))
+        count = library.run(A, B, C, D, OMEGA, tol, END, TIMES, len(TIMES), out)
+        return out, count
+
+    return run
 
 
-def main() -> None:
+def lines() -> Iterator[Line]:
+    """P1 with 20,000 samples, and a stiffer gear with 825 crossings."""
     model = gear()
-    stiff = model.with_parameters(A=12152.8, B=40.5, C=60.55)
-
-    def ours(dense: bool = True) -> fs.Trajectory:
-        return fs.simulate(model, [0, 0], periods=3, samples=TIMES, dense=dense)
-
-    exact = fs.simulate(
-        model, [0, 0], periods=3, samples=TIMES, integration=fs.Integration(rtol=1e-14)
-    )["x"]
-    mine, theirs = ours()["x"], scipy_with_events(1e-9)
-    print(f"largest error: fastslow {np.abs(mine - exact).max():.1e}, ", end="")
-    print(f"SciPy {np.abs(theirs - exact).max():.1e}")
-    fast = median(ours, 50)
-    slow = median(lambda: scipy_with_events(1e-9), 3)
-    print(f"P1, 20 000 samples: fastslow {fast:.2f} ms, SciPy {slow:.0f} ms: {slow / fast:.0f} x")
-    many = median(lambda: fs.simulate(stiff, [0, 0], periods=3, samples=TIMES), 10)
-    count = len(fs.simulate(stiff, [0, 0], periods=3).crossings)
-    print(f"{count} crossings: fastslow {many:.1f} ms")
-    if importlib.util.find_spec("heyoka") is None:
-        return
-    peer = with_heyoka(A, B, C, 1e-9)
-    error = np.abs(peer()[0] - exact).max()
-    print(f"heyoka, P1: {(taken := median(peer, 20)):.2f} ms, {taken / fast:.1f} x, ", end="")
-    print(f"error {error:.1e}, {peer()[1]} crossings")
-    peer = with_heyoka(12152.8, 40.5, 60.55, 1e-9)
-    print(
-        f"heyoka, 825 crossings: {(taken := median(peer, 5)):.1f} ms, {taken / many:.1f} x, ",
-        end="",
-    )
-    print(f"{peer()[1]} crossings found")
+    cases = {"P1, 20,000 samples": (A, B, C), "825 crossings, 20,000 samples": STIFF}
+    for work, (a, b, c) in cases.items():
+        here = model.with_parameters(A=a, B=b, C=c)
+        fine = fs.Integration(rtol=1e-14)
+        exact = fs.simulate(here, [0, 0], periods=3, samples=TIMES, integration=fine)["x"]
+        runs: dict[str, Callable[[], tuple[np.ndarray, int]]] = {
+            "fastslow": lambda here=here: _ours(here)  # type: ignore[misc]
+        }
+        if (peer := in_c(a, b, c, TOL)) is not None:
+            runs["C for this model"] = peer
+        if importlib.util.find_spec("heyoka") is not None:
+            runs["heyoka, one integrator a region"] = with_heyoka(a, b, c, TOL)
+        found = {name: run() for name, run in runs.items()}
+        times = medians(runs)
+        if (a, b, c) == (A, B, C):
+            slow = "SciPy, DOP853 with events"
+            found[slow] = scipy_with_events(TOL), 0
+            times |= medians({slow: lambda: scipy_with_events(TOL)}, repeats=3)
+        notes = {}
+        for name, (x, count) in found.items():
+            crossings = f", {count} crossings" if count else ""
+            notes[name] = f"error {np.abs(x - exact).max():.1e}{crossings}"
+        yield from against(work, "fastslow", times, notes)
+    short = lambda: fs.simulate(model, [0.5, 0.0], t=(0, 1e-3))  # noqa: E731
+    yield Line("a short run, all checks", "fastslow", medians({"": short})[""], "ms")
 
 
-if __name__ == "__main__":
-    main()
+def _ours(model: fs.Model) -> tuple[np.ndarray, int]:
+    run = fs.simulate(model, [0, 0], periods=3, samples=TIMES)
+    return run["x"], len(run.crossings)

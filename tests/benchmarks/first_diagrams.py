@@ -1,6 +1,6 @@
 """The first diagram of a model of many states, against the eigenvalues of its rows alone.
 
-Run with ``python -m tests.benchmarks.bench_first_diagrams``. The model is the Brusselator on
+The model is the Brusselator on
 a line, two states for each cell, with a feed that no earlier run has had, so that everything
 from its equations to the diagram is counted: elimination, generated code, its compilation,
 the search for equilibria, the branch, its special points and their normal forms. Loops
@@ -11,15 +11,13 @@ can do without. Processor time, with one thread in linear algebra.
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import time
+from collections.abc import Iterator
 
 import numpy as np
 
 import fastslow as fs
+from tests.benchmarks.measuring import Line, medians, used
 from tests.diagrams.models import LENGTH, brusselator
 
 OVER = (0.2, 2.0)
@@ -45,28 +43,23 @@ def jacobians(branch: fs.Branch) -> np.ndarray:
     return found
 
 
-def main() -> None:
+def lines() -> Iterator[Line]:
+    """First diagrams of models of more and more states, and the eigenvalues of their rows."""
     model, _ = brusselator(2)
     fs.continue_equilibria(model, LENGTH, OVER)
     fresh = 2.0 + (time.time_ns() % 10**9) * 1e-12
-    print("states  rows  Hopf points  diagram, s  eigvals, s   ratio")
     for states in STATES:
-        begin = time.process_time()
+        work = f"first diagram of a model of {states} states"
+        begin = used()
         model, _ = brusselator(states // 2, fresh)
         diagram = fs.continue_equilibria(model, LENGTH, OVER)
-        whole = time.process_time() - begin
+        whole = 1e3 * (used() - begin)
         (branch,) = diagram.branches
         matrices = jacobians(branch)
-        begin = time.process_time()
-        values = np.linalg.eigvals(matrices)
-        alone = time.process_time() - begin
+        alone = medians({"": lambda: np.linalg.eigvals(matrices)}, repeats=1)[""]  # noqa: B023
         # the peer computes the same numbers
+        values = np.linalg.eigvals(matrices)
         assert np.allclose(values.real.max(axis=1), branch.eigenvalues.real.max(axis=1))
-        print(
-            f"{states:6d}{len(branch):6d}{len(branch.special('HB')):13d}"
-            f"{whole:12.2f}{alone:12.3f}{whole / alone:8.0f}"
-        )
-
-
-if __name__ == "__main__":
-    main()
+        points = len(branch.special("HB"))
+        yield Line(work, "fastslow", whole, "ms", None, f"{len(branch)} rows, {points} Hopf points")
+        yield Line(work, "numpy.linalg.eigvals of the rows alone", alone, "ms", alone / whole)
