@@ -67,14 +67,16 @@ static double length_of(const series *s, double tol) {
 
 /* First root of a(h) - level in (0, h], or -1. `left`: the value at 0 is a root just left. */
 static double first_root(const double *a, double level, double h, int left) {
-    /* no root where the terms cannot reach the level */
-    double reach = 0.0, power = h;
+    /* no root where the terms cannot reach the level, one at most where the first one rules */
+    double reach = 0.0, bend = 0.0, power = h;
     for (int k = 1; k < LENGTH; k++) {
-        reach += fabs(a[k]) * power;
+        const double size = fabs(a[k]) * power;
+        reach += size;
+        bend += k * size;
         power *= h;
     }
     if (fabs(a[0] - level) > reach) return -1.0;
-    const int parts = 16;
+    const int parts = 2.0 * fabs(a[1]) * h > bend ? 1 : 16;
     double from = 0.0, value = left ? a[1] : a[0] - level;
     for (int k = 1; k <= parts; k++) {
         const double to = h * k / parts, next = at(a, to) - level;

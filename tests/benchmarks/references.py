@@ -23,7 +23,7 @@ def gear_in_c() -> ctypes.CDLL | None:
         return None
     folder = Path(tempfile.mkdtemp())
     target, source = folder / "gear.so", Path(__file__).with_name("gear.c")
-    flags = ["-O3", "-march=native", "-shared", "-fPIC"]
+    flags = ["-O3", "-march=native", "-ffast-math", "-shared", "-fPIC"]
     subprocess.run([compiler, *flags, "-o", target, source, "-lm", "-lpthread"], check=True)
     library = ctypes.CDLL(str(target))
     shutil.rmtree(folder)
