@@ -1,18 +1,13 @@
 """Overlays of runs on their diagrams, beside the runs themselves and a law's passage by SciPy.
 
-Run with ``python -m tests.benchmarks.bench_overlays``. Everything is compiled before. No other
+Everything is compiled before. No other
 program lays a trajectory over a diagram; what can be compared is the passage that the error of
-a law of delay is told by, which SciPy integrates by LSODA with rates in Python. Processor time.
+a law of delay is told by, which SciPy integrates by LSODA with rates in Python.
 """
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import statistics
-import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -21,16 +16,17 @@ from scipy.integrate import solve_ivp
 import fastslow as fs
 from fastslow.passage.local_passages import Event, Place, reached_delay
 from fastslow.passage.sites import site_of
+from tests.benchmarks.measuring import Line, used
 
 
-def median(function: Callable[[], object], repeats: int = 15) -> float:
-    """Median processor time of a call, in ms; it is called once before."""
+def median(function: Callable[[], object], repeats: int = 7) -> float:
+    """Median processor time of a call, in ms; it is called once before, and never repeated."""
     function()
     taken = []
     for _ in range(repeats):
-        begin = time.process_time()
+        begin = used()
         function()
-        taken.append(time.process_time() - begin)
+        taken.append(used() - begin)
     return 1e3 * statistics.median(taken)
 
 
@@ -78,11 +74,11 @@ def passages() -> tuple[float, float, float]:
         run = solve_ivp(rates, (0, 1e4), place.z, "LSODA", events=level, rtol=1e-11, atol=1e-14)
         return float(way * run.y[-1, -1])
 
-    return median(ours), median(theirs, 3), abs(ours() / theirs() - 1.0)
+    return median(ours, 15), median(theirs, 3), abs(ours() / theirs() - 1.0)
 
 
-def main() -> None:
-    print(f"{'':28}{'samples':>9}{'transitions':>13}{'run, ms':>10}{'overlay, ms':>13}{'ratio':>8}")
+def lines() -> Iterator[Line]:
+    """Overlays beside their runs, and the passage of a fold beside SciPy."""
     for name, model, slow, over, start, stop in cases():
         diagram = fs.continue_equilibria(model.frozen(), slow, over=over)
 
@@ -90,20 +86,17 @@ def main() -> None:
             return fs.simulate(m, s, t=(0, e))
 
         # a run keeps what was read off it: each overlay has its own
-        fresh = iter([run() for _ in range(8)])
-        lay = fs.overlay(diagram, run())
-        alone = median(run, 7)
-        laid = median(lambda d=diagram, f=fresh: fs.overlay(d, next(f)), 7)  # type: ignore[misc]
-        print(
-            f"{name:28}{len(lay.time):9d}{len(lay.transitions):13d}{alone:10.2f}{laid:13.2f}"
-            f"{laid / alone:8.1f}"
-        )
+        fresh = iter([run() for _ in range(20)])
+
+        def lay(d: fs.Diagram = diagram, runs: Iterator[fs.Trajectory] = fresh) -> fs.Overlay:
+            return fs.overlay(d, next(runs))
+
+        found = lay()
+        note = f"{len(found.time)} samples, {len(found.transitions)} transitions"
+        alone, laid = median(run), median(lay)
+        yield Line(f"overlay: {name}", "fastslow", laid, "ms", None, note)
+        yield Line(f"overlay: {name}", "fastslow, the run alone", alone, "ms")
     ours, theirs, apart = passages()
-    print(
-        f"a passage of a fold: {ours:.2f} ms, SciPy {theirs:.0f} ms: {theirs / ours:.0f} x; "
-        f"the delays differ by {apart:.0e}"
-    )
-
-
-if __name__ == "__main__":
-    main()
+    yield Line("the passage of a fold", "fastslow", ours, "ms")
+    note = f"the delays differ by {apart:.0e}"
+    yield Line("the passage of a fold", "SciPy, LSODA", theirs, "ms", theirs / ours, note)
