@@ -374,7 +374,9 @@ def _root_intervals(
     return [(float(lower + a * wide), float(lower + b * wide)) for a, b in found]
 
 
-def _at_infinity(rates: Sequence[Terms], ranges: dict[int, tuple[float, float]]) -> list[list[Terms]]:
+def _at_infinity(
+    rates: Sequence[Terms], ranges: dict[int, tuple[float, float]]
+) -> list[list[Terms]]:
     """Systems for the parameter at which an unknown has the largest size that is looked at."""
     count = len(rates)
     scales, _ = units(rates, ranges)

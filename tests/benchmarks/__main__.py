@@ -23,6 +23,7 @@ TABLES = (
     "continuation",
     "parameters",
     "overlays",
+    "derivations",
     "first_diagrams",
     "queries",
 )
