@@ -40,34 +40,55 @@ def possible_patterns(rows: Sequence[NDArray[np.float64] | None]) -> list[Patter
     point. Functions that are not affine never exclude a pattern. Patterns grow
     one interface at a time, so an empty beginning is left at once.
     """
+    lines = _Lines(rows)
     patterns: list[Pattern] = [()]
     for _ in rows:
-        patterns = [
-            grown for p in patterns for side in (1, -1) if _nonempty(rows, grown := (*p, side))
-        ]
+        patterns = [grown for p in patterns for side in (1, -1) if lines.meet(grown := (*p, side))]
     return patterns
 
 
-def _nonempty(rows: Sequence[NDArray[np.float64] | None], pattern: Pattern) -> bool:
-    """Whether s_j (a_j·z + b_j) > 0 has a solution for the affine rows of a pattern."""
-    pairs = [(r, s) for r, s in zip(rows, pattern, strict=False) if r is not None]
-    if not pairs:
-        return True
-    system = np.array([row * side for row, side in pairs])
-    still = ~system[:, :-1].any(axis=1)
-    if np.any(system[still, -1] <= 0):
-        return False
-    system = system[~still]
-    if not len(system):
-        return True
-    lead = system[0, :-1]
-    along = system[:, :-1] @ lead / (lead @ lead)
-    if np.allclose(system[:, :-1], along[:, None] * lead, rtol=0, atol=1e-14):
-        edge = -system[:, -1] / along
-        lower = edge[along > 0].max(initial=-np.inf)
-        upper = edge[along < 0].min(initial=np.inf)
-        return bool(lower < upper)
-    return _feasible(system)
+class _Lines:
+    """Affine functions, of which those along one direction are compared as numbers."""
+
+    def __init__(self, rows: Sequence[NDArray[np.float64] | None]) -> None:
+        self.rows = rows
+        known = [row for row in rows if row is not None]
+        lead = next((row[:-1] for row in known if row[:-1].any()), None)
+        #: For every function its constant, its slope along the first one that has a slope
+        #: and whether it has no other, and its zero along that direction.
+        self.entries: list[tuple[float, float | None, bool, float] | None] = []
+        for row in rows:
+            if row is None:
+                self.entries.append(None)
+            elif lead is None or not row[:-1].any():
+                self.entries.append((float(row[-1]), None, True, 0.0))
+            else:
+                along = float(row[:-1] @ lead / (lead @ lead))
+                parallel = bool((np.abs(row[:-1] - along * lead) <= 1e-14).all())
+                zero = float(-row[-1] / along) if parallel else 0.0
+                self.entries.append((float(row[-1]), along, parallel, zero))
+
+    def meet(self, pattern: Pattern) -> bool:
+        """Whether s_j (a_j·z + b_j) > 0 has a solution for the functions of a pattern."""
+        lower, upper, parallel = -np.inf, np.inf, True
+        for entry, side in zip(self.entries, pattern, strict=False):
+            if entry is None:
+                continue
+            constant, along, single, zero = entry
+            if along is None:
+                if constant * side <= 0:
+                    return False
+            elif not single:
+                parallel = False
+            elif along * side > 0:
+                lower = max(lower, zero)
+            else:
+                upper = min(upper, zero)
+        if parallel:
+            return lower < upper
+        pairs = zip(self.rows, pattern, strict=False)
+        system = np.array([r * s for r, s in pairs if r is not None and r[:-1].any()])
+        return _feasible(system)
 
 
 def _feasible(system: NDArray[np.float64]) -> bool:
