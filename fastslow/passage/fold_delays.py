@@ -60,6 +60,10 @@ SLOW_PART = 2.0
 #: last by exp(−40).
 BEFORE = (1.0, 1.5, 2.0, 3.0, 4.0, 5.5, 7.5, 9.65)
 
+#: A jump is simulated for 1/Y and this part of it more, and then for longer where it is not done:
+#: what the frozen model does behind it, as to oscillate, is not asked for.
+LONGER = (0.02, 0.2, 1.0, 9.0)
+
 #: A turn of the drift is looked for at so many places in every step of a run.
 PARTS = 4
 
@@ -269,21 +273,29 @@ def jump_time(site: Site, form: FoldForm, drift: Drift, kappa: float, level: Lev
     for y in (near, 0.5 * near):
         past = y / form.a
         state = site.u[:-1] + past * form.along + 0.5 * past**2 * form.bend
-        try:
-            run = simulate(model, state, t=(0.0, 10.0 / y), integration=Integration(rtol=1e-15))
-        except ModelError:
-            return math.nan
-        if isinstance(level, str):
-            done = _turned(run, speed)
-        else:
-            state_name, height = site.field.model.states[level[0]], float(site.u[level[0]])
-            hits = run.section(state_name, level=height + level[1])
-            done = float(hits.times[0]) if len(hits) else math.nan
+        for longer in LONGER:
+            until = (1.0 + longer) / y
+            try:
+                run = simulate(model, state, t=(0.0, until), integration=Integration(rtol=1e-15))
+            except ModelError:
+                return math.nan
+            done = _done(run, site, speed, level)
+            if not (math.isnan(done) and run.outcome):
+                break
         if math.isnan(done):
             return math.nan
         gone = done if drift.constant else _gone(run, speed, done)
         found.append(gone - 1.0 / y - (cubic - kappa) * math.log(y / (1.0 + cubic * y)))
     return 2.0 * found[1] - found[0]
+
+
+def _done(run: Trajectory, site: Site, speed: LocalDrift, level: Level) -> float:
+    """When a jump of the frozen model reaches a level; nan if it does not."""
+    if isinstance(level, str):
+        return _turned(run, speed)
+    name, height = site.field.model.states[level[0]], float(site.u[level[0]])
+    hits = run.section(name, level=height + level[1])
+    return float(hits.times[0]) if len(hits) else math.nan
 
 
 def _turned(run: Trajectory, speed: LocalDrift) -> float:
