@@ -48,9 +48,12 @@ OMEGA_0 = 2.338107410459767
 #: is −½ ln A'(Ω₀)² − ½ + ∫₋∞^Ω₀ A² ln A ds / A'(Ω₀)².
 MATCHING = -1.0085182549893932
 
-#: Jumps are timed from this part of the way on which the normal form holds: much nearer to the
-#: fold rounding, which grows as 1/Y³, is larger than what extrapolation leaves.
-NEAR = 1e-3
+#: Jumps are timed from this part of the way on which the normal form holds, and from half of the
+#: last one as often as this: rounding grows as 1/Y³.
+NEAR, HALVINGS = 0.4, 6
+
+#: Extrapolations that differ by no more than this are the limit.
+SETTLED = 1e-8
 
 #: A level nearer than this (in units of δ) is reached while the drift still carries the passage.
 SLOW_PART = 2.0
@@ -62,7 +65,7 @@ BEFORE = (1.0, 1.5, 2.0, 3.0, 4.0, 5.5, 7.5, 9.65)
 
 #: A jump is simulated for 1/Y and this part of it more, and then for longer where it is not done:
 #: what the frozen model does behind it, as to oscillate, is not asked for.
-LONGER = (0.02, 0.2, 1.0, 9.0)
+LONGER = (0.25, 1.0, 9.0)
 
 #: A turn of the drift is looked for at so many places in every step of a run.
 PARTS = 4
@@ -260,33 +263,70 @@ def jump_time(site: Site, form: FoldForm, drift: Drift, kappa: float, level: Lev
     Time counts by w'/rate, so that it is the change of the slow quantity along the jump. From
     Y = a y on the unstable side the frozen model needs a time T(Y) that grows as
     1/Y + d ln Y towards the fold, d = c/a² − κ; with those terms taken off, and with the
-    exact time of the cubic normal form in their place, it is simulated from two
-    small Y and extrapolated. nan where the level is not reached.
+    exact time of the cubic normal form in their place, what is left is a series in Y. It is
+    simulated from ever smaller Y and extrapolated to 0 by Romberg's scheme. nan where the level
+    is not reached.
     """
     cubic = form.c / form.a**2
     end = _end(form, level, kappa)
     bends = _turning(form, site.unit)
-    near = NEAR / max(abs(cubic), abs(kappa), 1.0 / form.slowest, bends, 1.0 / end)
+    y = NEAR / max(abs(cubic), abs(kappa), 1.0 / form.slowest, bends, 1.0 / end)
+    while not _inside(site, _past(site, form, y)):
+        y *= 0.5
+    best, change = math.nan, math.inf
+    row: list[float] = []
+    for _ in range(HALVINGS + 1):
+        gone = _gone(site, drift, _past(site, form, y), 1.0 / y, level)
+        following = [gone - 1.0 / y - (cubic - kappa) * math.log(y / (1.0 + cubic * y))]
+        for k, last in enumerate(row):
+            following.append(following[k] + (following[k] - last) / (2.0 ** (k + 1) - 1.0))
+        apart = abs(following[-1] - row[-1]) if row else math.inf
+        if math.isnan(gone) or (len(row) > 2 and not apart < change):
+            break
+        best, change = following[-1], apart
+        if change <= SETTLED * max(1.0, abs(best)):
+            break
+        row, y = following, 0.5 * y
+    return best
+
+
+def _past(site: Site, form: FoldForm, y: float) -> Array:
+    """The state on the centre manifold at Y past a fold, to second order."""
+    past = y / form.a
+    return np.asarray(site.u[:-1] + past * form.along + 0.5 * past**2 * form.bend)
+
+
+def _inside(site: Site, state: Array) -> bool:
+    """Whether a state at the fold's parameter is in the region of the fold."""
+    region, count = site.region(site.point.regions[0]), len(site.field.interfaces)
+    _, _, heights, _ = site.field.at(region, np.append(state, site.u[-1]))
+    return bool((site.field.signs[region, :count] * heights[:count] >= 0.0).all())
+
+
+def _gone(site: Site, drift: Drift, state: Array, slow: float, level: Level) -> float:
+    """∫ w' dt/rate along the jump of the frozen model from a state; nan if it is not done.
+
+    Parameters
+    ----------
+    site : Site
+    drift : Drift
+    state : ndarray, shape (n,)
+    slow : float
+        Time that it takes to leading order.
+    level : (int, float) or "turn"
+    """
     model = site.field.model.ramped(site.field.parameter, 0.0, float(site.u[-1]))
     speed = LocalDrift(site, drift)
-    found = []
-    for y in (near, 0.5 * near):
-        past = y / form.a
-        state = site.u[:-1] + past * form.along + 0.5 * past**2 * form.bend
-        for longer in LONGER:
-            until = (1.0 + longer) / y
-            try:
-                run = simulate(model, state, t=(0.0, until), integration=Integration(rtol=1e-15))
-            except ModelError:
-                return math.nan
-            done = _done(run, site, speed, level)
-            if not (math.isnan(done) and run.outcome):
-                break
-        if math.isnan(done):
+    for longer in LONGER:
+        span = (0.0, (1.0 + longer) * slow)
+        try:
+            run = simulate(model, state, t=span, integration=Integration(rtol=1e-15))
+        except ModelError:
             return math.nan
-        gone = done if drift.constant else _gone(run, speed, done)
-        found.append(gone - 1.0 / y - (cubic - kappa) * math.log(y / (1.0 + cubic * y)))
-    return 2.0 * found[1] - found[0]
+        done = _done(run, site, speed, level)
+        if not (math.isnan(done) and run.outcome):
+            break
+    return done if drift.constant or math.isnan(done) else _integral(run, speed, done)
 
 
 def _done(run: Trajectory, site: Site, speed: LocalDrift, level: Level) -> float:
@@ -313,7 +353,7 @@ def _turned(run: Trajectory, speed: LocalDrift) -> float:
     return float(brentq(relative, times[back[0] - 1], times[back[0]], xtol=1e-14 * times[-1]))
 
 
-def _gone(run: Trajectory, speed: LocalDrift, until: float) -> float:
+def _integral(run: Trajectory, speed: LocalDrift, until: float) -> float:
     """∫ w' dt/rate along a jump of the frozen model, by Gauss' rule on every step."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     edges = np.append(run.step_starts[run.step_starts < until], until)

@@ -19,6 +19,7 @@ from fastslow.passage.fold_delays import (
     airy_passage,
     fold_delay,
     fold_form_of,
+    jump_time,
     slow_part,
 )
 from fastslow.passage.sites import site_of
@@ -203,3 +204,21 @@ def test_the_slow_part_to_first_order(eta):
     left = [passed(s) - slow_part(eta, tuple(s * terms)) for s in (0.02, 0.01)]
     assert left[0] / left[1] == pytest.approx(4, rel=0.15)
     assert abs(left[1]) < 2e-4
+
+
+@pytest.mark.parametrize(("feedback", "level"), [(0.0, 0.7), (-40.0, "turn"), (-3.0, "turn")])
+def test_the_time_of_a_jump_in_closed_form(feedback, level):
+    """u' = p + u² + 3 u⁴, u = x + 4/3, p' = ε (1 + f u): ∫ (1 + f u)/(u² + 3 u⁴) du."""
+    u = x + sp.Rational(4, 3)
+    model = fs.Model({x: sp.expand(p + u**2 + 3 * u**4)}, parameters={p: -1})
+    fold = fs.continue_equilibria(model, "p", over=(-0.5, 0.5)).folds[0]
+    site = site_of(fold, None, None)
+    drift = fs.Drift(1e-4, by_state={"x": 1e-4 * feedback})
+    end = level if level != "turn" else -1.0 / feedback
+    known = level if level == "turn" else (0, level)
+    found = jump_time(site, fold_form_of(site), drift, feedback, known)
+    root = np.sqrt(3.0)
+    exact = -1.0 / end - root * np.arctan(root * end)
+    exact += feedback * (np.log(end) - 0.5 * np.log(1.0 + 3.0 * end**2))
+    # rounding of the fold by 1e-16 is magnified by 1/(3 Y³)
+    assert found == pytest.approx(exact, rel=2e-7, abs=1e-6)
