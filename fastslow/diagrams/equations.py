@@ -534,6 +534,39 @@ class RegionEquations:
             good = not on_pole and (good or here)
         return solved if there and good and near.all() and within.all() else None
 
+    def corrected_many(self, states: Array, values: Array) -> Array:
+        """As `corrected` at many states (N, n) and values (N,), NaN without convergence.
+
+        What is not plainly a solution is judged by itself.
+        """
+        n, field = self.field.n, self.field
+        units = np.array([self.unit(v) for v in values.tolist()])
+        sizes = np.maximum(units, np.abs(states))
+        sizes_of_values = np.array([self._parameter_unit(v) for v in values.tolist()])
+        scales = np.column_stack([sizes, sizes_of_values])
+        target = np.append(np.zeros(n), 1.0)
+        found, plain = np.column_stack([states, values]), np.zeros(len(values), dtype=bool)
+        for k, value in enumerate(values.tolist()):
+            one = field.refined(
+                self.region, found[k], scales[k], normal=target, point=value * target
+            )
+            found[k] = one.u
+            plain[k] = np.isfinite(one.residual) and one.correction < 1e-6
+        solved = found[:, :n]
+        rates, _, _, _ = field.at(self.region, found)
+        natural, slopes, _, _ = field.at(self.region, np.column_stack([units, values]))
+        with np.errstate(all="ignore"):
+            natural = np.abs(natural) + (np.abs(slopes[:, :, :n]) @ units[:, :, None])[:, :, 0]
+            natural = np.where(np.isfinite(natural), natural, 0.0)
+            plain &= (np.abs(rates) <= RESIDUAL * natural).all(axis=1)
+        plain &= (np.abs(solved - states) < 1e6 * sizes).all(axis=1)
+        plain &= (np.abs(solved) <= FARTHEST * sizes).all(axis=1)
+        plain &= np.abs(found[:, n] - values) <= 1e-12 * sizes_of_values
+        for k in np.flatnonzero(~plain):
+            alone = self.corrected(states[k], float(values[k]))
+            solved[k] = np.nan if alone is None else alone
+        return solved
+
     def _searched(self, value: float, known: Sequence[Array] = ()) -> list[Array]:
         """Newton's method from many states, until no more equilibria are found or it takes long.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from itertools import product
 from typing import Any
@@ -41,7 +41,7 @@ from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import SEARCHED, Diagram
 from fastslow.results.outcome import Outcome, with_ends
-from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
+from fastslow.results.points import Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.windows import LEFT, state_window
 from fastslow.symbolic.conserved import conserved_quantities
 from fastslow.symbolic.symmetries import free_directions
@@ -184,7 +184,7 @@ def continue_equilibria(
     full = len(branches) >= continuation.branches
     missed = starts.missed(branches)
     sound = all(o.success or o.code == LEFT for branch in branches for o in branch.outcomes)
-    corrector = _corrector(field)
+    corrector = _Corrector(field)
     labelled = _labelled(branches, name, within)
     unexplained = sum(len(branch.unexplained) for branch in labelled)
     traced = sound and not full and not missed and not unexplained
@@ -244,7 +244,7 @@ def _without_branches(
     outcome: Outcome,
 ) -> Diagram:
     """The diagram of a model in which no equilibrium is isolated, and its outcome."""
-    corrector = _corrector(field)
+    corrector = _Corrector(field)
     return Diagram(
         field.model.states,
         name,
@@ -529,8 +529,14 @@ def _levels(
     return found
 
 
-def _corrector(field: FrozenField) -> Corrector:
-    def correct(region: str, state: Array, value: float) -> Equilibrium | None:
+@dataclass(frozen=True, eq=False)
+class _Corrector:
+    """A `Corrector` by the equations of a field."""
+
+    field: FrozenField
+
+    def __call__(self, region: str, state: Array, value: float, /) -> Equilibrium | None:
+        field = self.field
         number = field.regions.index(region)
         solved = region_equations(field)[number].corrected(state, value)
         if solved is None:
@@ -538,4 +544,16 @@ def _corrector(field: FrozenField) -> Corrector:
         u = np.append(solved, value)
         return point_at(field, number, u, field.admissible(number, u))
 
-    return correct
+    def many(
+        self, region: str, states: Array, values: Array, /
+    ) -> tuple[Array, NDArray[np.complex128]]:
+        field = self.field
+        number = field.regions.index(region)
+        solved = region_equations(field)[number].corrected_many(states, values)
+        found = np.full(solved.shape, np.nan, dtype=complex)
+        known = ~np.isnan(solved).any(axis=1)
+        if known.any():
+            found[known] = field.eigenvalues(
+                number, np.column_stack([solved[known], values[known]])
+            )
+        return field.wrapped(solved), found

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fastslow.model.structure import real
 from fastslow.passage.critical_modes import CriticalMode
+from fastslow.passage.roots import sign_change
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -148,25 +149,21 @@ class LevelCurve:
 
     def ends(self, level: float) -> tuple[float, float]:
         """Entry and exit of a level on the real axis; nan where it has none."""
-        from scipy.optimize import brentq
-
         before, behind = self.mode.before, self.mode.behind
         leave = behind.where(level)
         if -before.integral(before.end) < level:
             return math.nan, leave
         low, high = sorted((before.end, before.here))
-        return float(brentq(lambda p: -before.integral(p) - level, low, high)), leave
+        fine = 4e-16 * max(abs(low), abs(high))
+        return sign_change(lambda p: -before.integral(p) - level, low, high, fine), leave
 
     def focal(self, level: float) -> bool:
         """Whether the eigenvalue is complex from the entry to the exit of a level."""
         enter, leave = self.ends(level)
         if not (math.isfinite(enter) and math.isfinite(leave)):
             return False
-        for value in np.linspace(enter, leave, 33):
-            mode = self.mode.at(float(value))
-            if mode is None or not mode.value.imag > 0.0:
-                return False
-        return True
+        modes = self.mode.modes(np.linspace(enter, leave, 33))
+        return all(mode is not None and mode.value.imag > 0.0 for mode in modes)
 
     def leads_back(self, level: float) -> bool:
         """Whether the curve of a level leads from its exit to its entry."""
@@ -176,7 +173,7 @@ class LevelCurve:
         if not (math.isfinite(enter) and math.isfinite(leave)):
             return False
         points = np.linspace(enter, leave, 65)
-        modes = [self.mode.at(float(value)) for value in points]
+        modes = self.mode.modes(points)
         turns = np.array([math.nan if m is None else m.value.imag for m in modes])
         fit = chebyshev.Chebyshev.fit(points, turns, 24)
         total = float(fit.integ()(leave) - fit.integ()(enter))

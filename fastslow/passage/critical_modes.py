@@ -38,6 +38,7 @@ class Mode:
 
     Parameters
     ----------
+    region : str
     state : ndarray, shape (n,)
     jacobian : ndarray, shape (n, n)
     value : complex
@@ -52,6 +53,7 @@ class Mode:
         Distance to the nearest eigenvalue that is not its conjugate.
     """
 
+    region: str
     state: Array
     jacobian: Array
     value: complex
@@ -91,11 +93,25 @@ class CriticalMode:
 
     def at(self, value: float) -> Mode | None:
         """The mode at a value of the parameter; None of a sliding motion or where it is not."""
-        sheet = self.side(value)
-        growth = float(sheet.rate(np.array([value]))[0])
-        if self.site is None or not math.isfinite(growth):
-            return None
-        region, state = sheet.place(value)
+        return self.modes(np.array([value]))[0]
+
+    def modes(self, values: Array) -> list[Mode | None]:
+        """The modes at values of the parameter, as `at`."""
+        found: list[Mode | None] = [None] * len(values)
+        ahead = self.behind.way * (values - self.behind.here) >= 0.0
+        for sheet, on in ((self.behind, ahead), (self.before, ~ahead)):
+            growth = sheet.rate(values)
+            rows = np.flatnonzero(on & np.isfinite(growth))
+            if self.site is None or not len(rows):
+                continue
+            regions, states = sheet.places(values[rows])
+            for row, region, state in zip(rows.tolist(), regions, states, strict=True):
+                found[row] = self._mode(str(region), state, float(values[row]), growth[row])
+        return found
+
+    def _mode(self, region: str, state: Array, value: float, growth: float) -> Mode | None:
+        """The mode at an equilibrium whose critical eigenvalue has this real part."""
+        assert self.site is not None
         number = self.site.region(region)
         if self.site.field.modes[number].sides is not None:
             return None
@@ -115,7 +131,7 @@ class CriticalMode:
             # a pair that meets on the real axis is its own neighbour
             others = np.where(np.abs(values - pair.conjugate()) == 0.0, 2 * abs(pair.imag), others)
         return Mode(
-            state / self.unit, jacobian, pair, left, right, lag, by_parameter,
+            region, state / self.unit, jacobian, pair, left, right, lag, by_parameter,
             float(others.min(initial=np.inf)),
         )  # fmt: skip
 
@@ -133,29 +149,41 @@ class CriticalMode:
         away = apart(state / self.unit, mode.state, self.periods) - mode.lag * rate
         return float(abs(mode.left @ away))
 
-    def first_order(self, value: float, rate: float) -> float:
+    def first_order(self, values: Array, rate: float) -> Array:
         """d/dp of the exponent's first-order terms: λ on the slow manifold, and the turning vector.
 
         nan within the width about a meeting of eigenvalues in which their mode is not defined.
         """
-        mode = self.at(value)
-        sheet = self.side(value)
-        step = STEP * sheet.length
-        before, after = self.at(value - step), self.at(value + step)
+        steps = STEP * np.array([self.side(v).length for v in values.tolist()])
+        modes = self.modes(np.concatenate([values, values - steps, values + steps]))
+        count = len(values)
+        thirds = (modes[k * count : (k + 1) * count] for k in range(3))
+        known = zip(values.tolist(), steps.tolist(), *thirds, strict=True)
+        return np.array([self._first_order(*each, rate) for each in known])
+
+    def _first_order(
+        self,
+        value: float,
+        step: float,
+        mode: Mode | None,
+        before: Mode | None,
+        after: Mode | None,
+        rate: float,
+    ) -> float:
+        """At one value, with the modes there and a step to both sides."""
         if self.site is None or mode is None or before is None or after is None:
             return math.nan
         change = abs(after.separation**2 - before.separation**2) / (2.0 * step)
         if change * abs(rate) > 2.0 * mode.separation**3:
             return math.nan
-        region, state = sheet.place(value)
-        number = self.site.region(region)
+        number = self.site.region(mode.region)
         size = float(np.abs(mode.lag).max())
         bent = 0.0
         if size > 0.0:
             # as far as the states' own scale, not as far as they lag
             reach = STEP / size
             up, down = (
-                self._slopes(number, state + s * reach * mode.lag * self.unit, value)[0]
+                self._slopes(number, (mode.state + s * reach * mode.lag) * self.unit, value)[0]
                 for s in (1, -1)
             )
             bent = float((mode.left @ (up - down) @ mode.right).real / (2.0 * reach))
@@ -168,18 +196,12 @@ class CriticalMode:
         Of what adds up to E along the way, a quarter of ∫ |dE| is allowed beside |E|: the
         terms of second order do not cancel as those of first order may.
         """
-        total = size = 0.0
         here = self.behind.here
-        lost = False
-        for low, high in ((start, here), (here, stop)):
-            half = 0.5 * (high - low)
-            for node, weight in zip(NODES, WEIGHTS, strict=True):
-                term = self.first_order(low + half * (1.0 + node), rate)
-                if math.isnan(term):
-                    lost = True
-                    continue
-                total += half * weight * term
-                size += abs(half * weight * term)
+        halves = np.array([0.5 * (here - start), 0.5 * (stop - here)])[:, None]
+        nodes = np.array([[start], [here]]) + halves * (1.0 + NODES)
+        terms = (halves * WEIGHTS).ravel() * self.first_order(nodes.ravel(), rate)
+        lost = bool(np.isnan(terms).any())
+        total, size = float(np.nansum(terms)), float(np.nansum(np.abs(terms)))
         return abs(total) + 0.25 * size + (CONNECTION if lost else 0.0)
 
 

@@ -21,6 +21,7 @@ from fastslow.passage.local_passages import (
     quasi_static,
     reached_delay,
 )
+from fastslow.passage.roots import sign_change
 from fastslow.passage.sites import (
     TURN,
     Level,
@@ -340,7 +341,6 @@ def _done(run: Trajectory, site: Site, speed: LocalDrift, level: Level) -> float
 
 def _turned(run: Trajectory, speed: LocalDrift) -> float:
     """When w' of a drift first vanishes along a jump of the frozen model; nan if never."""
-    from scipy.optimize import brentq
 
     def relative(time: float) -> float:
         return float(speed.on_a_path(run(np.array([time])).T)[0] / speed.drift.rate)
@@ -350,7 +350,8 @@ def _turned(run: Trajectory, speed: LocalDrift) -> float:
     back = np.flatnonzero(speed.on_a_path(run(times).T) / speed.drift.rate <= 0.0)
     if not len(back) or back[0] == 0:
         return math.nan
-    return float(brentq(relative, times[back[0] - 1], times[back[0]], xtol=1e-14 * times[-1]))
+    before, after = times[back[0] - 1 : back[0] + 1].tolist()
+    return sign_change(relative, before, after, 1e-15 * run.span[1])
 
 
 def _integral(run: Trajectory, speed: LocalDrift, until: float) -> float:
@@ -465,7 +466,6 @@ def airy_passage(eta: float) -> float:
     >>> round(airy_passage(0.0), 8), round(airy_passage(1e8), 7)
     (1.01879297, 2.3381074)
     """
-    from scipy.optimize import brentq
     from scipy.special import airy, airye
 
     if math.isinf(eta):
@@ -482,4 +482,4 @@ def airy_passage(eta: float) -> float:
     low = 1.0
     while left(low) > 0.0:
         low -= 1.0 + abs(low)
-    return float(brentq(left, low, OMEGA_0, xtol=1e-15, rtol=1e-15))
+    return sign_change(left, low, OMEGA_0, 4e-16 * max(1.0, abs(low)))

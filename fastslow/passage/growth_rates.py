@@ -12,6 +12,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from fastslow.passage.roots import sign_change
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import Diagram
 from fastslow.results.interpolation import hermite
@@ -122,6 +123,7 @@ class Sheet:
         breaks = range(1, len(self.rows)) if interpolated else joints
         self._breaks = sorted({self._along(values[self.rows[k]]) for k in breaks} | {self.length})
         self._steps = np.array([self._along(values[k]) for k in self.rows])
+        self._numbers = np.array(self.rows)
 
     def _direction(self, values: Array) -> int:
         for step in (1, -1):
@@ -178,8 +180,6 @@ class Sheet:
 
     def where(self, target: float) -> float:
         """The value at which the integral from the point reaches a target, nan if none does."""
-        from scipy.optimize import brentq
-
         if target <= 0 or not self.length > 0.0:
             return math.nan
         number = 0
@@ -191,8 +191,8 @@ class Sheet:
             for one, other in zip(*self._parts(piece), strict=True):
                 if piece.integral(other) >= target:
                     missing = partial(_missing, piece, target)
-                    fine = 1e-15 * abs(piece.stop - piece.start)
-                    return float(brentq(missing, one, other, xtol=fine, rtol=1e-14))
+                    fine = max(1e-15 * abs(piece.stop - piece.start), 4e-16 * abs(float(other)))
+                    return sign_change(missing, *sorted((float(one), float(other))), fine)
             number += 1
 
     @staticmethod
@@ -242,42 +242,51 @@ class Sheet:
     def _values(self, start: float, stop: float, pair: Followed) -> tuple[Array, Followed]:
         """Re λ at the Chebyshev points of an interval, followed from one to the next."""
         found = np.empty(len(NODES))
-        for k, node in enumerate(NODES):
-            along = start + 0.5 * (stop - start) * (1.0 + node)
-            pair = following(self.eigenvalues(self.here + self.way * along), pair, along)
+        along = start + 0.5 * (stop - start) * (1.0 + NODES)
+        spectra = self.eigenvalues(self.here + self.way * along)
+        for k, values in enumerate(spectra):
+            pair = following(values, pair, float(along[k]))
             found[k] = pair.value.real
         return found, pair
 
     def place(self, value: float) -> tuple[str, Array]:
         """The region and the equilibrium at a value of the parameter."""
-        row = self._row(value)
-        state = hermite(self.branch, np.array([row]), np.array([value]))[0]
-        if self.diagram.corrector is not None:
-            solved = self.diagram.corrector(str(self.branch.region[row]), state, value)
-            if solved is not None:
-                state = solved.state
-        return str(self.branch.region[row]), state
+        regions, states = self.places(np.array([value]))
+        return str(regions[0]), states[0]
 
-    def _row(self, value: float) -> int:
-        """The lower row of the step in which a value lies."""
-        k = int(np.searchsorted(self._steps, self._along(value), side="right"))
-        k = min(max(k, 1), len(self.rows) - 1)
-        while k > 1 and self._steps[k] == self._steps[k - 1]:
-            k -= 1
-        return min(self.rows[k - 1], self.rows[k])
+    def places(self, values: Array) -> tuple[NDArray[np.str_], Array]:
+        """Regions (N,) and equilibria (N, n) at values of the parameter."""
+        regions, states, _ = self._solved(values)
+        return regions, states
 
-    def eigenvalues(self, value: float) -> NDArray[np.complex128]:
-        """Of the equilibrium at a value, interpolated where the model is not at hand."""
-        branch, row = self.branch, self._row(value)
+    def eigenvalues(self, values: Array) -> NDArray[np.complex128]:
+        """Of the equilibria at values, shape (N, n); interpolated where there is no model."""
+        return self._solved(values)[2]
+
+    def _solved(self, values: Array) -> tuple[NDArray[np.str_], Array, NDArray[np.complex128]]:
+        """Regions, equilibria and eigenvalues at values of the parameter."""
+        branch, rows = self.branch, self._rows_below(values)
+        regions, states = branch.region[rows], hermite(branch, rows, values)
+        low, high = branch.parameter[rows], branch.parameter[rows + 1]
+        one, other = (np.sort_complex(branch.eigenvalues[rows + k]) for k in (0, 1))
+        with np.errstate(invalid="ignore"):
+            part = ((values - low) / (high - low))[:, None]
+            spectra = np.asarray((1 - part) * one + part * other)
         if self.diagram.corrector is not None:
-            state = hermite(branch, np.array([row]), np.array([value]))[0]
-            solved = self.diagram.corrector(str(branch.region[row]), state, value)
-            if solved is not None:
-                return solved.eigenvalues
-        low, high = branch.parameter[row], branch.parameter[row + 1]
-        part = (value - low) / (high - low)
-        both = np.sort_complex(branch.eigenvalues[row : row + 2])
-        return np.asarray((1 - part) * both[0] + part * both[1])
+            for region in np.unique(regions):
+                on = np.flatnonzero(regions == region)
+                solved, found = self.diagram.corrector.many(str(region), states[on], values[on])
+                known = ~np.isnan(solved).any(axis=1)
+                states[on[known]], spectra[on[known]] = solved[known], found[known]
+        return regions, states, spectra
+
+    def _rows_below(self, values: Array) -> NDArray[np.intp]:
+        """The lower row of the step in which each value lies."""
+        k = np.searchsorted(self._steps, self.way * (values - self.here), side="right")
+        k = np.clip(k, 1, len(self.rows) - 1)
+        while (level := (k > 1) & (self._steps[k] == self._steps[k - 1])).any():
+            k = k - level
+        return np.minimum(self._numbers[k - 1], self._numbers[k])
 
 
 def _missing(piece: Piece, target: float, value: float) -> float:

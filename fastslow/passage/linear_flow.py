@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fastslow.passage.roots import sign_change
 
 Array = NDArray[np.float64]
 
@@ -19,9 +22,6 @@ STEPS = 20_000
 
 #: Steps that are taken at once.
 BLOCK = 64
-
-#: Evaluations for the place of a root within a step.
-TRIALS = 100
 
 #: A matrix is brought below this by halving before its exponential is summed, in so many terms.
 HALVED, TERMS = 0.5, 16
@@ -177,27 +177,9 @@ class LinearFlow:
 
     def _root(self, row: Array, start: Array, step: float) -> float:
         """When row·z turns negative within a step."""
-        low, high = 0.0, step
-        left, right = float(row @ start), self._height(row, start, step)
-        if left <= 0.0:
+        if float(row @ start) <= 0.0:
             return 0.0
-        side = 0
-        for _ in range(TRIALS):
-            if not high - low > 1e-15 * step:
-                break
-            # regula falsi, the value at the end that stays halved (Illinois)
-            middle = (low * right - high * left) / (right - left) if right < left else low
-            if not low < middle < high:
-                middle = 0.5 * (low + high)
-            value = self._height(row, start, middle)
-            if value > 0.0:
-                right = 0.5 * right if side > 0 else right
-                low, left, side = middle, value, 1
-            else:
-                left = 0.5 * left if side < 0 else left
-                high, right, side = middle, value, -1
-                low = low if value < 0.0 else middle
-        return high
+        return sign_change(partial(self._height, row, start), 0.0, step, 1e-15 * step)
 
 
 def exponential(matrix: Array) -> Array:

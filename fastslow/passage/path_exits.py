@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fastslow.model.structure import TIME, real
 from fastslow.passage.critical_modes import CriticalMode
 from fastslow.passage.entry_exits import NUMERICAL, SAFETY
+from fastslow.passage.roots import sign_change
 from fastslow.passage.slow_quantities import SlowQuantity
 
 Array = NDArray[np.float64]
@@ -191,12 +192,10 @@ class Growth:
             return math.nan
         k = int(late[0])
         low, high = max(float(self.edges[k - 1]), since), float(self.edges[k])
-        for _ in range(BISECTIONS):
-            middle = 0.5 * (low + high)
-            if not low < middle < high:
-                break
-            low, high = (low, middle) if self.at(middle) >= level else (middle, high)
-        return high
+        if self.at(low) >= level:
+            return low
+        fine = 4e-16 * max(abs(low), abs(high))
+        return sign_change(lambda time: self.at(time) - level, low, high, fine)
 
     def last(self, level: float, until: float) -> float:
         """The last time of an edge before another at which the exponent is below a level."""
@@ -384,8 +383,8 @@ def _feedback(growth: Growth, at: float) -> float:
     edges = np.linspace(growth.path.start, at, FEEDBACK + 1)
     times = 0.5 * (edges[1:] + edges[:-1])
     total = 0.0
-    for time, value in zip(times, growth.path.at(times), strict=True):
-        mode = growth.mode.at(float(value))
+    values = growth.path.at(times)
+    for time, value, mode in zip(times, values, growth.mode.modes(values), strict=True):
         if mode is None:
             continue
         inside = min(float(time), growth.path.known)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -167,7 +167,18 @@ class Equilibrium(_Point):
 
 
 #: Solves for the equilibrium of a region near a state: (region, state, value) -> Equilibrium.
-Corrector = Callable[[str, NDArray[np.float64], float], Equilibrium | None]
+class Corrector(Protocol):
+    """Solves for equilibria of a diagram's model near states, at values of its parameter."""
+
+    def __call__(
+        self, region: str, state: NDArray[np.float64], value: float, /
+    ) -> Equilibrium | None:
+        """The equilibrium near a state, None without convergence."""
+
+    def many(
+        self, region: str, states: NDArray[np.float64], values: NDArray[np.float64], /
+    ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+        """Equilibria (N, n) near states and their eigenvalues (N, n), NaN without convergence."""
 
 
 class Equilibria(ImmutableSequence, tuple[Equilibrium, ...]):
