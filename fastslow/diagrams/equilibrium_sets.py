@@ -17,8 +17,6 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
-from scipy.ndimage import label
-from scipy.optimize import brentq, linprog, minimize
 
 from fastslow.continuation.ordering import in_order
 from fastslow.diagrams.equations import real_roots, region_equations
@@ -268,6 +266,8 @@ class Family:
             if ends is None:
                 return None
             return self._interval(value, ends[0] * units[0], ends[1] * units[0])
+        from scipy.optimize import linprog
+
         size = np.maximum(np.abs(rows).max(axis=1), np.finfo(float).tiny)
         system, right = -rows / size[:, None], origin / size
         lower, upper = base.copy(), base.copy()
@@ -307,6 +307,8 @@ class Family:
                 ends += real_roots(np.atleast_1d(np.array(coefficients(value), dtype=float)))
             ends = [-np.inf, *sorted(set(ends)), np.inf]
         else:
+            from scipy.optimize import brentq
+
             # a set with its middle in the principal range ends within a period of zero
             period = self.field.periods[self.field.model.states.index(self.free[0].name)]
             reach = float(period or REACH * self._units(value)[0])
@@ -412,6 +414,8 @@ class Family:
 
     def _filled(self, value: float, middle: Array, units: Array) -> _Filled:
         """The places of a grid around a place that are connected to it within the bounds."""
+        from scipy.ndimage import label
+
         count = FILLED[self.dimension]
         half, most = FIRST * units, REACH * units
         while True:
@@ -457,6 +461,7 @@ class Family:
 
     def _least(self, value: float, k: int, sign: float, start: Array, cell: Array) -> float:
         """The end of the range of a state in a set, from the place of a grid next to it."""
+        from scipy.optimize import minimize
 
         def height(steps: Array) -> float:
             return sign * float(self.state(value, *(start + steps * cell))[k])
