@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.compiled.generic import load_loop
 from fastslow.passage.extents import extents_of
 from fastslow.passage.sheets import Course
 from fastslow.passage.slow_quantities import SlowQuantity
@@ -29,50 +31,6 @@ SETTLED = 0.5
 #: A landing overshoots where the sheet is left again within so many of its relaxation times,
 #: and met again within as many more.
 OVERSHOOT = 3.0
-
-
-@dataclass(frozen=True, eq=False)
-class Chain:
-    """A polygonal curve, for distances from it.
-
-    Parameters
-    ----------
-    points : ndarray, shape (M, d)
-    """
-
-    points: Array
-
-    @cached_property
-    def _box(self) -> tuple[Array, Array]:
-        return self.points.min(axis=0), self.points.max(axis=0)
-
-    @cached_property
-    def _chords(self) -> tuple[Array, Array]:
-        """Each with its length squared, one for a chord of none."""
-        chords = np.diff(self.points, axis=0)
-        length = (chords**2).sum(axis=1)
-        return chords, np.where(length > 0, length, 1.0)
-
-    @cached_property
-    def _turned(self) -> tuple[Array, Array]:
-        return -2.0 * self.points.T, (self.points**2).sum(axis=1)
-
-    def about(self, points: Array, radius: float) -> Mask:
-        """Whether points (N, d) are nearer than a radius to the box around the curve."""
-        low, high = self._box
-        return np.asarray(((points > low - radius) & (points < high + radius)).all(axis=1))
-
-    def distance(self, points: Array) -> Array:
-        """Distance of points (N, d) from the curve, near its nearest vertex."""
-        turned, square = self._turned
-        nearest = np.argmin(points @ turned + square, axis=1)
-        chords, length = self._chords
-        # those before and behind the vertex
-        first = np.array([np.maximum(nearest - 1, 0), np.minimum(nearest, len(chords) - 1)])
-        chord, off = chords[first], points - self.points[first]
-        part = np.clip((off * chord).sum(axis=2) / length[first], 0.0, 1.0)
-        off -= part[:, :, None] * chord
-        return np.asarray(np.sqrt((off**2).sum(axis=2).min(axis=0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,23 +95,15 @@ class Measured:
     def nearness(self, course: int, slow: Array, scaled: Array) -> Array:
         """The radius less the distance of states from a course as a curve, shape (N,).
 
-        −radius where they are far from all of it.
+        −radius where they are far from all of it in the slow quantity.
         """
         if self.periods.any():
             place = self.courses[course].state(slow) / self.extent
             scaled = nearest_copy(scaled, place, self.periods)
         points = np.column_stack([scaled, slow / self.span])
-        chain = self._chains[course]
-        inside = np.flatnonzero(chain.about(points, self.radius))
-        near = np.full(len(points), -self.radius)
-        for start in range(0, len(inside), 4096):
-            part = inside[start : start + 4096]
-            near[part] = self.radius - chain.distance(points[part])
+        near = np.empty(len(points))
+        _nearness()(points, self.curves[course], self.radius, near)
         return near
-
-    @cached_property
-    def _chains(self) -> tuple[Chain, ...]:
-        return tuple(map(Chain, self.curves))
 
     def way(self, old: int, new: int) -> Array:
         """Which part of the way from one course to another the state has done, shape (N,)."""
@@ -211,6 +161,13 @@ def _resampled(curve: Array) -> Array:
     along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
     even = np.linspace(0.0, along[-1], POINTS)
     return np.column_stack([np.interp(even, along, column) for column in curve.T])
+
+
+@cache
+def _nearness() -> Callable[..., None]:
+    """The compiled loop over points."""
+    arguments = ("points", "chain", "radius", "near")
+    return load_loop("fastslow.passage.chain_distances", "nearness_to_chain", arguments)
 
 
 def way_done(scaled: Array, old: Array, new: Array, periods: Array) -> Array:

@@ -1,0 +1,56 @@
+"""Distances of points from a polygonal curve, compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+
+@njit(error_model="numpy")
+def nearness_to_chain(points, chain, radius, near):
+    """How much nearer than a radius points are to a curve whose last coordinate does not fall.
+
+    Parameters
+    ----------
+    points : ndarray, shape (N, d)
+    chain : ndarray, shape (M, d)
+        Vertices.
+    radius : float
+    near : ndarray, shape (N,)
+        Filled: the radius less the distance near the nearest vertex; −radius for a point
+        that differs by the radius or more from every vertex in the last coordinate.
+    """
+    count, size = chain.shape
+    last = size - 1
+    for i in range(points.shape[0]):
+        near[i] = -radius
+        value = points[i, last]
+        # a chord may reach farther than its ends: one vertex more on both sides
+        first = max(np.searchsorted(chain[:, last], value - radius) - 1, 0)
+        stop = min(np.searchsorted(chain[:, last], value + radius, side="right") + 1, count)
+        if chain[first, last] >= value + radius or chain[stop - 1, last] <= value - radius:
+            continue
+        least, nearest = np.inf, -1
+        for k in range(first, stop):
+            square = 0.0
+            for j in range(size):
+                square += (points[i, j] - chain[k, j]) ** 2
+            if square < least:
+                least, nearest = square, k
+        if nearest < 0:
+            continue
+        for k in range(max(nearest - 1, 0), min(nearest + 1, count - 1)):
+            length = along = 0.0
+            for j in range(size):
+                chord = chain[k + 1, j] - chain[k, j]
+                length += chord * chord
+                along += (points[i, j] - chain[k, j]) * chord
+            part = min(max(along / length, 0.0), 1.0) if length > 0.0 else 0.0
+            square = 0.0
+            for j in range(size):
+                chord = chain[k + 1, j] - chain[k, j]
+                square += (points[i, j] - chain[k, j] - part * chord) ** 2
+            least = min(least, square)
+        near[i] = radius - math.sqrt(least)
