@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.results.branches import Branch, Sheet
 from fastslow.results.diagrams import Diagram
-from fastslow.results.interpolation import hermite
+from fastslow.results.interpolation import Cubics, cubics
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
 from fastslow.results.transitions import StableSheet
@@ -87,8 +87,11 @@ class Course:
     def state(self, slow: Array) -> Array:
         """Equilibria at values of the parameter, shape (N, n); at its end beyond the range."""
         slow = np.clip(slow, *self.range)
-        lower, upper = self._between(slow)
-        return hermite(self.branch, np.minimum(lower, upper), slow)
+        return self._cubics.at(self._step(slow), slow)
+
+    @cached_property
+    def _cubics(self) -> Cubics:
+        return cubics(self.branch, np.minimum(self._rows[:-1], self._rows[1:]))
 
     def slope(self, slow: Array) -> Array:
         """dX/dw at parameter values, shape (N, n); infinite at a fold, 0 beyond the range."""
@@ -113,11 +116,15 @@ class Course:
 
     def _between(self, slow: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Rows on both sides of values inside the range."""
+        place = self._step(slow)
+        return self._rows[place], self._rows[place + 1]
+
+    def _step(self, slow: Array) -> NDArray[np.intp]:
+        """The step in which each of some values inside the range is."""
         place = np.searchsorted(self._ordered, slow, side="right") - 1
         place = np.clip(place, 0, len(self._ordered) - 2)
         # not between the two rows of a joint
-        place = np.where(self._ordered[place] == self._ordered[place + 1], place - 1, place)
-        return self._rows[place], self._rows[place + 1]
+        return np.where(self._ordered[place] == self._ordered[place + 1], place - 1, place)
 
 
 def _along(one: Array, other: Array) -> Array:

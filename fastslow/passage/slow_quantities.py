@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import evaluated, names_in
+from fastslow.results.dense import columns_at
 from fastslow.results.diagrams import Diagram
 from fastslow.results.trajectories import Trajectory
 
@@ -72,7 +73,7 @@ class SlowQuantity:
         if not self.dense:
             rows = [np.interp(times, self.run.t, self.run[n]) for n in self.states]
             return np.interp(times, self.run.t, self.table), np.column_stack(rows)
-        columns = self.run.dense_columns(times)
+        columns = columns_at(self.run, times)
         state = columns[[names.index(n) for n in self.states]].T
         if not self.laws:
             return columns[names.index(self.name)], state

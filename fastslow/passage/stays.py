@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -78,7 +78,13 @@ class Measured:
 
     def apart(self, course: int) -> Array:
         """Distance from a course at the same value of the slow quantity, shape (N,)."""
-        return np.asarray(np.linalg.norm(self.deviation(course), axis=1))
+        if course not in self._apart:
+            self._apart[course] = np.linalg.norm(self.deviation(course), axis=1)
+        return self._apart[course]
+
+    @cached_property
+    def _apart(self) -> dict[int, Array]:
+        return {}
 
     def deviation(self, course: int, rows: slice | Mask | int = slice(None)) -> Array:
         """Scaled states less those of a course at the same value of the slow quantity."""
@@ -107,7 +113,14 @@ class Measured:
 
     def way(self, old: int, new: int) -> Array:
         """Which part of the way from one course to another the state has done, shape (N,)."""
-        return way_done(self.scaled, self.places[:, old], self.places[:, new], self.periods)
+        if (old, new) not in self._ways:
+            places = self.places[:, old], self.places[:, new]
+            self._ways[old, new] = way_done(self.scaled, *places, self.periods)
+        return self._ways[old, new]
+
+    @cached_property
+    def _ways(self) -> dict[tuple[int, int], Array]:
+        return {}
 
 
 @dataclass(frozen=True)

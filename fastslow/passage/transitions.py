@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -77,6 +77,12 @@ class Passage:
             run.parameters,
             parameter=name,
         )
+
+    @cached_property
+    def crossed(self) -> tuple[Array, NDArray[np.str_], NDArray[np.str_]]:
+        """Times of the run's crossings, and the regions that are left and entered."""
+        table, modes = self.slow.run.crossing_table, np.array(self.slow.run.modes, dtype=str)
+        return table[:, 0], modes[table[:, 3].astype(int)], modes[table[:, 4].astype(int)]
 
     def first(self, start: float, stop: float, over: Callable[[Array, Array], Array]) -> float:
         """First time of an interval, to rounding, from which on a condition holds.
@@ -287,7 +293,7 @@ def passages_within(p: Passage, stay: Stay) -> list[Transition]:
         kind, note = "crossing", ""
         if special is not None and special.code == "BE":
             crossing = _crossing(p, special, left, entered, here.time)
-            here = p.moment(crossing.time) if crossing is not None else here
+            here = p.moment(crossing) if crossing is not None else here
         elif special is not None and special.code == "HB":
             kind, note = "Hopf", "stays near the branch all along its unstable stretch"
         found.append(
@@ -345,21 +351,20 @@ def _behind(p: Passage, number: int, row: int) -> bool:
 
 def _crossing(
     p: Passage, point: SpecialPoint, left: StableSheet, entered: StableSheet, time: float
-) -> Crossing | None:
-    """The crossing of a boundary equilibrium's interface that is nearest in time."""
-    met = [
-        c
-        for c in p.slow.run.crossings
-        if c.interface == point.interface
-        and (c.from_region, c.to_region) == (left.region, entered.region)
-    ]
-    nearest = min(met, key=lambda c: abs(c.time - time), default=None)
-    if nearest is None or not p.m.time[0] <= nearest.time <= p.m.time[-1]:
+) -> float | None:
+    """The time of the crossing of a boundary equilibrium's interface that is nearest to another."""
+    run, (times, outside, inside) = p.slow.run, p.crossed
+    through = run.crossing_table[:, 1].astype(int)
+    met = (outside == left.region) & (inside == entered.region)
+    met &= np.array(run.interfaces, dtype=str)[through] == point.interface
+    if not met.any():
+        return None
+    nearest = float(times[met][np.argmin(np.abs(times[met] - time))])
+    if not p.m.time[0] <= nearest <= p.m.time[-1]:
         return None
     # one that belongs to this passage lies before the slow quantity turns back
-    between = slice(*np.searchsorted(p.m.time, sorted((time, nearest.time))))
-    inside = p.m.slow[between]
-    turned = len(inside) > 2 and len(np.unique(np.sign(np.diff(inside)))) > 1
+    slow = p.m.slow[slice(*np.searchsorted(p.m.time, sorted((time, nearest))))]
+    turned = len(slow) > 2 and len(np.unique(np.sign(np.diff(slow)))) > 1
     return None if turned else nearest
 
 
@@ -520,9 +525,9 @@ def _touch(p: Passage, excursion: Excursion) -> Crossing | None:
     start, stop = excursion.rows(p.m)
     since = p.m.time[max(start - (stop - start), 0)]
     until = p.m.time[min(stop, len(p.m.time) - 1)]
-    return next(
-        (c for c in p.slow.run.crossings if since <= c.time <= until and c.tangential), None
-    )
+    times, tangential = p.crossed[0], p.slow.run.crossing_table[:, 5] != 0.0
+    found = np.flatnonzero((since <= times) & (times <= until) & tangential)
+    return p.slow.run.crossings[int(found[0])] if len(found) else None
 
 
 def _across(
@@ -531,9 +536,9 @@ def _across(
     """Where a trajectory leaves the one side of a gap and reaches the other."""
     if entered is None:
         return None
-    crossings: Sequence[Crossing] = p.slow.run.crossings
-    out = [c for c in crossings if c.from_region == left.region and c.time <= time]
-    if not out:
+    times, outside, inside = p.crossed
+    out = times[(outside == left.region) & (times <= time)]
+    if not len(out):
         return None
-    reach = [c for c in crossings if c.to_region == entered.region and c.time > out[-1].time]
-    return (p.moment(out[-1].time), p.moment(reach[0].time)) if reach else None
+    reach = times[(inside == entered.region) & (times > out[-1])]
+    return (p.moment(float(out[-1])), p.moment(float(reach[0]))) if len(reach) else None

@@ -45,6 +45,13 @@ def evaluate(
 ) -> NDArray[np.float64]:
     """All columns at offsets into given steps, shape (n + n_forcing, N)."""
     assert run.series is not None
+    if len(row) and row.min() == row.max():
+        taken = run.series[row[0]].T[:, :, None]
+        value = np.repeat(taken[-1], len(row), axis=1)
+        for power in taken[-2::-1]:
+            value *= offset
+            value += power
+        return value
     if len(row) < len(run.series):
         # the coefficients of one power side by side
         taken = np.ascontiguousarray(run.series[row].transpose(2, 1, 0))

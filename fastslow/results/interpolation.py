@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,10 +12,34 @@ if TYPE_CHECKING:
     from fastslow.results.branches import Branch
 
 
-def hermite(
-    branch: Branch, rows: NDArray[np.intp], values: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """States between rows ``rows`` and ``rows + 1`` at parameter values, shape (m, n).
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Cubics:
+    """States on the steps of a branch as cubics in the part of the step, by their coefficients.
+
+    Parameters
+    ----------
+    begin, width : ndarray, shape (m,)
+        The parameter at the lower row, and by how much it changes to the next.
+    powers : tuple of ndarray, shape (m, n)
+        Coefficients of 1, s, s² and s³.
+    """
+
+    begin: Floats
+    width: Floats
+    powers: tuple[Floats, Floats, Floats, Floats]
+
+    def at(self, steps: NDArray[np.intp], values: Floats) -> Floats:
+        """States on some of the steps at parameter values, shape (N, n)."""
+        part = ((values - self.begin[steps]) / self.width[steps])[:, None]
+        one, two, three = (power[steps] for power in self.powers[1:])
+        return np.asarray(self.powers[0][steps] + part * one + part**2 * two + part**3 * three)
+
+
+def cubics(branch: Branch, rows: NDArray[np.intp]) -> Cubics:
+    """The steps between rows ``rows`` and ``rows + 1``.
 
     Cubic Hermite in the parameter where both end slopes are finite and mild,
     linear otherwise (beside a fold the slope dx/dp grows without bound).
@@ -22,15 +47,17 @@ def hermite(
     p0, p1 = branch.parameter[rows], branch.parameter[rows + 1]
     x0, x1 = branch.state[rows], branch.state[rows + 1]
     width = p1 - p0
-    part = ((values - p0) / width)[:, None]
     chord = x1 - x0
-    straight = x0 + part * chord
     with np.errstate(divide="ignore", invalid="ignore"):
         m0 = branch.tangent[rows, :-1] / branch.tangent[rows, -1:] * width[:, None]
         m1 = branch.tangent[rows + 1, :-1] / branch.tangent[rows + 1, -1:] * width[:, None]
-        cubic = (
-            x0 + part * m0 + part**2 * (3 * chord - 2 * m0 - m1) + part**3 * (m0 + m1 - 2 * chord)
-        )
-    bound = 3.0 * np.abs(chord) + 1e-12 * np.maximum(np.abs(x0), np.abs(x1))
-    mild = (np.abs(m0) <= bound) & (np.abs(m1) <= bound)
-    return np.where(mild, cubic, straight)
+        bound = 3.0 * np.abs(chord) + 1e-12 * np.maximum(np.abs(x0), np.abs(x1))
+        mild = (np.abs(m0) <= bound) & (np.abs(m1) <= bound)
+        two = np.where(mild, 3 * chord - 2 * m0 - m1, 0.0)
+        three = np.where(mild, m0 + m1 - 2 * chord, 0.0)
+    return Cubics(p0, width, (x0, np.where(mild, m0, chord), two, three))
+
+
+def hermite(branch: Branch, rows: NDArray[np.intp], values: Floats) -> Floats:
+    """States between rows ``rows`` and ``rows + 1`` at parameter values, shape (m, n); `cubics`."""
+    return cubics(branch, rows).at(np.arange(len(rows)), values)
