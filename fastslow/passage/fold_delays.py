@@ -53,7 +53,7 @@ MATCHING = -1.0085182549893932
 #: last one as often as this: rounding grows as 1/Y³.
 NEAR, HALVINGS = 0.4, 6
 
-#: Extrapolations that differ by no more than this are the limit.
+#: Extrapolations that differ by no more than this, in units of the time of a jump, are the limit.
 SETTLED = 1e-8
 
 #: A level nearer than this (in units of δ) is reached while the drift still carries the passage.
@@ -271,7 +271,8 @@ def jump_time(site: Site, form: FoldForm, drift: Drift, kappa: float, level: Lev
     cubic = form.c / form.a**2
     end = _end(form, level, kappa)
     bends = _turning(form, site.unit)
-    y = NEAR / max(abs(cubic), abs(kappa), 1.0 / form.slowest, bends, 1.0 / end)
+    usual = max(abs(cubic), abs(kappa), 1.0 / form.slowest, bends, 1.0 / end)
+    y = NEAR / usual
     while not _inside(site, _past(site, form, y)):
         y *= 0.5
     best, change = math.nan, math.inf
@@ -285,7 +286,7 @@ def jump_time(site: Site, form: FoldForm, drift: Drift, kappa: float, level: Lev
         if math.isnan(gone) or (len(row) > 2 and not apart < change):
             break
         best, change = following[-1], apart
-        if change <= SETTLED * max(1.0, abs(best)):
+        if change <= SETTLED * max(usual, abs(best)):
             break
         row, y = following, 0.5 * y
     return best

@@ -192,7 +192,8 @@ class Sheet:
                 if piece.integral(other) >= target:
                     missing = partial(_missing, piece, target)
                     fine = max(1e-15 * abs(piece.stop - piece.start), 4e-16 * abs(float(other)))
-                    return sign_change(missing, *sorted((float(one), float(other))), fine)
+                    low, high = sorted((float(one), float(other)))
+                    return sign_change(missing, low, high, fine)
             number += 1
 
     @staticmethod

@@ -23,7 +23,7 @@ from fastslow.passage.predictions import with_laws
 from fastslow.passage.sheets import courses_of
 from fastslow.passage.slow_quantities import SlowQuantity, slow_quantity
 from fastslow.passage.spikes import refined, turns_of
-from fastslow.passage.stays import Measured, Stay, measured, stays_of
+from fastslow.passage.stays import Measured, Stay, measured, products, stays_of
 from fastslow.passage.sticking import along_edges, bands_at, with_sticking
 from fastslow.passage.transitions import Passage, leaving, passages_within, steep_parts
 from fastslow.results.angles import apart as apart_of
@@ -133,7 +133,8 @@ def overlay(
         after = excursions.get(id(stay))
         before = len(transitions)
         nxt = None if after is None else _between(p, after, transitions, bursts, ends)
-        labels = [sheets[k].label for k in p.followed[stay.start : stay.stop]]
+        numbers, rows = np.unique(p.followed[stay.start : stay.stop], return_index=True)
+        labels = [sheets[k].label for k in numbers[np.argsort(rows)]]
         end = float(m.time[-1]) if nxt is None else nxt.start
         phases.append(Phase(start, end, "quasi-static", tuple(dict.fromkeys(labels))))
         if nxt is not None:
@@ -299,10 +300,10 @@ def _distances(
         moves = np.where(m.velocities, 0.0, 1.0)
         slope = moves * course.slope(slow) / m.extent
         deviation = moves * m.deviation(number, on)
-        steep = (slope**2).sum(axis=1)
+        steep = products(slope, slope)
         rate = -course.relaxation(slow)
         with np.errstate(divide="ignore", invalid="ignore"):
-            ahead = (deviation * slope).sum(axis=1) / steep
+            ahead = products(deviation, slope) / steep
             behind = -ahead / p.drift[on]
             relaxation[on] = np.where(rate > 0, 1.0 / rate, np.nan)
         exists = (np.abs(p.drift[on]) > STILL * mean) & (np.sqrt(steep) * m.span > FLAT)
@@ -313,7 +314,8 @@ def _distances(
         before = np.where(inside, np.interp(earlier, m.time, m.slow), slow - step)
         exists &= np.abs(before - slow + step) <= REST * np.abs(step)
         rest = moves * apart_of(m.scaled[on], course.state(before) / m.extent, m.periods)
-        exists &= np.linalg.norm(rest, axis=1) <= REST * np.linalg.norm(deviation, axis=1)
+        left, whole = (np.sqrt(products(v, v)) for v in (rest, deviation))
+        exists &= left <= REST * whole
         lag[on] = np.where(exists, behind, np.nan)
     return distance, lag, relaxation
 

@@ -79,7 +79,8 @@ class Measured:
     def apart(self, course: int) -> Array:
         """Distance from a course at the same value of the slow quantity, shape (N,)."""
         if course not in self._apart:
-            self._apart[course] = np.linalg.norm(self.deviation(course), axis=1)
+            deviation = self.deviation(course)
+            self._apart[course] = np.sqrt(products(deviation, deviation))
         return self._apart[course]
 
     @cached_property
@@ -183,11 +184,20 @@ def _nearness() -> Callable[..., None]:
     return load_loop("fastslow.passage.chain_distances", "nearness_to_chain", arguments)
 
 
+def products(one: Array, other: Array) -> Array:
+    """The scalar product of each row of one table (N, n) with that of another, shape (N,)."""
+    # columns are few, and long
+    total = one[:, 0] * other[:, 0]
+    for k in range(1, one.shape[1]):
+        total += one[:, k] * other[:, k]
+    return np.asarray(total)
+
+
 def way_done(scaled: Array, old: Array, new: Array, periods: Array) -> Array:
     """Which part of the way from an old place to a new one states have done."""
     chord = apart(new, old, periods)
-    length = (chord**2).sum(axis=-1)
-    done = (apart(scaled, old, periods) * chord).sum(axis=-1)
+    length = products(chord, chord)
+    done = products(apart(scaled, old, periods), chord)
     return np.asarray(done / np.where(length > 0, length, np.inf))
 
 
