@@ -168,3 +168,18 @@ def test_an_unknown_name_suggests_the_nearest():
 
 def test_every_public_name_has_a_home():
     assert {*fastslow._HOME, "__version__"} == set(fastslow.__all__)
+
+
+def test_an_overlay_needs_no_optimisation_of_scipy():
+    """What a run of the gear and of the cusp needs of roots and exponentials is here."""
+    heavy = "{'scipy.optimize', 'scipy.integrate', 'scipy.ndimage'}"
+    code = f"""
+import sys, fastslow as fs
+for model, slow, start in (
+    (fs.systems.harmonic_gear(), "w", [0, 0]), (fs.systems.cusp(omega=0.002), "p", [-1.0])
+):
+    diagram = fs.continue_equilibria(model.frozen(), slow, over=(-2, 6))
+    fs.overlay(diagram, fs.simulate(model, start, periods=1)).summary()
+print(sorted({heavy} & set(sys.modules)))
+"""
+    assert run(code) == "[]"

@@ -562,7 +562,7 @@ class RegionEquations:
         plain &= (np.abs(solved - states) < 1e6 * sizes).all(axis=1)
         plain &= (np.abs(solved) <= FARTHEST * sizes).all(axis=1)
         plain &= np.abs(found[:, n] - values) <= 1e-12 * sizes_of_values
-        for k in np.flatnonzero(~plain):
+        for k in np.flatnonzero(~plain).tolist():
             alone = self.corrected(states[k], float(values[k]))
             solved[k] = np.nan if alone is None else alone
         return solved

@@ -16,7 +16,7 @@ def nearness_to_chain(points, chain, radius, near):
     ----------
     points : ndarray, shape (N, d)
     chain : ndarray, shape (M, d)
-        Vertices.
+        Vertices, evenly spaced.
     radius : float
     near : ndarray, shape (N,)
         Filled: the radius less the distance near the nearest vertex; −radius for a point

@@ -157,9 +157,14 @@ class CriticalMode:
         steps = STEP * np.array([self.side(v).length for v in values.tolist()])
         modes = self.modes(np.concatenate([values, values - steps, values + steps]))
         count = len(values)
-        thirds = (modes[k * count : (k + 1) * count] for k in range(3))
-        known = zip(values.tolist(), steps.tolist(), *thirds, strict=True)
-        return np.array([self._first_order(*each, rate) for each in known])
+        return np.array(
+            [
+                self._first_order(
+                    value, step, modes[k], modes[count + k], modes[2 * count + k], rate
+                )
+                for k, (value, step) in enumerate(zip(values, steps, strict=True))
+            ]
+        )
 
     def _first_order(
         self,
