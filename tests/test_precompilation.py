@@ -16,10 +16,12 @@ gap = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
 model = fs.Model({x: v, v: w - v - gap}, forcing={w: sp.sin(t)}, parameters={D: 0.25})
 """
 
-AHEAD = MODEL + "print(fs.precompile(model))"
+#: Of the frozen model the load has no value.
+AHEAD = MODEL + "print(fs.precompile(model, model.frozen()))"
 USE = MODEL + (
     "other = model.with_parameters(D=0.5);"
     "fs.simulate(other, [0, 0], periods=1);"
+    "fs.simulate(other.frozen().with_parameters(w=0.1), [0, 0], t=(0, 1));"
     "fs.continue_equilibria(other.frozen(), 'w', (-1, 1))"
 )
 
