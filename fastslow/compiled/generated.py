@@ -19,6 +19,11 @@ _CALLBACK: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _LOOP: dict[str, Any] = {"nogil": True}
 
 _compiled: dict[str, Any] = {}
+
+#: Every loop that was begun. Numba forgets one in a finaliser, which loses an interrupt that comes
+#: while garbage is collected; so those whose compilation was interrupted are kept as well.
+_begun: list[Any] = []
+
 _lock = threading.RLock()
 
 
@@ -82,6 +87,7 @@ def compile_loop(
 
         options = _LOOP if types is None else {**_LOOP, "_nrt": False}
         made: Any = njit(pipeline_class=KeptCompiler, **options)(python)
+        _begun.append(made)
         # what Numba calls for arguments of types that are new to it
         made.compile = partial(deferring_signals, made.compile)
         if types is not None:

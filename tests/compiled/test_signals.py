@@ -1,10 +1,15 @@
+import contextlib
+import gc
 import signal
+import weakref
 
 import pytest
-from numba import njit
+from numba import float64, njit
 from numba.core import event
+from numba.core.typing.context import BaseContext
 
-from fastslow.compiled.compiler import watched_passes
+from fastslow.compiled.compiler import KeptCompiler, watched_passes
+from fastslow.compiled.generated import compile_loop
 from fastslow.compiled.signals import deferring_signals
 
 
@@ -91,3 +96,25 @@ def test_one_compilation_within_another_is_part_of_it():
         deferring_signals(both)
     with pytest.raises(ValueError, match="invalid literal"):
         deferring_signals(int, "x")
+
+
+def test_what_an_interrupted_compilation_leaves_is_not_forgotten(monkeypatch):
+    """Numba's finalisers of loops would lose an interrupt that comes while one of them runs."""
+    disposed = []
+    insert = BaseContext._insert_global
+
+    def watched(self, value, kind):
+        insert(self, value, kind)
+        with contextlib.suppress(TypeError):
+            weakref.finalize(value, disposed.append, repr(value)).atexit = False
+
+    def stopped(self, function):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(BaseContext, "_insert_global", watched)
+    monkeypatch.setattr(KeptCompiler, "compile_extra", stopped)
+    for _ in range(3):
+        with pytest.raises(KeyboardInterrupt):
+            compile_loop("def tripled(x):\n    return 3.0 * x\n", "tripled", (float64,))
+    gc.collect()
+    assert disposed == []
