@@ -96,8 +96,13 @@ def _along_the_run(slow: SlowQuantity, time: float) -> Drift:
 
 def _of_a_forcing(model: Any, slow: SlowQuantity, time: float) -> Drift:
     """From the derivatives of a forcing at a time."""
-    rate = model.forcing[slow.name].diff(TIME)
-    return _drift_of(model, rate, {}, time, ())
+    return _drift_of(model, _in_time(model.forcing[slow.name]), {}, time, ())
+
+
+@lru_cache(maxsize=128)
+def _in_time(forcing: sp.Expr) -> sp.Expr:
+    """The rate of a forcing."""
+    return forcing.diff(TIME)
 
 
 def _of_a_slow_state(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift:

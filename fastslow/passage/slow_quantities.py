@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,17 +70,21 @@ class SlowQuantity:
 
         Without dense output the samples are joined by straight lines.
         """
-        names = self.run.columns
         if not self.dense:
             rows = [np.interp(times, self.run.t, self.run[n]) for n in self.states]
             return np.interp(times, self.run.t, self.table), np.column_stack(rows)
-        columns = columns_at(self.run, times)
-        state = columns[[names.index(n) for n in self.states]].T
+        columns, names = columns_at(self.run, times), self.run.columns
+        state = columns[self._rows].T
         if not self.laws:
             return columns[names.index(self.name)], state
         start = np.interp(times, self.run.t, self.table)
         wanted = np.array([columns[names.index(n)] for n in self.laws])
         return self._solved(start, wanted), state
+
+    @cached_property
+    def _rows(self) -> list[int]:
+        """Of the fast states among the columns of the run."""
+        return [self.run.columns.index(n) for n in self.states]
 
     def _values(self, value: Array) -> Array:
         """The slow quantities on the path, shape (quantities, N)."""

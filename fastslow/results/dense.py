@@ -36,7 +36,7 @@ def columns_at(run: Trajectory, times: ArrayLike) -> NDArray[np.float64]:
         raise ArgumentError(f"the run made no step: {run.outcome}")
     flat = where.reshape(-1)
     row = np.searchsorted(run.step_starts, flat, side="right") - 1
-    values = evaluate(run, row, flat - run.steps[row, 0])
+    values = evaluate(run, row, flat - run.step_starts[row])
     return values.reshape(len(run.columns), *where.shape)
 
 
