@@ -894,6 +894,13 @@ def _near(
     return np.asarray(np.all(gap <= within * np.maximum(unit, np.abs(one)), axis=-1))
 
 
+def among(state: Array, known: Array, unit: ArrayLike = 1.0, periods: ArrayLike = 0.0) -> bool:
+    """Whether a state is the `same` as one of some known ones, shape (m, n)."""
+    gap = np.abs(apart(known, state, periods))
+    near = gap <= SAME * np.maximum(unit, np.abs(known))
+    return bool(near.all(axis=-1).any())
+
+
 def same(one: Array, other: Array, unit: ArrayLike = 1.0, periods: ArrayLike = 0.0) -> bool:
     """Whether two states are equal modulo periods, but for what a double root may be off."""
     return bool(_near(one, other, np.asarray(unit), SAME, periods))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import flag, instance, mapping, takes
-from fastslow.diagrams.equations import region_equations, same
+from fastslow.diagrams.equations import among, region_equations
 from fastslow.diagrams.equilibrium_sets import all_known, in_a_set, sets_of
 from fastslow.diagrams.fields import IDLE, FrozenField, require_frozen
 from fastslow.diagrams.windows import within
@@ -177,14 +177,14 @@ def _distinct(points: list[Equilibrium], unit: Array, periods: Array) -> list[Eq
     equilibria of the regions at the same states.
     """
     kept: list[Equilibrium] = []
+    shared, count = np.empty((len(points), len(unit))), 0
     for point in sorted(points, key=lambda p: not p.continuum):
-        shared = point.admissible and any(
-            k.admissible
-            and same(k.state, point.state, unit, periods)
-            and not (k.continuum and k.pseudo)
-            for k in kept
-        )
-        if not shared:
-            kept.append(point)
+        if point.admissible:
+            if among(point.state, shared[:count], unit, periods):
+                continue
+            if not (point.continuum and point.pseudo):
+                shared[count] = point.state
+                count += 1
+        kept.append(point)
     order = {id(p): k for k, p in enumerate(points)}
     return sorted(kept, key=lambda p: order[id(p)])
