@@ -16,7 +16,7 @@ from fastslow.compiled.closure import digest_of_imports
 
 #: How functions are compiled; what changes here changes the key.
 _CALLBACK: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
-_LOOP: dict[str, Any] = {"nogil": True}
+_LOOP: dict[str, Any] = {"nogil": True, "_nrt": False}
 
 _compiled: dict[str, Any] = {}
 
@@ -63,6 +63,8 @@ def compile_loop(
 ) -> Callable[..., Any]:
     """Prepare a function for calls from Python.
 
+    Nothing can be allocated in it, and arrays are not counted: the caller is to keep them.
+
     Parameters
     ----------
     source : str
@@ -70,8 +72,7 @@ def compile_loop(
     function : str
         Name of the function in it.
     types : tuple, optional
-        Those of its arguments to Numba, for which it is compiled here. No others are then
-        taken, nothing can be allocated, and the caller is to keep the arrays.
+        Those of its arguments to Numba, for which it is compiled here. No others are then taken.
 
     Returns
     -------
@@ -85,8 +86,7 @@ def compile_loop(
         from fastslow.compiled.compiler import KeptCompiler
         from fastslow.compiled.signals import deferring_signals
 
-        options = _LOOP if types is None else {**_LOOP, "_nrt": False}
-        made: Any = njit(pipeline_class=KeptCompiler, **options)(python)
+        made: Any = njit(pipeline_class=KeptCompiler, **_LOOP)(python)
         _begun.append(made)
         # what Numba calls for arguments of types that are new to it
         made.compile = partial(deferring_signals, made.compile)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from itertools import count
 from typing import Any
 
 from fastslow.compiled.generated import compile_loop
@@ -22,57 +23,37 @@ def {function}({arguments}):
 
 
 @cache
-def load_loop(module: str, function: str, arguments: tuple[str, ...]) -> Callable[..., Any]:
+def load_loop(
+    module: str, function: str, arguments: tuple[type | str, ...], typed: bool = False
+) -> Callable[..., Any]:
     """The compiled form of a Numba function, read from the disk where it is there already.
+
+    Of records it is given all fields, in the order of `flattened`, and makes them again: Numba
+    takes long to find the type of a record that comes from Python.
 
     Parameters
     ----------
     module, function : str
         Where the function is, e.g. ``"fastslow.continuation.engine"`` and ``"trace"``.
-    arguments : tuple of str
-        Names of its arguments.
+    arguments : tuple
+        What each argument is: a record, a number (``int``), or of any type, by a name.
+    typed : bool
+        Whether nothing is of any type, so that it is compiled here.
 
     Returns
     -------
     callable
     """
-    listed = ", ".join(arguments)
+    records = [kind for kind in arguments if not isinstance(kind, str)]
+    names = (f"a{k}" for k in count())
+    parts = [construction(kind, names) for kind in arguments]
+    used = {record for kind in records for record in records_within(kind)}
     source = _SOURCE.format(
-        imports="", module=module, function=function, arguments=listed, given=listed
-    )
-    return compile_loop(source, function)
-
-
-@cache
-def load_loop_of_records(
-    module: str, function: str, arguments: tuple[type, ...]
-) -> Callable[..., Any]:
-    """The compiled form of a Numba function of records and numbers, given all of their fields.
-
-    Numba takes long to find the type of a record that comes from Python, so that the entry is
-    given its fields in the order of `flattened`, and makes it again.
-
-    Parameters
-    ----------
-    module, function : str
-    arguments : tuple of type
-        What each argument is: a record, or ``int``.
-
-    Returns
-    -------
-    callable
-    """
-    types = [kind for record in arguments for kind in types_within(record)]
-    names = [f"a{k}" for k in range(len(types))]
-    left = iter(names)
-    given = ", ".join(construction(record, left) for record in arguments)
-    used = {r for kind in arguments for r in records_within(kind)}
-    imports = sorted(f"from {record.__module__} import {record.__name__}\n" for record in used)
-    source = _SOURCE.format(
-        imports="".join(imports),
+        imports="".join(sorted(f"from {r.__module__} import {r.__name__}\n" for r in used)),
         module=module,
         function=function,
-        arguments=", ".join(names),
-        given=given,
+        arguments=", ".join(f"a{k}" for k in range(int(next(names)[1:]))),
+        given=", ".join(parts),
     )
-    return compile_loop(source, function, tuple(types))
+    types = tuple(kind for record in records for kind in types_within(record)) if typed else None
+    return compile_loop(source, function, types)

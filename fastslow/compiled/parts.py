@@ -21,6 +21,13 @@ _OPTIONS: dict[str, Any] = {
 }
 
 
+def unfused_part(function: F) -> F:
+    """As `part`, with every product rounded before it is added to anything."""
+    options = {name: option for name, option in _OPTIONS.items() if name != "fastmath"}
+    decorated: F = njit(**options)(function)
+    return decorated
+
+
 def part(function: F) -> F:
     """Let a function be compiled into the loops that call it; it is not called from Python."""
     decorated: F = njit(**_OPTIONS)(function)

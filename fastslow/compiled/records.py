@@ -90,7 +90,7 @@ def records_within(record: type) -> list[type]:
     return [record, *(r for kind in _kinds(record) for r in records_within(kind))]
 
 
-def construction(record: type, names: Iterator[str]) -> str:
+def construction(record: Any, names: Iterator[str]) -> str:
     """Source that makes a record from names, one for each field of it and of those within it.
 
     Examples

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from fastslow.compiled.parts import unfused_part
 from fastslow.compiled.pointers import call_address
 from fastslow.continuation.loops import (
     CLOSED,
@@ -41,7 +41,7 @@ BETWEEN = 0.01
 TANGENT = 1e-9
 
 
-@njit(error_model="numpy")
+@unfused_part
 def solve(matrix, right):  # type: ignore[no-untyped-def]
     """Solve a small dense system in place by elimination with row pivoting.
 
@@ -76,7 +76,7 @@ def solve(matrix, right):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(error_model="numpy")
+@unfused_part
 def _bordered(out, n, border, weight, matrix):  # type: ignore[no-untyped-def]
     for i in range(n):
         for j in range(n + 1):
@@ -85,7 +85,7 @@ def _bordered(out, n, border, weight, matrix):  # type: ignore[no-untyped-def]
         matrix[n, j] = border[j] * weight[j]
 
 
-@njit(error_model="numpy")
+@unfused_part
 def _norm(vector, weight):  # type: ignore[no-untyped-def]
     total = 0.0
     for j in range(vector.shape[0]):
@@ -93,7 +93,7 @@ def _norm(vector, weight):  # type: ignore[no-untyped-def]
     return math.sqrt(total)
 
 
-@njit(error_model="numpy")
+@unfused_part
 def _dips(h0, s0, h1, s1):  # type: ignore[no-untyped-def]
     """Whether the cubic through two positive values with given slopes is negative between."""
     if not (s0 < 0.0 < s1):
@@ -110,7 +110,7 @@ def _dips(h0, s0, h1, s1):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(error_model="numpy")
+@unfused_part
 def _local_weight(point, weight, middle, local):  # type: ignore[no-untyped-def]
     """Fill the weights at a point; returns how many units the farthest state is away."""
     farthest = 1.0
@@ -125,57 +125,18 @@ def _local_weight(point, weight, middle, local):  # type: ignore[no-untyped-def]
     return farthest
 
 
-@njit(error_model="numpy")
-def trace(  # type: ignore[no-untyped-def]
-    address,
-    mode,
-    parameters,
-    signs,
-    weight,
-    lower,
-    upper,
-    low,
-    high,
-    middle,
-    periods,
-    smallest,
-    largest,
-    turn,
-    tolerance,
-    iterations,
-    closing,
-    rows,
-    tangents,
-    in_use,
-    progress,
-):
+@unfused_part
+def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-def]
     """Follow one curve inside one region until something ends it, or to a pause.
 
     Parameters
     ----------
-    address, mode, parameters
-        The generated function, the region's number and the parameter array.
-    signs : ndarray, shape (m,)
-        Sign of each h in the region; 0 leaves an interface out.
-    weight : ndarray, shape (n + 1,)
-        Inverse squares of the scales.
-    lower, upper : float
-        Range of the last component.
-    low, high : ndarray, shape (n,)
-        Window of the others.
-    middle : ndarray, shape (n,)
-        Where each of the others is not far away; NaN if it never is.
-    periods : ndarray, shape (n,)
-        Period of each of the others, 0 if there is none.
-    closing : bool
-        Whether a return to the start ends the curve.
-    rows, tangents : ndarray, shape (N, n + 1)
-        Points of the curve and unit tangents (in the weighted norm), the first of which is to
-        be given; the others are filled in.
-    in_use : ndarray, shape (1,)
-        The step, changed here.
-    progress : ndarray of int64, shape (2,)
-        How many rows there are, and how many steps are tried before the next pause; changed here.
+    curve : Curve
+    region : Region
+    stepping : Stepping
+    traced : Traced
+        Changed here.
+    space : TraceSpace
 
     Returns
     -------
@@ -183,24 +144,17 @@ def trace(  # type: ignore[no-untyped-def]
         What ended it, or PAUSED. With RANGE, INTERFACE and WINDOW the last row lies beyond
         the end.
     """
+    address, mode, parameters = curve
+    signs, weight, lower, upper, low, high, middle, periods = region
+    smallest, largest, turn, tolerance, iterations, closing = stepping
+    rows, tangents, in_use, progress = traced
+    out, matrix, right, guess, turned, middle_point, h, slope, new_h, new_slope, local = space
     size = rows.shape[1]
     start = rows[0]
     tangent = tangents[0]
     step = in_use[0]
     n = size - 1
     m = signs.shape[0]
-    width = n * (n + 2) + m * (n + 2)
-    out = np.empty(width)
-    matrix = np.empty((size, size))
-    right = np.empty(size)
-    guess = np.empty(size)
-    turned = np.empty(size)
-    middle_point = np.empty(size)
-    h = np.empty(m)
-    slope = np.empty(m)
-    new_h = np.empty(m)
-    new_slope = np.empty(m)
-    local = np.empty(size)
     heights = n * (n + 2)
 
     count = progress[0]
@@ -313,8 +267,9 @@ def trace(  # type: ignore[no-untyped-def]
         if not accepted:
             step *= 0.5
             continue
-        rows[count] = guess
-        tangents[count] = turned
+        for j in range(size):
+            rows[count, j] = guess[j]
+            tangents[count, j] = turned[j]
         count += 1
         progress[0] = count
         for k in range(m):

@@ -5,32 +5,29 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from fastslow.compiled.parts import unfused_part
 from fastslow.compiled.pointers import call_address
 from fastslow.continuation.engine import solve
-from fastslow.continuation.location import flush_to_zero, grown
-
-_flush_to_zero = njit(error_model="numpy")(flush_to_zero)
-_grown = njit(error_model="numpy")(grown)
+from fastslow.continuation.location import DUST, ROUNDING
 
 
-@njit(error_model="numpy")
+@unfused_part
 def evaluate(address, modes, points, parameters, out):  # type: ignore[no-untyped-def]
     """Fill in the output of the generated function at every row of points, shape (N, width)."""
     for k in range(points.shape[0]):
         call_address(address, modes[k], points[k], parameters, out[k])
 
 
-@njit(error_model="numpy")
+@unfused_part
 def value_at(address, mode, point, parameters, out):  # type: ignore[no-untyped-def]
     """Fill in the output of the generated function at one point, shape (width,)."""
     call_address(address, mode, point, parameters, out)
 
 
-@njit(error_model="numpy")
+@unfused_part
 def newton_from(  # type: ignore[no-untyped-def]
-    address, mode, parameters, states, converged, value, unit, width, iterations
+    curve, states, converged, value, unit, iterations, space
 ):
     """Newton's method at a fixed last component from many starts.
 
@@ -43,13 +40,13 @@ def newton_from(  # type: ignore[no-untyped-def]
     converged : ndarray of bool, shape (m,)
         Filled in.
     """
+    address, mode, parameters = curve
     count, n = states.shape
-    u = np.empty(n + 1)
-    out = np.empty(width)
-    matrix = np.empty((n, n))
-    right = np.empty(n)
+    out, u = space.out, space.u
+    matrix, right = space.matrix, space.right[:n]
     for k in range(count):
-        u[:n] = states[k]
+        for i in range(n):
+            u[i] = states[k, i]
         u[n] = value
         converged[k] = False
         for _ in range(iterations):
@@ -71,12 +68,13 @@ def newton_from(  # type: ignore[no-untyped-def]
             if length <= 1e-7 * size:
                 converged[k] = True
                 break
-        states[k] = u[:n]
+        for i in range(n):
+            states[k, i] = u[i]
 
 
-@njit(error_model="numpy")
+@unfused_part
 def refine(  # type: ignore[no-untyped-def]
-    address, mode, parameters, u, scale, row, normal, point, width, m, iterations
+    curve, u, scale, row, normal, point, m, iterations, space
 ):
     """Newton's method for F = 0 with one more equation along the curve.
 
@@ -94,13 +92,11 @@ def refine(  # type: ignore[no-untyped-def]
         Of the equations, and of the last correction in units of the scale.
     converged : bool
     """
+    address, mode, parameters = curve
+    out, slopes, matrix = space.out, space.slopes, space.matrix
+    value, right, flushed, terms = space.value, space.right, space.u, space.terms
     columns = u.shape[0]
     n = columns - 1
-    out = np.empty(width)
-    slopes = np.empty((columns, columns))
-    matrix = np.empty((columns, columns))
-    value = np.empty(columns)
-    right = np.empty(columns)
     size = np.inf
     least = np.inf
     heights = n * (n + 2)
@@ -142,7 +138,9 @@ def refine(  # type: ignore[no-untyped-def]
         for j in range(columns):
             u[j] += right[j] * scale[j]
             size = max(size, abs(right[j]))
-    flushed = _flush_to_zero(u, scale)
+    # as `flush_to_zero` and `grown` have it
+    for j in range(columns):
+        flushed[j] = 0.0 if abs(u[j]) < DUST * scale[j] else u[j]
     call_address(address, mode, flushed, parameters, out)
     for i in range(n):
         right[i] = out[i]
@@ -152,23 +150,29 @@ def refine(  # type: ignore[no-untyped-def]
         right[n] = 0.0
         for j in range(columns):
             right[n] += normal[j] * (flushed[j] - point[j])
-    if not _grown(right, value, np.abs(slopes) @ np.abs(u)):
-        u[:] = flushed
-        value[:] = right
+    grown = False
+    for i in range(columns):
+        terms[i] = 0.0
+        for j in range(columns):
+            terms[i] += abs(slopes[i, j]) * abs(u[j])
+        grown = grown or not abs(right[i]) <= abs(value[i]) + ROUNDING * terms[i]
+    if not grown:
+        for j in range(columns):
+            u[j], value[j] = flushed[j], right[j]
     residual = 0.0
     balanced = True
     for i in range(columns):
-        terms = 0.0
+        total = 0.0
         for j in range(columns):
-            terms += abs(slopes[i, j]) * max(abs(u[j]), scale[j])
+            total += abs(slopes[i, j]) * max(abs(u[j]), scale[j])
         residual = max(residual, abs(value[i]))
-        balanced = balanced and abs(value[i]) <= 1e-9 * terms + 1e-300
+        balanced = balanced and abs(value[i]) <= 1e-9 * total + 1e-300
     return residual, size, size < 1e-8 and balanced
 
 
-@njit(error_model="numpy")
+@unfused_part
 def survey(  # type: ignore[no-untyped-def]
-    address, mode, parameters, points, tangents, scale, reach, width, branching, jacobians
+    curve, points, tangents, scale, reach, branching, jacobians, space
 ):
     """What is tested at every row of a piece.
 
@@ -182,14 +186,13 @@ def survey(  # type: ignore[no-untyped-def]
     jacobians : ndarray, shape (N, n, n)
         Filled in.
     """
+    address, mode, parameters = curve
+    out, matrix, largest, beside = space.out, space.matrix, space.largest, space.beside
     count, columns = points.shape
     n = columns - 1
-    out = np.empty(width)
-    matrix = np.empty((columns, columns))
-    largest = np.empty(columns)
-    beside = np.empty(columns)
     for k in range(count):
-        largest[:] = 0.0
+        for i in range(columns):
+            largest[i] = 0.0
         length = 0.0
         for j in range(columns):
             length = max(length, abs(tangents[k, j] / scale[j]))
@@ -214,11 +217,11 @@ def survey(  # type: ignore[no-untyped-def]
                     matrix[i, j] = out[n + i * columns + j] * scale[j]
                 else:
                     matrix[i, j] = tangents[k, j] / scale[j]
-        branching[k] = signed_distance(matrix, largest)
+        branching[k] = signed_distance(matrix, largest, space.constant)
 
 
-@njit(error_model="numpy")
-def signed_distance(matrix, least):  # type: ignore[no-untyped-def]
+@unfused_part
+def signed_distance(matrix, least, right):  # type: ignore[no-untyped-def]
     """Size of a matrix's smallest singular value, with the sign of its determinant.
 
     The rows are brought to length one, so that neither depends on units or on the
@@ -227,7 +230,6 @@ def signed_distance(matrix, least):  # type: ignore[no-untyped-def]
     one, at least the smallest singular value and zero with it. The matrix is spoiled.
     """
     size = matrix.shape[0]
-    right = np.empty(size)
     total = 0.0
     for i in range(size):
         squares = 0.0
@@ -282,7 +284,7 @@ def signed_distance(matrix, least):  # type: ignore[no-untyped-def]
     return sign * math.sqrt(total / solved)
 
 
-@njit(error_model="numpy")
+@unfused_part
 def pairs(jacobians, result):  # type: ignore[no-untyped-def]
     """Fill in the eigenvalues of 2×2 matrices as LAPACK's dlanv2 finds them, shape (N, 2)."""
     count = jacobians.shape[0]
@@ -290,7 +292,7 @@ def pairs(jacobians, result):  # type: ignore[no-untyped-def]
         a, b = jacobians[k, 0, 0], jacobians[k, 0, 1]
         c, d = jacobians[k, 1, 0], jacobians[k, 1, 1]
         if not math.isfinite(a + b + c + d):
-            result[k, :] = np.nan
+            result[k, 0] = result[k, 1] = np.nan
             continue
         half = 0.5 * (a - d)
         inside = half * half + b * c
@@ -303,14 +305,16 @@ def pairs(jacobians, result):  # type: ignore[no-untyped-def]
             result[k, 1] = complex(0.5 * (a + d), -math.sqrt(-inside))
 
 
-@njit(error_model="numpy")
-def passing(points, scale, u, within, found):  # type: ignore[no-untyped-def]
+@unfused_part
+def passing(points, scale, u, within, found, apart):  # type: ignore[no-untyped-def]
     """Chords of a curve that are nearest to a point, each nearer than its two neighbours.
 
     Parameters
     ----------
     found : ndarray of int, shape (N - 1,)
         Numbers of the chords with a distance below ``within``, in scaled units, filled in.
+    apart : ndarray, shape (N - 1,)
+        Work space.
 
     Returns
     -------
@@ -318,7 +322,6 @@ def passing(points, scale, u, within, found):  # type: ignore[no-untyped-def]
         How many.
     """
     count, columns = points.shape
-    apart = np.empty(count - 1)
     for k in range(count - 1):
         length = 0.0
         ahead = 0.0

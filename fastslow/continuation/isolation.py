@@ -10,8 +10,8 @@ is bounded along with the coefficients, so that it excludes nothing.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from fastslow.compiled.parts import unfused_part
 from fastslow.continuation.loops import PAUSED, TABLE_FULL
 
 #: By how much a box is enlarged on either side before Krawczyk's test, in units of its width.
@@ -28,17 +28,15 @@ CUT = 0.4871
 EPS = 2.220446049250313e-16
 
 
-@njit(error_model="numpy")
-def _binomials(most):  # type: ignore[no-untyped-def]
-    table = np.zeros((most + 1, most + 1))
+@unfused_part
+def _binomials(most, table):  # type: ignore[no-untyped-def]
     for i in range(most + 1):
         table[i, 0] = 1.0
         for j in range(1, i + 1):
             table[i, j] = table[i - 1, j - 1] + (table[i - 1, j] if j < i else 0.0)
-    return table
 
 
-@njit(error_model="numpy")
+@unfused_part
 def _along(matrix, degree, stride, tensor, scratch):  # type: ignore[no-untyped-def]
     """Multiply a flat tensor by a matrix along the axis of a degree and stride, in place."""
     size = tensor.shape[0]
@@ -54,17 +52,15 @@ def _along(matrix, degree, stride, tensor, scratch):  # type: ignore[no-untyped-
                 tensor[offset + i * stride] = scratch[i]
 
 
-@njit(error_model="numpy")
-def _converted(power, degrees, strides, low, high, table, out, error):  # type: ignore[no-untyped-def]
+@unfused_part
+def _converted(power, degrees, low, high, out, error, space):  # type: ignore[no-untyped-def]
     """Bernstein coefficients on a box of polynomials given by powers, and their rounding."""
     equations, size = power.shape
-    most = degrees.max()
-    matrix = np.zeros((most + 1, most + 1))
-    scratch = np.empty(most + 1)
-    sizes = np.empty(size)
+    matrix, scratch, sizes = space.conversion, space.scratch, space.moduli
+    strides, table = space.strides, space.table
     for k in range(equations):
-        out[k] = power[k]
         for s in range(size):
+            out[k, s] = power[k, s]
             sizes[s] = abs(power[k, s])
         operations = 8.0
         for m in range(degrees.shape[0]):
@@ -88,7 +84,7 @@ def _converted(power, degrees, strides, low, high, table, out, error):  # type: 
         error[k] = operations * EPS * sizes.max()
 
 
-@njit(error_model="numpy")
+@unfused_part
 def _halves(tensor, degree, stride, cut, left):  # type: ignore[no-untyped-def]
     """De Casteljau: the part above the cut in place, the part below into ``left``."""
     size = tensor.shape[0]
@@ -103,7 +99,7 @@ def _halves(tensor, degree, stride, cut, left):  # type: ignore[no-untyped-def]
                 left[offset + level * stride] = tensor[offset]
 
 
-@njit(error_model="numpy")
+@unfused_part
 def _inverted(matrix, inverse):  # type: ignore[no-untyped-def]
     """Inverse by elimination with row pivots; False where it is singular to rounding."""
     n = matrix.shape[0]
@@ -139,7 +135,7 @@ def _inverted(matrix, inverse):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(error_model="numpy")
+@unfused_part
 def _deviation(tensor, degrees, strides, row, width, rounding, deviation):  # type: ignore[no-untyped-def]
     """Bounds on row ``row`` of |G' − I| over a box of a width, from coefficients of G."""
     size = tensor.shape[0]
@@ -156,10 +152,10 @@ def _deviation(tensor, degrees, strides, row, width, rounding, deviation):  # ty
         deviation[m] = worst + 2.0 * d * rounding / width
 
 
-@njit(error_model="numpy")
+@unfused_part
 def isolate(  # type: ignore[no-untyped-def]
     power, degrees, low, high, logarithmic, floor, tolerance, budget, large, small, share,
-    stack, solutions, clusters, progress,
+    stack, solutions, clusters, progress, space,
 ):  # fmt: skip
     """Every solution of N polynomial equations in N unknowns inside boxes, or a pause.
 
@@ -197,6 +193,7 @@ def isolate(  # type: ignore[no-untyped-def]
     progress : ndarray of int64, shape (6,)
         At first zeros: boxes begun, boxes that wait, solutions, clusters, and boxes looked at,
         above the budget where it did not suffice; last how many to look at before a pause.
+    space : IsolationSpace
 
     Returns
     -------
@@ -205,15 +202,17 @@ def isolate(  # type: ignore[no-untyped-def]
     """
     n = degrees.shape[0]
     size = power.shape[1]
-    strides = np.empty(n, dtype=np.int64)
-    stride = 1
+    strides, table, weights, enlarging = space.strides, space.table, space.weights, space.enlarging
+    stride, most = 1, 0
     for m in range(n - 1, -1, -1):
         strides[m] = stride
         stride *= degrees[m] + 1
-    most = degrees.max()
-    table = _binomials(most)
+        most = max(most, degrees[m])
+    _binomials(most, table)
     # value and derivatives at the middle of the unit box, as sums over coefficients
-    weights = np.ones((n + 1, size))
+    for row in range(n + 1):
+        for s in range(size):
+            weights[row, s] = 1.0
     for m in range(n):
         d = degrees[m]
         for s in range(size):
@@ -230,14 +229,14 @@ def isolate(  # type: ignore[no-untyped-def]
                 else:
                     weights[row, s] *= plain
     # blossoms from the unit interval to the one with a margin
-    enlarging = np.zeros((n, most + 1, most + 1))
-    growth = 1.0
+    blossom, growth = space.blossom, 1.0
     for m in range(n):
         d = degrees[m]
         largest = 0.0
         for i in range(d + 1):
             # value of the blossom at i copies of 1 + margin and d − i copies of −margin
-            blossom = np.zeros(d + 1)
+            for j in range(d + 1):
+                blossom[j] = 0.0
             blossom[0] = 1.0
             for step in range(d):
                 t = 1.0 + MARGIN if step < i else -MARGIN
@@ -255,21 +254,16 @@ def isolate(  # type: ignore[no-untyped-def]
     capacity = lows.shape[0]
     seed, waiting, found = progress[0], progress[1], progress[2]
     unclear, looked_at, left = progress[3], progress[4], progress[5]
-    jacobian = np.empty((n, n))
-    inverse = np.empty((n, n))
-    preconditioned = np.empty((n, size))
-    enlarged = np.empty(size)
-    rounding = np.empty(n)
-    centre = np.empty(n)
-    deviation = np.empty(n)
-    scratch = np.empty(most + 1)
-    sizes = np.empty(n)
+    jacobian, inverse, preconditioned = space.jacobian, space.inverse, space.preconditioned
+    enlarged, rounding, centre = space.enlarged, space.rounding, space.centre
+    deviation, scratch, sizes = space.deviation, space.scratch, space.sizes
     code = 0
     while waiting > 0 or seed < low.shape[0]:
         if waiting == 0:
-            lows[0] = low[seed]
-            highs[0] = high[seed]
-            _converted(power, degrees, strides, lows[0], highs[0], table, tensors[0], errors[0])
+            for m in range(n):
+                lows[0, m] = low[seed, m]
+                highs[0, m] = high[seed, m]
+            _converted(power, degrees, lows[0], highs[0], tensors[0], errors[0], space)
             seed += 1
             waiting += 1
         while waiting > 0:
@@ -321,15 +315,15 @@ def isolate(  # type: ignore[no-untyped-def]
                 a = lows[here, axis]
                 b = highs[here, axis]
                 middle = np.sqrt(a * b) if a > 0.0 else -np.sqrt(a * b)
-                lows[here + 1] = lows[here]
-                highs[here + 1] = highs[here]
+                for m in range(n):
+                    lows[here + 1, m] = lows[here, m]
+                    highs[here + 1, m] = highs[here, m]
                 highs[here, axis] = middle
                 lows[here + 1, axis] = middle
                 for part in range(here, here + 2):
                     _converted(
-                        power, degrees, strides, lows[part], highs[part], table,
-                        tensors[part], errors[part],
-                    )  # fmt: skip
+                        power, degrees, lows[part], highs[part], tensors[part], errors[part], space
+                    )
                 waiting += 2
                 continue
             for k in range(n):
@@ -342,7 +336,8 @@ def isolate(  # type: ignore[no-untyped-def]
                 near = True
                 for k in range(n):
                     row = preconditioned[k]
-                    row[:] = 0.0
+                    for s in range(size):
+                        row[s] = 0.0
                     rounding[k] = 0.0
                     for j in range(n):
                         factor = inverse[k, j]
@@ -367,7 +362,8 @@ def isolate(  # type: ignore[no-untyped-def]
                 if near:
                     width = 1.0 + 2.0 * MARGIN
                     for k in range(n):
-                        enlarged[:] = preconditioned[k]
+                        for s in range(size):
+                            enlarged[s] = preconditioned[k, s]
                         for m in range(n):
                             _along(enlarging[m], degrees[m], strides[m], enlarged, scratch)
                         _deviation(
@@ -412,12 +408,14 @@ def isolate(  # type: ignore[no-untyped-def]
                     most_change = change
                     axis = m
             if axis < 0 or here + 2 >= capacity:
-                clusters[unclear, 0] = lows[here]
-                clusters[unclear, 1] = highs[here]
+                for m in range(n):
+                    clusters[unclear, 0, m] = lows[here, m]
+                    clusters[unclear, 1, m] = highs[here, m]
                 unclear += 1
                 continue
-            lows[here + 1] = lows[here]
-            highs[here + 1] = highs[here]
+            for m in range(n):
+                lows[here + 1, m] = lows[here, m]
+                highs[here + 1, m] = highs[here, m]
             cut = lows[here, axis] + CUT * (highs[here, axis] - lows[here, axis])
             for k in range(n):
                 _halves(tensors[here, k], degrees[axis], strides[axis], CUT, tensors[here + 1, k])

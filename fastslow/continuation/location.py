@@ -28,6 +28,9 @@ LARGE = 60
 #: is zero: each step reduces them by a factor.
 DUST = 1e-20
 
+#: Rounding of a residual, in units of the sum of the moduli of its terms.
+ROUNDING = 2.3e-16
+
 #: Part of the scale beside a point at which the slopes of a rate are looked at as well, to know
 #: their size where they vanish.
 REACH = 0.1
@@ -113,8 +116,7 @@ def _balanced(value: Array, slopes: Array, u: Array, scale: Array) -> bool:
 def flush_to_zero(u: Array, scale: Array) -> Array:
     """The point with components far below rounding of the scale set to zero.
 
-    The scale may be wrong: what the equations need is kept, see `grown`. Compiled in
-    `fastslow.continuation.evaluation`.
+    The scale may be wrong: what the equations need is kept, see `grown`.
 
     Examples
     --------
@@ -133,7 +135,7 @@ def grown(after: Array, before: Array, terms: Array) -> bool:
     >>> grown(np.array([0.0, -1e-9]), 0 * one, one), grown(1e-30 * one, 0 * one, one)
     (True, False)
     """
-    allowed = np.abs(before) + 2.3e-16 * terms
+    allowed = np.abs(before) + ROUNDING * terms
     return bool(np.any(~(np.abs(after) <= allowed)))
 
 

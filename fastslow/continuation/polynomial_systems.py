@@ -11,7 +11,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation.loops import PAUSED, TABLE_FULL, WORK, loop
+from fastslow.continuation.loops import PAUSED, TABLE_FULL, WORK, isolation_space, loop
 from fastslow.continuation.ordering import in_order
 
 Array = NDArray[np.float64]
@@ -200,6 +200,7 @@ def _isolated(
     )
     solutions, clusters = np.empty((64, count)), np.empty((64, 2, count))
     progress = np.zeros(6, dtype=np.int64)
+    space = isolation_space(count, size, int(max(degrees)))
     code = PAUSED
     while code != 0:
         # a box is looked at by products of all coefficients with those of every unknown
@@ -207,7 +208,7 @@ def _isolated(
         code = loop("isolate")(
             power, degrees, np.ascontiguousarray(boxes[:, :, 0]),
             np.ascontiguousarray(boxes[:, :, 1]), free, floor, NARROWEST, most,
-            inverse, small, COMPARABLE, stack, solutions, clusters, progress,
+            inverse, small, COMPARABLE, stack, solutions, clusters, progress, *space,
         )  # fmt: skip
         if code == TABLE_FULL:
             solutions, clusters = (

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from sympy.polys.domains import ZZ
 from sympy.polys.rings import ring
 
-from fastslow.continuation.loops import blocks, loop
+from fastslow.continuation.loops import blocks, loop, newton_space
 from fastslow.continuation.ordering import in_order
 from fastslow.continuation.polynomial_systems import (
     FARTHEST,
@@ -597,7 +597,7 @@ class RegionEquations:
             for s in blocks(len(starts), 100 * (16 * field.compiled.size + n**3)):
                 loop("newton_from")(
                     field.compiled.address, self.region, field.values, starts[s], converged[s],
-                    value, unit, field.compiled.size, 100,
+                    value, unit, 100, *newton_space(n, field.compiled.size),
                 )  # fmt: skip
             for state in field.wrapped(starts[converged]):
                 if np.all(np.abs(state) <= FARTHEST * unit) and not self._among(

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.compiled.fields import CompiledField, compile_field, parameter_array
 from fastslow.continuation.location import REACH, Located, with_condition
-from fastslow.continuation.loops import blocks, loop, writeable
+from fastslow.continuation.loops import blocks, loop, newton_space, writeable
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
@@ -270,10 +270,11 @@ class FrozenField:
         points = writeable(np.ascontiguousarray(points))
         tangents = writeable(np.ascontiguousarray(tangents))
         branching, jacobians = np.empty(len(points)), np.empty((len(points), self.n, self.n))
+        space = newton_space(self.n, self.compiled.size)
         for s in blocks(len(points), 48 * self.compiled.size + 2 * self.n**3):
             loop("survey")(
                 self.compiled.address, region, self.values, points[s], tangents[s], scale, REACH,
-                self.compiled.size, branching[s], jacobians[s],
+                branching[s], jacobians[s], *space,
             )  # fmt: skip
         return branching, jacobians
 
@@ -321,7 +322,7 @@ class FrozenField:
         u = start.copy()
         residual, size, converged = loop("refine")(
             self.compiled.address, region, self.values, u, scale, row, normal, point,
-            self.compiled.size, self.compiled.m, 40,
+            self.compiled.m, 40, *newton_space(self.n, self.compiled.size),
         )  # fmt: skip
         if converged:
             return Located(u, residual, True, _NONE, size)

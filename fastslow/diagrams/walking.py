@@ -215,6 +215,7 @@ def _traced(
         in_use = np.array([max(step, 10 * continuation.smallest_step)])
         progress = np.array([1, 0])
         status = loops.PAUSED
+        space = loops.trace_space(len(start) - 1, len(signs))
         while status == loops.PAUSED:
             progress[1] = max(1, loops.WORK // (8 * len(start) ** 3 + 16 * field.compiled.size))
             status = loops.loop("trace")(
@@ -222,7 +223,7 @@ def _traced(
                 window.lower, window.upper, low, high, window.states.middle(), field.periods,
                 continuation.smallest_step, largest, continuation.largest_turn,
                 continuation.tolerance, continuation.iterations, closing and not rows,
-                u, along, in_use, progress,
+                u, along, in_use, progress, *space,
             )  # fmt: skip
         u, along, step = u[: progress[0]], along[: progress[0]], float(in_use[0])
         missed = False

@@ -12,6 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.compiled.generic import load_loop
+from fastslow.compiled.records import (
+    ComplexMatrix,
+    ComplexTensor,
+    ComplexVector,
+    Matrix,
+    Vector,
+    zeros,
+)
 from fastslow.passage.drift_laws import NODES, DriftLaw, drift_law
 from fastslow.passage.sites import TURN, Site
 from fastslow.results.drifts import Drift
@@ -79,6 +87,44 @@ class Law(NamedTuple):
     coefficients: Array = _NO_SUMS
     address: int = 0
     numbers: Array = _NONE
+
+
+class Space(NamedTuple):
+    """Work space of compiled code.
+
+    Parameters
+    ----------
+    out, inputs, slopes
+        Of the compiled functions.
+    jacobian, factors, given, moved
+        Of the equations of a step.
+    stages, increments, kept : ndarray, shape (STAGES, n + 1)
+        Rates and increments at the stages of a step, and increments of the last one.
+    start, place, rates, scale, speeds : ndarray, shape (n + 1,)
+    heights : ndarray, shape (STAGES, count + 1)
+    here, floor, beyond : ndarray, shape (count + 1,)
+        Of the interfaces and of what ends the passage.
+    """
+
+    out: Vector
+    inputs: Vector
+    slopes: Vector
+    jacobian: Matrix
+    factors: ComplexTensor
+    given: ComplexVector
+    moved: ComplexMatrix
+    stages: Matrix
+    increments: Matrix
+    kept: Matrix
+    start: Vector
+    place: Vector
+    rates: Vector
+    scale: Vector
+    speeds: Vector
+    heights: Matrix
+    here: Vector
+    floor: Vector
+    beyond: Vector
 
 
 class End(NamedTuple):
@@ -280,15 +326,27 @@ def _leg(
         site.u,
         np.ascontiguousarray(field.signs[start.region, :count]),
     )
-    z, time, met, status = _passes()(
+    z, times = np.array(start.z, dtype=float), np.array([start.time, final], dtype=float)
+    met, status = _passes()(
         motion,
         speed.numbers(start.time, final),
         _end(stop, way),
-        np.array(start.z, dtype=float),
-        (float(start.time), float(final)),
+        z,
+        times,
         np.append(site.unit, reach),
+        _space(n, count, field.compiled.size),
     )
-    return Place(start.region, z, time), met, ("", TOO_LONG, FAILED)[status]
+    return Place(start.region, z, float(times[0])), met, ("", TOO_LONG, FAILED)[status]
+
+
+def _space(n: int, count: int, width: int) -> Space:
+    """Work space for n states and so many interfaces."""
+    from fastslow.simulation.radau import STAGES, VALUES
+
+    size, pairs = n + 1, len(VALUES)
+    shapes = (width, size + 1, size + 2, (size, size), (pairs, size, size + 1), size, (pairs, size))
+    stages, ends = [(STAGES, size)] * 3, [count + 1] * 3
+    return zeros(Space, *shapes, *stages, *[size] * 5, (STAGES, count + 1), *ends)
 
 
 def _end(stop: Event | None, way: float) -> End:
@@ -305,7 +363,7 @@ def _end(stop: Event | None, way: float) -> End:
 @cache
 def _passes() -> Callable[..., Any]:
     """The compiled loop over steps."""
-    arguments = ("motion", "law", "end", "start", "times", "unit")
+    arguments = ("motion", "law", "end", "z", "times", "unit", "space")
     return load_loop("fastslow.passage.radau_passages", "pass_through", arguments)
 
 

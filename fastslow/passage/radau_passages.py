@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
@@ -46,8 +45,8 @@ INTERFACES, PASSING, TURNING, LEVEL = range(4)
 ENDED, TOO_LONG, FAILED = range(3)
 
 
-@njit(error_model="numpy", fastmath={"contract"})
-def pass_through(motion, law, end, start, times, unit):
+@part
+def pass_through(motion, law, end, z, times, unit, space):
     """Integrate within one region until something ends the passage.
 
     Parameters
@@ -55,46 +54,36 @@ def pass_through(motion, law, end, start, times, unit):
     motion : Motion
     law : Law
     end : End
-    start : ndarray, shape (n + 1,)
-        z = (x - x*, w - w*).
-    times : (float, float)
-        At the start, and the latest one.
+    z : ndarray, shape (n + 1,)
+        (x - x*, w - w*) at the start; the last one is put in its place.
+    times : ndarray, shape (2,)
+        At the start, in whose place the last one is put, and the latest one.
     unit : ndarray, shape (n + 1,)
         Of z.
+    space : Space
 
     Returns
     -------
-    z : ndarray, shape (n + 1,)
-        The last one.
-    time : float
     met : int
         Number of the interface that ended it, -1 where it was not an interface.
     status : int
         ENDED, TOO_LONG or FAILED.
     """
-    size, count = start.shape[0], motion.signs.shape[0]
-    space = (
-        np.empty(motion.width),
-        np.empty(size + 1),
-        np.empty(size + 2),
-        np.empty((size, size)),
-        np.empty((VALUES.shape[0], size, size + 1), dtype=np.complex128),
-        np.empty(size, dtype=np.complex128),
-        np.empty((VALUES.shape[0], size), dtype=np.complex128),
-        np.empty((STAGES, size)),
-        np.empty((3, size)),
-    )
-    z, scale, rates = start.copy(), np.empty(size), np.empty(size)
-    Z, kept = np.zeros((STAGES, size)), np.zeros((STAGES, size))
-    heights, here, floor = np.empty((STAGES, count + 1)), np.empty(count + 1), np.empty(count + 1)
-    t, final = times
+    size, count = z.shape[0], motion.signs.shape[0]
+    scale, rates, Z, kept = space.scale, space.speeds, space.increments, space.kept
+    heights, here, floor = space.heights, space.here, space.floor
+    for j in range(STAGES):
+        for i in range(size):
+            Z[j, i] = kept[j, i] = 0.0
+    t, final = times[0], times[1]
     rates_at(motion, law, t, z, space, rates)
     heights_of(motion, end, z, rates, space, 1.0, here)
-    first = space[0].shape[0] - (space[0].shape[0] // (size + 1) - size + 1) * size
+    out = space.out
+    first = out.shape[0] - (out.shape[0] // (size + 1) - size + 1) * size
     for k in range(count):
         noise = 0.0
         for i in range(size):
-            noise += abs(space[0][first + k * size + i] * (motion.point[i] + z[i]))
+            noise += abs(out[first + k * size + i] * (motion.point[i] + z[i]))
         # the interface that was just crossed is met to rounding
         floor[k] = min(here[k], 0.0) - 4.0 * EPSILON * noise
     floor[count] = 0.0
@@ -104,7 +93,7 @@ def pass_through(motion, law, end, start, times, unit):
     for i in range(size):
         if rates[i] != 0.0:
             h = min(h, 0.01 * (abs(z[i]) + SMALL * unit[i]) / abs(rates[i]))
-    last, beyond = 0.0, np.empty(count + 1)
+    last, beyond = 0.0, space.beyond
     # between low and high, lengths of steps that end before and behind what ends the passage, by
     # the values left and right of the height that is met
     low = high = left = right = 0.0
@@ -112,10 +101,10 @@ def pass_through(motion, law, end, start, times, unit):
     for _ in range(STEPS):
         if met < 0:
             if not t < final:
-                return z, t, -1, TOO_LONG
+                return -1, TOO_LONG
             h = min(h, final - t)
             if not t + 1e-3 * h > t:
-                return z, t, -1, FAILED
+                return -1, FAILED
             for i in range(size):
                 noise = 64.0 * EPSILON * abs(motion.point[i]) / TOLERANCE
                 scale[i] = max(abs(z[i]) + SMALL * unit[i], noise)
@@ -127,7 +116,8 @@ def pass_through(motion, law, end, start, times, unit):
                 if other < 0:
                     for i in range(size):
                         z[i] += kept[STAGES - 1, i]
-                    return z, t + high, met if met < count else -1, ENDED
+                    times[0] = t + high
+                    return met if met < count else -1, ENDED
                 met, side, low = other, 0, 0.0
                 left, right = here[met] - floor[met], beyond[met] - floor[met]
                 continue
@@ -139,15 +129,16 @@ def pass_through(motion, law, end, start, times, unit):
         error = step(motion, law, end, t, z, h, scale, sense, space, Z, heights)
         if met >= 0:
             if not error < np.inf:
-                return z, t, -1, FAILED
+                return -1, FAILED
             # regula falsi, the value at the end that stays halved (Illinois)
             value = heights[STAGES - 1, met] - floor[met]
             if value <= 0.0:
                 left = 0.5 * left if side > 0 else left
                 high, right, side = h, value, 1
                 low = low if value < 0.0 else h
-                kept[:] = Z
-                beyond[:] = heights[STAGES - 1]
+                copied(Z, kept)
+                for k in range(count + 1):
+                    beyond[k] = heights[STAGES - 1, k]
             else:
                 right = 0.5 * right if side < 0 else right
                 low, left, side = h, value, -1
@@ -162,9 +153,10 @@ def pass_through(motion, law, end, start, times, unit):
             # a step that ends there comes first
             h *= C[stage]
             continue
-        kept[:] = Z
+        copied(Z, kept)
         if stage < STAGES:
-            beyond[:] = heights[stage]
+            for k in range(count + 1):
+                beyond[k] = heights[stage, k]
             met = another(beyond, floor, -1)
             low, high, side = 0.0, h, 0
             left, right = here[met] - floor[met], beyond[met] - floor[met]
@@ -172,12 +164,22 @@ def pass_through(motion, law, end, start, times, unit):
         for i in range(size):
             z[i] += Z[STAGES - 1, i]
             if not abs(z[i]) < np.inf:
-                return z, t, -1, FAILED
-        here[:] = heights[STAGES - 1]
+                return -1, FAILED
+        for k in range(count + 1):
+            here[k] = heights[STAGES - 1, k]
         t = t + h
+        times[0] = t
         last = h
         h *= min(GROWTH, 0.9 * error ** (-1.0 / (STAGES + 1))) if error > 0.0 else GROWTH
-    return z, t, -1, FAILED
+    return -1, FAILED
+
+
+@part
+def copied(values, into):
+    """Copy the values of all stages."""
+    for j in range(values.shape[0]):
+        for i in range(values.shape[1]):
+            into[j, i] = values[j, i]
 
 
 @part
@@ -227,8 +229,8 @@ def continued(kept, last, h, Z):
 
 @part
 def rates_at(motion, law, t, z, space, rates):
-    """The rates at a place; the output of the compiled function is in the first of the space."""
-    out, inputs, slopes = space[0], space[1], space[2]
+    """The rates at a place, and all that the compiled function gives there."""
+    out, inputs, slopes = space.out, space.inputs, space.slopes
     size = z.shape[0]
     for i in range(size):
         inputs[i] = motion.point[i] + z[i]
@@ -267,7 +269,7 @@ def by_table(breaks, coefficients, t):
 @part
 def heights_of(motion, end, z, rates, space, sense, heights):
     """Interface functions, not negative within the region, and what the event is told by."""
-    out, size, count = space[0], z.shape[0], motion.signs.shape[0]
+    out, size, count = space.out, z.shape[0], motion.signs.shape[0]
     first = (size - 1) * (size + 1)
     for k in range(count):
         heights[k] = motion.signs[k] * out[first + k]
@@ -290,10 +292,9 @@ def step(motion, law, end, t, z, h, scale, sense, space, Z, heights):
     float
         Its error in units of what is allowed, infinite where the equations are not solved.
     """
-    out, slopes, jacobian, factors, given, moved, F = (
-        space[0], space[2], space[3], space[4], space[5], space[6], space[7],
-    )  # fmt: skip
-    start, place, rates = space[8][0], space[8][1], space[8][2]
+    out, slopes, jacobian, factors = space.out, space.slopes, space.jacobian, space.factors
+    given, moved, F = space.given, space.moved, space.stages
+    start, place, rates = space.start, space.place, space.rates
     size, half = z.shape[0], VALUES.shape[0]
     rates_at(motion, law, t, z, space, start)
     n = size - 1

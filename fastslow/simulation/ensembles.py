@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import finite, flag, instance, mapping, takes, text, whole
-from fastslow.compiled.generic import load_loop_of_records
+from fastslow.compiled.generic import load_loop
 from fastslow.compiled.records import flattened
 from fastslow.compiled.series import CompiledSeries
 from fastslow.compiled.steps import CompiledSteps, compile_steps
@@ -524,4 +524,4 @@ def _bar(count: int, shown: bool) -> Any:
 def _many_loop() -> Callable[..., Any]:
     """The compiled loop over trajectories."""
     arguments = (Problem, int, int, Runs, Pool, Workspace, int, int)
-    return load_loop_of_records("fastslow.simulation.lanes", "drive_many", arguments)
+    return load_loop("fastslow.simulation.lanes", "drive_many", arguments, typed=True)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import finite, flag, instance, positive, takes, text
-from fastslow.compiled.generic import load_loop_of_records
+from fastslow.compiled.generic import load_loop
 from fastslow.compiled.records import flattened
 from fastslow.compiled.series import CompiledSeries, compile_series
 from fastslow.model.derived import KEPT, once, partition_of, sloped, timed
@@ -457,6 +457,6 @@ def error_rules(model: Model, resolved: Resolved, compiled: CompiledSeries) -> N
 
 def drive_loop() -> Callable[..., Any]:
     """The compiled stepping loop."""
-    return load_loop_of_records(
-        "fastslow.simulation.driver", "drive", (Problem, Run, Record, Workspace, int)
+    return load_loop(
+        "fastslow.simulation.driver", "drive", (Problem, Run, Record, Workspace, int), typed=True
     )

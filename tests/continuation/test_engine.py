@@ -15,7 +15,7 @@ from fastslow.continuation.location import (
     turning_pair,
     with_condition,
 )
-from fastslow.continuation.loops import loop
+from fastslow.continuation.loops import loop, newton_space
 from fastslow.diagrams.fields import FrozenField
 
 
@@ -98,7 +98,7 @@ def test_the_compiled_loop_tells_what_has_not_converged(steps):
     u, normal = np.array([1e6 + 1, 0.0]), np.array([0.0, 1.0])
     _, _, converged = loop("refine")(
         compiled.address, 0, field.values, u, np.ones(2), -1, normal, u.copy(),
-        compiled.size, compiled.m, steps,
+        compiled.m, steps, *newton_space(1, compiled.size),
     )  # fmt: skip
     assert converged == (steps == 50)
     assert abs(u[0] - 1e6) < (1e-6 if converged else 1e-3)
