@@ -29,6 +29,38 @@ EPS = 2.220446049250313e-16
 
 
 @unfused_part
+def _least(values):  # type: ignore[no-untyped-def]
+    """The least of several numbers, NaN if one is."""
+    found = values[0]
+    for k in range(values.shape[0]):
+        if not values[k] >= found:
+            found = values[k]
+            if found != found:
+                break
+    return found
+
+
+@unfused_part
+def _greatest(values):  # type: ignore[no-untyped-def]
+    """The greatest of several numbers, NaN if one is."""
+    found = values[0]
+    for k in range(values.shape[0]):
+        if not values[k] <= found:
+            found = values[k]
+            if found != found:
+                break
+    return found
+
+
+@unfused_part
+def _total(values):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for k in range(values.shape[0]):
+        total += values[k]
+    return total
+
+
+@unfused_part
 def _binomials(most, table):  # type: ignore[no-untyped-def]
     for i in range(most + 1):
         table[i, 0] = 1.0
@@ -81,7 +113,7 @@ def _converted(power, degrees, low, high, out, error, space):  # type: ignore[no
                             )
                         matrix[i, j] = total / table[d, j]
                 _along(matrix, d, strides[m], out[k] if weighed == 0 else sizes, scratch)
-        error[k] = operations * EPS * sizes.max()
+        error[k] = operations * EPS * _greatest(sizes)
 
 
 @unfused_part
@@ -283,8 +315,8 @@ def isolate(  # type: ignore[no-untyped-def]
             empty = False
             spent = False
             for k in range(n):
-                least = tensor[k].min()
-                largest = tensor[k].max()
+                least = _least(tensor[k])
+                largest = _greatest(tensor[k])
                 sizes[k] = max(abs(least), abs(largest))
                 if least > errors[here, k] or largest < -errors[here, k]:
                     empty = True
@@ -344,7 +376,7 @@ def isolate(  # type: ignore[no-untyped-def]
                         rounding[k] += abs(factor) * (errors[here, j] + 4.0 * n * EPS * sizes[j])
                         for s in range(size):
                             row[s] += factor * tensor[j, s]
-                    if row.min() > rounding[k] or row.max() < -rounding[k]:
+                    if _least(row) > rounding[k] or _greatest(row) < -rounding[k]:
                         empty = True
                         break
                     value = 0.0
@@ -352,11 +384,11 @@ def isolate(  # type: ignore[no-untyped-def]
                         value += weights[0, s] * row[s]
                     _deviation(row, degrees, strides, k, 1.0, rounding[k], deviation)
                     centre[k] = 0.5 - value
-                    reach = 0.5 * deviation.sum() + rounding[k]
+                    reach = 0.5 * _total(deviation) + rounding[k]
                     if centre[k] + reach < 0.0 or centre[k] - reach > 1.0:
                         empty = True
                         break
-                    near = near and deviation.sum() < 0.8
+                    near = near and _total(deviation) < 0.8
                 if empty:
                     continue
                 if near:
@@ -369,7 +401,7 @@ def isolate(  # type: ignore[no-untyped-def]
                         _deviation(
                             enlarged, degrees, strides, k, width, growth * rounding[k], deviation
                         )
-                        total = deviation.sum()
+                        total = _total(deviation)
                         reach = 0.5 * width * total + rounding[k]
                         near = (
                             near
