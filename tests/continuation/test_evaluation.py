@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from fastslow.continuation.evaluation import passing, signed_distance
+from fastslow.compiled.generic import load_loop
 from fastslow.continuation.loops import loop
 
 GENERATOR = np.random.default_rng(7)
@@ -23,7 +23,14 @@ def pairs_of(matrices):
 def passed(points, scale, u, within):
     """The chords, as the compiled loop numbers them."""
     found = np.empty(len(points) - 1, dtype=np.int64)
-    return found[: passing(points, scale, u, within, found)]
+    return found[: loop("passing")(points, scale, u, within, found, np.empty(len(found)))]
+
+
+def signed_distance(matrix, least):
+    """As the loop that surveys rows computes it."""
+    arguments = ("matrix", "least", "right")
+    compiled = load_loop("fastslow.continuation.evaluation", "signed_distance", arguments)
+    return compiled(matrix, least, np.empty(len(matrix)))
 
 
 def test_eigenvalues_of_pairs_are_those_of_lapack():
