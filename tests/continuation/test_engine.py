@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 import fastslow as fs
 from fastslow.compiled.generic import load_loop
+from fastslow.continuation import engine
 from fastslow.continuation.location import (
     branch_point,
     fold,
