@@ -117,8 +117,9 @@ def test_newton_s_method_does_not_converge_where_the_slope_vanishes():
     compiled = field.compiled
     starts, converged = np.array([[0.0], [4.9]]), np.zeros(2, dtype=bool)
     loop("newton_from")(
-        compiled.address, 0, field.values, starts, converged, 0.0, np.ones(1), compiled.size, 100
-    )
+        compiled.address, 0, field.values, starts, converged, 0.0, np.ones(1), 100,
+        *newton_space(1, compiled.size),
+    )  # fmt: skip
     assert converged.tolist() == [False, True]
     np.testing.assert_allclose(starts, [[0.0], [5.0]], atol=1e-12)
 
