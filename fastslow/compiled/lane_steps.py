@@ -21,13 +21,17 @@ from fastslow.compiled.native import ENTRY, WHOLE
 #: Rows that come after time and states, then those of the smallest and largest
 #: values of the states: by how much the time is late, the time that no step may
 #: reach, the one that is to be reported, the usual length of a step, how many
-#: more steps are allowed, how many until an implicit one is tried; and of the last step
-#: its time, its length and how it went.
-LATE, LIMIT, NEXT, USUAL, ALLOWED, CALM, BEGAN, LENGTH, OUTCOME = range(9)
-ROWS = 9
+#: more steps are allowed, how many until an implicit one is tried; of the last step
+#: its time, its length and how it went; and the interface that was crossed just now, -1 for none.
+LATE, LIMIT, NEXT, USUAL, ALLOWED, CALM, BEGAN, LENGTH, OUTCOME, LEFT = range(10)
+ROWS = 10
 
 #: How a step went: it was not taken; it was; or it was, and its series is wanted.
 NOT_TAKEN, TAKEN, REPORTED = 0.0, 1.0, 2.0
+
+#: A first step, or one after an event, that is this much shorter than the last one is due to
+#: a state that has no size yet.
+SUDDEN = 0.01
 
 #: Smallest coefficient that limits a step, in units of its row's size, and the largest.
 _SMALLEST, _LARGEST_TERM = 1e-250, 1e250
@@ -96,7 +100,8 @@ def _step(
     h = added(added(t + longest) - t)
     after = added(t + h)
     taken = (longest < added(number(LIMIT) - t) - late) & (h > 0.0) & (h <= 2.0 * usual)
-    taken &= (allowed >= 1.0) & known
+    left = number(LEFT)
+    taken &= (allowed >= 1.0) & known & ((left < 0.0) | (longest >= SUDDEN * usual))
     taken &= ~((calm <= 0.0) & _settled(rows, scales, longest, tolerance, order))
     state = [polynomial(row, h) for row in rows[:n]]
     for value in (*state, *(row[k] for row in rows[n:kept] for k in (0, order))):
@@ -104,7 +109,7 @@ def _step(
     for condition in trace.conditions:
         taken &= condition
     extremes = [(number(ROWS + i), number(ROWS + n + i)) for i in range(n)]
-    away, single = _nothing_happens(trace, rows[:n], extremes, rows[kept:], signs, h)
+    away, single = _nothing_happens(trace, rows[:n], extremes, rows[kept:], (signs, left), h)
     taken &= away
     plain = single & (after < number(NEXT))
     widened = taken & single
@@ -121,6 +126,7 @@ def _step(
         BEGAN: t,
         LENGTH: h,
         OUTCOME: taken.choose(plain.choose(TAKEN, REPORTED), NOT_TAKEN),
+        LEFT: taken.choose(-1.0, left),
     }
     for place, result in results.items():
         trace.store(result, lanes, 1 + n + place)
@@ -199,22 +205,26 @@ def _nothing_happens(
     states: Sequence[Sequence[Lanes]],
     extremes: Sequence[tuple[Lanes, Lanes]],
     interfaces: Sequence[Sequence[Lanes]],
-    signs: Sequence[int],
+    sides: tuple[Sequence[int], Lanes],
     h: Lanes,
 ) -> list[Mask]:
     """Whether no interface is met in a step, and whether its ends hold all new extremes.
 
+    An interface that was crossed just now is not met again where the motion leaves it.
+
     The sums of the moduli of the terms tell for most steps; for the others
     their Bernstein coefficients, between which the values lie.
     """
+    signs, left = sides
 
     def judged(bounds: _Bounds) -> list[Mask]:
         away = single = h > 0.0
-        for sign, row in zip(signs, interfaces, strict=True):
-            least, most, _ = bounds(row)
-            away &= row[0] > -least if sign > 0 else row[0] < -most
+        for j, (sign, row) in enumerate(zip(signs, interfaces, strict=True)):
+            least, most, _, one_sided = bounds(row)
+            leaving = (left >= float(j)) & (left <= float(j)) & one_sided & (row[1] * sign > 0.0)
+            away &= (row[0] > -least if sign > 0 else row[0] < -most) | leaving
         for row, (low, high) in zip(states, extremes, strict=True):
-            least, most, monotone = bounds(row)
+            least, most, monotone, _ = bounds(row)
             single &= ((row[0] + least >= low) & (row[0] + most <= high)) | monotone
         return [away, single]
 
@@ -222,32 +232,33 @@ def _nothing_happens(
     return trace.unless(away & single, [away, single], lambda: judged(_Bounds(h, _by_bernstein)))
 
 
+_Judged = tuple[Lanes, Lanes, Mask, Mask]
+
+
 class _Bounds:
     """What bounds the change of a row within a step, once for rows that differ in c_0 alone."""
 
-    def __init__(
-        self, h: Lanes, rule: Callable[[Sequence[Lanes], Lanes], tuple[Lanes, Lanes, Mask]]
-    ) -> None:
+    def __init__(self, h: Lanes, rule: Callable[[Sequence[Lanes], Lanes], _Judged]) -> None:
         self.h, self.rule = h, rule
-        self.known: dict[tuple[int, ...], tuple[Lanes, Lanes, Mask]] = {}
+        self.known: dict[tuple[int, ...], _Judged] = {}
 
-    def __call__(self, row: Sequence[Lanes]) -> tuple[Lanes, Lanes, Mask]:
+    def __call__(self, row: Sequence[Lanes]) -> _Judged:
         key = tuple(id(c) for c in row[1:])
         if key not in self.known:
             self.known[key] = self.rule(row, self.h)
         return self.known[key]
 
 
-def _by_moduli(row: Sequence[Lanes], h: Lanes) -> tuple[Lanes, Lanes, Mask]:
-    """Least and largest change, and whether the change has one sign: from sums of moduli."""
+def _by_moduli(row: Sequence[Lanes], h: Lanes) -> _Judged:
+    """Least and largest change, whether it goes one way and whether it has one sign, by moduli."""
     first = added(abs(row[1]) * h)
     rest = added(polynomial([abs(c) for c in row[2:]], h) * added(h * h))
     most = added(first + rest)
     # k times the modulus of the k-th term is at most n times it
-    return -most, most, first > rest * (len(row) - 1)
+    return -most, most, first > rest * (len(row) - 1), first > rest
 
 
-def _by_bernstein(row: Sequence[Lanes], h: Lanes) -> tuple[Lanes, Lanes, Mask]:
+def _by_bernstein(row: Sequence[Lanes], h: Lanes) -> _Judged:
     """The same from the Bernstein coefficients of the step."""
     n = len(row) - 1
     power, values = h.trace.lanes(1.0), [h.trace.lanes(0.0)]
@@ -258,11 +269,12 @@ def _by_bernstein(row: Sequence[Lanes], h: Lanes) -> tuple[Lanes, Lanes, Mask]:
         for j in range(n, level - 1, -1):
             values[j] = added(values[j] + values[j - 1])
     least = most = values[0]
-    rising = falling = h > 0.0
+    rising = falling = above = below = h > 0.0
     for a, b in pairwise(values):
+        above, below = above & (b > 0.0), below & (b < 0.0)
         least, most = (b < least).choose(b, least), (b > most).choose(b, most)
         rising, falling = rising & (b >= a), falling & (b <= a)
-    return least, most, rising | falling
+    return least, most, rising | falling, above | below
 
 
 def _report(trace: Trace, rows: Sequence[Sequence[Lanes]], W: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fastslow.compiled.lane_steps import SUDDEN
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
 from fastslow.simulation.events import find_event, holds, put_on_all
@@ -33,7 +34,6 @@ from fastslow.simulation.modes import (
 from fastslow.simulation.polynomials import ZERO, horner, sample
 from fastslow.simulation.scales import (
     REACHED,
-    SUDDEN,
     flush,
     raise_sizes,
     remember_sizes,
@@ -76,7 +76,7 @@ NOT_UNIQUE = 5
 NO_WAY_ON = 6
 ACCUMULATION = 7
 
-#: It did not end: a plain step was taken in a region, and others may take the next.
+#: It did not end: in a region, after a plain step or a crossing, others may take the next one.
 HANDED_OVER = -1
 
 #: It pauses between two steps, and goes on as if it had not when it is called again: its work is
@@ -107,7 +107,7 @@ def drive(problem, run, record, workspace, handed):
     workspace : Workspace
         From `workspace_for`; after a pause the one that the run paused in.
     handed : int
-        After a plain step in one of so many first modes the run is handed over.
+        In one of so many first modes the run is handed over after a plain step or a crossing.
 
     Returns
     -------
@@ -157,6 +157,10 @@ def drive(problem, run, record, workspace, handed):
             scales[REACHED, i] = carried[SIZES + i]
         for j in range(n_interfaces):
             on[j] = hit[j] = rests[j] = False
+        interface = counted[INTERFACE]
+        if interface >= 0:
+            # others did not take the step that leaves an interface after all
+            on[interface], noise[interface], fresh = True, carried[FLOOR], True
     while True:
         if listing and (
             n_steps == steps.shape[0]
@@ -222,6 +226,9 @@ def drive(problem, run, record, workspace, handed):
             fresh = True
             calm = pause = ZERO + WAIT
             in_a_row = ZERO
+            if ahead and mode < handed:
+                code = HANDED_OVER
+                break
         remaining = (stop - t) - late
         if not remaining > 0.0:
             break
@@ -395,6 +402,11 @@ def drive(problem, run, record, workspace, handed):
         counted[CHOOSING], counted[TOUCHED], counted[FRESH] = choosing, touched, fresh
         carried[WANTED], carried[LONGEST] = wanted, longest
         carried[DEPTH], carried[FLOOR] = depth, floor
+    else:
+        # the interface that it has crossed, where it is handed over before the step that leaves it
+        counted[INTERFACE] = interface if code == HANDED_OVER else -1
+        if code == HANDED_OVER and interface >= 0:
+            carried[FLOOR] = noise[interface]
     counted[WORK] = left
     carried[LATE], carried[USUAL], carried[LAST_EVENT] = late, usual, last_event
     for i in range(n_rows):

@@ -29,7 +29,17 @@ from fastslow.simulation.extremes import widen_extremes
 from fastslow.simulation.polynomials import ZERO, sample
 from fastslow.simulation.problems import Problem, Record, Run
 from fastslow.simulation.scales import FIXED, LASTING
-from fastslow.simulation.workspace import CALM, LATE, MODE, SAMPLES, SIZES, STEPS, USUAL, WORK
+from fastslow.simulation.workspace import (
+    CALM,
+    INTERFACE,
+    LATE,
+    MODE,
+    SAMPLES,
+    SIZES,
+    STEPS,
+    USUAL,
+    WORK,
+)
 
 #: Trajectories under way at a time, so that some region has one for every lane.
 UNDER_WAY = 8 * WIDTH
@@ -299,6 +309,7 @@ def take_up(problem, runs, pool, lane, i):
     # without a fast state there are no implicit steps to be tried
     rows[1 + n + step.CALM, lane] = counted[i, CALM] if problem.n_fast > 0 else np.inf
     rows[1 + n + step.NEXT, lane] = next_time(runs.times, i, counted[i, SAMPLES])
+    rows[1 + n + step.LEFT, lane] = counted[i, INTERFACE]
     # no extremes are widened before they count, and no step goes from there to where they do
     counting, stop = begin >= since, runs.spans[i, 1]
     rows[1 + n + step.LIMIT, lane] = stop if counting else min(since, stop)
@@ -324,6 +335,7 @@ def put_down(problem, runs, pool, lane, i):
         for k in range(n):
             extremes[i, 0, k] = rows[1 + n + step.ROWS + k, lane]
             extremes[i, 1, k] = rows[1 + n + step.ROWS + n + k, lane]
+    counted[i, INTERFACE] = np.int64(rows[1 + n + step.LEFT, lane])
     for k in range(1 + n):
         places[i, k] = rows[k, lane]
     carried[i, USUAL] = rows[1 + n + step.USUAL, lane]

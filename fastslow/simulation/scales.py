@@ -33,10 +33,6 @@ SMALLEST = 1e-300
 #: Terms of a series by which the size of a row is judged that begins at zero.
 LEADING = 4
 
-#: A first step, or one after an event, that is this much shorter than the last one is due to
-#: a state that has no size yet.
-SUDDEN = 0.01
-
 
 def rules_of(
     fixed: NDArray[np.float64], lasting: NDArray[np.float64], n_forcing: int, n_interfaces: int

@@ -23,7 +23,8 @@ LATE, USUAL, LAST_EVENT, WANTED, LONGEST, DEPTH, FLOOR, SIZES = range(8)
 #: Whole numbers carried: steps, crossings and samples so far, crossings crowded
 #: together, the mode, -1 before the first was chosen, steps until an implicit one is
 #: tried, and how many to wait for should it fail. Then what only a run that paused goes on
-#: from: that it did, how many implicit steps in a row, the interface of the last event,
+#: from: that it did, how many implicit steps in a row, the interface of the last event (of one
+#: that did not pause, the one that it has crossed and is to leave, else -1),
 #: whether it was touched, whether a mode is to be chosen, and whether it has just been. Last
 #: the work that is left before the next pause.
 (
@@ -64,7 +65,7 @@ def beginnings(
     carried[:, SIZES:] = rules[FIXED]
     carried[:, LAST_EVENT] = -np.inf
     counted = np.zeros((m, WORK + 1), dtype=np.int64)
-    counted[:, MODE] = -1
+    counted[:, [MODE, INTERFACE]] = -1
     counted[:, [CALM, PAUSE]] = WAIT
     return places, carried, counted
 

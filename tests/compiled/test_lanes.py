@@ -165,12 +165,13 @@ def test_what_bounds_the_change_of_a_polynomial(rule):
     generator = np.random.default_rng(3)
     rows = generator.normal(size=(4, 400)) * np.array([[1.0], [2.0], [1.0], [0.5]])
     h = generator.uniform(0.1, 1.5, 400)
-    least, most, single = (
+    least, most, single, one_sided = (
         compiled(lambda trace, *r, part=part: part(rule(r[:-1], r[-1])), 5)(*rows, h)
         for part in (
             lambda found: found[0],
             lambda found: found[1],
             lambda found: found[2].choose(1.0, 0.0),
+            lambda found: found[3].choose(1.0, 0.0),
         )
     )
     places = h * np.linspace(0, 1, 201)[:, None]
@@ -180,6 +181,10 @@ def test_what_bounds_the_change_of_a_polynomial(rule):
     one_way = (np.diff(change, axis=0) > 0).all(axis=0) | (np.diff(change, axis=0) < 0).all(axis=0)
     assert 20 < single.sum() <= one_way.sum() < 400
     assert one_way[single == 1].all()
+    # values after the beginning are on one side of it
+    aside = (change[1:] > 0).all(axis=0) | (change[1:] < 0).all(axis=0)
+    assert single.sum() < one_sided.sum() <= aside.sum() < 400
+    assert aside[one_sided == 1].all()
     if rule is _by_bernstein:
         shares = [[math.comb(j, k) / math.comb(3, k) for k in (1, 2, 3)] for j in range(4)]
         values = np.array(shares) @ np.array([rows[k] * h**k for k in (1, 2, 3)])
