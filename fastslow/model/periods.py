@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
+
+from fastslow.model.functions import KEPT, function_of
 
 
 def common_period(
@@ -74,10 +77,9 @@ def common_periods(
         return np.full(count, np.nan)
     table = np.empty((count, len(found)))
     for column, frequency in enumerate(found):
-        used = sorted(frequency.free_symbols, key=lambda s: s.name)
+        used, function = function_of(frequency)
         if any(symbol not in values for symbol in used):
             return np.full(count, np.nan)
-        function = sp.lambdify(used, frequency, "numpy")
         table[:, column] = function(*(values[symbol] for symbol in used))
     rows, which = np.unique(table, axis=0, return_inverse=True)
     periods = np.array([period_of(row) or np.nan for row in rows.tolist()])
@@ -111,11 +113,12 @@ def frequencies(expressions: Iterable[sp.Expr], time: sp.Symbol) -> list[sp.Expr
     return collected
 
 
-def _frequencies(expression: sp.Expr, time: sp.Symbol) -> list[sp.Expr] | None:
+@lru_cache(maxsize=KEPT)
+def _frequencies(expression: sp.Expr, time: sp.Symbol) -> tuple[sp.Expr, ...] | None:
     """Angular frequencies of the harmonics, or of the periodic functions' arguments."""
     harmonics = _harmonics(expression, time)
     if harmonics is not None:
-        return harmonics
+        return tuple(harmonics)
     periodic = [
         node
         for node in sp.preorder_traversal(expression)
@@ -126,7 +129,7 @@ def _frequencies(expression: sp.Expr, time: sp.Symbol) -> list[sp.Expr] | None:
     if time in outside.free_symbols:
         return None
     slopes = [_slope(node.args[0], time) for node in periodic]
-    return None if any(s is None for s in slopes) else [s for s in slopes if s is not None]
+    return None if any(s is None for s in slopes) else tuple(s for s in slopes if s is not None)
 
 
 def _harmonics(expression: sp.Expr, time: sp.Symbol) -> list[sp.Expr] | None:

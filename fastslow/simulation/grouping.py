@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from fastslow.model.functions import KEPT, function_of
 from fastslow.model.geometry import possible_patterns
 from fastslow.model.model import Model
 from fastslow.model.reading import factorise, switching_expressions
-from fastslow.model.structure import real
+from fastslow.model.structure import Structure, real
 
 Values = Mapping[str, NDArray[np.float64]]
 
@@ -69,14 +71,13 @@ def _signs(model: Model, values: Values, own: Mapping[str, float]) -> NDArray[np
     swept = {real(name) for name in values}
 
     def numbers(expression: sp.Expr) -> NDArray[np.float64]:
-        given = expression.subs({real(n): v for n, v in own.items()})
-        used = sorted(given.free_symbols, key=lambda s: s.name)
-        function = sp.lambdify(used, given, "numpy")
+        put_in = tuple((s, own[s.name]) for s in expression.free_symbols if s.name in own)
+        used, function = function_of(expression, tuple(sorted(put_in, key=str)))
         return np.broadcast_to(function(*(values[s.name] for s in used)), (count,)).astype(float)
 
     moving = [s for s in structure.moving if s not in swept]
     columns: list[NDArray[np.float64]] = []
-    for scale in _scales(model, moving):
+    for scale in _scales(structure, tuple(moving)):
         if scale.free_symbols & swept:
             columns.append(np.sign(numbers(scale)))
     rows = []
@@ -97,17 +98,18 @@ def _signs(model: Model, values: Values, own: Mapping[str, float]) -> NDArray[np
     return np.stack(columns, axis=1) if columns else np.zeros((count, 1))
 
 
-def _scales(model: Model, moving: list[sp.Symbol]) -> list[sp.Expr]:
+@lru_cache(maxsize=KEPT)
+def _scales(structure: Structure, moving: tuple[sp.Symbol, ...]) -> tuple[sp.Expr, ...]:
     """Factors of the switching expressions that hold parameters alone."""
-    written = (*model.structure.rates.values(), *model.structure.forcing.values())
+    written = (*structure.rates.values(), *structure.forcing.values())
     found: list[sp.Expr] = []
     for expression in written:
         for switching in switching_expressions(expression):
-            parts = factorise(switching, moving)
+            parts = factorise(switching, list(moving))
             for factor, _ in parts.scales:
                 if factor not in found:
                     found.append(factor)
-    return found
+    return tuple(found)
 
 
 def _patterns(table: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -28,7 +28,9 @@ FILES = {name_of(path): path for path in sorted(ROOT.rglob("*.py"))}
 KERNELS = sorted(
     name
     for name, path in FILES.items()
-    if re.search(r"^@(njit|part|unfused_part|intrinsic)|\bSIGNATURE = types", path.read_text(), re.M)
+    if re.search(
+        r"^@(njit|part|unfused_part|intrinsic)|\bSIGNATURE = types", path.read_text(), re.M
+    )
 )
 
 
