@@ -17,6 +17,7 @@ from fastslow.continuation.loops import _ARGUMENTS, loop
 from fastslow.diagrams.fields import FrozenField
 from fastslow.passage.local_passages import Event, Place, follow
 from fastslow.passage.sites import Site
+from fastslow.passage.stays import _nearness
 from fastslow.simulation.ensembles import _many_loop
 from fastslow.simulation.events import Search, search_for
 from fastslow.simulation.trajectories import drive_loop
@@ -80,6 +81,10 @@ def test_no_loop_of_passages_counts_arrays_or_allocates():
     )
     assert not reason
     assert b"NRT_" not in code_of("pass_through")
+    near = np.empty(1)
+    _nearness()(np.zeros((1, 2)), np.array([[0.0, 0.0], [1.0, 1.0]]), 0.5, near)
+    assert near[0] == 0.5
+    assert b"NRT_" not in code_of("nearness_to_chain")
 
 
 def test_what_allocates_is_refused():
