@@ -248,7 +248,8 @@ def _value(node: Node, values: Mapping[str, Any]) -> Any:
                 total = join(total, _value(factor, values))
             return total
         case Power(base, exponent):
-            return np.power(_value(base, values), _value(exponent, values))
+            # the operator squares and takes roots in every version of NumPy, the function in some
+            return np.asarray(_value(base, values)) ** _value(exponent, values)
         case Call("Piecewise", pieces):
             return _piecewise(pieces, values)
         case Call(function, arguments):

