@@ -19,6 +19,7 @@ LAYERS = [
     "interactive",
     "plot",
     "precompilation",
+    "wheel",
     "passage",
     "sweeps",
     "orbits",
@@ -151,6 +152,23 @@ def test_plotting_needs_neither_sympy_nor_numba():
     heavy = "{'sympy', 'numba', 'scipy', 'matplotlib.pyplot'}"
     code = f"import fastslow, sys; fastslow.plot; print(sorted({heavy} & set(sys.modules)))"
     assert run(code) == "[]"
+
+
+RUN = """
+import sys, sympy as sp, fastslow as fs
+x, v, t, w = sp.symbols("x v t w")
+model = fs.Model({x: v, v: w - v - x - sp.Abs(x) / 2}, forcing={w: sp.sin(t)})
+heavy = {"numba", "scipy.linalg", "scipy.optimize", "matplotlib"}
+fs.simulate(model, [0, 0], periods=1)
+print(sorted((heavy | {"numpy.f2py"}) & set(sys.modules)))
+fs.continue_equilibria(model.frozen(), w, (-1, 1))
+print(sorted(heavy & set(sys.modules)))
+"""
+
+
+def test_a_run_whose_code_is_at_hand_imports_nothing_that_compiles():
+    run(RUN)
+    assert run(RUN) == "[]\n[]"
 
 
 @pytest.mark.parametrize("name", fastslow.__all__)

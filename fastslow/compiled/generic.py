@@ -1,59 +1,158 @@
-"""Loops that serve every model, compiled once and kept on disk.
+"""Loops that serve every model: machine code that Python calls with numbers, arrays and records.
 
-Each has a generated module for its entry, whose key has all that the loop is made of.
+The code of a loop is looked for in three places: among what this package brings with it, on the
+user's disk, and, where neither has it, it is compiled by Numba and kept on disk. All three are
+objects of one form, so that only the last one imports Numba.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import hashlib
+import os
+import platform
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cache
-from itertools import count
+from importlib.metadata import version
 from typing import Any
 
-from fastslow.compiled.generated import compile_loop
-from fastslow.compiled.records import construction, records_within, types_within
+from fastslow.compiled import shipped, store
+from fastslow.compiled.calling import caller, entry_source
+from fastslow.compiled.closure import digest_of_imports
+from fastslow.compiled.loop_target import ENTRY, platform_name
+from fastslow.compiled.machine_code import load_object
+from fastslow.compiled.signals import between_passes, deferring_signals
 
-_SOURCE = '''"""Entry to {function} of {module}."""
-{imports}from {module} import {function} as loop
+#: Where everything is that loops are made by.
+_MAKER = "from fastslow.compiled import loop_compiler\n"
+
+_lock = threading.RLock()
 
 
-def {function}({arguments}):
-    return loop({given})
-'''
-
-
-@cache
-def load_loop(
-    module: str, function: str, arguments: tuple[type | str, ...], typed: bool = False
-) -> Callable[..., Any]:
-    """The compiled form of a Numba function, read from the disk where it is there already.
-
-    Of records it is given all fields, in the order of `flattened`, and makes them again: Numba
-    takes long to find the type of a record that comes from Python.
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """A function of this package that is compiled once for all models.
 
     Parameters
     ----------
     module, function : str
-        Where the function is, e.g. ``"fastslow.continuation.engine"`` and ``"trace"``.
-    arguments : tuple
-        What each argument is: a record, a number (``int``), or of any type, by a name.
-    typed : bool
-        Whether nothing is of any type, so that it is compiled here.
-
-    Returns
-    -------
-    callable
+        Where its source is, e.g. ``"fastslow.continuation.engine"`` and ``"trace"``.
     """
-    records = [kind for kind in arguments if not isinstance(kind, str)]
-    names = (f"a{k}" for k in count())
-    parts = [construction(kind, names) for kind in arguments]
-    used = {record for kind in records for record in records_within(kind)}
-    source = _SOURCE.format(
-        imports="".join(sorted(f"from {r.__module__} import {r.__name__}\n" for r in used)),
-        module=module,
-        function=function,
-        arguments=", ".join(f"a{k}" for k in range(int(next(names)[1:]))),
-        given=", ".join(parts),
-    )
-    types = tuple(kind for record in records for kind in types_within(record)) if typed else None
-    return compile_loop(source, function, types)
+
+    module: str
+    function: str
+
+    @property
+    def source(self) -> str:
+        """The module that Numba compiles: a function of a pointer that calls this one."""
+        raise NotImplementedError
+
+    @property
+    def key(self) -> str:
+        """All that its code depends on but the versions of what compiles it."""
+        source = self.source
+        return "\n".join((platform_name(), digest_of_imports(_MAKER + source), source))
+
+    @property
+    def name(self) -> str:
+        """Name of its object in an installation."""
+        return f"{self.function}_{_digest(self.key)}"
+
+
+@dataclass(frozen=True, eq=False)
+class Loop(Entry):
+    """A function that Python calls.
+
+    Parameters
+    ----------
+    arguments : mapping
+        Kind of each argument by its name: ``int``, ``float``, ``bool``, an array or a record of
+        `fastslow.compiled.records`.
+    results : tuple of type
+        Numbers that it returns: one, several as a tuple, or none.
+    kept : tuple of str
+        Records that are most often the ones of the last call, and stay in memory.
+    """
+
+    arguments: Mapping[str, Any]
+    results: tuple[type, ...] = ()
+    kept: tuple[str, ...] = ()
+
+    @property
+    def source(self) -> str:
+        return entry_source(self.module, self.function, self.arguments)
+
+
+def _digest(key: str) -> str:
+    return hashlib.sha256(key.encode()).hexdigest()[:24]
+
+
+@cache
+def load_loop(loop: Loop) -> Callable[..., Any]:
+    """A loop in the form that is called from Python, with its arguments by their positions.
+
+    See `fastslow.compiled.calling.caller`.
+    """
+    return caller(loop.function, loop.arguments, loop.results, load_address(loop), loop.kept)
+
+
+@cache
+def load_address(entry: Entry) -> int:
+    """The address of a function, which is compiled if its code is not at hand."""
+    with _lock:
+        return deferring_signals(_loaded, entry)
+
+
+def _loaded(entry: Entry) -> int:
+    code = shipped.read(entry.name)
+    return load_object(_kept(entry) if code is None else code, ENTRY, {})
+
+
+def _kept(entry: Entry) -> bytes:
+    """The code on the user's disk, compiled if it is not there."""
+    name = f"fastslow_{entry.function}_{_digest(entry.key + _versions())}"
+    code = store.read(name)
+    if code is None:
+        with store.alone(name, between_passes):
+            # by now another process may have compiled it
+            code = store.read(name)
+            if code is None:
+                code = compiled(entry, shipped.missing())
+                store.write(name, code)
+    return code
+
+
+def compiled(entry: Entry, reason: str) -> bytes:
+    """The code of a function, compiled here and now, which is said in one line.
+
+    Parameters
+    ----------
+    entry : Entry
+    reason : str
+        Why it is.
+    """
+
+    def say(text: str) -> None:
+        print(text, end="", file=sys.stderr, flush=True)
+
+    began = time.monotonic()
+    say(f"fastslow compiles {entry.module}.{entry.function} ({reason})")
+    try:
+        from fastslow.compiled.loop_compiler import compiled_object
+
+        code = compiled_object(entry.source, entry.function)
+    except BaseException:
+        say(": not finished\n")
+        raise
+    say(f": {time.monotonic() - began:.1f} s\n")
+    return code
+
+
+@cache
+def _versions() -> str:
+    packages = (f"{name} {version(name)}" for name in ("numba", "llvmlite", "numpy"))
+    settings = sorted(f"{k}={v}" for k, v in os.environ.items() if k.startswith("NUMBA_"))
+    return "|".join((*packages, platform.python_version(), *settings))

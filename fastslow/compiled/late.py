@@ -1,4 +1,4 @@
-"""Code that few runs need: compiled, or read from the disk, when the first of them does.
+"""Code that few runs need: loaded, or compiled, when the first of them does.
 
 It would otherwise be compiled into every loop, and optimised again with each of them. A
 loop that comes to it pauses; what it needs is compiled outside, where an error or an
@@ -7,9 +7,9 @@ interrupt is as any other, and the loop goes on with its address.
 
 from __future__ import annotations
 
-from functools import cache
+from dataclasses import dataclass
 
-from fastslow.compiled.generated import compile_callback
+from fastslow.compiled.generic import Entry
 
 _ENTRY = '''"""Entry to {function} of {module}."""
 from {module} import {record}, {function} as called
@@ -23,9 +23,9 @@ def {function}(pointer):
 '''
 
 
-@cache
-def address_of(module: str, function: str, record: str) -> int:
-    """The address of a function of one record, compiled for `call_with`.
+@dataclass(frozen=True, eq=False)
+class Late(Entry):
+    """A function of one record, which `fastslow.compiled.pointers.call_with` calls.
 
     Parameters
     ----------
@@ -33,7 +33,9 @@ def address_of(module: str, function: str, record: str) -> int:
         Where the function and the type of its argument are, e.g.
         ``"fastslow.simulation.radau"``, ``"radau_step"`` and ``"RadauStep"``.
     """
-    from numba import types
 
-    text = _ENTRY.format(module=module, function=function, record=record)
-    return compile_callback(text, function, types.float64(types.voidptr))
+    record: str
+
+    @property
+    def source(self) -> str:
+        return _ENTRY.format(module=self.module, function=self.function, record=self.record)

@@ -1,34 +1,89 @@
-"""How the functions that a generic loop is made of are compiled."""
+"""How the functions that a generic loop is made of are compiled.
+
+Numba is imported when one of them is compiled, which few processes do.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
-
-from numba import njit
+from functools import cached_property, update_wrapper
+from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-#: Wrappers for calls from Python would double the time to compile what only loops call.
-#: Products and sums are fused, which is faster and rounds once less; nothing is reordered.
+#: How all of them are. Wrappers for calls from Python would double the time to compile.
 #: Nothing is allocated, and no array is counted: to count them took half of the time.
-_OPTIONS: dict[str, Any] = {
+OPTIONS: dict[str, Any] = {
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
     "_nrt": False,
     "error_model": "numpy",
-    "fastmath": {"contract"},
 }
 
 
-def unfused_part(function: F) -> F:
-    """As `part`, with every product rounded before it is added to anything."""
-    options = {name: option for name, option in _OPTIONS.items() if name != "fastmath"}
-    decorated: F = njit(**options)(function)
-    return decorated
+class _Part:
+    """A function that Numba compiles into the loops that call it; Python calls its source."""
+
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        update_wrapper(self, function)
+        self.source, self.options = function, options
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.source(*arguments)
+
+    @cached_property
+    def _dispatcher(self) -> Any:
+        from numba import njit
+
+        return njit(**OPTIONS, **self.options)(self.source)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What Numba asks of a global name of a function that it compiles."""
+        return self._dispatcher._numba_type_
+
+
+class _Intrinsic:
+    """A function of loops whose instructions are written by hand, for Numba."""
+
+    def __init__(self, function: Callable[..., Any], literal: bool) -> None:
+        self.__name__, self.__doc__ = function.__name__, function.__doc__
+        self.typing, self.literal = function, literal
+
+    @cached_property
+    def _made(self) -> Any:
+        from numba.extending import intrinsic
+
+        return intrinsic(prefer_literal=self.literal)(self.typing)
+
+    @property
+    def _numba_type_(self) -> Any:
+        from numba.core.registry import cpu_target
+
+        made, context = self._made, cpu_target.typing_context
+        # it may be new to a compilation that has begun
+        context.refresh()
+        return context.resolve_value_type(made)
 
 
 def part(function: F) -> F:
-    """Let a function be compiled into the loops that call it; it is not called from Python."""
-    decorated: F = njit(**_OPTIONS)(function)
-    return decorated
+    """Let a function be compiled into the loops that call it.
+
+    Products and sums are fused, which is faster and rounds once less; nothing is reordered.
+    """
+    return cast(F, _Part(function, fastmath={"contract"}))
+
+
+def unfused_part(function: F) -> F:
+    """As `part`, with every product and sum rounded by itself."""
+    return cast(F, _Part(function))
+
+
+def instructions(function: F) -> F:
+    """As `numba.extending.intrinsic`, which is not imported before it is needed."""
+    return cast(F, _Intrinsic(function, literal=False))
+
+
+def literal_instructions(function: F) -> F:
+    """As `instructions`, of literal numbers and texts where they are given."""
+    return cast(F, _Intrinsic(function, literal=True))

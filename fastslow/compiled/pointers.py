@@ -8,27 +8,25 @@ a raw address costs a few per cent.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.core.errors import TypingError
-from numba.extending import intrinsic
 
+from fastslow.compiled.parts import instructions
 from fastslow.compiled.records import type_of
 
-DOUBLES = types.CPointer(types.float64)
-
-#: Signature of every generated function.
-SIGNATURE = types.void(types.int64, DOUBLES, DOUBLES, DOUBLES)
+_POINTER = ir.IntType(8).as_pointer()
 
 
-@intrinsic
+@instructions
 def call_address(  # type: ignore[no-untyped-def]
     typingctx, address, mode, inputs, parameters, outputs
 ):
     """Call the generated function at an address with a mode and three float64 arrays."""
+    from numba import types
+    from numba.core import cgutils
+
     signature = types.void(types.int64, types.int64, inputs, parameters, outputs)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -47,16 +45,27 @@ def call_address(  # type: ignore[no-untyped-def]
     return signature, codegen
 
 
-@intrinsic
+@instructions
 def call_with(typingctx, address, record):  # type: ignore[no-untyped-def]
-    """Call the function at an address with a record, which it loads; the result is a float64."""
+    """Call the function at an address with a record, which it loads; the result is a float64.
+
+    It is no number if the function has failed.
+    """
+    from numba import types
+    from numba.core import cgutils
+    from numba.core.errors import TypingError
+
     if record != type_of(record.instance_class):
         raise TypingError(f"{record}; expected {type_of(record.instance_class)}")
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place = builder.bitcast(cgutils.alloca_once_value(builder, args[1]), cgutils.voidptr_t)
-        kind = ir.FunctionType(ir.DoubleType(), [cgutils.voidptr_t])
-        return builder.call(builder.inttoptr(args[0], kind.as_pointer()), [place])
+        result = cgutils.alloca_once_value(builder, ir.Constant(ir.DoubleType(), math.nan))
+        error = cgutils.alloca_once(builder, _POINTER)
+        place = builder.bitcast(cgutils.alloca_once_value(builder, args[1]), _POINTER)
+        arguments = (result, error, place)
+        kind = ir.FunctionType(ir.IntType(32), [value.type for value in arguments])
+        builder.call(builder.inttoptr(args[0], kind.as_pointer()), arguments)
+        return builder.load(result)
 
     return types.float64(types.int64, record), codegen
 
@@ -65,12 +74,12 @@ def loader(record: type) -> Any:
     """A function for Numba that loads the record that `call_with` was given."""
     kind = type_of(record)
 
-    @intrinsic
+    @instructions
     def load(typingctx, pointer):  # type: ignore[no-untyped-def]
         def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             place = context.get_value_type(sig.return_type).as_pointer()
             return builder.load(builder.bitcast(args[0], place))
 
-        return kind(types.voidptr), codegen
+        return kind(pointer), codegen
 
     return load

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
-from typing import Annotated, Any, TypeVar, cast, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, TypeVar, cast, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,18 +71,6 @@ def type_of(kind: Any) -> Any:
     return types.Array(getattr(types, name), axes, "C")
 
 
-def types_within(record: type) -> list[Any]:
-    """The types to Numba of all fields of a record and of those within it; of a number its own."""
-    from numba import types
-
-    def within(kind: Any) -> list[Any]:
-        if isinstance(kind, types.NamedTuple):
-            return [inner for field in kind for inner in within(field)]
-        return [kind]
-
-    return within(type_of(record))
-
-
 def records_within(record: type) -> list[type]:
     """A record, and those within it; none for a number."""
     if not hasattr(record, "_fields"):
@@ -106,10 +94,36 @@ def construction(record: Any, names: Iterator[str]) -> str:
     return f"{record.__name__}({fields})"
 
 
-def flattened(record: Any, into: list[Any]) -> None:
-    """Append the fields of a record, and of those within it, to a list."""
-    for value in record:
-        if isinstance(value, tuple):
-            flattened(value, into)
-        else:
-            into.append(value)
+class Leaf(NamedTuple):
+    """A number or an array within an argument: how it is reached, its type, and its axes."""
+
+    path: str
+    kind: str
+    axes: int
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Its type to NumPy."""
+        return np.dtype(_TYPES[self.kind])
+
+
+_NUMBERS = {int: "int64", float: "float64", bool: "boolean"}
+
+
+def leaves(path: str, kind: Any) -> Iterator[Leaf]:
+    """The numbers and arrays of an argument, in the order of the fields of its records.
+
+    Examples
+    --------
+    >>> Pair = NamedTuple("Pair", [("first", int), ("second", Matrix)])
+    >>> [tuple(leaf) for leaf in leaves("pair", Pair)]
+    [('pair[0]', 'int64', 0), ('pair[1]', 'float64', 2)]
+    """
+    if kind in _NUMBERS:
+        yield Leaf(path, _NUMBERS[kind], 0)
+    elif hasattr(kind, "_fields"):
+        for place, inner in enumerate(_kinds(kind)):
+            yield from leaves(f"{path}[{place}]", inner)
+    else:
+        name, axes = kind if isinstance(kind, tuple) else kind.__metadata__
+        yield Leaf(path, name, axes)

@@ -28,10 +28,10 @@ except ImportError:
 else:
     _LOCKS = True
 
-_OWNERS = hasattr(os, "geteuid")
+OWNERS = hasattr(os, "geteuid")
 
 _BEGINNING = b"fastslow compiled code "
-_SUFFIX, _ASIDE = ".code", ".tmp"
+SUFFIX, _ASIDE = ".code", ".tmp"
 
 #: Files not used for so many days are removed, and the longest unused ones beyond so many bytes.
 KEPT_DAYS, KEPT_BYTES = 90, 2**30
@@ -92,8 +92,8 @@ def read(name: str) -> bytes | None:
             try:
                 content = folder.read(name)
             except OSError as error:
-                file = folder.path / f"{name}{_SUFFIX}"
-                _say(f"{file} is not loaded ({_reason(error)}): it is compiled again")
+                file = folder.path / f"{name}{SUFFIX}"
+                say(f"{file} is not loaded ({_reason(error)}): it is compiled again")
                 continue
             if content is not None:
                 return content
@@ -148,7 +148,7 @@ def _wait(descriptor: int, name: str, waiting: Callable[[], None]) -> None:
             fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, byte)
         except (BlockingIOError, PermissionError):
             if time.monotonic() > end:
-                _say(f"{name} is compiled here too: another process has been at it for too long")
+                say(f"{name} is compiled here too: another process has been at it for too long")
                 return
             waiting()
             time.sleep(_PAUSE)
@@ -184,7 +184,7 @@ class _UntrustedError(OSError):
 
 
 def _check(status: os.stat_result, what: str) -> None:
-    if not _OWNERS:
+    if not OWNERS:
         return
     if status.st_uid not in (os.geteuid(), 0):
         raise _UntrustedError(f"the {what} belongs to the user of number {status.st_uid}")
@@ -198,7 +198,7 @@ class _Folder:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.descriptor: int | None = None
-        if _OWNERS:
+        if OWNERS:
             self.descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
             try:
                 _check(os.fstat(self.descriptor), "directory")
@@ -228,7 +228,7 @@ class _Folder:
             os.unlink(self.at(file), dir_fd=self.descriptor)
 
     def read(self, name: str) -> bytes | None:
-        file = name + _SUFFIX
+        file = name + SUFFIX
         try:
             # a pipe in the place of the file must not block
             descriptor = self.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
@@ -239,7 +239,7 @@ class _Folder:
             _check(status, "file")
             if not stat.S_ISREG(status.st_mode):
                 raise _UntrustedError("it is not a file")
-            content = _content(name, stream.read())
+            content = unwrapped(name, stream.read())
         if content is not None and time.time() - status.st_mtime > _DAY:
             # its last use, for `_sweep`
             with contextlib.suppress(OSError):
@@ -251,9 +251,9 @@ class _Folder:
         descriptor = self.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL)
         try:
             with os.fdopen(descriptor, "wb") as stream:
-                stream.write(_BEGINNING + _checksum(name, content) + b"\n" + content)
+                stream.write(wrapped(name, content))
             inside = {"src_dir_fd": self.descriptor, "dst_dir_fd": self.descriptor}
-            os.replace(self.at(aside), self.at(name + _SUFFIX), **inside)  # noqa: PTH105
+            os.replace(self.at(aside), self.at(name + SUFFIX), **inside)  # noqa: PTH105
         except BaseException:
             self.remove(aside)
             raise
@@ -265,12 +265,16 @@ def _checksum(name: str, content: bytes) -> bytes:
     return digest.hexdigest().encode()
 
 
-def _content(name: str, whole: bytes) -> bytes | None:
+def wrapped(name: str, content: bytes) -> bytes:
+    """What is written to a file: the content, and before it a checksum."""
+    return _BEGINNING + _checksum(name, content) + b"\n" + content
+
+
+def unwrapped(name: str, whole: bytes) -> bytes | None:
     """What a file holds; None where that is not what was written under its name."""
     length = len(_BEGINNING) + 64
     content = whole[length + 1 :]
-    beginning = _BEGINNING + _checksum(name, content) + b"\n"
-    return content if whole[: length + 1] == beginning else None
+    return content if whole == wrapped(name, content) else None
 
 
 def _sweep(folder: _Folder) -> None:
@@ -280,14 +284,14 @@ def _sweep(folder: _Folder) -> None:
     # another process may remove them at the same time
     with contextlib.suppress(OSError), os.scandir(where) as entries:
         for entry in entries:
-            if entry.name.endswith((_SUFFIX, _ASIDE)):
+            if entry.name.endswith((SUFFIX, _ASIDE)):
                 status = entry.stat(follow_symlinks=False)
                 used = max(status.st_atime, status.st_mtime)
                 files.append((used, status.st_size, entry.name))
     total, now = 0, time.time()
     for used, size, file in sorted(files, reverse=True):
         total += size
-        days = KEPT_DAYS if file.endswith(_SUFFIX) else 1
+        days = KEPT_DAYS if file.endswith(SUFFIX) else 1
         if total > KEPT_BYTES or now - used > days * _DAY:
             folder.remove(file)
 
@@ -297,10 +301,10 @@ _said: set[str] = set()
 
 def _say_instead(refusals: list[str], instead: str) -> None:
     if refusals:
-        _say(f"{'; '.join(refusals)}: {instead}")
+        say(f"{'; '.join(refusals)}: {instead}")
 
 
-def _say(sentence: str) -> None:
+def say(sentence: str) -> None:
     """Warn once in a process."""
     if sentence not in _said:
         _said.add(sentence)

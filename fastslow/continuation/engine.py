@@ -12,7 +12,7 @@ import numpy as np
 
 from fastslow.compiled.parts import unfused_part
 from fastslow.compiled.pointers import call_address
-from fastslow.continuation.loops import (
+from fastslow.continuation.spaces import (
     CLOSED,
     FULL,
     INTERFACE,

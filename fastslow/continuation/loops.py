@@ -4,193 +4,100 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.compiled.generic import load_loop
-from fastslow.compiled.records import Integers, Matrix, Tensor, Vector, zeros
+from fastslow.compiled.generic import Loop, load_loop
+from fastslow.compiled.records import ComplexMatrix, Flags, Integers, Matrix, Tensor, Vector
+from fastslow.continuation.spaces import (
+    Boxes,
+    Curve,
+    IsolationSpace,
+    NewtonSpace,
+    Region,
+    Stepping,
+    Traced,
+    TraceSpace,
+)
 
 _ENGINE = "fastslow.continuation.engine"
 _EVALUATION = "fastslow.continuation.evaluation"
 _ISOLATION = "fastslow.continuation.isolation"
 
 
-class Curve(NamedTuple):
-    """The generated function of curves, the number of the region, and the parameters."""
-
-    address: int
-    mode: int
-    parameters: Vector
-
-
-class Region(NamedTuple):
-    """Where a curve may go.
-
-    Parameters
-    ----------
-    signs : ndarray, shape (m,)
-        Sign of each h in the region; 0 leaves an interface out.
-    weight : ndarray, shape (n + 1,)
-        Inverse squares of the scales.
-    lower, upper : float
-        Range of the last component.
-    low, high : ndarray, shape (n,)
-        Window of the others.
-    middle : ndarray, shape (n,)
-        Where each of the others is not far away; NaN if it never is.
-    periods : ndarray, shape (n,)
-        Period of each of the others, 0 if there is none.
-    """
-
-    signs: Vector
-    weight: Vector
-    lower: float
-    upper: float
-    low: Vector
-    high: Vector
-    middle: Vector
-    periods: Vector
-
-
-class Stepping(NamedTuple):
-    """How steps are made; ``closing`` says whether a return to the start ends the curve."""
-
-    smallest: float
-    largest: float
-    turn: float
-    tolerance: float
-    iterations: int
-    closing: bool
-
-
-class Traced(NamedTuple):
-    """What `trace` fills in.
-
-    Parameters
-    ----------
-    rows, tangents : ndarray, shape (N, n + 1)
-        Points of the curve and unit tangents (in the weighted norm), the first of which is to
-        be given.
-    in_use : ndarray, shape (1,)
-        The step.
-    progress : ndarray of int64, shape (2,)
-        How many rows there are, and how many steps are tried before the next pause.
-    """
-
-    rows: Matrix
-    tangents: Matrix
-    in_use: Vector
-    progress: Integers
-
-
-class TraceSpace(NamedTuple):
-    """Work space of `trace`."""
-
-    out: Vector
-    matrix: Matrix
-    right: Vector
-    guess: Vector
-    turned: Vector
-    middle_point: Vector
-    h: Vector
-    slope: Vector
-    new_h: Vector
-    new_slope: Vector
-    local: Vector
-
-
-def trace_space(n: int, m: int) -> TraceSpace:
-    """Work space for n states and m interfaces."""
-    size = n + 1
-    shapes = (n * (n + 2) + m * (n + 2), (size, size), *[size] * 4, *[m] * 4, size)
-    return zeros(TraceSpace, *shapes)
-
-
-class NewtonSpace(NamedTuple):
-    """Work space of `newton_from`, `refine` and `survey`: vectors of n + 1 numbers and others."""
-
-    out: Vector
-    matrix: Matrix
-    slopes: Matrix
-    u: Vector
-    right: Vector
-    value: Vector
-    terms: Vector
-    largest: Vector
-    beside: Vector
-    constant: Vector
-
-
-def newton_space(n: int, width: int) -> NewtonSpace:
-    """Work space for n states, and so many numbers that the generated function fills in."""
-    size = n + 1
-    return zeros(NewtonSpace, width, (size, size), (size, size), *[size] * 7)
-
-
-class IsolationSpace(NamedTuple):
-    """Work space of `isolate`; ``most`` is the highest degree."""
-
-    strides: Integers
-    table: Matrix
-    weights: Matrix
-    enlarging: Tensor
-    blossom: Vector
-    conversion: Matrix
-    jacobian: Matrix
-    inverse: Matrix
-    preconditioned: Matrix
-    enlarged: Vector
-    moduli: Vector
-    rounding: Vector
-    centre: Vector
-    deviation: Vector
-    scratch: Vector
-    sizes: Vector
-
-
-def isolation_space(n: int, size: int, most: int) -> IsolationSpace:
-    """Work space for n unknowns and so many coefficients of each polynomial."""
-    square, d = (n, n), most + 1
-    tables = ((d, d), (n + 1, size), (n, d, d), d, (d, d))
-    vectors = (size, size, n, n, n, d, n)
-    return zeros(IsolationSpace, n, *tables, square, square, (n, size), *vectors)
-
-
-#: The arguments of each loop: records, of which all fields are given, and names of others.
-_ARGUMENTS: dict[str, tuple[type | str, ...]] = {
-    "trace": (Curve, Region, Stepping, Traced, TraceSpace),
-    "evaluate": ("address", "modes", "points", "parameters", "out"),
-    "refine": (
-        *(Curve, "u", "scale", "row", "normal", "point", "m", "iterations"),
-        NewtonSpace,
+#: Name, module and arguments of each loop, and the numbers that it returns.
+_LOOPS = [
+    Loop(
+        _ENGINE,
+        "trace",
+        {
+            "curve": Curve, "region": Region, "stepping": Stepping, "traced": Traced,
+            "space": TraceSpace,
+        },
+        results=(int,),
     ),
-    "survey": (
-        Curve,
-        "points",
-        "tangents",
-        "scale",
-        "reach",
-        "branching",
-        "jacobians",
-        NewtonSpace,
+    Loop(
+        _EVALUATION,
+        "evaluate",
+        {"address": int, "modes": Integers, "points": Matrix, "parameters": Vector, "out": Matrix},
     ),
-    "pairs": ("jacobians", "result"),
-    "passing": ("points", "scale", "u", "within", "found", "apart"),
-    "value_at": ("address", "mode", "point", "parameters", "out"),
-    "newton_from": (Curve, "states", "converged", "value", "unit", "iterations", NewtonSpace),
-    "isolate": (
-        *("power", "degrees", "low", "high", "logarithmic", "floor", "tolerance", "budget"),
-        *("large", "small", "share", "stack", "solutions", "clusters", "progress"),
-        IsolationSpace,
+    Loop(
+        _EVALUATION,
+        "value_at",
+        {"address": int, "mode": int, "point": Vector, "parameters": Vector, "out": Vector},
     ),
-}
+    Loop(
+        _EVALUATION,
+        "refine",
+        {
+            "curve": Curve, "u": Vector, "scale": Vector, "row": int, "normal": Vector,
+            "point": Vector, "m": int, "iterations": int, "space": NewtonSpace,
+        },
+        results=(float, float, bool),
+    ),
+    Loop(
+        _EVALUATION,
+        "survey",
+        {
+            "curve": Curve, "points": Matrix, "tangents": Matrix, "scale": Vector, "reach": float,
+            "branching": Vector, "jacobians": Tensor, "space": NewtonSpace,
+        },
+    ),
+    Loop(_EVALUATION, "pairs", {"jacobians": Tensor, "result": ComplexMatrix}),
+    Loop(
+        _EVALUATION,
+        "passing",
+        {
+            "points": Matrix, "scale": Vector, "u": Vector, "within": float, "found": Integers,
+            "apart": Vector,
+        },
+        results=(int,),
+    ),
+    Loop(
+        _EVALUATION,
+        "newton_from",
+        {
+            "curve": Curve, "states": Matrix, "converged": Flags, "value": float, "unit": Vector,
+            "iterations": int, "space": NewtonSpace,
+        },
+    ),
+    Loop(
+        _ISOLATION,
+        "isolate",
+        {
+            "power": Matrix, "degrees": Integers, "low": Matrix, "high": Matrix,
+            "logarithmic": Flags, "floor": Vector, "tolerance": float, "budget": int,
+            "large": int, "small": Flags, "share": float, "stack": Boxes, "solutions": Matrix,
+            "clusters": Tensor, "progress": Integers, "space": IsolationSpace,
+        },
+        results=(int,),
+    ),
+]  # fmt: skip
 
-# how `trace` ends, as in the engine, whose import would bring Numba with it
-FULL, RANGE, INTERFACE, SMALL_STEP, WINDOW, CLOSED = range(6)
-
-#: How a loop returns that is to be called again: its work is done, or a table is full.
-PAUSED, TABLE_FULL = -1, -2
+#: The loops by their names.
+LOOPS = {loop.function: loop for loop in _LOOPS}
 
 #: Work between two pauses, in products: some hundredths of a second.
 WORK = 2**24
@@ -213,18 +120,10 @@ def blocks(count: int, cost: int) -> Iterator[slice]:
 
 @cache
 def loop(name: str) -> Callable[..., Any]:
-    """One of the loops by its name, compiled.
-
-    None returns an array: to make one Numba runs Python, in which an interrupt would be
-    raised and lost.
-    """
-    module = {"trace": _ENGINE, "isolate": _ISOLATION}.get(name, _EVALUATION)
-    return load_loop(module, name, _ARGUMENTS[name])
+    """One of the loops by its name, compiled."""
+    return load_loop(LOOPS[name])
 
 
 def writeable(array: NDArray[Any]) -> NDArray[Any]:
-    """An array that a loop takes: of a read-only one a copy.
-
-    To Numba a read-only array is another type, for which the loop would be compiled again.
-    """
-    return array if array.flags.writeable else array.copy()
+    """An array that a loop takes: of one that is read-only or not contiguous a copy."""
+    return array if array.flags.carray else np.array(array, order="C")

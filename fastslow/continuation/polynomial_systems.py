@@ -11,8 +11,9 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation.loops import PAUSED, TABLE_FULL, WORK, isolation_space, loop
+from fastslow.continuation.loops import WORK, loop
 from fastslow.continuation.ordering import in_order
+from fastslow.continuation.spaces import PAUSED, TABLE_FULL, Boxes, isolation_space
 
 Array = NDArray[np.float64]
 
@@ -195,9 +196,8 @@ def _isolated(
     fixed = {*limits, *bounds, *chart}
     small = np.array([bool(chart) and m not in fixed for m in range(count)])
     capacity = 128 * count + 16
-    stack = tuple(
-        np.empty((capacity, *shape)) for shape in ((count, size), (count,), (count,), (count,))
-    )
+    shapes = ((count, size), (count,), (count,), (count,))
+    stack = Boxes(*(np.empty((capacity, *shape)) for shape in shapes))
     solutions, clusters = np.empty((64, count)), np.empty((64, 2, count))
     progress = np.zeros(6, dtype=np.int64)
     space = isolation_space(count, size, int(max(degrees)))
@@ -208,7 +208,7 @@ def _isolated(
         code = loop("isolate")(
             power, degrees, np.ascontiguousarray(boxes[:, :, 0]),
             np.ascontiguousarray(boxes[:, :, 1]), free, floor, NARROWEST, most,
-            inverse, small, COMPARABLE, stack, solutions, clusters, progress, *space,
+            inverse, small, COMPARABLE, stack, solutions, clusters, progress, space,
         )  # fmt: skip
         if code == TABLE_FULL:
             solutions, clusters = (

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from sympy.polys.domains import ZZ
 from sympy.polys.rings import ring
 
-from fastslow.continuation.loops import blocks, loop, newton_space
+from fastslow.continuation.loops import blocks, loop
 from fastslow.continuation.ordering import in_order
 from fastslow.continuation.polynomial_systems import (
     FARTHEST,
@@ -25,6 +25,7 @@ from fastslow.continuation.polynomial_systems import (
     at_value,
     solve_polynomials,
 )
+from fastslow.continuation.spaces import Curve, newton_space
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.modes import Sides
 from fastslow.diagrams.parametric import (
@@ -594,10 +595,11 @@ class RegionEquations:
                 nearby = 1.0 + 0.1 * generator.standard_normal(rows.shape)
                 starts[1::2] = nearby * distinct[rows, np.arange(n)]
             converged = np.empty(len(starts), dtype=np.bool_)
+            space = newton_space(n, field.compiled.size)
             for s in blocks(len(starts), 100 * (16 * field.compiled.size + n**3)):
                 loop("newton_from")(
-                    field.compiled.address, self.region, field.values, starts[s], converged[s],
-                    value, unit, 100, *newton_space(n, field.compiled.size),
+                    Curve(field.compiled.address, self.region, field.values), starts[s],
+                    converged[s], value, unit, 100, space,
                 )  # fmt: skip
             for state in field.wrapped(starts[converged]):
                 if np.all(np.abs(state) <= FARTHEST * unit) and not self._among(

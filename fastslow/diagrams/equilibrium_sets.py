@@ -255,6 +255,8 @@ class Family:
 
     def _polytope(self, value: float) -> EquilibriumSet | None:
         """Ranges of the states by linear programming, corners by solving for the weights."""
+        from scipy.optimize import linprog
+
         d = self.dimension
         origin, base = self.values(value, *[0.0] * d), self.state(value, *[0.0] * d)
         # one step is the natural unit of a free state
@@ -266,7 +268,6 @@ class Family:
             if ends is None:
                 return None
             return self._interval(value, ends[0] * units[0], ends[1] * units[0])
-        from scipy.optimize import linprog
 
         size = np.maximum(np.abs(rows).max(axis=1), np.finfo(float).tiny)
         system, right = -rows / size[:, None], origin / size
@@ -301,6 +302,8 @@ class Family:
 
     def _pieces(self, value: float) -> list[tuple[float, float]]:
         """Intervals of the free coordinate in which no bound is negative."""
+        from scipy.optimize import brentq
+
         ends: list[float] = []
         if self._polynomials is not None:
             for coefficients in self._polynomials:

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.compiled.fields import CompiledField, compile_field, parameter_array
 from fastslow.continuation.location import REACH, Located, with_condition
-from fastslow.continuation.loops import blocks, loop, newton_space, writeable
+from fastslow.continuation.loops import blocks, loop, writeable
+from fastslow.continuation.spaces import Curve, newton_space
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
@@ -271,10 +272,10 @@ class FrozenField:
         tangents = writeable(np.ascontiguousarray(tangents))
         branching, jacobians = np.empty(len(points)), np.empty((len(points), self.n, self.n))
         space = newton_space(self.n, self.compiled.size)
+        curve = Curve(self.compiled.address, region, self.values)
         for s in blocks(len(points), 48 * self.compiled.size + 2 * self.n**3):
             loop("survey")(
-                self.compiled.address, region, self.values, points[s], tangents[s], scale, REACH,
-                branching[s], jacobians[s], *space,
+                curve, points[s], tangents[s], scale, REACH, branching[s], jacobians[s], space,
             )  # fmt: skip
         return branching, jacobians
 
@@ -321,8 +322,8 @@ class FrozenField:
         point = writeable(start if point is None else point)
         u = start.copy()
         residual, size, converged = loop("refine")(
-            self.compiled.address, region, self.values, u, scale, row, normal, point,
-            self.compiled.m, 40, *newton_space(self.n, self.compiled.size),
+            Curve(self.compiled.address, region, self.values), u, scale, row, normal, point,
+            self.compiled.m, 40, newton_space(self.n, self.compiled.size),
         )  # fmt: skip
         if converged:
             return Located(u, residual, True, _NONE, size)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation import loops
+from fastslow.continuation import loops, spaces
 from fastslow.continuation.location import Located
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.fields import FrozenField
@@ -136,26 +136,26 @@ def walk(
             pieces.append(back)
             return Walk(tuple(pieces), tuple(joins), _closed(), closed=True)
         met = None
-        if status in (loops.INTERFACE, loops.SMALL_STEP):
+        if status in (spaces.INTERFACE, spaces.SMALL_STEP):
             end = two_fold_ahead(field, region, u, window.scale)
             inside = end is not None and window.lower <= end[-1] <= window.upper
             if end is not None and inside and window.contains(end):
                 pieces.append(Piece(region, *cut_at_two_fold(u, tangents, end, window.scale)))
                 return Walk(tuple(pieces), tuple(joins), _two_fold(field, region, end))
-        if status == loops.INTERFACE:
+        if status == spaces.INTERFACE:
             met = _first_interface(field, region, u, tangents, window)
             if met is None:
-                status = loops.SMALL_STEP
+                status = spaces.SMALL_STEP
                 u, tangents = u[:-1], tangents[:-1]
             elif not window.contains(met[1]):
-                status = loops.WINDOW
+                status = spaces.WINDOW
             elif not window.lower <= met[1][-1] <= window.upper:
-                status = loops.RANGE
-        if status in (loops.RANGE, loops.WINDOW):
+                status = spaces.RANGE
+        if status in (spaces.RANGE, spaces.WINDOW):
             u, tangents, status = _cut(field, region, u, tangents, window, status)
-        if status != loops.INTERFACE or met is None:
+        if status != spaces.INTERFACE or met is None:
             pieces.append(Piece(region, u, tangents))
-            closed = status == loops.CLOSED
+            closed = status == spaces.CLOSED
             if closed:
                 u[-1] = nearest_copy(first.u[0], u[-1], np.append(periods, 0.0))
                 tangents[-1] = first.tangents[0]
@@ -214,27 +214,31 @@ def _traced(
         u[0], along[0] = start, tangent
         in_use = np.array([max(step, 10 * continuation.smallest_step)])
         progress = np.array([1, 0])
-        status = loops.PAUSED
-        space = loops.trace_space(len(start) - 1, len(signs))
-        while status == loops.PAUSED:
+        status = spaces.PAUSED
+        space = spaces.trace_space(len(start) - 1, len(signs))
+        curve = spaces.Curve(field.compiled.address, region, field.values)
+        limits = spaces.Region(
+            signs, window.weight, window.lower, window.upper, low, high,
+            window.states.middle(), field.periods,
+        )  # fmt: skip
+        stepping = spaces.Stepping(
+            continuation.smallest_step, largest, continuation.largest_turn,
+            continuation.tolerance, continuation.iterations, closing and not rows,
+        )  # fmt: skip
+        traced = spaces.Traced(u, along, in_use, progress)
+        while status == spaces.PAUSED:
             progress[1] = max(1, loops.WORK // (8 * len(start) ** 3 + 16 * field.compiled.size))
-            status = loops.loop("trace")(
-                field.compiled.address, region, field.values, signs, window.weight,
-                window.lower, window.upper, low, high, window.states.middle(), field.periods,
-                continuation.smallest_step, largest, continuation.largest_turn,
-                continuation.tolerance, continuation.iterations, closing and not rows,
-                u, along, in_use, progress, *space,
-            )  # fmt: skip
+            status = loops.loop("trace")(curve, limits, stepping, traced, space)
         u, along, step = u[: progress[0]], along[: progress[0]], float(in_use[0])
         missed = False
-        if status == loops.RANGE:
+        if status == spaces.RANGE:
             end, _, ended = _cut(field, region, u.copy(), along.copy(), window, status)
-            missed = ended == loops.RANGE and not _at_end(end[-1], window)
+            missed = ended == spaces.RANGE and not _at_end(end[-1], window)
         if missed and finer < FINEST and len(u) > 1:
             finer += 1
             step = continuation.largest_step / FINER**finer
             kept = len(u) - 2
-        elif status == loops.FULL and finer and len(u) < left:
+        elif status == spaces.FULL and finer and len(u) < left:
             finer, kept = 0, len(u) - 1
         else:
             break
@@ -398,16 +402,16 @@ def _cut(
     """Replace the last row, beyond the range or the window, by the first point on an edge."""
     if not window.contains(u[-1]):
         edge = _on_window(field, region, u, tangents, window)
-        if edge is None and status == loops.WINDOW:
-            return u[:-1], tangents[:-1], loops.WINDOW
+        if edge is None and status == spaces.WINDOW:
+            return u[:-1], tangents[:-1], spaces.WINDOW
         if edge is not None and window.lower <= edge[-1] <= window.upper:
             if np.abs((edge - u[-2]) / window.scale).max() < 1e-13:
-                return u[:-1], tangents[:-1], loops.WINDOW
+                return u[:-1], tangents[:-1], spaces.WINDOW
             tangent = field.tangent(region, edge, window.weight)[0]
             u[-1], tangents[-1] = edge, _oriented(tangent, tangents[-1], window)
-            return u, tangents, loops.WINDOW
+            return u, tangents, spaces.WINDOW
     u, tangents = _cut_at_range(field, region, u, tangents, window)
-    return u, tangents, loops.RANGE
+    return u, tangents, spaces.RANGE
 
 
 def _on_window(
@@ -512,22 +516,22 @@ def _outcome(
     continuation: Continuation,
 ) -> Outcome:
     where = _where(field, u)
-    if status == loops.RANGE and not _at_end(u, window):
+    if status == spaces.RANGE and not _at_end(u, window):
         return Outcome(
             "edge of domain",
             f"followed to {where}; no equilibrium was found at the end of the range itself, where "
             "the rates may not be defined.",
             False,
         )
-    if status == loops.RANGE:
+    if status == spaces.RANGE:
         return Outcome(
             "end of range", f"reached {field.parameter} = {u[-1]:g}, the end of the range.", True
         )
-    if status == loops.CLOSED:
+    if status == spaces.CLOSED:
         return _closed()
-    if status == loops.WINDOW:
+    if status == spaces.WINDOW:
         return _left(field, u, window)
-    if status == loops.FULL:
+    if status == spaces.FULL:
         return _full(field, u, continuation)
     return Outcome(
         "step too small",

@@ -5,10 +5,25 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from fastslow.compiled.parts import unfused_part
 
 
-@njit(error_model="numpy")
+@unfused_part
+def count_below(chain, value, included):
+    """How many vertices have a last coordinate below a value, or at it where that is included."""
+    last = chain.shape[1] - 1
+    low, high = 0, chain.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if chain[middle, last] < value or (included and chain[middle, last] == value):
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@unfused_part
 def nearness_to_chain(points, chain, radius, near):
     """How much nearer than a radius points are to a curve whose last coordinate does not fall.
 
@@ -28,8 +43,8 @@ def nearness_to_chain(points, chain, radius, near):
         near[i] = -radius
         value = points[i, last]
         # a chord may reach farther than its ends: one vertex more on both sides
-        first = max(np.searchsorted(chain[:, last], value - radius) - 1, 0)
-        stop = min(np.searchsorted(chain[:, last], value + radius, side="right") + 1, count)
+        first = max(count_below(chain, value - radius, False) - 1, 0)
+        stop = min(count_below(chain, value + radius, True) + 1, count)
         if chain[first, last] >= value + radius or chain[stop - 1, last] <= value - radius:
             continue
         least, nearest = np.inf, -1

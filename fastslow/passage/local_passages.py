@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property
-from typing import Any, NamedTuple
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.compiled.generic import load_loop
-from fastslow.compiled.records import (
-    ComplexMatrix,
-    ComplexTensor,
-    ComplexVector,
-    Matrix,
-    Vector,
-    zeros,
-)
-from fastslow.passage.drift_laws import NODES, DriftLaw, drift_law
+from fastslow.passage.drift_laws import DriftLaw, drift_law
+from fastslow.passage.loops import PASS_THROUGH
+from fastslow.passage.radau_passages import End, Law, Motion, space_for
 from fastslow.passage.sites import TURN, Site
 from fastslow.results.drifts import Drift
 
@@ -37,115 +29,6 @@ REGIONS = 12
 
 #: Why a passage does not end, as its integration tells.
 TOO_LONG, FAILED = "it takes longer than expected", "the integration failed"
-
-_NONE, _NO_SUMS = np.empty(0), np.empty((0, NODES))
-
-
-class Motion(NamedTuple):
-    """The motion within a region, for compiled code.
-
-    Parameters
-    ----------
-    address, region : int
-        Of the frozen model's compiled function.
-    parameters : ndarray
-    width : int
-        Of the function's output.
-    point : ndarray, shape (n + 1,)
-        The special point (x*, w*).
-    signs : ndarray
-        Of the interface functions within the region.
-    """
-
-    address: int
-    region: int
-    parameters: Array
-    width: int
-    point: Array
-    signs: Array
-
-
-class Law(NamedTuple):
-    """w' of a drift, for compiled code: the sum of what is given.
-
-    Parameters
-    ----------
-    rate, change : float
-    gradient : ndarray, shape (n + 1,)
-    breaks, coefficients : ndarray
-        A table over time, empty for none.
-    address : int
-        Of a compiled function, 0 for none.
-    numbers : ndarray
-        Its parameters.
-    """
-
-    rate: float
-    change: float
-    gradient: Array
-    breaks: Array = _NONE
-    coefficients: Array = _NO_SUMS
-    address: int = 0
-    numbers: Array = _NONE
-
-
-class Space(NamedTuple):
-    """Work space of compiled code.
-
-    Parameters
-    ----------
-    out, inputs, slopes
-        Of the compiled functions.
-    jacobian, factors, given, moved
-        Of the equations of a step.
-    stages, increments, kept : ndarray, shape (STAGES, n + 1)
-        Rates and increments at the stages of a step, and increments of the last one.
-    start, place, rates, scale, speeds : ndarray, shape (n + 1,)
-    heights : ndarray, shape (STAGES, count + 1)
-    here, floor, beyond : ndarray, shape (count + 1,)
-        Of the interfaces and of what ends the passage.
-    """
-
-    out: Vector
-    inputs: Vector
-    slopes: Vector
-    jacobian: Matrix
-    factors: ComplexTensor
-    given: ComplexVector
-    moved: ComplexMatrix
-    stages: Matrix
-    increments: Matrix
-    kept: Matrix
-    start: Vector
-    place: Vector
-    rates: Vector
-    scale: Vector
-    speeds: Vector
-    heights: Matrix
-    here: Vector
-    floor: Vector
-    beyond: Vector
-
-
-class End(NamedTuple):
-    """What ends a passage, for compiled code.
-
-    Parameters
-    ----------
-    kind : int
-        0 an interface only, 1 that w passes w*, 2 a turn of w, 3 a level.
-    number : int
-        Of the state that reaches a level.
-    height : float
-        Of the level above the point.
-    way : float
-        Direction of the drift.
-    """
-
-    kind: int
-    number: int
-    height: float
-    way: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,26 +210,16 @@ def _leg(
         np.ascontiguousarray(field.signs[start.region, :count]),
     )
     z, times = np.array(start.z, dtype=float), np.array([start.time, final], dtype=float)
-    met, status = _passes()(
+    met, status = load_loop(PASS_THROUGH)(
         motion,
         speed.numbers(start.time, final),
         _end(stop, way),
         z,
         times,
         np.append(site.unit, reach),
-        _space(n, count, field.compiled.size),
+        space_for(n, count, field.compiled.size),
     )
     return Place(start.region, z, float(times[0])), met, ("", TOO_LONG, FAILED)[status]
-
-
-def _space(n: int, count: int, width: int) -> Space:
-    """Work space for n states and so many interfaces."""
-    from fastslow.simulation.radau import STAGES, VALUES
-
-    size, pairs = n + 1, len(VALUES)
-    shapes = (width, size + 1, size + 2, (size, size), (pairs, size, size + 1), size, (pairs, size))
-    stages, ends = [(STAGES, size)] * 3, [count + 1] * 3
-    return zeros(Space, *shapes, *stages, *[size] * 5, (STAGES, count + 1), *ends)
 
 
 def _end(stop: Event | None, way: float) -> End:
@@ -358,13 +231,6 @@ def _end(stop: Event | None, way: float) -> End:
     if isinstance(stop.level, tuple):
         return End(3, stop.level[0], float(stop.level[1]), way)
     return End(0, 0, 0.0, way)
-
-
-@cache
-def _passes() -> Callable[..., Any]:
-    """The compiled loop over steps."""
-    arguments = ("motion", "law", "end", "z", "times", "unit", "space")
-    return load_loop("fastslow.passage.radau_passages", "pass_through", arguments)
 
 
 def reached_delay(

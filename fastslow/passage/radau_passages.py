@@ -10,11 +10,20 @@ of another length ends, so that it is as accurate as the steps are.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from fastslow.compiled.parts import part
 from fastslow.compiled.pointers import call_address
+from fastslow.compiled.records import (
+    ComplexMatrix,
+    ComplexTensor,
+    ComplexVector,
+    Matrix,
+    Vector,
+    zeros,
+)
 from fastslow.simulation.matrices import factorise_in_place, solve_in_place
 from fastslow.simulation.polynomials import EPSILON
 from fastslow.simulation.radau import BETWEEN, INTO, OUT_OF, POWERS, STAGES, VALUES, WITHIN, C
@@ -43,6 +52,121 @@ INTERFACES, PASSING, TURNING, LEVEL = range(4)
 
 #: How it went.
 ENDED, TOO_LONG, FAILED = range(3)
+
+
+class Motion(NamedTuple):
+    """The motion within a region, for compiled code.
+
+    Parameters
+    ----------
+    address, region : int
+        Of the frozen model's compiled function.
+    parameters : ndarray
+    width : int
+        Of the function's output.
+    point : ndarray, shape (n + 1,)
+        The special point (x*, w*).
+    signs : ndarray
+        Of the interface functions within the region.
+    """
+
+    address: int
+    region: int
+    parameters: Vector
+    width: int
+    point: Vector
+    signs: Vector
+
+
+class Law(NamedTuple):
+    """w' of a drift, for compiled code: the sum of what is given.
+
+    Parameters
+    ----------
+    rate, change : float
+    gradient : ndarray, shape (n + 1,)
+    breaks, coefficients : ndarray
+        A table over time, empty for none.
+    address : int
+        Of a compiled function, 0 for none.
+    numbers : ndarray
+        Its parameters.
+    """
+
+    rate: float
+    change: float
+    gradient: Vector
+    breaks: Vector = np.empty(0)
+    coefficients: Matrix = np.empty((0, 0))
+    address: int = 0
+    numbers: Vector = np.empty(0)
+
+
+class Space(NamedTuple):
+    """Work space of compiled code.
+
+    Parameters
+    ----------
+    out, inputs, slopes
+        Of the compiled functions.
+    jacobian, factors, given, moved
+        Of the equations of a step.
+    stages, increments, kept : ndarray, shape (STAGES, n + 1)
+        Rates and increments at the stages of a step, and increments of the last one.
+    start, place, rates, scale, speeds : ndarray, shape (n + 1,)
+    heights : ndarray, shape (STAGES, count + 1)
+    here, floor, beyond : ndarray, shape (count + 1,)
+        Of the interfaces and of what ends the passage.
+    """
+
+    out: Vector
+    inputs: Vector
+    slopes: Vector
+    jacobian: Matrix
+    factors: ComplexTensor
+    given: ComplexVector
+    moved: ComplexMatrix
+    stages: Matrix
+    increments: Matrix
+    kept: Matrix
+    start: Vector
+    place: Vector
+    rates: Vector
+    scale: Vector
+    speeds: Vector
+    heights: Matrix
+    here: Vector
+    floor: Vector
+    beyond: Vector
+
+
+class End(NamedTuple):
+    """What ends a passage, for compiled code.
+
+    Parameters
+    ----------
+    kind : int
+        0 an interface only, 1 that w passes w*, 2 a turn of w, 3 a level.
+    number : int
+        Of the state that reaches a level.
+    height : float
+        Of the level above the point.
+    way : float
+        Direction of the drift.
+    """
+
+    kind: int
+    number: int
+    height: float
+    way: float
+
+
+def space_for(n: int, count: int, width: int) -> Space:
+    """Work space for n states and so many interfaces."""
+    size, pairs = n + 1, len(VALUES)
+    shapes = (width, size + 1, size + 2, (size, size), (pairs, size, size + 1), size, (pairs, size))
+    stages, ends = [(STAGES, size)] * 3, [count + 1] * 3
+    return zeros(Space, *shapes, *stages, *[size] * 5, (STAGES, count + 1), *ends)
 
 
 @part

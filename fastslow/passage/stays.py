@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.compiled.generic import load_loop
 from fastslow.passage.extents import extents_of
+from fastslow.passage.loops import NEARNESS
 from fastslow.passage.sheets import Course
 from fastslow.passage.slow_quantities import SlowQuantity
 from fastslow.results.angles import apart, nearest_copy, periods_of
@@ -109,7 +109,7 @@ class Measured:
             scaled = nearest_copy(scaled, place, self.periods)
         points = np.column_stack([scaled, slow / self.span])
         near = np.empty(len(points))
-        _nearness()(points, self.curves[course], self.radius, near)
+        load_loop(NEARNESS)(points, self.curves[course], self.radius, near)
         return near
 
     def way(self, old: int, new: int) -> Array:
@@ -175,13 +175,6 @@ def _resampled(curve: Array) -> Array:
     along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
     even = np.linspace(0.0, along[-1], POINTS)
     return np.column_stack([np.interp(even, along, column) for column in curve.T])
-
-
-@cache
-def _nearness() -> Callable[..., None]:
-    """The compiled loop over points."""
-    arguments = ("points", "chain", "radius", "near")
-    return load_loop("fastslow.passage.chain_distances", "nearness_to_chain", arguments)
 
 
 def products(one: Array, other: Array) -> Array:

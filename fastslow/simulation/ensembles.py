@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import finite, flag, instance, mapping, takes, text, whole
 from fastslow.compiled.generic import load_loop
-from fastslow.compiled.records import flattened
 from fastslow.compiled.series import CompiledSeries
 from fastslow.compiled.steps import CompiledSteps, compile_steps
 from fastslow.model.derived import once, partition_of
@@ -31,7 +30,8 @@ from fastslow.results.regimes import (
 )
 from fastslow.simulation.driver import OUT_OF_WORK, REACHED_END
 from fastslow.simulation.grouping import alike
-from fastslow.simulation.lanes import LEFT, Pool, Runs, pool_for
+from fastslow.simulation.lanes import LEFT, Runs, pool_for
+from fastslow.simulation.loops import DRIVE_MANY
 from fastslow.simulation.many_arguments import (
     periods_of,
     spans_of,
@@ -57,7 +57,7 @@ from fastslow.simulation.trajectories import (
     together_of,
     vanishing_of,
 )
-from fastslow.simulation.workspace import MODE, STEPS, Workspace, beginnings, workspace_for
+from fastslow.simulation.workspace import MODE, STEPS, beginnings, workspace_for
 
 Floats = NDArray[np.float64]
 
@@ -450,7 +450,7 @@ def _run(
     places, carried, whole = beginnings(spans[:, 0], starts, compiled.n_forcing, problem.rules)
     codes = np.empty(count, dtype=np.int64)
     samples = np.full((count, n_columns, times.shape[1]), np.nan)
-    many = _many_loop()
+    many = load_loop(DRIVE_MANY)
     stops = spans.copy()
     runs = Runs(
         values, stops, since, times, samples, extremes, hits, seen, places, carried, whole, codes
@@ -469,13 +469,12 @@ def _run(
 
     def advance(chunk: tuple[int, int]) -> Iterator[int]:
         pool = pool_for(problem, lanes.regions, values.shape[1], times.shape[1], count)
-        space: list[Any] = []
-        flattened(workspace_for(problem, compiled.n_rows), space)
+        workspace = workspace_for(problem, compiled.n_rows)
         pace = Pace(compiled.n_rows, compiled.order)
         while True:
             pool.progress[LEFT] = pace.begin()
-            given = (*with_late_code(problem), lanes.address, lanes.regions)
-            code = many(*given, *runs, *pool, *space, *chunk)
+            given = with_late_code(problem)
+            code = many(given, lanes.address, lanes.regions, runs, pool, workspace, *chunk)
             if code == REACHED_END:
                 return
             if stopping.is_set():
@@ -519,9 +518,3 @@ def _bar(count: int, shown: bool) -> Any:
     from tqdm import tqdm
 
     return tqdm(total=count, disable=not shown, unit="run")
-
-
-def _many_loop() -> Callable[..., Any]:
-    """The compiled loop over trajectories."""
-    arguments = (Problem, int, int, Runs, Pool, Workspace, int, int)
-    return load_loop("fastslow.simulation.lanes", "drive_many", arguments, typed=True)

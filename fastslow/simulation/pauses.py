@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import time
 
-from fastslow.compiled.late import address_of
+from fastslow.compiled.generic import load_address
 from fastslow.simulation.driver import NEEDS_COLLOCATION, NEEDS_RADAU
+from fastslow.simulation.loops import COLLOCATION, RADAU
 from fastslow.simulation.problems import Problem
 
 #: Seconds between two pauses, about.
@@ -75,8 +76,6 @@ def provide(code: int, n_fast: int) -> None:
         States that implicit steps may be tried for, 0 if none.
     """
     if code == NEEDS_RADAU or n_fast:
-        module = "fastslow.simulation.radau"
-        _late[NEEDS_RADAU] = address_of(module, "radau_step", "RadauStep")
+        _late[NEEDS_RADAU] = load_address(RADAU)
     if code == NEEDS_COLLOCATION:
-        module = "fastslow.simulation.collocation"
-        _late[NEEDS_COLLOCATION] = address_of(module, "collocate", "CollocationStep")
+        _late[NEEDS_COLLOCATION] = load_address(COLLOCATION)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import finite, flag, instance, positive, takes, text
 from fastslow.compiled.generic import load_loop
-from fastslow.compiled.records import flattened
 from fastslow.compiled.series import CompiledSeries, compile_series
 from fastslow.model.derived import KEPT, once, partition_of, sloped, timed
 from fastslow.model.invariance import factor_states, states_together
@@ -31,6 +30,7 @@ from fastslow.simulation.arguments import (
 )
 from fastslow.simulation.driver import OUT_OF_WORK, TABLE_FULL
 from fastslow.simulation.implicit_steps import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
+from fastslow.simulation.loops import DRIVE
 from fastslow.simulation.pauses import Pace, provide, with_late_code
 from fastslow.simulation.problems import Problem, Record, Run
 from fastslow.simulation.radau import RADAU_ORDER
@@ -158,11 +158,11 @@ def simulate(
     tables = _memory.taken(compiled.n_states, stride)
     workspace = _memory.workspace(prepared)
     offsets = np.empty(len(times))
-    loop, pace = drive_loop(), Pace(compiled.n_rows, compiled.order)
+    loop, pace = load_loop(DRIVE), Pace(compiled.n_rows, compiled.order)
     while True:
         counted[WORK] = pace.begin()
-        record = (times, offsets, sampled, *tables, *_LISTED)
-        code = loop(*with_late_code(problem), *run, *record, *workspace, 0)
+        record = Record(times, offsets, sampled, *tables, *_LISTED)
+        code = loop(with_late_code(problem), run, record, workspace, 0)
         if code == OUT_OF_WORK:
             pace.end()
         elif code == TABLE_FULL:
@@ -359,16 +359,15 @@ class _Memory(threading.local):
 
     def __init__(self) -> None:
         self.free = [np.empty(0) for _ in _Tables._fields]
-        self.workspaces: dict[tuple[int, ...], list[Any]] = {}
+        self.workspaces: dict[tuple[int, ...], Workspace] = {}
 
-    def workspace(self, prepared: Prepared) -> list[Any]:
-        """The fields of a work space, which a run gives back under its shape."""
+    def workspace(self, prepared: Prepared) -> Workspace:
+        """Work space, which a run gives back under its shape."""
         found = self.workspaces.pop(prepared.shape, None)
         if found is None:
             # of other models there may be many
             self.workspaces.clear()
-            found = []
-            flattened(workspace_for(prepared.problem, prepared.compiled.n_rows), found)
+            found = workspace_for(prepared.problem, prepared.compiled.n_rows)
         return found
 
     def taken(self, n_states: int, stride: int) -> _Tables:
@@ -453,10 +452,3 @@ def error_rules(model: Model, resolved: Resolved, compiled: CompiledSeries) -> N
         elif name not in vanishing:
             lasting[i] = FORGETTING
     return rules_of(fixed, lasting, compiled.n_forcing, compiled.n_interfaces)
-
-
-def drive_loop() -> Callable[..., Any]:
-    """The compiled stepping loop."""
-    return load_loop(
-        "fastslow.simulation.driver", "drive", (Problem, Run, Record, Workspace, int), typed=True
-    )

@@ -1,4 +1,4 @@
-"""Compiled functions in forks of a process that has imported Numba and has no threads."""
+"""Compiled functions in forks of a process that has no threads."""
 
 import ctypes
 import json
@@ -6,12 +6,7 @@ import os
 import traceback
 import warnings
 
-from numba import cfunc
-from numba.core.compiler import Compiler
-
 from fastslow.compiled import model_code, store
-from fastslow.compiled.generated import _compiled, compile_callback
-from fastslow.compiled.pointers import SIGNATURE
 
 CALL = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 3)
 compiled_here = []
@@ -23,37 +18,23 @@ def source(number=1):
 
 def use(number=1):
     """Value of a compiled function, read or compiled anew."""
-    _compiled.clear()
-    inputs, out = (ctypes.c_double * 1)(2.0), (ctypes.c_double * 1)()
-    CALL(compile_callback(source(number), "field", SIGNATURE))(0, inputs, None, out)
-    return out[0] - 6.0
-
-
-def use_model(number=1):
-    """The same of code as models have it, made without Numba."""
     model_code._addresses.clear()
     inputs, out = (ctypes.c_double * 1)(2.0), (ctypes.c_double * 1)()
     CALL(model_code.load_function(source(number), "field"))(0, inputs, None, out)
     return out[0] - 6.0
 
 
-original, original_code = Compiler.compile_extra, model_code.object_code
+original = model_code.object_code
 
 
-def counted(self, func):
-    compiled_here.append(func.__qualname__)
-    return original(self, func)
-
-
-def counted_code(build):
-    compiled_here.append("field")
-    return original_code(build)
+def counted(build):
+    compiled_here.append(build)
+    return original(build)
 
 
 def prepare():
-    """Compile once, as the first time takes long, and count what is compiled from then on."""
-    cfunc(SIGNATURE)(lambda mode, inputs, parameters, W: None)
-    Compiler.compile_extra, model_code.object_code = counted, counted_code
+    """Count what is compiled from now on."""
+    model_code.object_code = counted
 
 
 class Child:

@@ -5,7 +5,6 @@ Run as ``python -m tests.compiled.store_scenarios``: prints what each scenario f
 
 import json
 import os
-import pickle
 import resource
 import shutil
 import signal
@@ -14,9 +13,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from numba.core.compiler import Compiler
-
-from fastslow.compiled import store
+from fastslow.compiled import model_code, store
 from tests.compiled.forks import Child, counted, prepare, run, use
 
 STRANGER, NOBODY = 65534, 54321  # the second is in no table of users
@@ -36,13 +33,13 @@ def modes(folder, umask):
     return first, again, oct(place.stat().st_mode & 0o777), files(place)
 
 
-def slowly(self, func):
+def slowly(build):
     time.sleep(0.5)
-    return counted(self, func)
+    return counted(build)
 
 
 def use_slowly():
-    Compiler.compile_extra = slowly
+    model_code.object_code = slowly
     return use()
 
 
@@ -143,23 +140,17 @@ def shared(folder):
     return [loaded, missing, again, homeless, hidden]
 
 
-class Planted:
-    def __init__(self, canary):
-        self.canary = canary
-
-    def __reduce__(self):
-        return os.system, (f"touch {self.canary}",)
-
-
-def plant(folder, canary, spoil):
-    """A directory with a file of the right name and checksum that would leave a trace."""
+def plant(folder, spoil):
+    """A directory with a file of the right name and checksum, of another function."""
+    elsewhere = folder.parent / "elsewhere"
+    run(use, 41, FASTSLOW_CACHE=elsewhere)
     run(use, FASTSLOW_CACHE=folder)
-    (file,) = folder.glob("*.code")
-    content = pickle.dumps(Planted(canary))
-    file.write_bytes(store._BEGINNING + store._checksum(file.stem, content) + b"\n" + content)
+    (file,), (other,) = folder.glob("*.code"), elsewhere.glob("*.code")
+    content = store.unwrapped(other.stem, other.read_bytes())
+    file.write_bytes(store.wrapped(file.stem, content))
     spoil(folder, file)
     result = run(use, FASTSLOW_CACHE=folder, HOME=folder.parent)
-    return result, canary.exists()
+    return result, result.get("value") == 41.0
 
 
 def planted(folder):
@@ -184,10 +175,10 @@ def planted(folder):
     for spoil in (belongs_to_stranger, file_of_stranger, open_to_all, file_open_to_group, link):
         place = folder / spoil.__name__ / "cache"
         place.parent.mkdir()
-        found[spoil.__name__] = plant(place, place.parent / "canary", spoil)
+        found[spoil.__name__] = plant(place, spoil)
     place = folder / "own" / "cache"
     place.parent.mkdir()
-    found["own"] = plant(place, place.parent / "canary", lambda *_: None)
+    found["own"] = plant(place, lambda *_: None)
     return found
 
 
@@ -220,7 +211,7 @@ def locations(folder):
 
 def use_on_full_disk():
     # a file may not grow beyond this; Python ignores the signal
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
     return [use(1), use(2)]
 
 

@@ -4,12 +4,12 @@ import signal
 import weakref
 
 import pytest
-from numba import float64, njit
+from numba import njit
 from numba.core import event
+from numba.core.compiler import Compiler
 from numba.core.typing.context import BaseContext
 
-from fastslow.compiled.compiler import KeptCompiler, watched_passes
-from fastslow.compiled.generated import compile_loop
+from fastslow.compiled.loop_compiler import compiled_object, watched_passes
 from fastslow.compiled.signals import deferring_signals
 
 
@@ -112,9 +112,9 @@ def test_what_an_interrupted_compilation_leaves_is_not_forgotten(monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(BaseContext, "_insert_global", watched)
-    monkeypatch.setattr(KeptCompiler, "compile_extra", stopped)
+    monkeypatch.setattr(Compiler, "compile_extra", stopped)
     for _ in range(3):
         with pytest.raises(KeyboardInterrupt):
-            compile_loop("def tripled(x):\n    return 3.0 * x\n", "tripled", (float64,))
+            compiled_object("def tripled(slots):\n    return 3 * slots[0]\n", "tripled")
     gc.collect()
     assert disposed == []

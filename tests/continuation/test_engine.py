@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fastslow as fs
-from fastslow.compiled.generic import load_loop
+from fastslow.compiled.generic import Loop, load_loop
+from fastslow.compiled.records import Matrix, Vector
 from fastslow.continuation import engine
 from fastslow.continuation.location import (
     branch_point,
@@ -16,13 +17,16 @@ from fastslow.continuation.location import (
     turning_pair,
     with_condition,
 )
-from fastslow.continuation.loops import loop, newton_space
+from fastslow.continuation.loops import loop
+from fastslow.continuation.spaces import Curve, newton_space
 from fastslow.diagrams.fields import FrozenField
+
+#: The compiled elimination, of which loops are made.
+SOLVE = Loop("fastslow.continuation.engine", "solve", {"matrix": Matrix, "right": Vector}, (bool,))
 
 
 def solve(matrix, right):
-    """The compiled elimination, of which loops are made."""
-    return load_loop("fastslow.continuation.engine", "solve", ("matrix", "right"))(matrix, right)
+    return load_loop(SOLVE)(matrix, right)
 
 
 @settings(deadline=None)
@@ -103,8 +107,8 @@ def test_the_compiled_loop_tells_what_has_not_converged(steps):
     compiled = field.compiled
     u, normal = np.array([1e6 + 1, 0.0]), np.array([0.0, 1.0])
     _, _, converged = loop("refine")(
-        compiled.address, 0, field.values, u, np.ones(2), -1, normal, u.copy(),
-        compiled.m, steps, *newton_space(1, compiled.size),
+        Curve(compiled.address, 0, field.values), u, np.ones(2), -1, normal, u.copy(),
+        compiled.m, steps, newton_space(1, compiled.size),
     )  # fmt: skip
     assert converged == (steps == 50)
     assert abs(u[0] - 1e6) < (1e-6 if converged else 1e-3)
@@ -116,10 +120,9 @@ def test_newton_s_method_does_not_converge_where_the_slope_vanishes():
     field = FrozenField(fs.Model({x: x**3 - 5 * x**2 + p}, parameters={p: 0}), "p")
     compiled = field.compiled
     starts, converged = np.array([[0.0], [4.9]]), np.zeros(2, dtype=bool)
-    loop("newton_from")(
-        compiled.address, 0, field.values, starts, converged, 0.0, np.ones(1), 100,
-        *newton_space(1, compiled.size),
-    )  # fmt: skip
+    curve = Curve(compiled.address, 0, field.values)
+    space = newton_space(1, compiled.size)
+    loop("newton_from")(curve, starts, converged, 0.0, np.ones(1), 100, space)
     assert converged.tolist() == [False, True]
     np.testing.assert_allclose(starts, [[0.0], [5.0]], atol=1e-12)
 
@@ -187,7 +190,7 @@ def test_a_cubic_that_falls_and_then_rises_may_dip_below_zero():
         a, b = 2 * (h0 - h1) + s0 + s1, 3 * (h1 - h0) - 2 * s0 - s1
         least = (((a * places + b) * places + s0) * places + h0).min()
         if abs(least) > 1e-5 and h1 > 0:
-            assert engine._dips.py_func(h0, s0, h1, s1) == (least < 0)
+            assert engine._dips(h0, s0, h1, s1) == (least < 0)
             seen.add((bool(least < 0), k % 4 == 0))
     assert len(seen) == 4
 

@@ -4,7 +4,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from fastslow.compiled.generic import load_loop
+from fastslow.compiled.generic import Loop, load_loop
+from fastslow.compiled.records import Matrix, Vector
 from fastslow.continuation.loops import loop
 
 GENERATOR = np.random.default_rng(7)
@@ -26,11 +27,17 @@ def passed(points, scale, u, within):
     return found[: loop("passing")(points, scale, u, within, found, np.empty(len(found)))]
 
 
+DISTANCE = Loop(
+    "fastslow.continuation.evaluation",
+    "signed_distance",
+    {"matrix": Matrix, "least": Vector, "right": Vector},
+    results=(float,),
+)
+
+
 def signed_distance(matrix, least):
     """As the loop that surveys rows computes it."""
-    arguments = ("matrix", "least", "right")
-    compiled = load_loop("fastslow.continuation.evaluation", "signed_distance", arguments)
-    return compiled(matrix, least, np.empty(len(matrix)))
+    return load_loop(DISTANCE)(matrix, least, np.empty(len(matrix)))
 
 
 def test_eigenvalues_of_pairs_are_those_of_lapack():

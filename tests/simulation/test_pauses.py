@@ -133,7 +133,7 @@ def test_code_that_cannot_be_compiled_is_an_error(monkeypatch):
     expected = fs.simulate(model, start, t=span)
     with monkeypatch.context() as patched:
         patched.setattr(pauses, "_late", {})
-        patched.setattr(pauses, "address_of", failing)
+        patched.setattr(pauses, "load_address", failing)
         with pytest.raises(OSError, match="no space left"):
             fs.simulate(model, start, t=span)
         with pytest.raises(OSError, match="no space left"):

@@ -1,0 +1,25 @@
+"""The compiled loops of this package."""
+
+from __future__ import annotations
+
+from fastslow.compiled.generic import Loop
+from fastslow.compiled.records import Matrix, Vector
+from fastslow.passage.radau_passages import End, Law, Motion, Space
+
+PASS_THROUGH = Loop(
+    "fastslow.passage.radau_passages",
+    "pass_through",
+    {
+        "motion": Motion, "law": Law, "end": End, "z": Vector, "times": Vector, "unit": Vector,
+        "space": Space,
+    },
+    results=(int, int),
+)  # fmt: skip
+
+NEARNESS = Loop(
+    "fastslow.passage.chain_distances",
+    "nearness_to_chain",
+    {"points": Matrix, "chain": Matrix, "radius": float, "near": Vector},
+)
+
+LOOPS = (PASS_THROUGH, NEARNESS)
