@@ -257,9 +257,9 @@ def zero_between(times: Array, values: Array, start: float, stop: float) -> floa
 
     Examples
     --------
-    >>> t = np.array([0.0, 1.0, 2.0, 3.0])
-    >>> round(zero_between(t, (t + 1) ** 3 - 10, 1.0, 2.0), 3)
-    1.155
+    >>> t = np.array([1.0, 1.1, 1.2, 1.3])
+    >>> round(zero_between(t, (t + 1) ** 3 - 10, 1.1, 1.2), 4)
+    1.1545
     """
     for used in (slice(None), (times >= start) & (times <= stop)):
         t, v = times[used].tolist(), values[used].tolist()
