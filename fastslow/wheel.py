@@ -8,6 +8,7 @@ from pathlib import Path
 from fastslow.compiled import shipped, store
 from fastslow.compiled.generic import Entry, compiled
 from fastslow.compiled.loop_target import platform_name
+from fastslow.disk import write_file, write_text
 
 
 def entries() -> Iterator[Entry]:
@@ -24,9 +25,9 @@ def entries() -> Iterator[Entry]:
 def write_objects(folder: Path) -> list[Path]:
     """Compile everything into the files of a folder."""
     files = [folder / shipped.PLATFORM]
-    files[0].write_text(platform_name() + "\n", encoding="utf-8")
+    write_text(files[0], platform_name() + "\n")
     for entry in entries():
         file = folder / f"{entry.name}{store.SUFFIX}"
-        file.write_bytes(store.wrapped(entry.name, compiled(entry, "for the wheel")))
+        write_file(file, store.wrapped(entry.name, compiled(entry, "for the wheel")))
         files.append(file)
     return files
