@@ -136,8 +136,11 @@ def unexplained_rows(
     found = []
     # the numbers that are possible at the row, and the last row at which there was only one
     possible = set(range(most + 1))
-    since = 0
-    for row in range(len(low)):
+    since, done = 0, -1
+    for row in _eventful(low, high, [*steps, *jumps]):
+        if row - 1 > done and low[row - 1] == high[row - 1]:
+            since = row - 1
+        done = row
         changes = steps.get(row, ())
         if None in changes or row in jumps:
             possible = set(range(most + 1))
@@ -153,3 +156,13 @@ def unexplained_rows(
             if len(here) == 1:
                 since = row
     return found
+
+
+def _eventful(low: NDArray[np.intp], high: NDArray[np.intp], places: Collection[int]) -> list[int]:
+    """Rows that differ from the one before, some others, and the one after each of these."""
+    eventful = np.ones(len(low), dtype=bool)
+    eventful[1:] = (np.diff(low) != 0) | (np.diff(high) != 0)
+    near = np.array([*places, *(place + 1 for place in places)], dtype=np.intp)
+    eventful[near[(near >= 0) & (near < len(low))]] = True
+    rows: list[int] = np.flatnonzero(eventful).tolist()
+    return rows
