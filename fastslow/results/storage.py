@@ -90,10 +90,15 @@ def write_archive(text: str, arrays: Mapping[str, Array]) -> bytes:
     stream = BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
         archive.comment = bytes(SEAL_SIZE)
-        for name, array in {TEXT: np.array(text.encode("ascii")), **arrays}.items():
-            entry = zipfile.ZipInfo(f"{name}.npy")
-            with archive.open(entry, "w", force_zip64=True) as member:
-                np.lib.format.write_array(member, array, allow_pickle=False)
+        try:
+            for name, array in {TEXT: np.array(text.encode("ascii")), **arrays}.items():
+                entry = zipfile.ZipInfo(f"{name}.npy")
+                with archive.open(entry, "w", force_zip64=True) as member:
+                    np.lib.format.write_array(member, array, allow_pickle=False)
+        except BaseException:
+            # closing an archive in which a member was left open fails, and would hide an interrupt
+            archive.fp = None
+            raise
     return _sealed(stream, stream.seek(0, SEEK_END) - SEAL_SIZE)
 
 

@@ -23,6 +23,7 @@ from fastslow.results.encoding import classes
 from fastslow.results.outcome import Outcome
 from fastslow.results.points import SpecialPoints
 from fastslow.results.result import Result
+from fastslow.results.spectra import Spectrum
 from fastslow.results.storage import sealed, write_archive
 
 FORMATS = [".npz", ".nc"]
@@ -268,6 +269,23 @@ def test_two_saves_write_the_same_bytes(results, tmp_path):
         results["diagram"].save(tmp_path / f"a{ending}")
         results["diagram"].save(tmp_path / f"b{ending}")
         assert (tmp_path / f"a{ending}").read_bytes() == (tmp_path / f"b{ending}").read_bytes()
+
+
+def test_an_interrupt_between_members_of_an_archive_comes_out(tmp_path, monkeypatch):
+    """It may come when a member is open and nobody has it yet; zipfile then refuses to close."""
+    spectrum = Spectrum("x", "hann", (0.0, 1.0), np.arange(300.0), np.arange(300.0))
+
+    def interrupted(archive, *args, **kwargs):
+        archive._writing = True
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(zipfile.ZipFile, "open", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            spectrum.save(tmp_path / "a.npz")
+    assert not list(tmp_path.iterdir())
+    spectrum.save(tmp_path / "a.npz")
+    assert fs.load(tmp_path / "a.npz") == spectrum
 
 
 def test_endings_in_capital_letters(results, same, tmp_path):
