@@ -13,6 +13,7 @@ import platform
 import sys
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -33,7 +34,7 @@ _lock = threading.RLock()
 
 
 @dataclass(frozen=True, eq=False)
-class Entry:
+class Entry(ABC):
     """A function of this package that is compiled once for all models.
 
     Parameters
@@ -46,9 +47,9 @@ class Entry:
     function: str
 
     @property
+    @abstractmethod
     def source(self) -> str:
         """The module that Numba compiles: a function of a pointer that calls this one."""
-        raise NotImplementedError
 
     @property
     def key(self) -> str:

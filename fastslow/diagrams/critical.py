@@ -21,7 +21,8 @@ from fastslow.continuation.polynomial_systems import (
     solve_polynomials,
     units,
 )
-from fastslow.diagrams.equations import RegionEquations, ratios, real_roots, terms_of
+from fastslow.diagrams.equations import RegionEquations
+from fastslow.diagrams.exact_polynomials import ratios, real_roots, terms_of
 from fastslow.model.structure import real
 
 #: Polynomials in one unknown and the parameter.

@@ -26,17 +26,21 @@ from fastslow.continuation.polynomial_systems import (
     solve_polynomials,
 )
 from fastslow.continuation.spaces import Curve, newton_space
+from fastslow.diagrams.exact_polynomials import (
+    ParametricPolynomials,
+    coefficient_function,
+    exactly,
+    multiple_root,
+    numerator,
+    polynomials_of,
+    ratios,
+    real_roots,
+    terms_of,
+    values_at,
+)
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.modes import Sides
-from fastslow.diagrams.parametric import (
-    STATES,
-    Answers,
-    ParametricElimination,
-    ParametricPolynomials,
-    eliminations_of,
-    exactly,
-    polynomials_of,
-)
+from fastslow.diagrams.parametric import STATES, Decisions, ParametricElimination, eliminations_of
 from fastslow.model.rational import exact
 from fastslow.model.structure import real
 from fastslow.results.angles import apart
@@ -107,14 +111,14 @@ class RegionEquations:
     field : FrozenField
     region : int
         Number of the region.
-    answers : Answers, optional
+    decisions : Decisions, optional
         With it the other parameters are symbols, and this says which expressions vanish.
     """
 
     field: FrozenField
     region: int
     _: KW_ONLY
-    answers: Answers | None = None
+    decisions: Decisions | None = None
 
     @cached_property
     def numbers(self) -> dict[sp.Symbol, sp.Rational]:
@@ -131,7 +135,7 @@ class RegionEquations:
 
     def _number(self, expression: sp.Expr) -> sp.Expr:
         """An expression with exact numbers for the other parameters, or for those that are 0."""
-        if self.answers is None:
+        if self.decisions is None:
             return exact(expression).subs(self.numbers)
         zero = {s: v for s, v in self.numbers.items() if v == 0}
         return exact(expression).subs(zero)
@@ -148,19 +152,19 @@ class RegionEquations:
         zero = tuple(s.name for s, v in self.numbers.items() if v == 0)
         known = eliminations_of(self.field.model, self.field.parameter, self.region, zero)
         kind = type(self)
-        return known.at(moving, lambda a: kind(self.field, self.region, answers=a)._open())
+        return known.at(moving, lambda a: kind(self.field, self.region, decisions=a)._parametric())
 
-    def _open(self) -> ParametricElimination | None:
+    def _parametric(self) -> ParametricElimination | None:
         """The elimination with symbols for those parameters that are not 0, if it is of use."""
-        assert self.answers is not None
-        left, parameters = self.elimination, tuple(self.answers.values)
+        assert self.decisions is not None
+        left, parameters = self.elimination, tuple(self.decisions.values)
         symbols = [*left.unknowns, real(self.field.parameter)]
         if len(left.unknowns) > 1:
             return None
 
         inserted = {real(n): e for n, e in left.solved.items()}
-        edges = [sp.expand(_numerator(h.subs(inserted))) for h in self.bounds]
-        remaining = polynomials_of([_numerator(e) for e in left.remaining], symbols, parameters)
+        edges = [sp.expand(numerator(h.subs(inserted))) for h in self.bounds]
+        remaining = polynomials_of([numerator(e) for e in left.remaining], symbols, parameters)
         bounds = polynomials_of(edges, symbols, parameters)
         solved: list[ParametricPolynomials] = []
         for state in left.state({}, self.field.model.states):
@@ -181,17 +185,17 @@ class RegionEquations:
     @cached_property
     def elimination(self) -> Elimination:
         """Of the rates with every other parameter a number, so that its sign is known."""
-        if self.answers is None and self.general is not None:
-            return self.general.general.at(self.numbers)
+        if self.decisions is None and self.general is not None:
+            return self.general.elimination.at(self.numbers)
         return self._eliminated()
 
     def _eliminated(self) -> Elimination:
-        return eliminate(self.equations, tuple(self.equations), nonzero=self.answers)
+        return eliminate(self.equations, tuple(self.equations), nonzero=self.decisions)
 
     @cached_property
     def unknowns(self) -> tuple[sp.Symbol, ...]:
         """The states that were not solved for."""
-        return (self.elimination if self.general is None else self.general.general).unknowns
+        return (self.general or self).elimination.unknowns
 
     @cached_property
     def polynomials(self) -> list[WholeTerms] | None:
@@ -227,7 +231,7 @@ class RegionEquations:
         for function in functions:
             h = function.subs(solved)
             if not h.is_polynomial(*self._symbols):
-                h = sp.together(h).as_numer_denom()[0]
+                h = numerator(h)
             if not h.is_polynomial(*self._symbols):
                 return None
             found.append(sp.expand(h))
@@ -282,13 +286,13 @@ class RegionEquations:
         """Exponents in every equation, and their coefficients over the parameter."""
         p = real(self.field.parameter)
         system = [sp.Poly(e, *self.unknowns) for e in self.elimination.remaining]
-        return [[(e, _function_of(c, p)) for e, c in q.terms()] for q in system]
+        return [[(e, coefficient_function(c, p)) for e, c in q.terms()] for q in system]
 
     def _terms_at(self, value: float) -> list[Terms]:
         """The polynomials in the unknowns at a value of the parameter."""
         if self.polynomials is not None:
-            count, exactly = len(self.unknowns), Fraction(value)
-            return [at_value(q, count, exactly) for q in self.polynomials]
+            count, at = len(self.unknowns), Fraction(value)
+            return [at_value(q, count, at) for q in self.polynomials]
         found = [{e: c(value) for e, c in q} for q in self._coefficients]
         return [{e: c for e, c in q.items() if c} for q in found]
 
@@ -312,7 +316,7 @@ class RegionEquations:
             if self._quotients is None:
                 return [np.array(self._formula(value, *unknowns), dtype=float)]
             place = [*map(Fraction, unknowns), Fraction(value)]
-            values = (_at(quotient, place) for quotient in self._quotients)
+            values = (values_at(quotient, place) for quotient in self._quotients)
             return [np.array([above / below for above, below in values])]
         except (ArithmeticError, ValueError, TypeError):
             return []
@@ -375,7 +379,7 @@ class RegionEquations:
         complete = solved.complete
         middles = solved.clusters.mean(axis=1)
         if len(terms) == 1:
-            middles = np.array([[_multiple_root(terms[0], *m)] for m in middles]).reshape(-1, 1)
+            middles = np.array([[multiple_root(terms[0], *m)] for m in middles]).reshape(-1, 1)
         for sure, roots in ((True, solved.simple), (False, middles)):
             for root in roots:
                 whole = self._whole(value, *root)
@@ -460,7 +464,7 @@ class RegionEquations:
         p = real(self.field.parameter)
         solved = {real(n): e for n, e in self.elimination.solved.items()}
         for bound in self.bounds:
-            line = sp.together(bound.subs(solved).subs(p, value)).as_numer_denom()[0]
+            line = numerator(bound.subs(solved).subs(p, value))
             yield from terms_of([line], list(self.unknowns)) or []
 
     def _polished(self, value: float, states: Sequence[Array]) -> list[Array]:
@@ -602,13 +606,13 @@ class RegionEquations:
                     converged[s], value, unit, 100, space,
                 )  # fmt: skip
             for state in field.wrapped(starts[converged]):
-                if np.all(np.abs(state) <= FARTHEST * unit) and not self._among(
-                    state, distinct, unit, 1e-5
+                if np.all(np.abs(state) <= FARTHEST * unit) and not among(
+                    state, distinct, unit, field.periods, 1e-5
                 ):
                     polished = self.corrected(state, value)
                     polished = None if polished is None else field.wrapped(polished)
-                    if polished is not None and not self._among(
-                        polished, distinct, self.unit(value), SAME
+                    if polished is not None and not among(
+                        polished, distinct, self.unit(value), field.periods
                     ):
                         distinct = np.vstack([distinct, polished])
             quiet = quiet + 1 if batch and len(distinct) == before else 0
@@ -618,10 +622,6 @@ class RegionEquations:
             sizes = np.abs(distinct).max(axis=0, initial=0.0)
             unit = np.where(sizes > 0, sizes, unit)
         return [distinct[k] for k in in_order(distinct, unit)]
-
-    def _among(self, state: Array, states: Array, unit: Array, within: float) -> bool:
-        """Whether a state is one of several."""
-        return bool(_near(state, states, unit, within, self.field.periods).any())
 
 
 def _determined(slopes: Array, terms: Array, scale: Array) -> bool:
@@ -639,14 +639,6 @@ def _determined(slopes: Array, terms: Array, scale: Array) -> bool:
     return bool(np.abs(inverse).sum(axis=1).max() * np.finfo(float).eps < UNCERTAIN)
 
 
-def _multiple_root(terms: Terms, near: float) -> float:
-    """The root of the derivative next to a multiple root, where it is simple and well known."""
-    powers = ratios([terms.get((k,), 0) for k in range(1 + max(e for (e,) in terms))])
-    roots: NDArray[Any] = np.polynomial.Polynomial(powers).deriv().roots()
-    roots = roots.real[np.abs(roots - near) < 1e-3 * abs(near)]
-    return float(roots[np.argmin(np.abs(roots - near))]) if len(roots) else near
-
-
 def starts_tried(states: int) -> int:
     """How many starts of Newton's method are tried, fewer where each of them takes long.
 
@@ -656,75 +648,6 @@ def starts_tried(states: int) -> int:
     (200, 20, 10)
     """
     return min(STARTS, max(FEWEST, int(COST / states**3)))
-
-
-def _function_of(coefficient: sp.Expr, p: sp.Symbol) -> Any:
-    """A coefficient as a function of the parameter's value, exact where it is a polynomial."""
-    if coefficient.is_Rational:
-        number = Fraction(int(coefficient.p), int(coefficient.q))
-        return lambda value: number
-    if coefficient.is_polynomial(p):
-        powers = [_fraction(c) for c in sp.Poly(coefficient, p).all_coeffs()]
-
-        def horner(value: float) -> Fraction:
-            total, at = Fraction(0), Fraction(value)
-            for power in powers:
-                total = total * at + power
-            return total
-
-        return horner
-    function = sp.lambdify(p, sp.N(coefficient, 17), "math")
-    return lambda value: Fraction(float(function(value)))
-
-
-def _at(polynomials: Sequence[WholeTerms], place: Sequence[Fraction]) -> list[int]:
-    """Values of polynomials at a place, all times the same positive number, whole."""
-    powers = []
-    for k, at in enumerate(place):
-        most = max((e[k] for terms in polynomials for e in terms), default=0)
-        n, d = at.numerator, at.denominator
-        powers.append([n**j * d ** (most - j) for j in range(most + 1)])
-    return [
-        sum(
-            c * math.prod(table[j] for table, j in zip(powers, e, strict=True))
-            for e, c in terms.items()
-        )
-        for terms in polynomials
-    ]
-
-
-def _numerator(expression: sp.Expr) -> sp.Expr:
-    return sp.together(expression).as_numer_denom()[0]
-
-
-def ratios(numbers: Sequence[Fraction | int]) -> Array:
-    """Numbers in units of the largest, each rounded once."""
-    largest = max((abs(Fraction(number)) for number in numbers), default=Fraction(0))
-    return np.array([float(number / (largest or 1)) for number in numbers])
-
-
-def _fraction(number: sp.Expr) -> Fraction:
-    """A number as a fraction, exact or to 40 digits."""
-    rational = number if number.is_Rational else sp.Rational(sp.N(number, 40))
-    return Fraction(int(rational.p), int(rational.q))
-
-
-def terms_of(
-    expressions: Sequence[sp.Expr], symbols: Sequence[sp.Symbol]
-) -> list[WholeTerms] | None:
-    """Polynomials by exponents of symbols, each with whole coefficients up to a positive factor.
-
-    None where one is no polynomial in the symbols.
-    """
-    found: list[WholeTerms] = []
-    for expression in expressions:
-        if not expression.is_polynomial(*symbols):
-            return None
-        terms = sp.Poly(expression, *symbols).terms() if symbols else [((), expression)]
-        exact_ones = {e: _fraction(c) for e, c in terms if c != 0}
-        common = math.lcm(1, *(c.denominator for c in exact_ones.values()))
-        found.append({e: int(c * common) for e, c in exact_ones.items()})
-    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -823,7 +746,7 @@ class SlidingEquations(RegionEquations):
 
     @cached_property
     def _with_share(self) -> Elimination:
-        return eliminate(self.equations, tuple(self.equations), nonzero=self.answers)
+        return eliminate(self.equations, tuple(self.equations), nonzero=self.decisions)
 
     @cached_property
     def _without_share(self) -> Elimination | None:
@@ -833,10 +756,10 @@ class SlidingEquations(RegionEquations):
         for k, name in enumerate(states):
             # sum of ∂h/∂x times these vanishes: one with ∂h/∂x ≠ 0 may be left out
             slope = h.diff(real(name))
-            if slope.is_nonzero if self.answers is None else self.answers(slope):
+            if slope.is_nonzero if self.decisions is None else self.decisions(slope):
                 crossed[k] = h
                 rates = dict(zip(states, crossed, strict=True))
-                return eliminate(rates, states, nonzero=self.answers)
+                return eliminate(rates, states, nonzero=self.decisions)
         return None
 
     @cached_property
@@ -861,30 +784,6 @@ class SlidingEquations(RegionEquations):
         return None if np.all(np.abs(h[-2:]) <= 1e-9 * size[-2:]) else solved
 
 
-def real_roots(coefficients: Array) -> list[float]:
-    """Real roots of a polynomial, highest coefficient first, double ones once or twice.
-
-    A root counts as real when its imaginary part is within the error that
-    rounding makes at a double root, relative to the largest root; Newton decides afterwards.
-
-    Examples
-    --------
-    >>> [round(r, 12) for r in real_roots(np.array([1.0, 0.0, -4.0]))]
-    [-2.0, 2.0]
-    """
-    leading = np.flatnonzero(coefficients)
-    if len(leading) == 0:
-        return []
-    shares = coefficients[leading[0] :] / coefficients[leading[0]]
-    powers = np.arange(len(shares))
-    # Fujiwara's bound: in this unit no root is beyond two, and no coefficient beyond one
-    bounds = np.abs(shares[1:]) ** (1.0 / powers[1:])
-    unit = float(bounds.max(initial=0.0)) or 1.0
-    roots = np.roots(shares / unit**powers)
-    real = roots.real[np.abs(roots.imag) < 1e-6 * np.maximum(1.0, np.abs(roots))]
-    return sorted(float(unit * r) for r in real)
-
-
 def _near(
     one: Array, others: Array, unit: Array, within: float, periods: ArrayLike
 ) -> NDArray[np.bool_]:
@@ -896,11 +795,15 @@ def _near(
     return np.asarray(np.all(gap <= within * np.maximum(unit, np.abs(one)), axis=-1))
 
 
-def among(state: Array, known: Array, unit: ArrayLike = 1.0, periods: ArrayLike = 0.0) -> bool:
-    """Whether a state is the `same` as one of some known ones, shape (m, n)."""
-    gap = np.abs(apart(known, state, periods))
-    near = gap <= SAME * np.maximum(unit, np.abs(known))
-    return bool(near.all(axis=-1).any())
+def among(
+    state: Array,
+    known: Array,
+    unit: ArrayLike = 1.0,
+    periods: ArrayLike = 0.0,
+    within: float = SAME,
+) -> bool:
+    """Whether a state is one of some known ones, shape (m, n), to a part of its size."""
+    return bool(_near(state, known, np.asarray(unit), within, periods).any())
 
 
 def same(one: Array, other: Array, unit: ArrayLike = 1.0, periods: ArrayLike = 0.0) -> bool:

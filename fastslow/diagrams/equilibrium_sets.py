@@ -19,7 +19,8 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.continuation.ordering import in_order
-from fastslow.diagrams.equations import real_roots, region_equations
+from fastslow.diagrams.equations import region_equations
+from fastslow.diagrams.exact_polynomials import real_roots
 from fastslow.diagrams.fields import IDLE, FrozenField
 from fastslow.model.motions import Motion, motions_of
 from fastslow.model.rational import exact

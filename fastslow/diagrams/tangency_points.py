@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from fastslow.arguments import instance, mapping, takes
 from fastslow.continuation.location import newton
 from fastslow.continuation.ordering import in_order
-from fastslow.diagrams.equations import DEGREE, STARTS, real_roots
+from fastslow.diagrams.equations import DEGREE, STARTS
+from fastslow.diagrams.exact_polynomials import real_roots
 from fastslow.diagrams.fields import require_frozen
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ArgumentError, ModelError

@@ -9,8 +9,9 @@ import sympy as sp
 import fastslow as fs
 from fastslow.diagrams.critical import critical_values
 from fastslow.diagrams.equations import SlidingEquations, region_equations
+from fastslow.diagrams.exact_polynomials import polynomials_of
 from fastslow.diagrams.fields import FrozenField
-from fastslow.diagrams.parametric import eliminations_of, polynomials_of
+from fastslow.diagrams.parametric import eliminations_of
 
 x, y, v, w, t, a, b, c, k = sp.symbols("x y v w t a b c k")
 

@@ -7,7 +7,7 @@ import sympy as sp
 import fastslow as fs
 from fastslow.continuation.location import branch_point
 from fastslow.continuation.ordering import in_order
-from fastslow.diagrams.equations import real_roots
+from fastslow.diagrams.exact_polynomials import real_roots
 from fastslow.diagrams.fields import FrozenField
 from fastslow.model.units import natural_units
 from fastslow.results.points import stability_of
