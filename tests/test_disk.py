@@ -24,8 +24,6 @@ ROOT = Path(fs.__file__).parent
 OTHER = {
     "results/storage.py": {"archive.open"},  # a member of an archive in memory
     "plot/style.py": {"figure.savefig"},  # into memory
-    "plot/drawings.py": {"self.figure.savefig"},
-    "interactive/pointers.py": {"figure.savefig"},
 }
 
 

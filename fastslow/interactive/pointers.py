@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from io import BytesIO
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -14,7 +13,7 @@ from matplotlib.text import Annotation
 from fastslow.arguments import function, takes
 from fastslow.errors import MissingPackageError
 from fastslow.interactive.picking import Curve, Pick, curves_of, pick
-from fastslow.plot.style import BLACK, GREY, SMALL
+from fastslow.plot.style import BLACK, GREY, SMALL, printed
 from fastslow.plot.typesetting import paragraph
 from fastslow.results.diagrams import Diagram
 from fastslow.results.overlays import Overlay
@@ -181,9 +180,7 @@ class Pointer:
 
 def picture(figure: Figure, text: str) -> dict[str, Any]:
     """How a figure is shown where there are no widgets."""
-    stream = BytesIO()
-    figure.savefig(stream, format="png")
-    return {"text/plain": text, "image/png": stream.getvalue()}
+    return {"text/plain": text, "image/png": printed(figure, "png", figure.dpi)}
 
 
 def _blits(canvas: FigureCanvasBase) -> bool:

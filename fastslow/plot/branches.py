@@ -15,7 +15,6 @@ from matplotlib.text import Annotation
 from fastslow.arguments import flag, instance, takes
 from fastslow.plot.arguments import axis_quantity, figure_width, line_colour, line_style
 from fastslow.plot.bands import Bands, draw_bands
-from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.equilibrium_sets import draw_sets
 from fastslow.plot.labels import place
@@ -189,8 +188,6 @@ def diagram(
     )
     drawn = replace(drawn, legend=explained(ax, drawn.handles, own, label, legend))
     place(ax, drawn.labels, [], [drawn.bands])
-    if own:
-        settle(ax)
     return drawn
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +16,8 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from fastslow.arguments import path, takes, within
-from fastslow.plot.style import root, save
+from fastslow.plot.style import SHOWN, printed, root, save
 from fastslow.results.immutable import fixed
-
-#: Dots per inch of a figure shown in a notebook.
-SHOWN = 150
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -95,9 +91,7 @@ class Drawing:
         return f"{type(self).__name__}({y} over {x})"
 
     def _repr_png_(self) -> bytes:
-        stream = BytesIO()
-        self.figure.savefig(stream, format="png", dpi=SHOWN)
-        return stream.getvalue()
+        return printed(self.figure, "png", SHOWN)
 
 
 def _artists(value: Any) -> Iterator[Artist]:

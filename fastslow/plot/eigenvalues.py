@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from fastslow.arguments import flag, instance, takes
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import figure_width, line_style
-from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place, tag
 from fastslow.plot.legends import explained
@@ -150,7 +149,6 @@ def eigenvalue_path(
     handles: list[Artist] = [*markers, *jumps[:1]]
     shown = explained(ax, handles, own, label, legend)
     place(ax, labels)
-    settle(ax)
     return EigenvalueDrawing(ax, tuple(paths), tuple(jumps), markers, labels, bar, shown)
 
 

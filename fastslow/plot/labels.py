@@ -185,16 +185,14 @@ def _move(
     axis = (ax.xaxis if vertical else ax.yaxis).get_transform()
     ends = axis.transform([start, stop])
     air = AIR * root(ax).dpi / 72.0 * np.array([-1.0, -1.0, 1.0, 1.0])
-    best: tuple[float, tuple[float, float], Points] = (np.inf, name.get_position(), boxes[:0])
-    for depth in DEPTHS:
-        inside = float(axis.inverted().transform([ends[0] + depth * (ends[1] - ends[0])])[0])
-        for side in SIDES:
-            at = (inside, side) if vertical else (side, inside)
-            name.set_position(at)
-            box = box_of(name, renderer)[None]
-            cost = float(overlaid(box + air, ink, boxes, frame)[0])
-            if cost < best[0]:
-                best = cost, at, box
-    name.set_position(best[1])
-    name.set_visible(best[0] < TAKEN)
-    return np.vstack([boxes, best[2]]) if best[0] < TAKEN else boxes
+    inside = axis.inverted().transform(ends[0] + np.array(DEPTHS) * (ends[1] - ends[0]))
+    across, along = np.repeat(inside, len(SIDES)), np.tile(SIDES, len(DEPTHS))
+    spots = np.column_stack([across, along] if vertical else [along, across])
+    seat = name.get_transform()
+    around = box_of(name, renderer) - np.tile(seat.transform(name.get_position()), 2)
+    places = around + np.tile(seat.transform(spots), 2)
+    costs = overlaid(places + air, ink, boxes, frame)
+    best = int(np.argmin(costs))
+    name.set_position((float(spots[best, 0]), float(spots[best, 1])))
+    name.set_visible(bool(costs[best] < TAKEN))
+    return np.vstack([boxes, places[best]]) if costs[best] < TAKEN else boxes

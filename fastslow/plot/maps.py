@@ -162,7 +162,6 @@ def regime_map(
             patch = shown_key.get_patches()[result.labels.index(word)]
             patch.set(hatch=hatch)
     place(ax, tags)
-    settle(ax)
     return MapDrawing(
         ax, drawn, tuple(lines), tuple(over), names, tuple(tags), shown_key, tuple(points)
     )

@@ -306,8 +306,6 @@ def _explained(
     if len(drawn.handles) > 1:
         drawn = replace(drawn, legend=explained(drawn.ax, drawn.handles, own, label, legend, top))
     place(drawn.ax, bands=drawn.bands)
-    if own and (drawn.bands or drawn.words):
-        settle(drawn.ax)
     return drawn
 
 

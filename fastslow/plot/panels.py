@@ -13,7 +13,6 @@ from matplotlib.patches import Patch
 from fastslow.arguments import flag, formula, instance, items, takes, text
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.plot.arguments import figure_width, line_style
-from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place
 from fastslow.plot.legends import legend_below, legend_inside
@@ -139,7 +138,6 @@ def panel(
         draw = legend_below if ax is None else legend_inside
         key = draw(laid.ax, [*laid.handles, *strips])
     place(axes[2], laid.diagram.labels, bands=[laid.diagram.bands])
-    settle(laid.ax)
     return PanelDrawing(laid.ax, series, portrait, laid, key)
 
 

@@ -16,7 +16,6 @@ from fastslow.arguments import flag, instance, takes
 from fastslow.plot.arguments import axis_quantity, figure_width, line_colour, line_style
 from fastslow.plot.arrows import draw_heads, points
 from fastslow.plot.branches import DiagramDrawing, draw_branches
-from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place
 from fastslow.plot.legends import explained
@@ -218,8 +217,6 @@ def overlay(
     )
     drawn = replace(drawn, legend=explained(ax, drawn.handles, own, label, legend))
     place(ax, drawn.diagram.labels, [], [drawn.diagram.bands])
-    if own:
-        settle(ax)
     return drawn
 
 

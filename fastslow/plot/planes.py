@@ -20,7 +20,6 @@ from fastslow.arguments import flag, instance, takes
 from fastslow.errors import ArgumentError
 from fastslow.plot.areas import draw_areas, samples
 from fastslow.plot.arguments import axis_quantity, figure_width, line_style
-from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place, tag
 from fastslow.plot.legends import explained
@@ -190,8 +189,6 @@ def parameter_plane(
     seen: dict[str, Artist] = {str(line.get_label()): line for line in (*lines, *markers)}
     key = explained(ax, [*seen.values(), *samples(fills)], own, label, legend)
     place(ax, labels)
-    if own:
-        settle(ax)
     across, up, *above = (q.text for q in quantities)
     drawn = tuple(lines), tuple(markers), tuple(labels), key
     return PlaneDrawing(ax, *drawn, across, up, "".join(above), fills)

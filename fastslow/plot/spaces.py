@@ -138,7 +138,6 @@ def draw_space(
     settle(space)
     if line is not None:
         heads = draw_arrows(line, length_along(line), ARROWS)
-        settle(space)
     along, x, y = (q.text for q in shown)
     below = tuple(branches), markers, line, key, labels, heads
     return SpaceDrawing(space, x, y, *below, along, dots, changes, turns)

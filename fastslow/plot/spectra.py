@@ -14,7 +14,6 @@ from matplotlib.text import Annotation
 from fastslow.arguments import flag, instance, interval, takes, whole
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import figure_width, line_colour, line_style
-from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.labels import place, tag
 from fastslow.plot.legends import explained
@@ -158,5 +157,4 @@ def spectrum(
         labels = tuple(tag(ax, f"{spot[0]:.4g}", spot) for spot in at)
     key = explained(ax, [line, marks], own, label, legend)
     place(ax, labels)
-    settle(ax)
     return SpectrumDrawing(ax, line, marks, labels, key)

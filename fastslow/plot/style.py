@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import get_registered_canvas_class
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from fastslow.arguments import word
@@ -88,6 +92,9 @@ WHITE_WORDS = ("sticking",)
 #: Light fills of the regions, in turn.
 BANDS = ("#D6E7F4", "#FFFFFF", "#FEF0D8")
 
+#: Dots per inch of a figure on a screen.
+SHOWN = 150
+
 MM = 1 / 25.4
 COLUMN, FULL = 85 * MM, 170 * MM
 TEXT, SMALL = 8.0, 7.0
@@ -98,7 +105,10 @@ WIDTHS = {"column": 85.0, "page": 170.0}
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure of a size in inches, outside pyplot."""
-    return Figure(figsize=(width, height), dpi=150, layout="constrained")
+    figure = Figure(figsize=(width, height), dpi=SHOWN, layout="constrained")
+    # keeps one renderer, which measures a text once, where a bare figure makes one for each
+    FigureCanvasAgg(figure)
+    return figure
 
 
 def dressed(ax: Axes) -> Axes:
@@ -278,8 +288,41 @@ def save(figure: Figure, path: str | Path, dpi: float = 300) -> Path:
     target = Path(path)
     ending = target.suffix.removeprefix(".").lower()
     word("figure format", sorted(figure.canvas.get_supported_filetypes()))("path", ending)
-    stream = BytesIO()
-    with rc_context({"pdf.fonttype": 42, "svg.fonttype": "none"}):
-        figure.savefig(stream, format=ending, dpi=dpi)
-    write_file(target, stream.getvalue())
+    write_file(target, printed(figure, ending, dpi))
     return target
+
+
+def printed(figure: Figure, ending: str, dpi: float) -> bytes:
+    """A figure in a format, laid out for it and drawn once."""
+    stream = BytesIO()
+    # Matplotlib 3.11 looks up under "ps" how many characters a font in PDF may hold
+    fonts = rc_context({"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "none"})
+    with fonts, _laid_out(figure, ending, dpi):
+        figure.savefig(stream, format=ending, dpi=dpi)
+    return stream.getvalue()
+
+
+@contextmanager
+def _laid_out(figure: Figure, ending: str, dpi: float) -> Iterator[None]:
+    """Lay a figure out for a format, and keep that from being done anew.
+
+    Matplotlib draws a figure with a layout twice when it saves it, the first time to lay
+    it out alone.
+    """
+    engine, canvas, resolution = figure.get_layout_engine(), figure.canvas, figure.dpi
+    # a canvas on a fine screen has scaled the figure, which another one would do again
+    if engine is None or not figure.axes or canvas.device_pixel_ratio != 1:
+        yield
+        return
+    try:
+        for_it: Any = get_registered_canvas_class(ending)(figure)
+        figure.dpi = for_it.fixed_dpi or dpi
+        engine.execute(figure)
+    finally:
+        figure.dpi = resolution
+        figure.set_canvas(canvas)
+    figure.set_layout_engine(None)
+    try:
+        yield
+    finally:
+        figure.set_layout_engine(engine)

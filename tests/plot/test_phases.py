@@ -43,6 +43,7 @@ def test_what_has_no_room_stays_hidden_at_another_resolution(folded_lay, dpi):
         Phase(start + 2 * part, end, "quasi-static", ("S2",)),
     ]
     drawn = fs.plot.time_series(folded_lay.run, phases=phases)
+    drawn.figure.draw_without_rendering()
     shown = [word.get_visible() for word in drawn.words]
     assert shown[1:] == [False, True]
     drawn.figure.savefig(BytesIO(), dpi=dpi)

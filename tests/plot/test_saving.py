@@ -1,0 +1,60 @@
+"""A file is laid out for its format and drawn once; the figure stays as it was."""
+
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import fastslow as fs
+
+
+@pytest.fixture
+def drawn_axes(monkeypatch):
+    """The axes drawn, one entry each time."""
+    met, draw = [], Axes.draw
+
+    def counted(ax, renderer):
+        met.append(ax)
+        draw(ax, renderer)
+
+    monkeypatch.setattr(Axes, "draw", counted)
+    return met
+
+
+@pytest.mark.parametrize("suffix", ["pdf", "svg", "png", "eps"])
+def test_a_panel_is_drawn_once_and_that_into_the_file(gear_lay, drawn_axes, tmp_path, suffix):
+    drawn = fs.plot.panel(gear_lay)
+    assert drawn_axes == []
+    drawn.save(tmp_path / f"a.{suffix}")
+    assert sorted(map(id, drawn_axes)) == sorted(map(id, drawn.figure.axes))
+
+
+@pytest.mark.parametrize("suffix", ["pdf", "svg", "png", "eps"])
+def test_a_file_is_laid_out_as_matplotlib_lays_it_out(gear_lay, tmp_path, suffix):
+    ours, theirs = (fs.plot.panel(gear_lay).figure for _ in range(2))
+    fs.plot.style.save(ours, tmp_path / f"a.{suffix}", dpi=100)
+    theirs.savefig(tmp_path / f"b.{suffix}", dpi=100)
+    for one, other in zip(ours.axes, theirs.axes, strict=True):
+        assert one.get_position().extents.tolist() == other.get_position().extents.tolist()
+
+
+def test_the_figure_stays_as_it_was(gear_lay, tmp_path):
+    figure = fs.plot.panel(gear_lay).figure
+    before = figure.get_layout_engine(), figure.canvas, figure.dpi
+    fs.plot.style.save(figure, tmp_path / "a.pdf")
+    assert (figure.get_layout_engine(), figure.canvas, figure.dpi) == before
+
+
+def test_a_figure_that_cannot_be_drawn_stays_as_it_was(tmp_path):
+    figure = Figure(layout="constrained")
+    figure.add_subplot().xaxis.set_major_formatter(lambda value, place: f"{1 / 0}")
+    before = figure.get_layout_engine(), figure.canvas, figure.dpi
+    with pytest.raises(ZeroDivisionError):
+        fs.plot.style.save(figure, tmp_path / "a.pdf")
+    assert (figure.get_layout_engine(), figure.canvas, figure.dpi) == before
+
+
+def test_a_font_stands_in_a_file_once(gear_lay, tmp_path):
+    """With the minus signs, which Matplotlib may put into a font of their own."""
+    text = fs.plot.panel(gear_lay).save(tmp_path / "a.pdf").read_bytes()
+    assert text.count(b"/FontFile2") == 2
+    assert text.count(b"/Type0") == 2
