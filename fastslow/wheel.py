@@ -1,12 +1,15 @@
-"""The loops of this package as objects, for its wheel."""
+"""The loops of this package as objects, for an installation."""
 
 from __future__ import annotations
 
+import multiprocessing
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
 from fastslow.compiled import shipped, store
-from fastslow.compiled.generic import Entry, compiled
+from fastslow.compiled.generic import Entry
+from fastslow.compiled.loop_compiler import compiled_object
 from fastslow.compiled.loop_target import platform_name
 from fastslow.disk import write_file, write_text
 
@@ -17,17 +20,33 @@ def entries() -> Iterator[Entry]:
     from fastslow.passage import loops as passage
     from fastslow.simulation import loops as simulation
 
-    yield from continuation.LOOPS.values()
+    # those that take longest to compile come first
     yield from simulation.LOOPS
     yield from passage.LOOPS
+    yield from continuation.LOOPS.values()
 
 
 def write_objects(folder: Path) -> list[Path]:
-    """Compile everything into the files of a folder."""
-    files = [folder / shipped.PLATFORM]
-    write_text(files[0], platform_name() + "\n")
-    for entry in entries():
-        file = folder / f"{entry.name}{store.SUFFIX}"
-        write_file(file, store.wrapped(entry.name, compiled(entry, "for the wheel")))
-        files.append(file)
-    return files
+    """Compile everything into the files of a folder, and remove what is for other sources.
+
+    Files that are whole stay as they are. The others are made by as many processes as there are
+    processors.
+    """
+    folder.mkdir(exist_ok=True)
+    (folder / shipped.PLATFORM).unlink(missing_ok=True)
+    files = {entry.name: folder / f"{entry.name}{store.SUFFIX}" for entry in entries()}
+    for file in folder.glob(f"*{store.SUFFIX}"):
+        if file.stem not in files or store.unwrapped(file.stem, file.read_bytes()) is None:
+            file.unlink()
+    missing = [(name, file) for name, file in files.items() if not file.exists()]
+    if missing:
+        context = multiprocessing.get_context("spawn")
+        with context.Pool(min(os.cpu_count() or 1, len(missing))) as pool:
+            pool.starmap(_write_object, missing, chunksize=1)
+    write_text(folder / shipped.PLATFORM, platform_name() + "\n")
+    return [folder / shipped.PLATFORM, *files.values()]
+
+
+def _write_object(name: str, file: Path) -> None:
+    (entry,) = (entry for entry in entries() if entry.name == name)
+    write_file(file, store.wrapped(name, compiled_object(entry.source, entry.function)))

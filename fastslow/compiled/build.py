@@ -1,20 +1,18 @@
-"""Hatchling's hook that compiles the loops of this package into its wheel.
+"""Hatchling's hook that compiles the loops of this package when it is installed.
 
 A wheel is for one platform and one class of processors. Its objects say what they were made of,
 and the loops are compiled anew where that does not fit (`fastslow.compiled.generic`). Where
 they cannot be compiled, or the environment variable FASTSLOW_BUILD is ``none``, the wheel holds
-no machine code and is for every platform. A checkout that is installed for editing compiles what
-it needs, as it is needed.
+no machine code and is for every platform. The objects stay in the checkout, where an editable
+installation, and whoever runs the sources in place, finds them too.
 """
 
 from __future__ import annotations
 
 import os
 import platform
-import shutil
 import sys
 import sysconfig
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -25,40 +23,33 @@ _GLIBC = "manylinux_2_17"
 
 
 class CompiledLoops(BuildHookInterface[Any]):
-    """Adds objects to a wheel."""
+    """Makes the objects, and adds them to a wheel."""
 
     PLUGIN_NAME = "custom"
 
-    #: Where the objects are until the wheel is written.
-    folder: Path | None = None
-
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        if self.target_name != "wheel" or version == "editable":
+        if self.target_name != "wheel":
             return
         if os.environ.get("FASTSLOW_BUILD") == "none":
             self.app.display_info("FASTSLOW_BUILD=none: the wheel holds no machine code")
             return
-        self.folder = folder = Path(tempfile.mkdtemp(prefix="fastslow-objects-"))
+        inside = "fastslow/compiled/objects"
         # the root of the project is not always where modules are looked for
         sys.path.insert(0, self.root)
         try:
             from fastslow.wheel import write_objects
 
-            files = write_objects(folder)
+            files = write_objects(Path(self.root, inside))
         except Exception as error:
             self.app.display_warning(f"the wheel holds no machine code: {error!r}")
             return
         finally:
             sys.path.remove(self.root)
-        inside = "fastslow/compiled/objects"
+        if version == "editable":
+            return
         build_data["force_include"].update({str(file): f"{inside}/{file.name}" for file in files})
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{_platform()}"
-
-    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
-        """Remove the objects, which are in the wheel now."""
-        if self.folder is not None:
-            shutil.rmtree(self.folder, ignore_errors=True)
 
 
 def _platform() -> str:

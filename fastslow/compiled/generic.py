@@ -108,8 +108,13 @@ def load_address(entry: Entry) -> int:
 
 
 def _loaded(entry: Entry) -> int:
+    return load_object(code_of(entry), ENTRY, {})
+
+
+def code_of(entry: Entry) -> bytes:
+    """The object of a function: what is brought, else what is kept, else compiled now."""
     code = shipped.read(entry.name)
-    return load_object(_kept(entry) if code is None else code, ENTRY, {})
+    return _kept(entry) if code is None else code
 
 
 def _kept(entry: Entry) -> bytes:

@@ -44,7 +44,7 @@ def undefined(code):
 @pytest.mark.parametrize("entry", list(wheel.entries()), ids=lambda entry: entry.function)
 def test_loops_call_nothing_but_the_c_library(entry):
     """So none allocates, counts arrays or runs Python: Numba has functions for that."""
-    code = generic._kept(entry)
+    code = generic.code_of(entry)
     if code[:4] == b"\x7fELF":
         assert set(undefined(code)) <= C_LIBRARY
     assert b"NRT_" not in code
