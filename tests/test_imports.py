@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -66,58 +67,60 @@ def imports(tree: ast.AST, late: bool = True) -> set[str]:
     return found
 
 
+@cache
 def modules_of(path: Path, late: bool = True) -> set[str]:
     return imports(ast.parse(path.read_text(encoding="utf-8")), late)
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
-def test_imports_point_down(path):
-    if path == PACKAGE_INIT:
-        return
-    layer = layer_of(path)
-    assert layer in LAYERS, f"{layer} is not one of the layers"
-    below = LAYERS[LAYERS.index(layer) :]
-    for name in modules_of(path):
-        if name.startswith("fastslow."):
-            other = name.split(".")[1]
-            assert other in below, f"{path.relative_to(ROOT)} imports {name}, a layer above it"
+def parents(names: set[str]) -> set[str]:
+    return {name.split(".")[0] for name in names}
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
-def test_third_parties_stay_in_their_layers(path):
-    layer = layer_of(path)
+def inside(names: set[str]) -> set[str]:
+    """Layers among the modules imported."""
+    return {name.split(".")[1] for name in names if name.startswith("fastslow.")}
+
+
+#: What the package may import of others at all.
+FOREIGN = {"llvmlite", "matplotlib", "mpmath", "numba", "numpy", "scipy", "sympy", "tqdm"}
+BELOW_PLOT = {"arguments", "disk", "errors", "formulas", "plot", "results"}
+
+
+def test_imports_point_down():
+    upward = []
+    for path in FILES:
+        if path != PACKAGE_INIT:
+            layer = layer_of(path)
+            assert layer in LAYERS, f"{layer} is not one of the layers"
+            above = inside(modules_of(path)) - {*LAYERS[LAYERS.index(layer) :]}
+            upward += [f"{path.relative_to(ROOT)} imports from {other}" for other in above]
+    assert upward == []
+
+
+def third_parties(path: Path) -> set[str]:
+    """Imports of a file that its layer does not allow."""
+    layer, names = layer_of(path), modules_of(path)
     own = {"fastslow", *sys.stdlib_module_names}
-    foreign = {name.split(".")[0] for name in modules_of(path)} - own
+    foreign = parents(names) - own
+    wrong = foreign - FOREIGN
     if layer == "results":
-        now = {name.split(".")[0] for name in modules_of(path, late=False)} - own
-        assert now <= {"numpy"}
-    if layer == "formulas":
-        assert foreign <= {"numpy"} or path.name == "symbolic.py"
+        wrong |= parents(modules_of(path, late=False)) - own - {"numpy"}
+    if layer == "formulas" and path.name != "symbolic.py":
+        wrong |= foreign - {"numpy"}
     if layer in {"results", "plot"}:
-        assert "fastslow.formulas.symbolic" not in modules_of(path)
+        wrong |= names & {"fastslow.formulas.symbolic"}
     if layer == "plot":
-        assert foreign <= {"matplotlib", "numpy"}
-        assert {n.split(".")[1] for n in modules_of(path) if n.startswith("fastslow.")} <= {
-            "arguments",
-            "disk",
-            "errors",
-            "formulas",
-            "plot",
-            "results",
-        }
+        wrong |= foreign - {"matplotlib", "numpy"} | inside(names) - BELOW_PLOT
     if layer == "continuation":
-        assert not any(n.startswith("fastslow.model") for n in modules_of(path))
-    assert "matplotlib" not in foreign or layer in {"plot", "interactive"}
-    assert foreign <= {
-        "llvmlite",
-        "matplotlib",
-        "mpmath",
-        "numba",
-        "numpy",
-        "scipy",
-        "sympy",
-        "tqdm",
-    }
+        wrong |= inside(names) & {"model"}
+    if layer not in {"plot", "interactive"}:
+        wrong |= foreign & {"matplotlib"}
+    return wrong
+
+
+def test_third_parties_stay_in_their_layers():
+    found = {str(path.relative_to(ROOT)): third_parties(path) for path in FILES}
+    assert {path: names for path, names in found.items() if names} == {}
 
 
 def test_no_module_bears_the_name_of_a_public_function():
@@ -173,10 +176,10 @@ def test_a_run_whose_code_is_at_hand_imports_nothing_that_compiles():
     assert run(RUN) == "[]\n[]"
 
 
-@pytest.mark.parametrize("name", fastslow.__all__)
-def test_every_public_name_is_there(name):
-    assert getattr(fastslow, name) is not None
-    assert name in dir(fastslow)
+def test_every_public_name_is_there():
+    for name in fastslow.__all__:
+        assert getattr(fastslow, name) is not None
+        assert name in dir(fastslow)
 
 
 def test_an_unknown_name_suggests_the_nearest():
