@@ -11,6 +11,7 @@ from importlib import import_module
 #: Name of each campaign, and what one of its counts is. A module of the name has
 #: ``campaign(count, seed)``, which returns a report with ``failures``, and prints as text.
 CAMPAIGNS = {
+    "arguments": "calls of each public function with something hostile in one argument",
     "cache": "damaged files of compiled code, each loaded in a process of its own",
     "crossings": "crossings of random piecewise-linear systems",
     "detection": "special points of random block systems of up to 200 states",
