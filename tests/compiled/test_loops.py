@@ -213,6 +213,5 @@ def test_what_is_compiled_here_has_the_bits_of_what_is_installed(tmp_path, monke
     assert shipped.read(evaluate.name) == generic.compiled(evaluate, "for a test")
     said = capsys.readouterr().err.splitlines()
     assert [re.sub(r"[\d.]+ s$", "… s", line) for line in said] == [
-        "fastslow compiles fastslow.continuation.evaluation.evaluate (for the wheel): … s",
         "fastslow compiles fastslow.continuation.evaluation.evaluate (for a test): … s",
     ]
