@@ -41,7 +41,7 @@ _CHECK = """    {name} = {path}
         {name}.__class__ is _ndarray
         and {name}.dtype == {dtype}
         and {name}.ndim == {axes}
-        and {name}.flags.carray
+        and {flags}
     ):
         {name} = _taken({name}, {path!r}, {kind!r}, {axes}, {copies})
 """
@@ -81,6 +81,7 @@ def caller(
     results: Sequence[type],
     address: int,
     kept: Collection[str] = (),
+    read: Collection[str] = (),
 ) -> Callable[..., Any]:
     """A function of Python that calls code at an address with slots.
 
@@ -95,20 +96,23 @@ def caller(
     address : int
     kept : collection of str, optional
         Records that are most often the ones of the last call.
+    read : collection of str, optional
+        Arguments that the code writes nothing to.
 
     Returns
     -------
     callable
         Of the arguments by position. Arrays of other types raise TypeError; of those that are
-        strided or read-only a copy is handed in. Other threads run while the code does.
+        strided, or read-only where the code may write, a copy is handed in. Other threads run
+        while the code does.
     """
-    read = struct.Struct("<" + "".join(_FORMATS[kind] for kind in results))
+    returned = struct.Struct("<" + "".join(_FORMATS[kind] for kind in results))
     known: dict[str, Any] = {
         "_create": ctypes.create_string_buffer,
         "_entry": _SIGNATURE(address),
         "_error": ctypes.create_string_buffer(8),
         "_ended": _ENDED,
-        "_unpack": read.unpack_from,
+        "_unpack": returned.unpack_from,
         "_ndarray": np.ndarray,
         "_taken": _taken,
         "_first": struct.pack("q", fields_of_arrays()),
@@ -120,7 +124,10 @@ def caller(
         known[f"_pack_{argument}"] = struct.Struct("".join(map(_letter, fields))).pack
         names = {leaf: f"_{argument}_{k}" for k, leaf in enumerate(fields)}
         stays = argument in kept
-        checks = "".join(_check(leaf, name, stays) for leaf, name in names.items() if leaf.axes)
+        writes = argument not in read
+        checks = "".join(
+            _check(leaf, name, stays, writes) for leaf, name in names.items() if leaf.axes
+        )
         words = ", ".join(f"id({name})" if f.axes else f.path for f, name in names.items())
         pack = f"_pack_{argument}({words})"
         if argument in kept:
@@ -134,7 +141,7 @@ def caller(
         function=function,
         names=", ".join(arguments),
         parts="".join(parts),
-        size=max(read.size, 8),
+        size=max(returned.size, 8),
         slots=" + ".join(slots),
         end=_end(len(results)),
     )
@@ -151,9 +158,11 @@ def _dtype_name(leaf: Leaf) -> str:
     return f"_dtype_{leaf.kind}"
 
 
-def _check(leaf: Leaf, name: str, kept: bool) -> str:
+def _check(leaf: Leaf, name: str, kept: bool, writes: bool) -> str:
+    flags = ("carray",) if writes else ("c_contiguous", "aligned")
     return _CHECK.format(
         name=name,
+        flags=" and ".join(f"{name}.flags.{flag}" for flag in flags),
         path=leaf.path,
         dtype=_dtype_name(leaf),
         axes=leaf.axes,

@@ -76,11 +76,14 @@ class Loop(Entry):
         Numbers that it returns: one, several as a tuple, or none.
     kept : tuple of str
         Records that are most often the ones of the last call, and stay in memory.
+    read : tuple of str
+        Arguments that it writes nothing to; their arrays may be read-only.
     """
 
     arguments: Mapping[str, Any]
     results: tuple[type, ...] = ()
     kept: tuple[str, ...] = ()
+    read: tuple[str, ...] = ()
 
     @property
     def source(self) -> str:
@@ -97,7 +100,8 @@ def load_loop(loop: Loop) -> Callable[..., Any]:
 
     See `fastslow.compiled.calling.caller`.
     """
-    return caller(loop.function, loop.arguments, loop.results, load_address(loop), loop.kept)
+    address = load_address(loop)
+    return caller(loop.function, loop.arguments, loop.results, address, loop.kept, loop.read)
 
 
 @cache

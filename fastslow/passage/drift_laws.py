@@ -39,13 +39,10 @@ class DriftLaw:
     text : str
     names : tuple of str
         Of the states and of the slow quantity.
-    of_time : callable, optional
-        Its values at times (N,), where it depends on nothing else and they are known.
     """
 
     text: str
     names: tuple[str, ...]
-    of_time: Callable[[Array], Any] | None = None
 
     @cached_property
     def expression(self) -> sp.Expr:
@@ -54,13 +51,10 @@ class DriftLaw:
     @cached_property
     def in_time(self) -> bool:
         """Whether it depends on the time alone."""
-        return self.of_time is not None or self.expression.free_symbols <= {TIME}
+        return bool(self.expression.free_symbols <= {TIME})
 
     @cached_property
     def _function(self) -> Callable[..., Any]:
-        if self.of_time is not None:
-            of_time = self.of_time
-            return lambda *values: of_time(values[-1])
         symbols = [*map(real, self.names), TIME]
         function: Callable[..., Any] = sp.lambdify(symbols, self.expression, "numpy")
         return function

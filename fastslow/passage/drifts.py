@@ -29,7 +29,9 @@ WINDOW = 1e-4
 DIGITS = 17
 
 
-def drift_at(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift | None:
+def drift_at(
+    slow: SlowQuantity, point: SpecialPoint, time: float, *, told: bool = True
+) -> Drift | None:
     """The drift of the slow quantity about a special point that a run passes at a time.
 
     Of a forcing with its derivatives at that time; of a slow state with its rate and
@@ -44,6 +46,9 @@ def drift_at(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift | No
     point : SpecialPoint
     time : float
         When the slow quantity passes the value of the point.
+    told : bool
+        Whether a rate that is not linear is put into words; without it the law of the drift
+        may be missing.
 
     Returns
     -------
@@ -54,7 +59,7 @@ def drift_at(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift | No
     model = run.model
     try:
         if name in run.forcing and model is not None:
-            return _of_a_forcing(model, slow, time)
+            return _of_a_forcing(model, slow, time, told)
         if slow.laws and slow.dense and model is not None:
             return _on_a_path(slow, point, time)
         if slow.laws or not slow.dense:
@@ -63,7 +68,7 @@ def drift_at(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift | No
             _, rate, double = _derivatives(run, time)[:, run.columns.index(name)]
             change = float(double) if name in run.forcing else 0.0
             return Drift(float(rate), change=change, complete=False)
-        return _of_a_slow_state(slow, point, time)
+        return _of_a_slow_state(slow, point, time, told)
     except ArgumentError:
         # the drift is at rest, or not finite
         return None
@@ -94,9 +99,9 @@ def _along_the_run(slow: SlowQuantity, time: float) -> Drift:
     return Drift((after - before) / (2.0 * step), change=change, complete=False)
 
 
-def _of_a_forcing(model: Any, slow: SlowQuantity, time: float) -> Drift:
+def _of_a_forcing(model: Any, slow: SlowQuantity, time: float, told: bool) -> Drift:
     """From the derivatives of a forcing at a time."""
-    return _drift_of(model, _in_time(model.forcing[slow.name]), {}, time, ())
+    return _drift_of(model, _in_time(model.forcing[slow.name]), {}, time, (), told)
 
 
 @lru_cache(maxsize=128)
@@ -105,7 +110,7 @@ def _in_time(forcing: sp.Expr) -> sp.Expr:
     return forcing.diff(TIME)
 
 
-def _of_a_slow_state(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift:
+def _of_a_slow_state(slow: SlowQuantity, point: SpecialPoint, time: float, told: bool) -> Drift:
     """From the rate of a slow state, its gradient at the special point, and what else moves."""
     model, names = slow.run.model, (*slow.states, slow.name)
     others = [n for n in slow.run.columns if n not in names]
@@ -114,11 +119,16 @@ def _of_a_slow_state(slow: SlowQuantity, point: SpecialPoint, time: float) -> Dr
         law = _rate(model, slow.name, time).xreplace(_moving(slow, time))
         return drift_of_law(law, {n: point[n] for n in names})
     here = {n: float(point[n]) for n in names}
-    return _drift_of(model, rate, here, time, names)
+    return _drift_of(model, rate, here, time, names, told)
 
 
 def _drift_of(
-    model: Any, rate: sp.Expr, here: Mapping[str, float], time: float, names: tuple[str, ...]
+    model: Any,
+    rate: sp.Expr,
+    here: Mapping[str, float],
+    time: float,
+    names: tuple[str, ...],
+    told: bool,
 ) -> Drift:
     """As `drift_of_law` of a rate in the parameters of a model, by functions that are made once.
 
@@ -132,6 +142,8 @@ def _drift_of(
         When it is passed.
     names : tuple of str
         Of ``here``, in order; the slow quantity is the last.
+    told : bool
+        Whether a rate that is not linear is put into words.
     """
     known = {n: sp.Float(v, DIGITS) for n, v in model.values.items() if n in rate.free_symbols}
     arguments = (*known, *map(real, names), TIME)
@@ -145,7 +157,7 @@ def _drift_of(
         # what these functions cannot tell, SymPy may
         return drift_of_law(rate.xreplace({**known, TIME: _later(time)}), here)
     text = ""
-    if not _linear(rate, arguments[len(known) :]):
+    if told and not _linear(rate, arguments[len(known) :]):
         moved = rate.xreplace(known)
         if not _linear(moved, arguments[len(known) :]):
             text = str(moved.xreplace({TIME: _later(time)}))

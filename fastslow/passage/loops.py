@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fastslow.compiled.generic import Loop
-from fastslow.compiled.records import Matrix, Vector
+from fastslow.compiled.records import Matrix, Tensor, Vector
 from fastslow.passage.radau_passages import End, Law, Motion, Space
 
 PASS_THROUGH = Loop(
@@ -20,6 +20,18 @@ NEARNESS = Loop(
     "fastslow.passage.chain_distances",
     "nearness_to_chain",
     {"points": Matrix, "chain": Matrix, "radius": float, "near": Vector},
+    read=("points", "chain"),
 )
 
-LOOPS = (PASS_THROUGH, NEARNESS)
+STEP_VALUES = Loop(
+    "fastslow.passage.step_values",
+    "values_in_steps",
+    {
+        "series": Tensor, "starts": Vector, "begin": float, "end": float, "times": Vector,
+        "values": Matrix,
+    },
+    results=(int,),
+    read=("series", "starts", "times"),
+)  # fmt: skip
+
+LOOPS = (PASS_THROUGH, NEARNESS, STEP_VALUES)

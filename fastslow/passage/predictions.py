@@ -39,23 +39,26 @@ def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
             found.append(replace(t, law=exit_law(p, t, point, modes)))
             continue
         passed = p.passing(point, t.time)
-        drift = None if passed is None else drift_at(p.slow, point, passed)
+        drift = None if passed is None else drift_at(p.slow, point, passed, told=False)
         where: str | dict[str, float] | None = None
         if t.kind == "jump":
             where = TURN if t.turned else _level(p, t)
         key = (point.label, t.kind, _rounded(drift), _rounded(where))
         if key not in known:
-            known[key] = None if drift is None else _law(p, point, drift, where)
+            known[key] = None if passed is None else _law(p, point, passed, where)
         law = known[key]
-        if law is not None and drift is not None and passed is not None:
-            law = with_memory(p, t, transitions, law, drift, passed)
+        if law is not None and passed is not None:
+            law = with_memory(p, t, transitions, law, passed)
         found.append(replace(t, law=law))
     return found
 
 
 def _law(
-    p: Passage, point: SpecialPoint, drift: Drift, where: str | dict[str, float] | None
+    p: Passage, point: SpecialPoint, passed: float, where: str | dict[str, float] | None
 ) -> Delay | None:
+    drift = drift_at(p.slow, point, passed)
+    if drift is None:
+        return None
     try:
         return predict_delay(point, drift, level=where)
     except ArgumentError:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fastslow.passage.drifts import drift_at
 from fastslow.passage.local_passages import SAFETY, Event, Place, reached_delay
 from fastslow.passage.sites import Site, level_of, site_of
 from fastslow.passage.transitions import Passage
@@ -25,11 +26,11 @@ TOLD = 0.1
 
 
 def with_memory(
-    p: Passage, t: Transition, earlier: list[Transition], law: Delay, drift: Drift, passed: float
+    p: Passage, t: Transition, earlier: list[Transition], law: Delay, passed: float
 ) -> Delay:
     """A law with what the delay owes to the state in which the branch was reached in its error.
 
-    The passage is integrated once more, from that state, at this drift.
+    The passage is integrated once more, from that state, at the drift of that time.
 
     Parameters
     ----------
@@ -39,7 +40,6 @@ def with_memory(
     earlier : list of Transition
         All of the run.
     law : Delay
-    drift : Drift
     passed : float
         When the slow quantity passed the special point.
     """
@@ -48,6 +48,9 @@ def with_memory(
     landed = [o.land.time for o in earlier if o.land is not None and o.land.time < passed]
     start = max(landed, default=float(p.m.time[0]))
     if start >= passed or _decay(p, t, start, passed) > SETTLED:
+        return law
+    drift = drift_at(p.slow, law.point, passed)
+    if drift is None:
         return law
     site = site_of(law.point, law.parameter, None)
     moment = p.moment(start)

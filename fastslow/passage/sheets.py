@@ -60,7 +60,7 @@ class Course:
         size = np.abs(self.branch.eigenvalues[self._rows])
         return np.where(np.isfinite(size), size, np.inf).min(axis=1)
 
-    @property
+    @cached_property
     def range(self) -> tuple[float, float]:
         return float(self._ordered[0]), float(self._ordered[-1])
 
@@ -86,7 +86,8 @@ class Course:
 
     def state(self, slow: Array) -> Array:
         """Equilibria at values of the parameter, shape (N, n); at its end beyond the range."""
-        slow = np.clip(slow, *self.range)
+        low, high = self.range
+        slow = np.minimum(np.maximum(slow, low), high)
         return self._cubics.at(self._step(slow), slow)
 
     @cached_property
@@ -121,8 +122,12 @@ class Course:
 
     def _step(self, slow: Array) -> NDArray[np.intp]:
         """The step in which each of some values inside the range is."""
-        place = np.searchsorted(self._ordered, slow, side="right") - 1
-        place = np.clip(place, 0, len(self._ordered) - 2)
+        return self._step_after[np.searchsorted(self._ordered, slow, side="right")]
+
+    @cached_property
+    def _step_after(self) -> NDArray[np.intp]:
+        """The step of a value that is not below so many rows."""
+        place = np.clip(np.arange(len(self._ordered) + 1) - 1, 0, len(self._ordered) - 2)
         # not between the two rows of a joint
         return np.where(self._ordered[place] == self._ordered[place + 1], place - 1, place)
 

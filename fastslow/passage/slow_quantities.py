@@ -9,8 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.compiled.generic import load_loop
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import evaluated, names_in
+from fastslow.passage.loops import STEP_VALUES
 from fastslow.results.dense import columns_at
 from fastslow.results.diagrams import Diagram
 from fastslow.results.trajectories import Trajectory
@@ -73,7 +75,11 @@ class SlowQuantity:
         if not self.dense:
             rows = [np.interp(times, self.run.t, self.run[n]) for n in self.states]
             return np.interp(times, self.run.t, self.table), np.column_stack(rows)
-        columns, names = columns_at(self.run, times), self.run.columns
+        run, names = self.run, self.run.columns
+        columns = np.empty((len(names), len(times)))
+        if load_loop(STEP_VALUES)(run.series, run.step_starts, *run.span, times, columns):
+            # says which of the times is outside the run
+            columns = columns_at(run, times)
         state = columns[self._rows].T
         if not self.laws:
             return columns[names.index(self.name)], state

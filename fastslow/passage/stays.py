@@ -107,8 +107,8 @@ class Measured:
         if self.periods.any():
             place = self.courses[course].state(slow) / self.extent
             scaled = nearest_copy(scaled, place, self.periods)
-        points = np.column_stack([scaled, slow / self.span])
-        near = np.empty(len(points))
+        points = np.vstack([scaled.T, slow / self.span])
+        near = np.empty(len(slow))
         load_loop(NEARNESS)(points, self.curves[course], self.radius, near)
         return near
 
@@ -141,10 +141,12 @@ def measured(
 ) -> Measured:
     """Measure the samples of a run against all courses."""
     run = slow.run
-    state = np.column_stack([run[name] for name in slow.states])
+    # the samples of each state side by side in memory
+    state = np.array([run[name] for name in slow.states]).T
     within = (slow.table >= over[0]) & (slow.table <= over[1])
-    shape = (len(slow.table), len(courses), state.shape[1])
-    places, present = np.empty(shape), np.empty(shape[:2], dtype=bool)
+    count, n = state.shape
+    places = np.empty((len(courses), n, count)).transpose(2, 0, 1)
+    present = np.empty((len(courses), count), dtype=bool).T
     for k, course in enumerate(courses):
         present[:, k] = course.present(slow.table) & within
         places[:, k] = course.state(slow.table)

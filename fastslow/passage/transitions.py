@@ -97,7 +97,8 @@ class Passage:
         guess = 0.5 * (start + stop)
         while stop - start > 4.0 * EPSILON * max(abs(start), abs(stop)):
             times = np.concatenate([start + (stop - start) * EVEN, guess + (stop - start) * NEARBY])
-            times = np.sort(np.clip(times, start, stop))
+            times = np.minimum(np.maximum(times, start), stop)
+            times.sort()
             value = np.asarray(over(*self.slow.at(times)))
             holds = value >= 0.0
             holds[times <= start], holds[times >= stop] = False, True

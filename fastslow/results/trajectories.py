@@ -168,6 +168,7 @@ class Trajectory(Queries, Recurrence, Table, Result):
         values = self._table[1]
         return values[row] if row < len(values) else self._all_sampled[row]
 
+    @takes(times=numbers)
     def __call__(self, times: ArrayLike) -> NDArray[np.float64]:
         """States at any times of the run, shape (n, N); (n,) for a scalar time.
 
@@ -176,7 +177,7 @@ class Trajectory(Queries, Recurrence, Table, Result):
         ArgumentError
             For a time outside the run, or without dense output.
         """
-        return self.dense_columns(times)[: len(self.states)]
+        return columns_at(self, times, slice(len(self.states)))
 
     @takes(times=numbers)
     def dense_columns(self, times: ArrayLike) -> NDArray[np.float64]:

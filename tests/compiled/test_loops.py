@@ -15,6 +15,7 @@ from fastslow.compiled.parts import part
 from fastslow.compiled.records import Matrix, Vector, construction, leaves, type_of, zeros
 from fastslow.compiled.slots import fields_of_arrays
 from fastslow.continuation.loops import LOOPS
+from fastslow.passage.loops import STEP_VALUES
 from fastslow.simulation.events import Search, search_for
 
 #: What the loops may call: functions of C99, which every system has.
@@ -140,6 +141,16 @@ def test_read_only_and_strided_arrays_are_copied():
     assert found.tolist() == [[7, 0], [7, 7]]
     assert apart[:, 0].tolist() == [pytest.approx(0.1), pytest.approx(np.hypot(0.5, 0.1))]
     assert not apart[:, 1:].any()
+
+
+def test_what_a_loop_only_reads_is_not_copied(monkeypatch):
+    """A run's coefficients are read-only, and megabytes."""
+    series, times = read_only(np.ones((2, 1, 3))), np.array([0.5, 1.5])
+    starts, values = read_only(np.array([0.0, 1.0])), np.empty((1, 2))
+    values_in_steps = load_loop(STEP_VALUES)
+    monkeypatch.setitem(values_in_steps.__globals__, "_taken", None)
+    assert values_in_steps(series, starts, 0.0, 2.0, times, values) == 0
+    assert values.tolist() == [[1.75, 1.75]]
 
 
 # where they come from

@@ -16,7 +16,7 @@ def test_the_nearest_of_all_chords_counts(radius):
     chain = _resampled(np.column_stack([np.sin(5 * slow), height, np.minimum(slow, 0.9)]))
     points = chain[draw.integers(0, 257, 400)] + draw.normal(0.0, radius, (400, 3))
     near = np.empty(400)
-    nearness_to_chain(points, chain, radius, near)
+    nearness_to_chain(np.ascontiguousarray(points.T), chain, radius, near)
     begin, chord = chain[:-1], np.diff(chain, axis=0)
     length = (chord**2).sum(axis=1)
     part = ((points[:, None] - begin) * chord).sum(axis=2) / np.where(length > 0, length, 1.0)

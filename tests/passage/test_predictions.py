@@ -5,6 +5,8 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.passage import predictions
+from fastslow.passage.drifts import drift_at
 from tests.passage import slow_models
 
 x, y, p, t = sp.symbols("x y p t")
@@ -66,6 +68,20 @@ def test_jumps_are_within_the_error_of_their_law(case, state, end):
         assert abs(jump.delay - jump.law.delay) <= jump.law.error + 1e-9
         assert jump.law.error <= 0.06 * abs(jump.delay)
         assert not jump.law.drift.constant
+
+
+def test_a_drift_is_put_into_words_once_for_every_law(monkeypatch):
+    """The gap is crossed twice in every period, both ways at the same rates."""
+    calls = []
+
+    def counted(slow, point, time, *, told=True):
+        calls.append(told)
+        return drift_at(slow, point, time, told=told)
+
+    monkeypatch.setattr(predictions, "drift_at", counted)
+    lay = laid(fs.systems.harmonic_gear(), "w", (-20, 20), [0.0, 0.0], periods=3)
+    assert len([t for t in lay.transitions if t.law]) == 6
+    assert (calls.count(False), calls.count(True)) == (6, 2)
 
 
 @pytest.mark.parametrize("start", [-0.95, -0.73, -0.6])

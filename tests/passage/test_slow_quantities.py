@@ -5,6 +5,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.passage.slow_quantities import slow_quantity
 
 x, t, g, w1, w2, omega = sp.symbols("x t g w1 w2 omega")
 
@@ -85,3 +86,26 @@ def test_a_parameter_that_is_no_slow_quantity_is_refused(two_forcings, run):
     lay = fs.overlay(held, run)
     assert lay.outcome.code == "another slow quantity"
     assert "holds w1 = 0.1, in the run it goes from -" in lay.summary()
+
+
+@pytest.fixture(scope="module")
+def gear_run():
+    model = fs.systems.harmonic_gear()
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(-20, 20))
+    return slow_quantity(diagram, fs.simulate(model, [0.0, 0.0], t=(0.0, 50.0)))
+
+
+def test_between_the_steps_it_has_the_bits_of_the_run(gear_run):
+    run = gear_run.run
+    times = np.sort(np.r_[np.linspace(*run.span, 500), run.step_starts])
+    for asked in (times, times[::-1].copy(), times[77:78], times[:0]):
+        value, state = gear_run.at(asked)
+        columns = run.dense_columns(asked)
+        assert value.tobytes() == columns[2].tobytes()
+        assert state.T.tobytes() == columns[:2].tobytes()
+
+
+@pytest.mark.parametrize("time", [-1e-9, 50.1, float("nan")])
+def test_outside_the_run_there_is_none(gear_run, time):
+    with pytest.raises(fs.ArgumentError, match="outside the run"):
+        gear_run.at(np.array([1.0, time]))
