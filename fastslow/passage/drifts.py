@@ -145,21 +145,20 @@ def _drift_of(
     told : bool
         Whether a rate that is not linear is put into words.
     """
-    known = {n: sp.Float(v, DIGITS) for n, v in model.values.items() if n in rate.free_symbols}
-    arguments = (*known, *map(real, names), TIME)
-    values = _values(rate, arguments, (*map(real, names), TIME))
-    given = [*map(float, known.values()), *(here[n] for n in names), time]
+    moving = (*map(real, names), TIME)
+    used, values = _values(rate, tuple(model.values), moving)
+    given = [*(float(model.values[n]) for n in used), *(here[n] for n in names), time]
     try:
         value, *slopes, change = map(float, values(*given))
     except (TypeError, ValueError, NameError, ArithmeticError):
         value, slopes, change = math.nan, [], math.nan
     if not all(map(math.isfinite, (value, *slopes, change))):
         # what these functions cannot tell, SymPy may
-        return drift_of_law(rate.xreplace({**known, TIME: _later(time)}), here)
+        return drift_of_law(rate.xreplace({**_known(model, used), TIME: _later(time)}), here)
     text = ""
-    if told and not _linear(rate, arguments[len(known) :]):
-        moved = rate.xreplace(known)
-        if not _linear(moved, arguments[len(known) :]):
+    if told and not _linear(rate, moving):
+        moved = rate.xreplace(_known(model, used))
+        if not _linear(moved, moving):
             text = str(moved.xreplace({TIME: _later(time)}))
     *states, last = [*names] or [""]
     by = dict(zip(names, slopes, strict=True))
@@ -172,14 +171,20 @@ def _drift_of(
     )
 
 
+def _known(model: Any, used: tuple[sp.Symbol, ...]) -> dict[sp.Symbol, sp.Float]:
+    """Values of some parameters."""
+    return {n: sp.Float(model.values[n], DIGITS) for n in used}
+
+
 @lru_cache(maxsize=128)
 def _values(
-    rate: sp.Expr, arguments: tuple[sp.Symbol, ...], moving: tuple[sp.Symbol, ...]
-) -> Callable[..., Any]:
-    """A rate and its slopes as a function of numbers."""
+    rate: sp.Expr, parameters: tuple[sp.Symbol, ...], moving: tuple[sp.Symbol, ...]
+) -> tuple[tuple[sp.Symbol, ...], Callable[..., Any]]:
+    """The parameters in a rate, and it and its slopes as a function of these and what moves."""
+    used = tuple(n for n in parameters if n in rate.free_symbols)
     slopes = [rate.diff(s) if s in rate.free_symbols else sp.Integer(0) for s in moving]
-    function: Callable[..., Any] = sp.lambdify(arguments, [rate, *slopes], "math")
-    return function
+    function: Callable[..., Any] = sp.lambdify((*used, *moving), [rate, *slopes], "math")
+    return used, function
 
 
 @lru_cache(maxsize=256)

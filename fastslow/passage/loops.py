@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fastslow.compiled.generic import Loop
-from fastslow.compiled.records import Matrix, Tensor, Vector
+from fastslow.compiled.records import Flags, Matrix, Tensor, Vector
 from fastslow.passage.radau_passages import End, Law, Motion, Space
 
 PASS_THROUGH = Loop(
@@ -23,6 +23,13 @@ NEARNESS = Loop(
     read=("points", "chain"),
 )
 
+BESIDE = Loop(
+    "fastslow.passage.chain_distances",
+    "beside_chain",
+    {"points": Matrix, "chain": Matrix, "radius": float, "beside": Flags},
+    read=("points", "chain"),
+)
+
 STEP_VALUES = Loop(
     "fastslow.passage.step_values",
     "values_in_steps",
@@ -34,4 +41,4 @@ STEP_VALUES = Loop(
     read=("series", "starts", "times"),
 )  # fmt: skip
 
-LOOPS = (PASS_THROUGH, NEARNESS, STEP_VALUES)
+LOOPS = (PASS_THROUGH, NEARNESS, BESIDE, STEP_VALUES)

@@ -23,7 +23,7 @@ from fastslow.passage.predictions import with_laws
 from fastslow.passage.sheets import courses_of
 from fastslow.passage.slow_quantities import SlowQuantity, slow_quantity
 from fastslow.passage.spikes import refined, turns_of
-from fastslow.passage.stays import Measured, Stay, measured, products, stays_of
+from fastslow.passage.stays import Measured, Stay, measured, products, rows_of, stays_of
 from fastslow.passage.sticking import along_edges, bands_at, with_sticking
 from fastslow.passage.transitions import Passage, leaving, passages_within, steep_parts
 from fastslow.results.angles import apart as apart_of
@@ -293,13 +293,13 @@ def _distances(
     lag, relaxation = np.full((2, len(m.time)), np.nan)
     mean = float(np.abs(np.diff(m.slow)).sum()) / (float(m.time[-1] - m.time[0]) or 1.0)
     for number, course in enumerate(m.courses):
-        on = np.isin(followed, course.sheets)
+        on = np.flatnonzero(np.isin(np.arange(-1, len(p.sheets)), course.sheets)[followed + 1])
         distance[on] = apart[number, on]
         slow = m.slow[on]
         # a velocity is that of the drifting sheet itself, at whatever lag
         moves = np.where(m.velocities, 0.0, 1.0)
         slope = moves * course.slope(slow) / m.extent
-        deviation = moves * m.deviation(number, on)
+        deviation = moves * rows_of(m.deviation(number), on)
         steep = products(slope, slope)
         rate = -course.relaxation(slow)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -313,7 +313,7 @@ def _distances(
         inside = (earlier >= m.time[0]) & (earlier <= m.time[-1])
         before = np.where(inside, np.interp(earlier, m.time, m.slow), slow - step)
         exists &= np.abs(before - slow + step) <= REST * np.abs(step)
-        rest = moves * apart_of(m.scaled[on], course.state(before) / m.extent, m.periods)
+        rest = moves * apart_of(rows_of(m.scaled, on), course.state(before) / m.extent, m.periods)
         left, whole = (np.sqrt(products(v, v)) for v in (rest, deviation))
         exists &= left <= REST * whole
         lag[on] = np.where(exists, behind, np.nan)

@@ -97,15 +97,26 @@ class Course:
     def slope(self, slow: Array) -> Array:
         """dX/dw at parameter values, shape (N, n); infinite at a fold, 0 beyond the range."""
         low, high = self.range
-        inside = np.clip(slow, low, high)
-        lower, upper = self._between(inside)
-        values, tangent = self.branch.parameter, self.branch.tangent
-        part = ((inside - values[lower]) / (values[upper] - values[lower]))[:, None]
-        mean = (1 - part) * tangent[lower] + part * _along(tangent[upper], tangent[lower])
+        inside = np.minimum(np.maximum(slow, low), high)
+        step, (begin, width, lower, upper) = self._step(inside), self._tangents
+        part = (inside - begin[step]) / width[step]
+        mean = (1 - part) * lower.take(step, axis=1) + part * upper.take(step, axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
-            slope = mean[:, :-1] / mean[:, -1:]
-        slope[(slow < low) | (slow > high)] = 0.0
-        return slope
+            slope = mean[:-1] / mean[-1]
+        slope[:, (slow < low) | (slow > high)] = 0.0
+        return slope.T
+
+    @cached_property
+    def _tangents(self) -> tuple[Array, Array, Array, Array]:
+        """Where each step begins, its width, and tangents at its lower and its upper row.
+
+        Those of one step, in columns, point the same way.
+        """
+        values, tangent = self._ordered, self.branch.tangent[self._rows]
+        one, other = tangent[:-1], tangent[1:]
+        other = np.where(np.sum(one * other, axis=1, keepdims=True) < 0, -other, other)
+        lower, upper = (np.ascontiguousarray(t.T) for t in (one, other))
+        return values[:-1], np.diff(values), lower, upper
 
     def relaxation(self, slow: Array) -> Array:
         """Largest real part of the eigenvalues at values of the parameter, shape (N,)."""
@@ -114,11 +125,6 @@ class Course:
     def stiffness(self, slow: Array) -> Array:
         """Least modulus of the eigenvalues at values of the parameter, shape (N,)."""
         return np.interp(slow, self._ordered, self._softest)
-
-    def _between(self, slow: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Rows on both sides of values inside the range."""
-        place = self._step(slow)
-        return self._rows[place], self._rows[place + 1]
 
     def _step(self, slow: Array) -> NDArray[np.intp]:
         """The step in which each of some values inside the range is."""
@@ -130,11 +136,6 @@ class Course:
         place = np.clip(np.arange(len(self._ordered) + 1) - 1, 0, len(self._ordered) - 2)
         # not between the two rows of a joint
         return np.where(self._ordered[place] == self._ordered[place + 1], place - 1, place)
-
-
-def _along(one: Array, other: Array) -> Array:
-    """Tangents turned to point along others."""
-    return np.where(np.sum(one * other, axis=1, keepdims=True) < 0, -one, one)
 
 
 def courses_of(diagram: Diagram) -> tuple[tuple[StableSheet, ...], tuple[Course, ...]]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.compiled.generic import load_loop
 from fastslow.passage.extents import extents_of
-from fastslow.passage.loops import NEARNESS
+from fastslow.passage.loops import BESIDE, NEARNESS
 from fastslow.passage.sheets import Course
 from fastslow.passage.slow_quantities import SlowQuantity
 from fastslow.results.angles import apart, nearest_copy, periods_of
@@ -91,26 +91,32 @@ class Measured:
         """Scaled states less those of a course at the same value of the slow quantity."""
         return apart(self.scaled[rows], self.places[rows, course], self.periods)
 
-    def beside(self, course: int, slow: Array, scaled: Array) -> Mask:
-        """Whether states are nearer than the radius to a course as a curve, shape (N,).
+    def beside(self, course: int) -> Mask:
+        """Which samples are nearer than the radius to a course as a curve, shape (N,).
 
         What lags behind a sheet is beside it all the same: the place where it is to
         be found is one of a moment ago.
         """
-        return self.nearness(course, slow, scaled) > 0.0
+        points = self._points(course, self.slow, self.scaled)
+        beside = np.empty(len(self.slow), dtype=bool)
+        load_loop(BESIDE)(points, self.curves[course], self.radius, beside)
+        return beside
 
     def nearness(self, course: int, slow: Array, scaled: Array) -> Array:
         """The radius less the distance of states from a course as a curve, shape (N,).
 
         −radius where they are far from all of it in the slow quantity.
         """
+        points, near = self._points(course, slow, scaled), np.empty(len(slow))
+        load_loop(NEARNESS)(points, self.curves[course], self.radius, near)
+        return near
+
+    def _points(self, course: int, slow: Array, scaled: Array) -> Array:
+        """States and the slow quantity in the units of the curves, shape (n + 1, N)."""
         if self.periods.any():
             place = self.courses[course].state(slow) / self.extent
             scaled = nearest_copy(scaled, place, self.periods)
-        points = np.vstack([scaled.T, slow / self.span])
-        near = np.empty(len(slow))
-        load_loop(NEARNESS)(points, self.curves[course], self.radius, near)
-        return near
+        return np.vstack([scaled.T, slow / self.span])
 
     def way(self, old: int, new: int) -> Array:
         """Which part of the way from one course to another the state has done, shape (N,)."""
@@ -150,7 +156,7 @@ def measured(
     for k, course in enumerate(courses):
         present[:, k] = course.present(slow.table) & within
         places[:, k] = course.state(slow.table)
-    met = [places[present[:, k], k] for k in range(len(courses))]
+    met = [rows_of(places[:, k], np.flatnonzero(present[:, k])) for k in range(len(courses))]
     extent, velocities = extents_of(slow, courses, state, met)
     periods = periods_of(slow.states, run.periods)
     span = max(float(np.ptp(slow.table)), 1e-3 * (over[1] - over[0]))
@@ -188,6 +194,11 @@ def products(one: Array, other: Array) -> Array:
     return np.asarray(total)
 
 
+def rows_of(table: Array, rows: NDArray[np.intp]) -> Array:
+    """Some rows of a table (N, n) whose columns lie side by side in memory, as those of it."""
+    return np.asarray(table.T.take(rows, axis=1).T)
+
+
 def way_done(scaled: Array, old: Array, new: Array, periods: Array) -> Array:
     """Which part of the way from an old place to a new one states have done."""
     chord = apart(new, old, periods)
@@ -204,7 +215,7 @@ def stays_of(m: Measured) -> list[Stay]:
     sooner. It is left where it is no longer near, or where two thirds of the way to
     another stable sheet are done.
     """
-    beside = [m.beside(k, m.slow, m.scaled) for k in range(len(m.courses))]
+    beside = [m.beside(k) for k in range(len(m.courses))]
     visits = [v for k, near in enumerate(beside) for v in _visits(k, near & m.present[:, k])]
     stays: list[Stay] = []
     here = 0
