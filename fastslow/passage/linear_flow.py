@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,17 +56,17 @@ class LinearFlow:
     by_state: Array = field(default_factory=lambda: np.empty(0))
     offset: Array = field(default_factory=lambda: np.empty(0))
 
-    @property
+    @cached_property
     def feedback(self) -> Array:
         """``by_state``, shape (n,)."""
         return self.by_state if self.by_state.size else np.zeros(len(self.slope))
 
-    @property
+    @cached_property
     def drift(self) -> Array:
         """Row whose product with z is μ', shape (n + 3,)."""
         return np.concatenate([self.feedback, [self.by_value, self.change, self.rate]])
 
-    @property
+    @cached_property
     def matrix(self) -> Array:
         n = len(self.slope)
         whole = np.zeros((n + 3, n + 3))

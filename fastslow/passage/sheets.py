@@ -66,8 +66,10 @@ class Course:
 
     def present(self, slow: Array) -> NDArray[np.bool_]:
         """Whether a stable sheet of the course exists at values of the parameter."""
-        low, high = self.ranges.T
-        return ((slow[:, None] >= low) & (slow[:, None] <= high)).any(axis=1)
+        found = np.zeros(len(slow), dtype=bool)
+        for low, high in self.ranges.tolist():
+            found |= (slow >= low) & (slow <= high)
+        return found
 
     def sheet(self, slow: Array) -> NDArray[np.intp]:
         """Number of the stable sheet at (or nearest to) values of the parameter."""

@@ -39,6 +39,7 @@ EPSILON = float(np.finfo(float).eps)
 #: Places between two times, and about where a condition is expected to begin to hold.
 EVEN = np.linspace(0.0, 1.0, 17)
 NEARBY = np.concatenate([-(10.0 ** -np.arange(1, 13)), [0.0], 10.0 ** -np.arange(1, 13)])
+PLACES = np.concatenate([EVEN, NEARBY])
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,12 +97,13 @@ class Passage:
         """
         guess = 0.5 * (start + stop)
         while stop - start > 4.0 * EPSILON * max(abs(start), abs(stop)):
-            times = np.concatenate([start + (stop - start) * EVEN, guess + (stop - start) * NEARBY])
+            times = (stop - start) * PLACES
+            times[: len(EVEN)] += start
+            times[len(EVEN) :] += guess
             times = np.minimum(np.maximum(times, start), stop)
             times.sort()
             value = np.asarray(over(*self.slow.at(times)))
-            holds = value >= 0.0
-            holds[times <= start], holds[times >= stop] = False, True
+            holds = (value >= 0.0) & (times > start) | (times >= stop)
             k = int(np.argmax(holds))
             if not times[k] - times[k - 1] < stop - start:
                 break

@@ -23,18 +23,18 @@ class Cubics:
     ----------
     begin, width : ndarray, shape (m,)
         The parameter at the lower row, and by how much it changes to the next.
-    powers : tuple of ndarray, shape (n, m)
+    powers : ndarray, shape (4, n, m)
         Coefficients of 1, s, s² and s³, those of each state side by side.
     """
 
     begin: Floats
     width: Floats
-    powers: tuple[Floats, ...]
+    powers: Floats
 
     def at(self, steps: NDArray[np.intp], values: Floats) -> Floats:
         """States on some of the steps at parameter values, shape (N, n)."""
         part = (values - self.begin[steps]) / self.width[steps]
-        zero, one, two, three = (power.take(steps, axis=1) for power in self.powers)
+        zero, one, two, three = self.powers.take(steps, axis=2)
         return np.asarray(zero + part * one + part**2 * two + part**3 * three).T
 
 
@@ -55,8 +55,8 @@ def cubics(branch: Branch, rows: NDArray[np.intp]) -> Cubics:
         mild = (np.abs(m0) <= bound) & (np.abs(m1) <= bound)
         two = np.where(mild, 3 * chord - 2 * m0 - m1, 0.0)
         three = np.where(mild, m0 + m1 - 2 * chord, 0.0)
-    powers = (x0, np.where(mild, m0, chord), two, three)
-    return Cubics(p0, width, tuple(np.ascontiguousarray(power.T) for power in powers))
+    powers = np.array([x0, np.where(mild, m0, chord), two, three])
+    return Cubics(p0, width, np.ascontiguousarray(powers.transpose(0, 2, 1)))
 
 
 def hermite(branch: Branch, rows: NDArray[np.intp], values: Floats) -> Floats:
