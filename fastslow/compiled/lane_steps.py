@@ -163,12 +163,18 @@ def _length(
     And whether every row that moves has a size. One that is and stays zero has
     none, and counts for nothing: 0/0 is no number, which no comparison lets through.
     """
-    scales = [1.0 / size for size in sizes]
+    # rows that differ in c_0 alone are judged by the smallest of their sizes
+    smallest: dict[tuple[int, ...], tuple[Sequence[Lanes], Lanes]] = {}
+    for row, size in zip(rows, sizes, strict=True):
+        key = tuple(id(c) for c in row[order - 2 :])
+        _, other = smallest.get(key, (row, size))
+        smallest[key] = row, size if other is size else (size < other).choose(size, other)
+    judged = [(row, 1.0 / size) for row, size in smallest.values()]
     shortest: Lanes | None = None
     known: Mask | None = None
     for k in (order, order - 1, order - 2):
         largest = tolerance.trace.lanes(_SMALLEST)
-        for row, scale in zip(rows, scales, strict=True):
+        for row, scale in judged:
             size = added(abs(row[k]) * scale)
             largest = (size > largest).choose(size, largest)
         length = added((tolerance - log2(largest)) * (1.0 / k))

@@ -2,6 +2,7 @@
 
 import ctypes
 import math
+from functools import partial
 
 import mpmath
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from llvmlite import ir
 
 from fastslow.compiled.lane_functions import Mathematics, exp2, log2
-from fastslow.compiled.lane_steps import _by_bernstein, _by_moduli
+from fastslow.compiled.lane_steps import _by_bernstein, _by_moduli, _length
 from fastslow.compiled.lanes import WIDTH, Trace, Workspace, added, polynomial
 from fastslow.compiled.machine_code import load_object, object_code
 from fastslow.compiled.native import ENTRY
@@ -190,3 +191,28 @@ def test_what_bounds_the_change_of_a_polynomial(rule):
         values = np.array(shares) @ np.array([rows[k] * h**k for k in (1, 2, 3)])
         np.testing.assert_allclose(least, values.min(axis=0), atol=1e-13)
         np.testing.assert_allclose(most, values.max(axis=0), atol=1e-13)
+
+
+def test_rows_that_differ_in_their_values_alone_are_judged_once():
+    """By the smallest of their sizes: the length is that of all of them, with one division."""
+
+    def length(trace, c, a, b, *, apart):
+        rows = [[a, c, c, c, c], [b, *((c + 1.0) - 1.0 if apart else c for _ in range(4))]]
+        tolerance = trace.lanes(-20.0)
+        return _length(rows, [abs(a), abs(b)], tolerance, 4)[0]
+
+    numbers = np.random.default_rng(1).integers(1, 2**20, (3, 200)) / 2.0**16
+    together, apart = (
+        compiled(partial(length, apart=apart), count=3)(*numbers) for apart in (False, True)
+    )
+    np.testing.assert_array_equal(together, apart)
+
+    made = []
+
+    def count(trace, c, a, b):
+        divide = trace.operation
+        trace.operation = lambda name, *given: made.append(name) or divide(name, *given)
+        return length(trace, c, a, b, apart=False)
+
+    compiled(count, count=3)
+    assert made.count("fdiv") == 1
