@@ -349,13 +349,16 @@ def position(key: Any, count: int, what: str) -> int:
     return place % count
 
 
+#: What is no number, though NumPy would make one of it.
+_NO_NUMBER = (bool, str, bytes)
+
+
 def numbers(name: str, value: Any) -> NDArray[np.float64]:
     """An array of real numbers, of any shape; they need not be finite."""
     try:
         raw = np.asarray(value)
-        objects = raw.flat if raw.dtype.kind == "O" else ()
-        mixed = any(isinstance(item, bool | str | bytes) for item in objects)
-        if raw.dtype.kind not in _REAL or mixed:
+        kind = raw.dtype.kind
+        if kind not in _REAL or (kind == "O" and any(isinstance(n, _NO_NUMBER) for n in raw.flat)):
             raise TypeError
         return np.array(raw, dtype=float)
     except (TypeError, ValueError, OverflowError):

@@ -74,6 +74,11 @@ def part(function: F) -> F:
     return cast(F, _Part(function, fastmath={"contract"}))
 
 
+def inlined_part(function: F) -> F:
+    """As `part`, put where it is called: to hand over large records took a tenth of a short run."""
+    return cast(F, _Part(function, fastmath={"contract"}, forceinline=True))
+
+
 def unfused_part(function: F) -> F:
     """As `part`, with every product and sum rounded by itself."""
     return cast(F, _Part(function))

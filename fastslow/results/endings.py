@@ -16,14 +16,15 @@ def outcome_of(
     mode: int,
     end: NDArray[np.float64],
     n_steps: int,
-    start_size: float,
+    begin: NDArray[np.float64],
     modes: tuple[str, ...],
     limits: tuple[int, int],
     undecided: tuple[tuple[str, str], ...] = (),
 ) -> Outcome:
     """The outcome of a run, from the code of the loop (see `fastslow.simulation.driver`).
 
-    ``undecided`` names intersections of interfaces without a sliding motion, and why.
+    ``begin`` is the initial state, ``end`` the time and state reached; ``undecided`` names
+    intersections of interfaces without a sliding motion, and why.
     """
     time = f"t = {end[0]:.10g}"
     if code == 0:
@@ -35,7 +36,8 @@ def outcome_of(
             False,
         )
     size = float(np.abs(end[1:]).max())
-    if code in (1, 3, 4) and n_steps and not size <= _BLOW_UP * (1.0 + start_size):
+    most = _BLOW_UP * (1.0 + float(np.abs(begin).max()))
+    if code in (1, 3, 4) and n_steps and not size <= most:
         return Outcome(
             "blow-up",
             f"the state grew to {size:.3g} within {n_steps} steps, by {time}.",

@@ -151,7 +151,6 @@ class Ensemble(Table, Result):
     @cached_property
     def outcomes(self) -> tuple[Outcome, ...]:
         """How each trajectory ended, in words."""
-        size = np.abs(self.start).max(axis=1)
         ends = np.column_stack([self.reached, self.final])
         return tuple(
             outcome_of(
@@ -159,7 +158,7 @@ class Ensemble(Table, Result):
                 int(self.last_mode[i]),
                 ends[i],
                 int(self.n_steps[i]),
-                float(size[i]),
+                self.start[i],
                 self.modes,
                 self.limits,
                 self.undecided,

@@ -126,6 +126,13 @@ class Immutable(ReadOnly):
             if type(value) not in PLAIN:
                 own[name] = fixed(name, value)
 
+    @classmethod
+    def of_fixed(cls, shared: Mapping[str, Any], **own: Any) -> Self:
+        """One whose fields, all of them given, are `fixed` already: none is looked at again."""
+        made = object.__new__(cls)
+        made.__dict__.update(shared, **own)
+        return made
+
     def __copy__(self) -> Self:
         return self
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fastslow.compiled.lane_steps import SUDDEN
-from fastslow.compiled.parts import part
+from fastslow.compiled.parts import inlined_part
 from fastslow.compiled.pointers import call_address
 from fastslow.simulation.events import find_event, holds, put_on_all
 from fastslow.simulation.extremes import widen_extremes
@@ -31,7 +31,7 @@ from fastslow.simulation.modes import (
     interface_noise,
     leaves,
 )
-from fastslow.simulation.polynomials import ZERO, horner, sample
+from fastslow.simulation.polynomials import ZERO, horner, take_samples
 from fastslow.simulation.scales import (
     REACHED,
     flush,
@@ -90,7 +90,7 @@ CROWD = 40
 TANGENTIAL = 1e-6
 
 
-@part
+@inlined_part
 def drive(problem, run, record, workspace, handed):
     """Follow one trajectory to its end, until others may take its next step, or to a pause.
 
@@ -126,7 +126,7 @@ def drive(problem, run, record, workspace, handed):
     implicit, memory = workspace.implicit, workspace.collocation.memory
     right, poly, phase = implicit.right, implicit.poly, implicit.radau.phase
     on, hit, rests, side, noise = search.on, search.hit, search.rests, search.side, search.noise
-    gradient, offsets = search.gradient, record.offsets
+    gradient, offsets, samples = search.gradient, workspace.offsets, record.samples
     columns = order + 1
     kept = n_states + problem.n_forcing
     stride = kept * columns
@@ -353,15 +353,12 @@ def drive(problem, run, record, workspace, handed):
                     unused = (since - begin) - lag
                     widen_extremes(W, order, unused, taken, extremes, search)
             if dense:
+                coefficients = store[n_steps * stride : (n_steps + 1) * stride]
                 for i in range(stride):
-                    store[n_steps * stride + i] = W[i]
+                    coefficients[i] = W[i]
             n_steps += 1
-            first = n_samples
-            while n_samples < times.shape[0] and times[n_samples] <= t:
-                offsets[n_samples] = (times[n_samples] - begin) - lag
-                n_samples += 1
-            if n_samples > first:
-                sample(W, columns, offsets[first:n_samples], record.samples, first)
+            step = (begin, lag, t)
+            n_samples = take_samples(W, columns, step, times, samples, n_samples, offsets)
             for i in range(kept):
                 inputs[1 + i] = horner(W, i * columns, i * columns + order, taken)
             flush(rules, inputs, n_states)

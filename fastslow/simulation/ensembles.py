@@ -468,7 +468,7 @@ def _run(
                 kept.after(stop, chunk, places, seen, codes)
 
     def advance(chunk: tuple[int, int]) -> Iterator[int]:
-        pool = pool_for(problem, lanes.regions, values.shape[1], times.shape[1], count)
+        pool = pool_for(problem, lanes.regions, values.shape[1], count)
         workspace = workspace_for(problem, compiled.n_rows)
         pace = Pace(compiled.n_rows, compiled.order)
         while True:

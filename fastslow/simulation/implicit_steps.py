@@ -283,12 +283,10 @@ def settled(problem, W, h, scales):
     """
     order = problem.order
     most = problem.tol * math.exp(0.5 * order)
-    for i in range(problem.n_states + problem.n_forcing + problem.n_interfaces):
-        row = i * (order + 1)
-        allowed = most * scales[NOW, i]
-        k = order // 2
-        for m in range(k - 1, k + 1):
-            if not abs(W[row + m]) * h**m <= allowed:
+    for k in range(order // 2 - 1, order // 2 + 1):
+        power = h**k
+        for i in range(problem.n_states + problem.n_forcing + problem.n_interfaces):
+            if not abs(W[i * (order + 1) + k]) * power <= most * scales[NOW, i]:
                 return False
     return True
 

@@ -26,7 +26,7 @@ from fastslow.compiled.records import (
 )
 from fastslow.simulation.driver import HANDED_OVER, OUT_OF_WORK, REACHED_END, drive
 from fastslow.simulation.extremes import widen_extremes
-from fastslow.simulation.polynomials import ZERO, sample
+from fastslow.simulation.polynomials import ZERO, take_samples
 from fastslow.simulation.problems import Problem, Record, Run
 from fastslow.simulation.scales import FIXED, LASTING
 from fastslow.simulation.workspace import (
@@ -106,8 +106,6 @@ class Pool(NamedTuple):
         What the loop goes on from after a pause, and the work up to the next one.
     table : float64 array, shape (0, 0)
     nothing : float64 array, shape (0,)
-    offsets : float64 array, shape (n_times,)
-        Work space.
     """
 
     rows: Matrix
@@ -121,11 +119,10 @@ class Pool(NamedTuple):
     progress: Integers
     table: Matrix
     nothing: Vector
-    offsets: Vector
 
 
-def pool_for(problem: Problem, regions: int, n_values: int, n_times: int, count: int) -> Pool:
-    """An empty pool for so many runs, with so many parameters and samples."""
+def pool_for(problem: Problem, regions: int, n_values: int, count: int) -> Pool:
+    """An empty pool for so many runs, with so many parameters."""
     n, n_forcing, order = problem.n_states, problem.n_forcing, problem.order
     rows = n + n_forcing + problem.n_interfaces
     under_way = min(UNDER_WAY, count)
@@ -142,7 +139,6 @@ def pool_for(problem: Problem, regions: int, n_values: int, n_times: int, count:
         LEFT + 1,
         (0, 0),
         0,
-        n_times,
     )
 
 
@@ -207,7 +203,6 @@ def drive_many(problem, steps, regions, runs, pool, workspace, first, last):
             )
             record = Record(
                 times[min(i, times.shape[0] - 1)],
-                pool.offsets,
                 runs.samples[i],
                 pool.table,
                 pool.table,
@@ -362,7 +357,7 @@ def copy_into_the_rest(held, rows, given):
 def report(problem, runs, pool, workspace, lane, i):
     """Add the samples and the extremes within the last step of a lane."""
     n, order, rows, times = problem.n_states, problem.order, pool.rows, runs.times
-    W, offsets, extremes, counted = workspace.W, pool.offsets, runs.extremes, runs.counted
+    W, extremes, counted = workspace.W, runs.extremes, runs.counted
     began, length = rows[1 + n + step.BEGAN, lane], rows[1 + n + step.LENGTH, lane]
     for k in range(pool.series.shape[0]):
         W[k] = pool.series[k, lane]
@@ -374,14 +369,12 @@ def report(problem, runs, pool, workspace, lane, i):
         for k in range(n):
             rows[1 + n + step.ROWS + k, lane] = extremes[i, 0, k]
             rows[1 + n + step.ROWS + n + k, lane] = extremes[i, 1, k]
-    first = last = counted[i, SAMPLES]
-    while next_time(times, i, last) <= rows[0, lane]:
-        offsets[last] = (next_time(times, i, last) - began) - rows[1 + n + step.LATE, lane]
-        last += 1
-    if last > first:
-        sample(W, order + 1, offsets[first:last], runs.samples[i], first)
-    counted[i, SAMPLES] = last
-    rows[1 + n + step.NEXT, lane] = next_time(times, i, last)
+    whole = (began, rows[1 + n + step.LATE, lane], rows[0, lane])
+    own, samples, offsets = times[min(i, times.shape[0] - 1)], runs.samples[i], workspace.offsets
+    counted[i, SAMPLES] = take_samples(
+        W, order + 1, whole, own, samples, counted[i, SAMPLES], offsets
+    )
+    rows[1 + n + step.NEXT, lane] = next_time(times, i, counted[i, SAMPLES])
 
 
 @part

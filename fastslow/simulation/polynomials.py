@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from fastslow.compiled.parts import part
+from fastslow.compiled.vectors import horner_of_four
 
 EPSILON = float(np.finfo(float).eps)
 
@@ -44,46 +45,43 @@ def horner(b, first, last, s):
 
 
 @part
+def take_samples(W, columns, step, times, out, first, offsets):
+    """Evaluate rows of a step at all the times in it, from the first on; returns the next.
+
+    Parameters
+    ----------
+    W : float64 array
+    columns : int
+    step : tuple of float
+        When it begins, by how much that is late, and when it ends.
+    times : float64 array
+        Increasing.
+    out : float64 array, shape (rows, n_times)
+    first : int
+    offsets : float64 array
+        Work space.
+    """
+    begin, lag, end = step
+    while first < times.shape[0] and times[first] <= end:
+        count, most = ZERO, min(offsets.shape[0], times.shape[0] - first)
+        while count < most and times[first + count] <= end:
+            offsets[count] = (times[first + count] - begin) - lag
+            count += 1
+        sample(W, columns, offsets[:count], out, first)
+        first += count
+    return first
+
+
+@part
 def sample(W, columns, s, out, first):
     """Evaluate rows of a step at the offsets s, into the columns of ``out`` from the first."""
     n, rows = s.shape[0], out.shape[0]
-    # eight values at a time, because each waits for its own last product
-    for i in range(0, rows - 1, 2):
-        top = i * columns + columns - 1
-        for c in range(0, n - 3, 4):
-            s0, s1, s2, s3 = s[c], s[c + 1], s[c + 2], s[c + 3]
-            v0 = v1 = v2 = v3 = W[top]
-            w0 = w1 = w2 = w3 = W[top + columns]
-            for k in range(1, columns):
-                coefficient, below = W[top - k], W[top + columns - k]
-                v0 = v0 * s0 + coefficient
-                v1 = v1 * s1 + coefficient
-                v2 = v2 * s2 + coefficient
-                v3 = v3 * s3 + coefficient
-                w0 = w0 * s0 + below
-                w1 = w1 * s1 + below
-                w2 = w2 * s2 + below
-                w3 = w3 * s3 + below
-            place = first + c
-            out[i, place], out[i, place + 1], out[i, place + 2], out[i, place + 3] = v0, v1, v2, v3
-            j = i + 1
-            out[j, place], out[j, place + 1], out[j, place + 2], out[j, place + 3] = w0, w1, w2, w3
-    if rows % 2 == 1:
-        top = rows * columns - 1
-        for c in range(0, n - 3, 4):
-            s0, s1, s2, s3 = s[c], s[c + 1], s[c + 2], s[c + 3]
-            v0 = v1 = v2 = v3 = W[top]
-            for k in range(1, columns):
-                coefficient = W[top - k]
-                v0 = v0 * s0 + coefficient
-                v1 = v1 * s1 + coefficient
-                v2 = v2 * s2 + coefficient
-                v3 = v3 * s3 + coefficient
-            i, place = rows - 1, first + c
-            out[i, place], out[i, place + 1], out[i, place + 2], out[i, place + 3] = v0, v1, v2, v3
     for i in range(rows):
+        last = i * columns + columns - 1
+        for c in range(0, n - 3, 4):
+            horner_of_four(W, last, columns, s, c, out, i * out.shape[1] + first + c)
         for c in range(n - n % 4, n):
-            out[i, first + c] = horner(W, i * columns, i * columns + columns - 1, s[c])
+            out[i, first + c] = horner(W, i * columns, last, s[c])
 
 
 @part

@@ -80,8 +80,6 @@ class Record(NamedTuple):
     ----------
     times : float64 array
         Increasing times of the samples, within the span.
-    offsets : float64 array, shape (n_times,)
-        Work space.
     samples : float64 array, shape (n_rows, n_times)
         The first rows at those times, as far as they are reached.
     steps : float64 array, shape (space, 4)
@@ -102,7 +100,6 @@ class Record(NamedTuple):
     """
 
     times: Vector
-    offsets: Vector
     samples: Matrix
     steps: Matrix
     crossings: Matrix

@@ -155,13 +155,12 @@ def simulate(
     run = prepared.run(begin, span)
     place, counted = run.inputs, run.counted
     stride = kept * (compiled.order + 1) if dense else 0
-    tables = _memory.taken(compiled.n_states, stride)
+    tables = _memory.tables(compiled.n_states, stride)
     workspace = _memory.workspace(prepared)
-    offsets = np.empty(len(times))
     loop, pace = load_loop(DRIVE), Pace(compiled.n_rows, compiled.order)
     while True:
         counted[WORK] = pace.begin()
-        record = Record(times, offsets, sampled, *tables, *_LISTED)
+        record = Record(times, sampled, *tables, *_LISTED)
         code = loop(with_late_code(problem), run, record, workspace, 0)
         if code == OUT_OF_WORK:
             pace.end()
@@ -172,20 +171,20 @@ def simulate(
         else:
             break
     _memory.workspaces[prepared.shape] = workspace
-    steps, crossings, store = _memory.given_back(tables, counted, stride)
-    end, reached = place[: 1 + compiled.n_states].copy(), int(counted[SAMPLES])
+    steps, crossings, store = _memory.filled(tables, counted, stride)
+    end, reached = read_only(place[: 1 + compiled.n_states].copy()), int(counted[SAMPLES])
     n_steps, mode = int(counted[STEPS]), int(counted[MODE])
     outcome = outcome_of(
         code,
         mode,
         end,
         n_steps,
-        float(np.abs(begin).max()),
+        begin,
         compiled.modes,
         prepared.resolved.limits,
         compiled.undecided,
     )
-    series = store.reshape(len(steps), kept, compiled.order + 1) if dense else None
+    series = store.reshape(n_steps, kept, compiled.order + 1) if dense else None
     vanishing, together = prepared.vanishing, prepared.together
     if vanishing or together:
         if series is not None:
@@ -203,23 +202,18 @@ def simulate(
             outcome, model, prepared.resolved, vanishing, together, whole, columns, compiled.modes
         )
     if reached < len(times):
-        times, sampled = times[:reached], sampled[:, :reached].copy()
-    return Trajectory(
-        names,
-        *prepared.described,
-        period,
-        prepared.gap,
-        outcome,
-        (span[0], float(end[0])),
-        read_only(end),
-        _method(compiled, steps),
-        steps,
-        compiled.modes,
-        crossings,
-        series,
-        (times, read_only(sampled)) if samples is not None else None,
-        *prepared.recorded,
-        model,
+        times, sampled = times[:reached].copy(), sampled[:, :reached].copy()
+    return Trajectory.of_fixed(
+        prepared.shared,
+        period=period,
+        outcome=outcome,
+        span=(span[0], float(end[0])),
+        end=end,
+        method=_method(compiled, steps),
+        steps=steps,
+        crossing_table=crossings,
+        series=series,
+        sampled=read_only((times, sampled)) if samples is not None else None,
     )
 
 
@@ -255,20 +249,23 @@ class Prepared:
         return period_of(self.model)
 
     @cached_property
-    def described(self) -> tuple[Any, ...]:
-        """Slow quantities, interfaces, regions and parameters, as a run keeps them."""
+    def shared(self) -> dict[str, Any]:
+        """The fields of a `Trajectory` that all runs have in common."""
         model = self.model
-        named = (tuple(group) for group in (model.forcing, model.interfaces, model.regions))
-        return (*named, fixed("parameters", dict(model.parameters)))
-
-    @cached_property
-    def recorded(self) -> tuple[Any, ...]:
-        """Equations, settings and periods of states, as a run keeps them."""
-        return (
-            self.model.equations,
-            fixed("settings", self.resolved.recorded()),
-            fixed("periods", dict(self.model.periodic)),
-        )
+        content = {
+            "states": self.names,
+            "forcing": tuple(model.forcing),
+            "interfaces": tuple(model.interfaces),
+            "regions": tuple(model.regions),
+            "parameters": dict(model.parameters),
+            "gap": self.gap,
+            "modes": self.compiled.modes,
+            "equations": model.equations,
+            "settings": self.resolved.recorded(),
+            "periods": dict(model.periodic),
+            "model": model,
+        }
+        return {name: fixed(name, value) for name, value in content.items()}
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -289,7 +286,8 @@ class Prepared:
         """A run at its beginning."""
         parameters, carried, counted = self._beginning
         place = np.zeros(1 + len(state) + self.compiled.n_forcing)
-        place[0], place[1 : 1 + len(state)] = span[0], state
+        place[0] = span[0]
+        place[1 : 1 + len(state)] = state
         return Run(*span, span[0], parameters, place, carried.copy(), counted.copy())
 
 
@@ -312,11 +310,8 @@ def prepared_run(model: Model, integration: Integration, gap: str | None) -> Pre
     )
 
 
-#: Larger tables (in numbers) are handed over as they are instead of copied.
-_LARGE = 2**23
-
-#: Numbers that are copied at a time, and with which a table begins.
-_BLOCK, _LEAST = 2**22, 2**12
+#: Numbers that are copied at a time, with which a table begins at least, and at most.
+_BLOCK, _LEAST, _MOST = 2**22, 2**12, 2**23
 
 
 class _Tables(NamedTuple):
@@ -355,10 +350,10 @@ def _larger(table: NDArray[np.float64], used: int, more: int) -> NDArray[np.floa
 
 
 class _Memory(threading.local):
-    """Memory for the tables of a run, used again by the next one of the same thread."""
+    """What runs of a thread have in common: work space, and how much the last one kept."""
 
     def __init__(self) -> None:
-        self.free = [np.empty(0) for _ in _Tables._fields]
+        self.kept = (0, 0, 0)
         self.workspaces: dict[tuple[int, ...], Workspace] = {}
 
     def workspace(self, prepared: Prepared) -> Workspace:
@@ -370,31 +365,23 @@ class _Memory(threading.local):
             found = workspace_for(prepared.problem, prepared.compiled.n_rows)
         return found
 
-    def taken(self, n_states: int, stride: int) -> _Tables:
-        """Tables for a run, its own until they are given back: a signal handler may simulate."""
-        own = [flat if flat.size else np.empty(_LEAST) for flat in self.free]
-        self.free = [np.empty(0) for _ in _Tables._fields]
-        steps, crossings = (
-            flat[: len(flat) - len(flat) % columns].reshape(-1, columns)
-            for flat, columns in zip(own, (4, 6 + n_states), strict=False)
-        )
+    def tables(self, n_states: int, stride: int) -> _Tables:
+        """Tables for a run that keeps as much as the last one."""
+        steps, crossings, store = (min(max(n + n // 8, _LEAST), _MOST) for n in self.kept)
         # an empty store is for none
-        return _Tables(steps, crossings, own[2] if stride else np.empty(0))
+        return _Tables(
+            np.empty((steps // 4, 4)),
+            np.empty((crossings // (6 + n_states), 6 + n_states)),
+            np.empty(store if stride else 0),
+        )
 
-    def given_back(
-        self, tables: _Tables, counted: NDArray[np.int64], stride: int
-    ) -> tuple[NDArray[np.float64], ...]:
-        """What a run has filled of its tables."""
-        kept = []
-        for k, (table, used) in enumerate(zip(tables, tables.filled(counted, stride), strict=True)):
-            rows = table[:used]
-            if table.size <= _LARGE:
-                self.free[k] = table.reshape(-1)
-                rows = rows.copy()
-            else:
-                read_only(table)
-            kept.append(read_only(rows))
-        return tuple(kept)
+    def filled(self, tables: _Tables, counted: NDArray[np.int64], stride: int) -> _Tables:
+        """Tables cut, where they are, to what a run has filled of them."""
+        for table, used in zip(tables, tables.filled(counted, stride), strict=True):
+            table.resize((used, *table.shape[1:]), refcheck=False)
+            table.flags.writeable = False
+        self.kept = (tables.steps.size, tables.crossings.size, tables.store.size)
+        return tables
 
 
 _memory = _Memory()
@@ -402,7 +389,7 @@ _memory = _Memory()
 
 def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
     """How a run was stepped, in words."""
-    if not steps[:, 3].any():
+    if not np.count_nonzero(steps[:, 3]):
         return compiled.method
     words = [compiled.method]
     collocated, implicit, stiff = (

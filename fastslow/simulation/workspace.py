@@ -37,6 +37,10 @@ LATE, USUAL, LAST_EVENT, WANTED, LONGEST, DEPTH, FLOOR, SIZES = range(8)
 COLLOCATED_WORK, IMPLICIT_WORK = 50, 4
 
 
+#: Samples that are taken at a time, a multiple of those that one instruction takes.
+_SAMPLES_AT_A_TIME = 256
+
+
 def beginnings(
     times: NDArray[np.float64],
     states: NDArray[np.float64],
@@ -77,6 +81,8 @@ class Workspace(NamedTuple):
     ----------
     W, work : float64 arrays
         As large as the series.
+    offsets : float64 array
+        Of samples within a step, some at a time.
     scales : float64 array, shape (2, n_states + n_forcing + n_interfaces)
     search : Search
     collocation : Collocation
@@ -85,6 +91,7 @@ class Workspace(NamedTuple):
 
     W: Vector
     work: Vector
+    offsets: Vector
     scales: Matrix
     search: Search
     collocation: Collocation
@@ -99,6 +106,7 @@ def workspace_for(problem: Problem, n_rows: int) -> Workspace:
     return zeros(
         Workspace,
         *(size, size),
+        _SAMPLES_AT_A_TIME,
         (2, n + forcing + interfaces),
         search_for(n, forcing, interfaces, problem.order),
         collocation_for(n, forcing, interfaces, problem.order, n_rows),

@@ -255,6 +255,25 @@ def test_a_view_of_foreign_memory_is_copied():
     assert kept[0] == 0.0
 
 
+@pytest.mark.parametrize(
+    "given",
+    [{}, {"samples": 9}, {"samples": [0.5, 1.0], "dense": False}, {"periods": 1.0, "t": None}],
+    ids=str,
+)
+def test_what_a_run_puts_together_is_fixed_already(given):
+    """It is not looked at again, so that a short run is not held up by what it is made of."""
+    x, w, t = sp.symbols("x w t")
+    turn = sp.sin(sp.pi * x)
+    model = fs.Model({x: w - sp.sign(turn)}, forcing={w: sp.sin(t)}, periodic={x: 2})
+    few = fs.Integration(max_steps=3)
+    for integration in (fs.Integration(), few):
+        run = fs.simulate(model, [0.5], **({"t": (0, 6)} | given), integration=integration)
+        content = vars(run)
+        assert content.keys() == {entry.name for entry in dataclasses.fields(run)}
+        assert all(fixed(name, value) is value for name, value in content.items())
+        assert run == type(run)(**content)
+
+
 def test_loops_take_copies_of_read_only_and_strided_arrays():
     diagram = results()["diagram"]
     branch, field = diagram[0], fs.diagrams.tracing._field(results()["fast"], "p")

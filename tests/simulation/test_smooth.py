@@ -6,6 +6,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from fastslow.model.model import Model
+from fastslow.simulation import trajectories
 from fastslow.simulation.settings import Integration
 from fastslow.simulation.trajectories import simulate
 
@@ -72,3 +73,35 @@ def test_order_is_free():
     for order in (6, 30):
         run = simulate(model, [1, 0], t=(0, 10), integration=Integration(rtol=1e-10, order=order))
         assert run(10.0) == pytest.approx([np.cos(10), -np.sin(10)], abs=1e-8)
+
+
+def test_samples_are_what_the_series_says_however_many_a_step_has():
+    model = Model({x: y, y: -x}, forcing={w: sp.sin(t)})
+    for count in (2, 5, 40, 2000):
+        for dense in (True, False):
+            run = simulate(model, [1, 0], t=(0, 3), samples=count, dense=dense)
+            assert len(run.steps) < 5
+            exact = [np.cos(run.t), -np.sin(run.t), np.sin(run.t)]
+            assert np.abs(run.sampled[1] - exact[: len(run.sampled[1])]).max() < 1e-8
+
+
+def test_tables_are_as_large_as_those_of_the_last_run_and_cut_to_what_is_kept():
+    model = Model({x: y, y: -x})
+    long, short = (simulate(model, [1, 0], t=(0, end)) for end in (3000, 1))
+    grown = []
+    original = trajectories._Tables.with_space
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(
+            trajectories._Tables, "with_space", lambda *a: grown.append(a) or original(*a)
+        )
+        again = simulate(model, [1, 0], t=(0, 3000))
+        assert grown
+        grown.clear()
+        once_more = simulate(model, [1, 0], t=(0, 3000))
+        assert not grown
+    assert again == once_more == long
+    for run in (long, short, again, once_more):
+        for table in (run.steps, run.crossing_table, run.series.base):
+            assert table.base is None
+            assert table.flags.owndata
+            assert not table.flags.writeable
