@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.pycode import PythonCodePrinter
 
-from fastslow.compiled.functions import refusal, teach_functions
 from fastslow.compiled.model_code import load_function
 from fastslow.errors import ModelError
+from fastslow.model.known_functions import refusal, teach_functions
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 

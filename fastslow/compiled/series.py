@@ -7,15 +7,17 @@ equations alone: parameter values arrive as an array.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.compiled.functions import without_recurrence
 from fastslow.compiled.model_code import load_function
-from fastslow.compiled.recurrences import Recurrences, scalar_code
+from fastslow.compiled.recurrences import Recurrences
 from fastslow.compiled.series_modes import (
     COLLOCATION,
     DIRECTIONAL,
@@ -23,9 +25,7 @@ from fastslow.compiled.series_modes import (
     SHORT,
     SHORTENED,
 )
-from fastslow.model.model import Model
-from fastslow.model.motions import Motion, drift, motions_of, regions_of
-from fastslow.model.structure import TIME, real
+from fastslow.results.operations import Operations, SeriesOperations, ValueOperations
 
 _HEADER = '''"""{what} for {modes} modes of {states} states."""
 
@@ -45,6 +45,20 @@ def series(mode, inputs, parameters, W):
             mode -= {number}
             n = {short}
 '''
+
+
+#: Operations whose compiled series is kept in memory.
+KEPT = 256
+
+
+class HasOperations(Protocol):
+    """A model, or one that was stored."""
+
+    @property
+    def operations(self) -> Operations: ...
+
+    @property
+    def parameters(self) -> Mapping[str, float]: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,81 +121,19 @@ class CompiledSeries:
             return f"collocation of order {self.order} (no Taylor recurrence for {names})"
         return f"Taylor series of order {self.order}"
 
-    def parameter_array(self, model: Model) -> NDArray[np.float64]:
+    def parameter_array(self, model: HasOperations) -> NDArray[np.float64]:
         """Parameter values in the order that the compiled function expects, never empty."""
         return np.array([model.parameters[name] for name in self.parameters] or [0.0])
 
 
-@dataclass(frozen=True)
-class Equations:
-    """Everything that the generated source depends on."""
-
-    states: tuple[sp.Symbol, ...]
-    quantities: tuple[sp.Symbol, ...]
-    interfaces: tuple[sp.Expr, ...]
-    modes: tuple[Motion, ...]
-    order: int
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Names of all parameters in use, sorted."""
-        used = set().union(*(h.free_symbols for h in self.interfaces))
-        for mode in self.modes:
-            used |= set().union(*(e.free_symbols for e in (*mode.rates, *mode.laws)))
-        return tuple(sorted(s.name for s in used - self.moving))
-
-    def renamed(self) -> Equations:
-        """The same with symbols that are valid in any source: y0, w0, p0, …."""
-        groups = {"y": self.states, "w": self.quantities, "p": map(real, self.parameters)}
-        new = {s: real(f"{g}{i}") for g, symbols in groups.items() for i, s in enumerate(symbols)}
-
-        def rename(expressions: tuple[sp.Expr, ...]) -> tuple[sp.Expr, ...]:
-            return tuple(e.xreplace(new) for e in expressions)
-
-        modes = tuple(
-            replace(
-                mode, rates=rename(mode.rates), laws=rename(mode.laws), bounds=rename(mode.bounds)
-            )
-            for mode in self.modes
-        )
-        return Equations(
-            tuple(new[s] for s in self.states),
-            tuple(new[s] for s in self.quantities),
-            rename(self.interfaces),
-            modes,
-            self.order,
-        )
-
-    @property
-    def n_bounds(self) -> int:
-        """Number of rows for the bounds of sliding, the same in every mode."""
-        return max(2, *(len(mode.bounds) for mode in self.modes), 0)
-
-    @property
-    def moving(self) -> set[sp.Symbol]:
-        """All symbols that change with time."""
-        return {*self.states, *self.quantities, TIME}
-
-    @property
-    def without_recurrence(self) -> tuple[str, ...]:
-        """Names of functions for which a Taylor series cannot be generated."""
-        used = [*self.interfaces]
-        for mode in self.modes:
-            used += [*mode.rates, *mode.laws, *mode.bounds]
-        return tuple(sorted(set().union(*(without_recurrence(e, self.moving) for e in used))))
-
-
-_compiled: dict[Equations, CompiledSeries] = {}
-
-
-def compile_series(model: Model, order: int) -> CompiledSeries:
+def compile_series(model: HasOperations, order: int) -> CompiledSeries:
     """Compile the Taylor series of a model, or find it compiled already.
 
     A model with a function that has no recurrence is compiled to values and rates.
 
     Parameters
     ----------
-    model : Model
+    model : Model or StoredModel
     order : int
         Highest coefficient, lowered to `COLLOCATION` where no Taylor series exists.
 
@@ -190,82 +142,57 @@ def compile_series(model: Model, order: int) -> CompiledSeries:
     ModelError
         If a function in the equations cannot be compiled.
     """
-    equations = equations_of(model, order)
-    if equations not in _compiled:
-        motions = motions_of(model)
-        whole = replace(equations, modes=(*motions.regions, *motions.sliding))
-        if whole.without_recurrence:
-            whole = replace(whole, order=min(order, COLLOCATION))
-        _compiled[equations] = _compile(
-            whole, np.array(list(model.continuous.values()), dtype=bool), motions.undecided
-        )
-    return _compiled[equations]
+    operations = model.operations
+    return _compiled(operations, min(order, COLLOCATION) if operations.values_only else order)
 
 
-def equations_of(model: Model, order: int) -> Equations:
-    """What the generated source of a model depends on, its regions alone as modes."""
-    names = (*model.states, *model.slow_states)
-    return Equations(
-        tuple(map(real, names)),
-        tuple(map(real, model.forcing)),
-        tuple(i.function for i in model.interfaces.values()),
-        regions_of(model),
-        order,
-    )
-
-
-def _compile(
-    equations: Equations,
-    continuous: NDArray[np.bool_],
-    undecided: tuple[tuple[str, str], ...],
-) -> CompiledSeries:
-    parameters = equations.parameters
-    source, n_rows = _source(equations.renamed(), len(parameters))
-    m, q, p = (len(g) for g in (equations.states, equations.quantities, equations.interfaces))
-    signs = np.array([mode.signs for mode in equations.modes], dtype=np.int64)
+@lru_cache(maxsize=KEPT)
+def _compiled(operations: Operations, order: int) -> CompiledSeries:
+    source, n_rows = _source(operations, order)
+    m, q, p = operations.sizes
+    signs = np.array([motion.signs for motion in operations.motions], dtype=np.int64)
     return CompiledSeries(
         load_function(source, "series"),
-        equations.order,
-        parameters,
+        order,
+        operations.parameters,
         m,
         q,
         p,
         n_rows,
-        signs.reshape(len(equations.modes), p),
-        tuple(mode.name for mode in equations.modes),
-        continuous,
-        equations.without_recurrence,
-        undecided,
+        signs.reshape(len(operations.motions), p),
+        tuple(motion.name for motion in operations.motions),
+        np.array(operations.continuous, dtype=bool),
+        operations.values_only,
+        operations.undecided,
     )
 
 
-def _source(equations: Equations, n_parameters: int) -> tuple[str, int]:
+def _source(operations: Operations, order: int) -> tuple[str, int]:
     """Source of the generated module, and the number of rows it fills."""
-    lines = [f"    p{i} = parameters[{i}]" for i in range(n_parameters)]
+    lines = [f"    p{i} = parameters[{i}]" for i in range(len(operations.parameters))]
     n_rows = 0
     bodies: list[list[str]] = []
-    alone = bool(equations.without_recurrence)
-    for mode in equations.modes:
-        body, rows = (
-            _values_source(equations, mode)
-            if alone
-            else mode_source(equations, mode, clock="clock")
-        )
+    for motion in operations.motions:
+        if isinstance(motion, SeriesOperations):
+            body, rows = motion_source(operations, motion, order, clock="clock")
+        else:
+            body, rows = _values_source(operations, motion, order)
         bodies.append(body)
         n_rows = max(n_rows, rows)
-    bodies += [_gradient_source(equations, h) for h in equations.interfaces]
+    bodies += [_gradient_source(operations, number) for number in range(operations.sizes[2])]
     for number, body in enumerate(bodies):
         lines.append(f"    {'if' if number == 0 else 'elif'} mode == {number}:")
         lines += [f"        {line}" for line in body]
     text = "\n".join(lines) + "\n"
-    what = "Values and rates" if alone else f"Taylor coefficients of order {equations.order}"
+    alone = operations.values_only
+    what = "Values and rates" if alone else f"Taylor coefficients of order {order}"
     header = _HEADER.format(
         what=what,
-        order=equations.order,
-        modes=len(equations.modes),
-        states=len(equations.states),
-        short=min(SHORT, equations.order),
-        second=min(2, equations.order),
+        order=order,
+        modes=len(operations.motions),
+        states=operations.sizes[0],
+        short=min(SHORT, order),
+        second=min(2, order),
         number=SHORTENED * len(bodies),
         rates=RATES * len(bodies),
         directional=DIRECTIONAL * len(bodies),
@@ -273,78 +200,62 @@ def _source(equations: Equations, n_parameters: int) -> tuple[str, int]:
     return header + text, n_rows
 
 
-def mode_source(equations: Equations, mode: Motion, *, clock: str = "1.0") -> tuple[list[str], int]:
-    """Source lines that fill the series of one mode, and the number of its rows.
+def motion_source(
+    operations: Operations, motion: SeriesOperations, order: int, *, clock: str = "1.0"
+) -> tuple[list[str], int]:
+    """Source lines that fill the series of one motion, and the number of its rows.
 
     Where ``clock`` is the name of the rate of time, the first coefficients of the
     states are kept as they are while it is 0.
     """
-    m, q, p = (len(g) for g in (equations.states, equations.quantities, equations.interfaces))
-    targets = [*mode.laws, *equations.interfaces, *mode.bounds]
-    symbols = {s: i for i, s in enumerate(equations.states)}
-    outputs = dict(enumerate(targets, start=m))
-    reserved: dict[sp.Expr, int] = {}
-    for row, expression in outputs.items():
-        if expression not in symbols:
-            reserved.setdefault(expression, row)
-    free = m + q + p + equations.n_bounds
-    work = Recurrences(equations.order, symbols, TIME, reserved, free, clock)
-    for symbol, law in zip(equations.quantities, mode.laws, strict=True):
-        work.name(symbol, work.row(law))
-    rates = [work.row(rate) for rate in mode.rates]
-    held = {row: work.row(expression) for row, expression in outputs.items()}
-    copies = {row: source for row, source in held.items() if row != source}
+    m = operations.sizes[0]
+    work = Recurrences(motion.nodes, order, clock)
+    copies = {row: held for row, held in enumerate(motion.outputs, start=m) if row != held}
     body = ["t = inputs[0]"]
     body += [f"{work.at(i, '0')} = inputs[{i + 1}]" for i in range(m)]
-    body += [f"{name} = {code}" for code, name in work.scalars.items()]
+    body += [f"c{k} = {code}" for k, code in enumerate(motion.scalars)]
     body += work.values()
-    first = [f"{work.at(i, '1')} = {work.at(r, '0')}" for i, r in enumerate(rates)]
+    first = [f"{work.at(i, '1')} = {work.at(r, '0')}" for i, r in enumerate(motion.rates)]
     body += first if clock == "1.0" else [f"if {clock} != 0.0:", *(f"    {s}" for s in first)]
     body += ["for k in range(1, n):", "    q = 1.0 / k"]
     body += ["    " + line for line in work.general()]
     body += ["    r = 1.0 / (k + 1)"]
-    body += [f"    {work.at(i, 'k + 1')} = {work.at(r)} * r" for i, r in enumerate(rates)]
-    last = work.general(tuple(held.values()))
+    body += [f"    {work.at(i, 'k + 1')} = {work.at(r)} * r" for i, r in enumerate(motion.rates)]
+    last = work.general(motion.outputs)
     body += ["k = n", "q = 1.0 / k", *last] if last else []
     if copies:
         body += ["for k in range(n + 1):"]
-        body += [f"    {work.at(row)} = {work.at(source)}" for row, source in copies.items()]
-    return body, work.next
+        body += [f"    {work.at(row)} = {work.at(held)}" for row, held in copies.items()]
+    rows = (node[1] + 1 for node in motion.nodes)
+    return body, max(operations.first_free, *rows, 0)
 
 
-def _values_source(equations: Equations, mode: Motion) -> tuple[list[str], int]:
-    """What a mode fills without recurrences: values, and rates of states and interfaces."""
-    columns, m, q = equations.order + 1, len(equations.states), len(equations.quantities)
-    names = [s.name for s in equations.states]
-    laws = dict(zip((s.name for s in equations.quantities), mode.laws, strict=True))
-    outputs = {i * columns + 1: rate for i, rate in enumerate(mode.rates)}
-    for row, h in enumerate(equations.interfaces, start=m + q):
-        outputs[row * columns] = h
-        outputs[row * columns + 1] = drift(h, names, mode.rates, laws)
-    n_rows = m + q + len(equations.interfaces)
-    outputs |= {(n_rows + k) * columns: drift for k, drift in enumerate(mode.bounds)}
-    shared, results = sp.cse(
-        list(outputs.values()), symbols=sp.numbered_symbols("s", real=True), list=True
-    )
+def _values_source(
+    operations: Operations, motion: ValueOperations, order: int
+) -> tuple[list[str], int]:
+    """What a motion fills without recurrences: values, and rates of states and interfaces."""
+    columns, (m, q, p) = order + 1, operations.sizes
     body = ["t = inputs[0]"]
     for i in range(m):
         body += [f"y{i} = inputs[{i + 1}]", f"W[{i * columns}] = y{i}"]
-    for k, law in enumerate(mode.laws):
-        body += [f"w{k} = {scalar_code(law)}", f"W[{(m + k) * columns}] = w{k}"]
-    body += [f"{symbol} = {scalar_code(value)}" for symbol, value in shared]
-    body += [
-        f"W[{place}] = {scalar_code(value)}" for place, value in zip(outputs, results, strict=True)
-    ]
+    for k, law in enumerate(motion.laws):
+        body += [f"w{k} = {law}", f"W[{(m + k) * columns}] = w{k}"]
+    body += [f"s{k} = {code}" for k, code in enumerate(motion.shared)]
+    body += [f"W[{i * columns + 1}] = {rate}" for i, rate in enumerate(motion.rates)]
+    for row, (height, rate) in enumerate(motion.heights, start=m + q):
+        body += [f"W[{row * columns}] = {height}", f"W[{row * columns + 1}] = {rate}"]
+    first = m + q + p
+    body += [f"W[{k * columns}] = {bound}" for k, bound in enumerate(motion.bounds, start=first)]
     # what no recurrence gives
-    return [*body, f"W[{equations.order}] = math.nan"], n_rows + equations.n_bounds
+    return [*body, f"W[{order}] = math.nan"], operations.first_free
 
 
-def _gradient_source(equations: Equations, function: sp.Expr) -> list[str]:
-    m = len(equations.states)
-    symbols = (TIME, *equations.states, *equations.quantities)
-    body = [f"{s.name} = inputs[{i}]" for i, s in enumerate(symbols) if s in function.free_symbols]
-    terms = [scalar_code(term) for term in sp.Add.make_args(function)]
+def _gradient_source(operations: Operations, number: int) -> list[str]:
+    terms, slopes = operations.gradients[number]
+    m, q, _ = operations.sizes
+    symbols = ("t", *(f"y{i}" for i in range(m)), *(f"w{k}" for k in range(q)))
+    used = set(re.findall(r"\b[tyw]\d*\b", " ".join(terms)))
+    body = [f"{s} = inputs[{i}]" for i, s in enumerate(symbols) if s in used]
     body.append("W[0] = " + " + ".join(f"({term})" for term in terms))
     body.append("W[1] = " + " + ".join(f"abs({term})" for term in terms))
-    slopes = [scalar_code(function.diff(s)) for s in equations.states]
-    return body + [f"W[{2 + i}] = {slopes[i]}" for i in range(m)]
+    return body + [f"W[{2 + i}] = {slope}" for i, slope in enumerate(slopes)]

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from llvmlite import ir
 
 from fastslow.compiled.lane_steps import plain_steps
 from fastslow.compiled.model_code import load_built
-from fastslow.compiled.series import Equations, equations_of, mode_source
-from fastslow.model.model import Model
+from fastslow.compiled.series import KEPT, HasOperations, motion_source
+from fastslow.results.operations import Operations, SeriesOperations
 
 #: Larger models are not compiled: rows of all regions times the square of the order. The
 #: instructions are that many, and take half a minute per 100,000 to compile.
@@ -44,10 +45,8 @@ class CompiledSteps:
 #: functions, or too large.
 NO_STEPS = CompiledSteps(0, 0)
 
-_compiled: dict[Any, CompiledSteps] = {}
 
-
-def compile_steps(model: Model, order: int) -> CompiledSteps:
+def compile_steps(model: HasOperations, order: int) -> CompiledSteps:
     """Compile the plain steps of a model, or find them compiled already.
 
     Parameters
@@ -56,18 +55,17 @@ def compile_steps(model: Model, order: int) -> CompiledSteps:
     order : int
         Order of the series.
     """
-    equations = equations_of(model, order)
-    if equations not in _compiled:
-        _compiled[equations] = _compile(equations)
-    return _compiled[equations]
+    return _compiled(model.operations, order)
 
 
-def _compile(equations: Equations) -> CompiledSteps:
-    if equations.without_recurrence:
+@lru_cache(maxsize=KEPT)
+def _compiled(operations: Operations, order: int) -> CompiledSteps:
+    if operations.values_only:
         return NO_STEPS
-    n, order = len(equations.parameters), equations.order
-    new = equations.renamed()
-    sources = [mode_source(new, mode) for mode in new.modes]
+    n = len(operations.parameters)
+    plain = (m for m in operations.motions if isinstance(m, SeriesOperations))
+    regions = [m for m in plain if 0 not in m.signs]
+    sources = [motion_source(operations, region, order) for region in regions]
     if sum(rows for _, rows in sources) * order**2 > _LARGEST:
         return NO_STEPS
     text = ""
@@ -77,13 +75,13 @@ def _compile(equations: Equations) -> CompiledSteps:
         text += "".join(f"    {line}\n" for line in lines) + "\n\n"
     if "special." in text:
         return NO_STEPS
-    signs = tuple(mode.signs for mode in new.modes)
-    sizes = (len(new.states), len(new.quantities), n, order)
+    signs = tuple(region.signs for region in regions)
+    sizes = (*operations.sizes[:2], n, order)
 
     def build(module: ir.Module) -> None:
         traced: dict[str, Any] = {}
         exec(text, traced)
-        regions = [traced[f"region_{number}"] for number in range(len(sources))]
-        plain_steps(module, regions, signs, sizes)
+        functions = [traced[f"region_{number}"] for number in range(len(sources))]
+        plain_steps(module, functions, signs, sizes)
 
     return CompiledSteps(load_built(f"{signs} {sizes}\n{text}", "steps", build), len(sources))

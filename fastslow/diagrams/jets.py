@@ -17,7 +17,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.compiled.functions import CLOSED, IN_MPMATH, OPEN
+from fastslow.model.known_functions import CLOSED, IN_MPMATH, OPEN
 
 Jet = NDArray[np.complex128]
 

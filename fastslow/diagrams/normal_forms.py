@@ -15,8 +15,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.compiled.functions import CLOSED, IN_MPMATH, OPEN
 from fastslow.diagrams.fields import FrozenField
+from fastslow.model.known_functions import CLOSED, IN_MPMATH, OPEN
 from fastslow.model.structure import real
 
 Array = NDArray[np.float64]

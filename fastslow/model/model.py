@@ -27,6 +27,7 @@ from fastslow.model.structure import (
     shared,
 )
 from fastslow.results.named import Named
+from fastslow.results.operations import Operations
 
 Written = Mapping[Any, Any]
 
@@ -409,6 +410,13 @@ class Model:
         return Named(
             "interface", {name: whole or self._continuous(name) for name in self.interfaces}
         )
+
+    @property
+    def operations(self) -> Operations:
+        """The equations as lists of operations, from which code is made."""
+        from fastslow.model.operations import operations_of
+
+        return operations_of(self)
 
     def _continuous(self, name: str) -> bool:
         function = self.interfaces[name].function

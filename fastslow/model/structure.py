@@ -19,7 +19,6 @@ from fastslow.arguments import shown
 from fastslow.errors import ArgumentError, ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.formulas.symbolic import read
-from fastslow.model.geometry import Pattern, affine_rows, possible_patterns, scaled_row
 from fastslow.model.interfaces import Interface, Region
 from fastslow.model.keyed import Keyed
 from fastslow.model.reading import (
@@ -33,6 +32,7 @@ from fastslow.model.reading import (
     with_piecewise,
 )
 from fastslow.results.named import Named
+from fastslow.results.sign_patterns import Pattern, possible_patterns, scaled_row
 
 TIME = sp.Symbol("t", real=True)
 
@@ -216,7 +216,7 @@ class Structure:
                 # a value outside the domain, or a function that only SymPy evaluates
                 found = None
             if found is None:
-                rows += affine_rows([interface.function.subs(values)], loose)
+                rows.append(_affine_row(interface.function.subs(values), loose))
             else:
                 rows.append(found)
         return tuple(possible_patterns(rows))
@@ -397,6 +397,15 @@ def _partition_of(
 def _sign(number: sp.Expr) -> int | None:
     known = number.is_number and number.is_real and number.is_finite
     return int(np.sign(float(number))) if known else None
+
+
+def _affine_row(function: sp.Expr, moving: Sequence[sp.Symbol]) -> NDArray[np.float64] | None:
+    """Coefficients (a, b) of a function a·z + b of the moving symbols, None if not affine."""
+    slopes = [function.diff(z) for z in moving]
+    if any(slope.free_symbols for slope in slopes):
+        return None
+    rest = function.subs(dict.fromkeys(moving, 0))
+    return scaled_row([*map(float, slopes), float(rest)])
 
 
 @lru_cache(maxsize=PARTITIONS)

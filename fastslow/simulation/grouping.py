@@ -10,10 +10,10 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.model.functions import KEPT, function_of
-from fastslow.model.geometry import possible_patterns
 from fastslow.model.model import Model
 from fastslow.model.reading import factorise, switching_expressions
 from fastslow.model.structure import Structure, real
+from fastslow.results.sign_patterns import possible_patterns
 
 Values = Mapping[str, NDArray[np.float64]]
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from fastslow.compiled.functions import IN_MPMATH, OPEN, without_recurrence
 from fastslow.compiled.series import compile_series
+from fastslow.model.known_functions import IN_MPMATH, OPEN, without_recurrence
 from fastslow.model.model import Model
 from tests.compiled.test_recurrences import call
 

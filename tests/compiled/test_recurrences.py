@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from fastslow.compiled.functions import CLOSED, ELEMENTARY, IN_MPMATH
-from fastslow.compiled.recurrences import scalar_code
 from fastslow.compiled.series import compile_series
 from fastslow.errors import ModelError
+from fastslow.model.known_functions import CLOSED, ELEMENTARY, IN_MPMATH
 from fastslow.model.model import Model
+from fastslow.model.recurrences import scalar_code
 
 t, x, a = sp.symbols("t x a", real=True)
 ORDER = 12

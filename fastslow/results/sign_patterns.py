@@ -5,25 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 Pattern = tuple[int, ...]
-
-
-def affine_rows(
-    functions: Sequence[sp.Expr], moving: Sequence[sp.Symbol]
-) -> list[NDArray[np.float64] | None]:
-    """Coefficients (a, b) of each function a·z + b of the moving symbols, None if not affine."""
-    rows: list[NDArray[np.float64] | None] = []
-    for function in functions:
-        slopes = [function.diff(z) for z in moving]
-        if any(slope.free_symbols for slope in slopes):
-            rows.append(None)
-            continue
-        rest = function.subs(dict.fromkeys(moving, 0))
-        rows.append(scaled_row([*map(float, slopes), float(rest)]))
-    return rows
 
 
 def scaled_row(row: Sequence[float]) -> NDArray[np.float64]:

@@ -1,0 +1,170 @@
+"""A model's equations as lists of operations, from which its code is made without SymPy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import sympy as sp
+
+from fastslow.model.derived import once, partition_of
+from fastslow.model.known_functions import without_recurrence
+from fastslow.model.model import Model
+from fastslow.model.motions import Motion, drift, motions_of, regions_of
+from fastslow.model.recurrences import Recurrences, scalar_code
+from fastslow.model.structure import TIME, real
+from fastslow.results.operations import Operations, SeriesOperations, ValueOperations
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Everything that the operations depend on."""
+
+    states: tuple[sp.Symbol, ...]
+    quantities: tuple[sp.Symbol, ...]
+    interfaces: tuple[sp.Expr, ...]
+    modes: tuple[Motion, ...]
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of all parameters in use, sorted."""
+        used = set().union(*(h.free_symbols for h in self.interfaces))
+        for mode in self.modes:
+            used |= set().union(*(e.free_symbols for e in (*mode.rates, *mode.laws)))
+        return tuple(sorted(s.name for s in used - self.moving))
+
+    def renamed(self) -> Equations:
+        """The same with symbols that are valid in any source: y0, w0, p0, …."""
+        groups = {"y": self.states, "w": self.quantities, "p": map(real, self.parameters)}
+        new = {s: real(f"{g}{i}") for g, symbols in groups.items() for i, s in enumerate(symbols)}
+
+        def rename(expressions: tuple[sp.Expr, ...]) -> tuple[sp.Expr, ...]:
+            return tuple(e.xreplace(new) for e in expressions)
+
+        modes = tuple(
+            replace(
+                mode, rates=rename(mode.rates), laws=rename(mode.laws), bounds=rename(mode.bounds)
+            )
+            for mode in self.modes
+        )
+        return Equations(
+            tuple(new[s] for s in self.states),
+            tuple(new[s] for s in self.quantities),
+            rename(self.interfaces),
+            modes,
+        )
+
+    @property
+    def n_bounds(self) -> int:
+        """Number of rows for the bounds of sliding, the same in every mode."""
+        return max(2, *(len(mode.bounds) for mode in self.modes), 0)
+
+    @property
+    def moving(self) -> set[sp.Symbol]:
+        """All symbols that change with time."""
+        return {*self.states, *self.quantities, TIME}
+
+    @property
+    def without_recurrence(self) -> tuple[str, ...]:
+        """Names of functions for which a Taylor series cannot be generated."""
+        used = [*self.interfaces]
+        for mode in self.modes:
+            used += [*mode.rates, *mode.laws, *mode.bounds]
+        return tuple(sorted(set().union(*(without_recurrence(e, self.moving) for e in used))))
+
+
+_derived: dict[tuple[Equations, tuple[bool, ...]], Operations] = {}
+
+
+@once(partition_of)
+def operations_of(model: Model) -> Operations:
+    """The operations of a model, of its regions and of sliding, derived once.
+
+    Parameters
+    ----------
+    model : Model
+
+    Raises
+    ------
+    ModelError
+        If a function in the equations cannot be compiled.
+    """
+    names = (*model.states, *model.slow_states)
+    equations = Equations(
+        tuple(map(real, names)),
+        tuple(map(real, model.forcing)),
+        tuple(i.function for i in model.interfaces.values()),
+        regions_of(model),
+    )
+    # models that differ in what is not in their equations have the same
+    key = equations, tuple(model.continuous.values())
+    if key not in _derived:
+        motions = motions_of(model)
+        whole = replace(equations, modes=(*motions.regions, *motions.sliding))
+        _derived[key] = _operations(whole, key[1], motions.undecided)
+    return _derived[key]
+
+
+def _operations(
+    written: Equations, continuous: tuple[bool, ...], undecided: tuple[tuple[str, str], ...]
+) -> Operations:
+    equations, alone = written.renamed(), written.without_recurrence
+    one = _value_operations if alone else _series_operations
+    return Operations(
+        (len(equations.states), len(equations.quantities), len(equations.interfaces)),
+        written.parameters,
+        tuple(one(equations, mode) for mode in equations.modes),
+        tuple(_gradient(equations, h) for h in equations.interfaces),
+        continuous,
+        alone,
+        undecided,
+    )
+
+
+def _series_operations(equations: Equations, mode: Motion) -> SeriesOperations:
+    m, q, p = (len(g) for g in (equations.states, equations.quantities, equations.interfaces))
+    targets = [*mode.laws, *equations.interfaces, *mode.bounds]
+    symbols = {s: i for i, s in enumerate(equations.states)}
+    outputs = dict(enumerate(targets, start=m))
+    reserved: dict[sp.Expr, int] = {}
+    for row, expression in outputs.items():
+        if expression not in symbols:
+            reserved.setdefault(expression, row)
+    work = Recurrences(symbols, TIME, reserved, m + q + p + equations.n_bounds)
+    for symbol, law in zip(equations.quantities, mode.laws, strict=True):
+        work.name(symbol, work.row(law))
+    rates = tuple(work.row(rate) for rate in mode.rates)
+    held = tuple(work.row(expression) for expression in targets)
+    return SeriesOperations(
+        mode.name, mode.signs, tuple(work.scalars), tuple(work.nodes), rates, held
+    )
+
+
+def _value_operations(equations: Equations, mode: Motion) -> ValueOperations:
+    """What a mode fills without recurrences: values, and rates of states and interfaces."""
+    names = [s.name for s in equations.states]
+    laws = dict(zip((s.name for s in equations.quantities), mode.laws, strict=True))
+    outputs = [*mode.rates]
+    for h in equations.interfaces:
+        outputs += [h, drift(h, names, mode.rates, laws)]
+    outputs += mode.bounds
+    shared, results = sp.cse(outputs, symbols=sp.numbered_symbols("s", real=True), list=True)
+    codes = [scalar_code(value) for value in results]
+    m, p = len(equations.states), len(equations.interfaces)
+    heights = codes[m : m + 2 * p]
+    return ValueOperations(
+        mode.name,
+        mode.signs,
+        tuple(map(scalar_code, mode.laws)),
+        tuple(scalar_code(value) for _, value in shared),
+        tuple(codes[:m]),
+        tuple(zip(heights[::2], heights[1::2], strict=True)),
+        tuple(codes[m + 2 * p :]),
+    )
+
+
+def _gradient(equations: Equations, function: sp.Expr) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The terms of a function, and its derivatives by states."""
+    return (
+        tuple(scalar_code(term) for term in sp.Add.make_args(function)),
+        tuple(scalar_code(function.diff(s)) for s in equations.states),
+    )
