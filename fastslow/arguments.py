@@ -402,7 +402,11 @@ def instance(*kinds: type) -> Check:
     def check(name: str, value: Any) -> Any:
         if not isinstance(value, kinds):
             received = shown(value) if value is None else class_of(value)
-            raise ArgumentError(f"{name}: expected {with_article(names)}, received {received}")
+            reason = getattr(value, "not_enough", "")
+            raise ArgumentError(
+                f"{name}: expected {with_article(names)}, received {received}"
+                + (f": {reason}" if isinstance(reason, str) and reason else "")
+            )
         return value
 
     return check

@@ -21,10 +21,11 @@ from fastslow.diagrams.fields import require_frozen
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.interfaces import vanishes_on
-from fastslow.model.model import Model, number
+from fastslow.model.model import Model
 from fastslow.model.motions import drift
 from fastslow.model.structure import real
 from fastslow.model.units import natural_units
+from fastslow.results.stored_models import finite_number
 from fastslow.results.tangencies import Tangencies, Tangency
 from fastslow.symbolic.elimination import eliminate
 
@@ -84,7 +85,7 @@ def tangencies(
     Tangency(x = 0.5, v = 1; of S2 to v - 1; visible)
     """
     changes = {str(k): v for k, v in {**(values or {}), **named}.items()}
-    held = {n: number(f"state {n}", changes.pop(n)) for n in model.states if n in changes}
+    held = {n: finite_number(f"state {n}", changes.pop(n)) for n in model.states if n in changes}
     require_frozen(model, "look for the tangencies of")
     given = model.with_parameters(changes)
     _check(given, held)

@@ -210,6 +210,7 @@ def continue_equilibria(
         starts.window,
         bands_of(field, lower, upper, asked) if from_points is None else (),
         dict(model.periodic),
+        field.model,
     )
 
 
@@ -260,6 +261,7 @@ def _without_branches(
         outcome,
         {quantity: str(law) for quantity, law in field.model.path.items()},
         asdict(continuation),
+        model=field.model,
     )
 
 

@@ -20,7 +20,7 @@ from fastslow.results.overlays import Overlay
 from fastslow.results.trajectories import Trajectory
 from fastslow.simulation.arguments import initial_state, time_span
 from fastslow.simulation.settings import DEFAULT, Integration
-from fastslow.simulation.trajectories import period_of, simulate
+from fastslow.simulation.trajectories import simulate
 
 R = TypeVar("R")
 Range = tuple[float, float]
@@ -180,8 +180,8 @@ def setup_of(
     names = (*model.states, *model.slow_states)
     begin = initial_state(model, np.zeros(len(names)) if start is None else start)
     if t is None and periods is None:
-        t, periods = ((0.0, LONG), None) if period_of(model) is None else (None, 2.0)
-    time_span(t, periods, 0.0, None, lambda: period_of(model))
+        t, periods = ((0.0, LONG), None) if model.period() is None else (None, 2.0)
+    time_span(t, periods, 0.0, None, model.period)
     limits = None if over is None else interval("over", over)
     if limits is None and name is not None and name not in slow:
         limits = around(dict(model.parameters).get(name, 0.0))

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import sympy as sp
 
-from fastslow.arguments import formula, mapping, real_number, shown, takes
+from fastslow.arguments import formula, mapping, takes
 from fastslow.errors import ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.model.angles import read_periods
@@ -28,6 +27,7 @@ from fastslow.model.structure import (
 )
 from fastslow.results.named import Named
 from fastslow.results.operations import Operations
+from fastslow.results.stored_models import StoredModel, Traits, finite_number
 
 Written = Mapping[Any, Any]
 
@@ -130,7 +130,7 @@ class Model:
         periodic: Written | None = None,
     ) -> None:
         values = {
-            name_of(k, "parameter"): number(f"parameter {k}", v)
+            name_of(k, "parameter"): finite_number(f"parameter {k}", v)
             for k, v in (parameters or {}).items()
         }
         if len(values) < len(parameters or {}):
@@ -222,7 +222,7 @@ class Model:
             name = normalised(str(key))
             if name not in valid:
                 raise unknown_name("parameter", key, valid)
-            values[name] = number(f"parameter {key}", value)
+            values[name] = finite_number(f"parameter {key}", value)
         return self._from(self.structure, values)
 
     @takes(name=formula)
@@ -333,8 +333,8 @@ class Model:
         freed = self.freed(key)
         first, speed = f"{key}_start", f"{key}_rate"
         numbers = {
-            first: number(f"parameter {first}", start),
-            speed: number(f"parameter {speed}", rate),
+            first: finite_number(f"parameter {first}", start),
+            speed: finite_number(f"parameter {speed}", rate),
         }
         taken = [
             n
@@ -362,8 +362,8 @@ class Model:
         >>> Model({x: w - x}, forcing={w: sp.sin(4 * t)}).period() / sp.pi.evalf(15)
         0.500000000000000
         """
-        laws = [*self.forcing.values(), *self.rates.values()]
-        return common_period(laws, TIME, self.values)
+        known = tuple((n, self.parameters.get(n)) for n in self.structure.timed)
+        return _period(self.structure, known)
 
     @property
     def vanished(self) -> tuple[str, ...]:
@@ -417,6 +417,32 @@ class Model:
         from fastslow.model.operations import operations_of
 
         return operations_of(self)
+
+    @property
+    def traits(self) -> Traits:
+        """What the outcome of a run needs of the equations."""
+        from fastslow.model.traits import traits_of
+
+        return traits_of(self)
+
+    @property
+    def stored(self) -> StoredModel:
+        """The model as it is kept in a file: it runs without SymPy, and has no equations.
+
+        Examples
+        --------
+        >>> import tempfile, fastslow as fs
+        >>> x, k = sp.symbols("x k")
+        >>> model = Model({x: -k * x}, parameters={k: 1})
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     model.stored.save(f"{folder}/model.npz")
+        ...     again = fs.load(f"{folder}/model.npz")
+        >>> fs.simulate(again, [1], t=(0, 1)) == fs.simulate(model, [1], t=(0, 1))
+        True
+        """
+        from fastslow.model.storing import stored_form
+
+        return stored_form(self)
 
     def _continuous(self, name: str) -> bool:
         function = self.interfaces[name].function
@@ -475,18 +501,11 @@ class Model:
         return "\n".join(lines)
 
 
-def number(what: str, value: object) -> float:
-    """A finite float, or an error that shows what was received.
+#: Structures and values of which the period is kept.
+PERIODS = 256
 
-    Examples
-    --------
-    >>> number("parameter A", "1/0")
-    Traceback (most recent call last):
-    ...
-    fastslow.errors.ModelError: parameter A: expected a finite number, received '1/0'
-    """
-    result = real_number(value)
-    if result is None or not math.isfinite(result):
-        raise ModelError(f"{what}: expected a finite number, received {shown(value)}")
-    # −0.0 is 0.0: equal models have equal values
-    return result + 0.0
+
+@lru_cache(maxsize=PERIODS)
+def _period(structure: Structure, values: tuple[tuple[str, float | None], ...]) -> float | None:
+    known = {real(name): value for name, value in values if value is not None}
+    return common_period([*structure.forcing.values(), *structure.rates.values()], TIME, known)

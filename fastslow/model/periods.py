@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
-from fractions import Fraction
 from functools import lru_cache
 
 import numpy as np
@@ -12,6 +10,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.model.functions import KEPT, function_of
+from fastslow.results.harmonics import period_of
 
 
 def common_period(
@@ -84,21 +83,6 @@ def common_periods(
     rows, which = np.unique(table, axis=0, return_inverse=True)
     periods = np.array([period_of(row) or np.nan for row in rows.tolist()])
     return periods[which.reshape(-1)]
-
-
-def period_of(frequencies: Iterable[float]) -> float | None:
-    """The common period of harmonics from their angular frequencies, None if there is none."""
-    positive = [abs(f) for f in frequencies if f != 0]
-    if not positive:
-        return None
-    base = min(positive)
-    ratios = [Fraction(f / base).limit_denominator(10_000) for f in positive]
-    if any(abs(r - f / base) > 1e-12 * f / base for r, f in zip(ratios, positive, strict=True)):
-        return None
-    # the greatest common divisor of the ratios, all brought to one denominator
-    bottom = math.lcm(*(r.denominator for r in ratios))
-    top = math.gcd(*(int(r * bottom) for r in ratios))
-    return 2.0 * math.pi * bottom / (top * base)
 
 
 def frequencies(expressions: Iterable[sp.Expr], time: sp.Symbol) -> list[sp.Expr] | None:

@@ -48,8 +48,12 @@ def require_one_model(diagram: Diagram, run: Trajectory) -> bool:
     different = [n for n in diagram.states if ours.get(n) != theirs.get(n)]
     if not different:
         return True
-    if run.model is not None:
-        agrees = [a for b in diagram.branches if (a := _agrees(run.model, b, diagram)) is not None]
+    if run.symbolic_model is not None:
+        agrees = [
+            a
+            for b in diagram.branches
+            if (a := _agrees(run.symbolic_model, b, diagram)) is not None
+        ]
         if agrees and all(agrees):
             return True
         if not agrees:

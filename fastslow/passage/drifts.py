@@ -56,7 +56,7 @@ def drift_at(
         None where the slow quantity is at rest there.
     """
     run, name = slow.run, slow.name
-    model = run.model
+    model = run.symbolic_model
     try:
         if name in run.forcing and model is not None:
             return _of_a_forcing(model, slow, time, told)
@@ -112,7 +112,7 @@ def _in_time(forcing: sp.Expr) -> sp.Expr:
 
 def _of_a_slow_state(slow: SlowQuantity, point: SpecialPoint, time: float, told: bool) -> Drift:
     """From the rate of a slow state, its gradient at the special point, and what else moves."""
-    model, names = slow.run.model, (*slow.states, slow.name)
+    model, names = slow.run.symbolic_model, (*slow.states, slow.name)
     others = [n for n in slow.run.columns if n not in names]
     rate = model.rates[slow.name]
     if any(symbol.name in others for symbol in rate.free_symbols):
@@ -209,7 +209,7 @@ def _on_a_path(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift:
     slopes = {n: law.diff(parameter) for n, law in path.items()}
     size = {n: abs(float(s.subs(parameter, here[slow.name]))) for n, s in slopes.items()}
     most = max(size, key=lambda n: size[n])
-    law = _rate(slow.run.model, most.name, time).xreplace({**_moving(slow, time), **path})
+    law = _rate(slow.run.symbolic_model, most.name, time).xreplace({**_moving(slow, time), **path})
     return drift_of_law(law / slopes[most], here)
 
 

@@ -128,7 +128,7 @@ def _from_modes(slow: SlowQuantity, courses: Sequence[Course], extent: Array) ->
 
     In each mode of the linearised fast motion, the other states have their extents.
     """
-    if not courses or slow.run.model is None or slow.laws:
+    if not courses or slow.run.symbolic_model is None or slow.laws:
         return extent
     rows = np.concatenate([c.curve()[:, :-1] for c in courses])
     fixed = np.ptp(rows, axis=0) <= FLAT * np.maximum(np.abs(rows).max(axis=0), extent)
@@ -152,7 +152,7 @@ def _from_modes(slow: SlowQuantity, courses: Sequence[Course], extent: Array) ->
 def _modes(slow: SlowQuantity, course: Course) -> list[NDArray[np.complex128]]:
     """Eigenvectors of the Jacobian at rows of a course, each shape (n, n)."""
     branch = course.branch
-    field = frozen_field(slow.run.model, slow.name, branch.parameters)
+    field = frozen_field(slow.run.symbolic_model, slow.name, branch.parameters)
     rows = np.concatenate([np.arange(piece.start, piece.stop) for piece in course.pieces])
     found = []
     for row in rows[np.linspace(0, len(rows) - 1, ROWS).astype(int)]:

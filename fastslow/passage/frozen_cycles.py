@@ -137,9 +137,9 @@ def frozen_end(p: Passage, times: Sequence[float]) -> FrozenEnd | None:
 def _frozen(p: Passage) -> Model | None:
     """The frozen fast subsystem, with one parameter free; None where it is not known."""
     run, diagram = p.slow.run, p.diagram
-    if run.model is None or diagram.path:
+    if run.symbolic_model is None or diagram.path:
         return None
-    fast: Model = run.model.frozen()
+    fast: Model = run.symbolic_model.frozen()
     held = {n: v for n, v in diagram.parameters.items() if n in (*fast.parameters, *fast.free)}
     fast = fast.with_parameters(held)
     known = fast.states == diagram.states and fast.free == (diagram.parameter,)

@@ -101,7 +101,7 @@ def path_of(mode: CriticalMode, slow: SlowQuantity, start: float, left: float) -
     A forcing goes on, whatever the state does. The rate of a slow state is that of the
     branch after the run has left it, if it depends on nothing else that moves.
     """
-    run, model, name = slow.run, slow.run.model, slow.name
+    run, model, name = slow.run, slow.run.symbolic_model, slow.name
     end = float(run.t[-1])
     if slow.laws or name in run.forcing:
         beyond = None
@@ -372,7 +372,7 @@ def _nonlinear(growth: Growth, small: float, left: float) -> float:
 def _feedback(growth: Growth, at: float) -> float:
     """What the feedback of a slow state adds to the exponent, by λ of all states together."""
     slow = growth.path.slow
-    model, name = slow.run.model, slow.name
+    model, name = slow.run.symbolic_model, slow.name
     if model is None or slow.laws or name in slow.run.forcing:
         return 0.0
     law = _numbers(model, model.rates[name])

@@ -71,12 +71,12 @@ def _others(p: Passage) -> bool:
     """Whether quantities other than the one of the diagram move in the fast rates."""
     run = p.slow.run
     moving = {n for n in run.columns if n != p.slow.name and n not in p.slow.states}
-    if run.model is None or p.slow.laws:
+    if run.symbolic_model is None or p.slow.laws:
         return bool(moving) and not p.slow.laws
     return any(
         symbol.name in moving
         for name in p.slow.states
-        for symbol in run.model.rates[name].free_symbols
+        for symbol in run.symbolic_model.rates[name].free_symbols
     )
 
 
@@ -132,7 +132,7 @@ def _law(
 
 def _constant(p: Passage) -> bool:
     """Whether the slow quantity is a forcing of constant rate."""
-    model, name = p.slow.run.model, p.slow.name
+    model, name = p.slow.run.symbolic_model, p.slow.name
     if model is None or p.slow.laws or name not in p.slow.run.forcing:
         return False
     return bool(sp.expand(model.forcing[name].diff(TIME).diff(TIME)) == 0) and not _others(p)

@@ -22,7 +22,7 @@ from fastslow.results.markup import diagram_html
 from fastslow.results.nearness import nearest_of
 from fastslow.results.outcome import CUT_SHORT, Outcome
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
-from fastslow.results.result import LIVE, Result
+from fastslow.results.result import LIVE, STORED, Result
 from fastslow.results.selecting import limits_of
 from fastslow.results.tables import Table
 from fastslow.results.unexplained import UnexplainedChange, unexplained_changes
@@ -78,6 +78,9 @@ class Diagram(Table, Result):
         neither looked for nor traced, and "complete" says nothing of it.
     periods : mapping
         The period of every state that has one.
+    model : Model or StoredModel, optional
+        The frozen model, in which the parameter has no value; of a diagram from a file a stored
+        model, which can be simulated and needs no SymPy.
 
     Examples
     --------
@@ -107,6 +110,7 @@ class Diagram(Table, Result):
     window: StateWindow | None = None
     bands: tuple[EquilibriumBand, ...] = ()
     periods: Mapping[str, float] = field(default_factory=dict)
+    model: Any = field(default=None, repr=False, metadata=STORED)
 
     def __len__(self) -> int:
         return len(self.branches)

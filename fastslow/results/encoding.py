@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.errors import ArgumentError
+from fastslow.errors import ArgumentError, ModelError
 from fastslow.results.named import Named
 from fastslow.results.points import Equilibria, SpecialPoints
+from fastslow.results.stored_models import StoredModel
 from fastslow.results.tangencies import Tangencies
 
 Array = NDArray[Any]
@@ -167,14 +168,30 @@ def _safe(name: str) -> str:
 
 
 def _record(value: Any, path: str, arrays: dict[str, Array]) -> Any:
-    kept = {
-        entry.name: encoded(
-            getattr(value, entry.name), f"{path}/{entry.name}" if path else entry.name, arrays
-        )
-        for entry in fields(value)
-        if not entry.metadata.get("live")
-    }
+    kept = {}
+    for entry in fields(value):
+        if entry.metadata.get("live") and not _is_stored(entry):
+            continue
+        part = getattr(value, entry.name)
+        if _is_stored(entry):
+            part = _stored(part)
+            if part is None:
+                continue
+        where = f"{path}/{entry.name}" if path else entry.name
+        kept[entry.name] = encoded(part, where, arrays)
     return {"class": type(value).__name__, "fields": kept}
+
+
+def _stored(model: Any) -> StoredModel | None:
+    """The stored form of a model, None where there is none or it cannot be simulated."""
+    try:
+        return None if model is None else model.stored
+    except ModelError:
+        return None
+
+
+def _is_stored(entry: Field[Any]) -> bool:
+    return bool(entry.metadata.get("stored"))
 
 
 def decoded(node: Any, arrays: Arrays) -> Any:
@@ -235,10 +252,16 @@ def _object(node: dict[str, Any], arrays: Arrays) -> Any:
     known = {entry.name: entry for entry in fields(classes()[name])}
     values = {key: decoded(value, arrays) for key, value in node["fields"].items()}
     for key in values:
-        if key not in known or known[key].metadata.get("live"):
+        live = key in known and known[key].metadata.get("live") and not _is_stored(known[key])
+        if key not in known or live:
             raise BrokenError(f"its {name} has a field {key}, which this version does not know")
     for key, entry in known.items():
         optional = entry.default is not MISSING or entry.default_factory is not MISSING
         if key not in values and not optional:
             raise BrokenError(f"its {name} lacks the field {key}")
-    return classes()[name](**values)
+        if _is_stored(entry) and not isinstance(values.get(key), StoredModel | None):
+            raise BrokenError(f"the {key} of its {name} is no stored model")
+    built = classes()[name](**values)
+    if isinstance(built, StoredModel):
+        built.check()
+    return built

@@ -63,8 +63,9 @@ def load(path: str | os.PathLike[str]) -> Any:
 
     The checksum of the file is compared first: a file that changed since it was
     written is refused. Nothing in the file is run, and neither SymPy, Numba nor
-    matplotlib is needed. The result answers and plots as before; what it read off a model
-    (`Diagram.at` between rows) is interpolated now, and says so.
+    matplotlib is needed. The result answers and plots as before, and its ``model`` can be
+    simulated (`StoredModel`); what a diagram solved for (`Diagram.at` between rows) is
+    interpolated now, and says so.
 
     Parameters
     ----------

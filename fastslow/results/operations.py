@@ -9,12 +9,12 @@ this and nothing else before anything is made of it.
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from fastslow.results.arithmetic import UnknownOperationError, check_literal, check_number
 from fastslow.results.equality import content_hash
 from fastslow.results.immutable import Immutable
 
@@ -22,31 +22,6 @@ from fastslow.results.immutable import Immutable
 SCALAR, TIME, SUM, MULTIPLE, PRODUCT = "scalar", "time", "sum", "multiple", "product"
 QUOTIENT, ROOT, POWER, LOGARITHM = "quotient", "root", "power", "logarithm"
 FUNCTION = "function"
-
-#: The functions of `math` and the special ones that a text may call, with their arguments.
-MATHEMATICS: Mapping[str, int] = {
-    **dict.fromkeys(("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"), 1),
-    **dict.fromkeys(("asinh", "acosh", "atanh", "exp", "log", "sqrt", "erf", "erfc"), 1),
-    **dict.fromkeys(("floor", "fabs"), 1),
-    **dict.fromkeys(("pow", "atan2", "copysign"), 2),
-}
-SPECIAL: Mapping[str, int] = {
-    **dict.fromkeys(("gamma", "loggamma", "zetac", "sinc", "expi"), 1),
-    **dict.fromkeys(("erfi", "erfinv", "erfcinv", "ellipk", "ellipe"), 1),
-    **dict.fromkeys(("jv", "yv", "iv", "kv", "expn", "ellipkinc", "ellipeinc"), 2),
-    **dict.fromkeys(("beta", "gammainc", "gammaincc", "polygamma", "lambertw"), 2),
-}
-#: Special functions with several results, of which the last argument names one.
-SEVERAL: Mapping[str, int] = {"airy": 4, "sici": 2, "shichi": 2, "fresnel": 2}
-
-_CONSTANTS = ("pi", "e", "nan", "inf")
-
-#: Longest text, and the deepest one.
-LONGEST, DEEPEST = 10**6, 90
-
-
-class UnknownOperationError(ValueError):
-    """An operation that is none of the vocabulary; the message says which."""
 
 
 @dataclass(frozen=True)
@@ -144,6 +119,11 @@ class Operations(Immutable):
         return self._hash
 
     @cached_property
+    def regions(self) -> Mapping[str, tuple[int, ...]]:
+        """The signs of the interface functions in each region by its name."""
+        return {motion.name: motion.signs for motion in self.motions if 0 not in motion.signs}
+
+    @cached_property
     def n_bounds(self) -> int:
         """Number of rows for the bounds of sliding, the same in every motion."""
         return max(2, *(_bounds(motion, self.sizes) for motion in self.motions), 0)
@@ -161,7 +141,6 @@ class Operations(Immutable):
         UnknownOperationError
         """
         m, q, p = self.sizes
-        _expect(all(type(n) is int for n in self.sizes), "numbers of rows")
         _expect(min(m - 1, q, p) >= 0, "numbers of rows")
         _expect(len(self.motions) > 0 and len(self.gradients) == p, "a motion")
         _expect(len(self.continuous) == p, "a flag for every interface")
@@ -171,7 +150,7 @@ class Operations(Immutable):
         done: set[str] = set()
         for motion in self.motions:
             _expect(type(motion) is kind and len(motion.signs) == p, "motions of one kind")
-            _expect(all(s in (-1, 0, 1) for s in motion.signs), "signs")
+            _expect(set(motion.signs) <= {-1, 0, 1}, "signs")
             if isinstance(motion, SeriesOperations):
                 _check_series(motion, self, known, done)
             else:
@@ -223,11 +202,8 @@ def _check_series(
     filled = set(range(m))
 
     def number(text: Any) -> None:
-        """A literal or a name, with a sign."""
-        _expect(isinstance(text, str) and len(text) < 100, "a name or a number")
-        if text not in names:
-            check_number(text, names)
-            _expect(not _operators(text), "a name or a number")
+        if not (isinstance(text, str) and text in names):
+            check_literal(text)
 
     def row(given: Any, among: Iterable[int] = filled) -> None:
         _expect(type(given) is int and given in among, "a row that is known")
@@ -244,7 +220,7 @@ def _check_series(
                 number(text)
             case (str(),) if kind == TIME:
                 pass
-            case (str(), tuple() as terms, text) if kind == SUM and (terms or text):
+            case (str(), tuple() as terms, str() as text) if kind == SUM and (terms or text):
                 for factor, term in terms:
                     row(term)
                     if factor not in ("+", "-"):
@@ -270,7 +246,7 @@ def _check_series(
                 for a, slope, steady in slots:
                     row(a)
                     row(slope, everything)
-                    if steady:
+                    if steady != "":
                         number(steady)
                 check_number(text, {*names, *(f"r{a}" for a, _, _ in slots)})
             case _:
@@ -279,104 +255,3 @@ def _check_series(
     _expect(len(motion.rates) == m and len(motion.outputs) >= q + p, "a row for every result")
     for a in (*motion.rates, *motion.outputs):
         row(a)
-
-
-_ARITHMETIC = (ast.Add, ast.Sub, ast.Mult, ast.Div)
-_COMPARED = (ast.Eq, ast.NotEq, ast.Lt, ast.LtE, ast.Gt, ast.GtE)
-
-
-def check_number(text: Any, names: set[str]) -> None:
-    """Refuse a text unless it is arithmetic in some names that gives a number.
-
-    Parameters
-    ----------
-    text : str
-    names : set of str
-        The names that it may contain.
-
-    Raises
-    ------
-    UnknownOperationError
-
-    Examples
-    --------
-    >>> check_number("math.sin(p0) * 2.0 if p0 < 1.0 else -p0", {"p0"})
-    >>> check_number("p0.__class__", {"p0"})
-    Traceback (most recent call last):
-    ...
-    fastslow.results.operations.UnknownOperationError: expected arithmetic, received p0.__class__
-    """
-    _check(_parsed(text), names, 0, True)
-
-
-def _parsed(text: Any) -> ast.expr:
-    _expect(isinstance(text, str) and 0 < len(text) <= LONGEST, "a text of arithmetic")
-    try:
-        return ast.parse(text, mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise UnknownOperationError(f"expected arithmetic, received {text[:80]!a}") from None
-
-
-def _operators(text: str) -> bool:
-    node = _parsed(text)
-    if isinstance(node, ast.UnaryOp):
-        node = node.operand
-    return not isinstance(node, ast.Name | ast.Constant | ast.Attribute)
-
-
-def _check(node: ast.expr, names: set[str], depth: int, number: bool) -> None:
-    """Refuse a node that is no number, or no truth value where that is asked for."""
-    if depth > DEEPEST:
-        raise UnknownOperationError(f"expected at most {DEEPEST} operations inside one another")
-
-    def all_of(parts: Iterable[ast.expr], kind: bool) -> None:
-        for part in parts:
-            _check(part, names, depth + 1, kind)
-
-    while number and isinstance(node, ast.BinOp) and isinstance(node.op, _ARITHMETIC):
-        # a long sum is no deep one
-        all_of([node.right], True)
-        node = node.left
-    match node:
-        case ast.Constant(value=bool()) if not number:
-            return None
-        case ast.Constant(value=float() | int() as value) if number and type(value) is not bool:
-            if abs(value) < 2**53 or isinstance(value, float):
-                return None
-        case ast.Name(id=name) if number and name in names:
-            return None
-        case ast.Attribute(value=ast.Name(id="math"), attr=name) if number and name in _CONSTANTS:
-            return None
-        case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=a) if number:
-            return all_of([a], True)
-        case ast.IfExp(test=test, body=a, orelse=b) if number:
-            all_of([test], False)
-            return all_of([a, b], True)
-        case ast.Compare(left=a, ops=[op], comparators=[b]) if not number:
-            if isinstance(op, _COMPARED):
-                return all_of([a, b], True)
-        case ast.BoolOp(values=parts) if not number:
-            return all_of(parts, False)
-        case ast.UnaryOp(op=ast.Not(), operand=a) if not number:
-            return all_of([a], False)
-        case ast.Call(func=function, args=arguments, keywords=[]) if number:
-            if _may_call(function, arguments):
-                return all_of(arguments, True)
-    raise UnknownOperationError(f"expected arithmetic, received {ast.unparse(node)[:80]}")
-
-
-def _may_call(function: ast.expr, arguments: list[ast.expr]) -> bool:
-    count = len(arguments)
-    match function:
-        case ast.Name(id="abs"):
-            return count == 1
-        case ast.Name(id="max" | "min"):
-            return count >= 2
-        case ast.Attribute(value=ast.Name(id="math"), attr=name):
-            return MATHEMATICS.get(name) == count
-        case ast.Attribute(value=ast.Name(id="special"), attr=name) if name in SEVERAL:
-            which = arguments[-1] if count == 2 else None
-            return isinstance(which, ast.Constant) and which.value in range(SEVERAL[name])
-        case ast.Attribute(value=ast.Name(id="special"), attr=name):
-            return SPECIAL.get(name) == count
-    return False

@@ -10,6 +10,9 @@ from fastslow.results.immutable import Immutable
 #: Metadata of a field that lives only in this process, such as a model: dropped when kept.
 LIVE = {"live": True}
 
+#: The same of one that files keep in another form, its own attribute ``stored``.
+STORED = {"live": True, "stored": True}
+
 
 class Saved:
     """What can be kept in a file."""
@@ -20,8 +23,9 @@ class Saved:
 
         The file is written whole or not at all; a symbolic link is followed, and a
         file that exists keeps its permission bits. A checksum of the content is at
-        its end. What lives only in this process (the model behind a diagram, which
-        corrects what is read off it) is not kept.
+        its end. The model of a trajectory or a diagram is kept as a `StoredModel`. What
+        lives only in this process (what corrects points between the rows of a diagram) is
+        not kept.
 
         Parameters
         ----------

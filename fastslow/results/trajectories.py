@@ -26,10 +26,11 @@ from fastslow.results.moments import Moment, in_blocks, is_dense, sample
 from fastslow.results.outcome import Outcome
 from fastslow.results.recurrence import Recurrence
 from fastslow.results.regimes import SAME, Regimes, regimes_of
-from fastslow.results.result import LIVE, Result
+from fastslow.results.result import STORED, Result
 from fastslow.results.run_parts import samples_of
 from fastslow.results.run_queries import Queries
 from fastslow.results.sections import window_of
+from fastslow.results.stored_models import StoredModel
 from fastslow.results.tables import Table
 
 
@@ -81,8 +82,9 @@ class Trajectory(Queries, Recurrence, Table, Result):
     periods : mapping
         The period of every state that has one. Columns go on beyond it without a
         jump; distances are taken modulo the period.
-    model : Model, optional
-        What was simulated; not kept in a file.
+    model : Model or StoredModel, optional
+        What was simulated; of a run from a file a stored model, which can be simulated again
+        and needs no SymPy.
 
     Examples
     --------
@@ -116,10 +118,15 @@ class Trajectory(Queries, Recurrence, Table, Result):
     equations: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict)
     periods: Mapping[str, float] = field(default_factory=dict)
-    model: Any = field(default=None, repr=False, metadata=LIVE)
+    model: Any = field(default=None, repr=False, metadata=STORED)
 
     _row = "t"
     _places = ("t",)
+
+    @property
+    def symbolic_model(self) -> Any:
+        """The model with its equations in SymPy, None of a run from a file."""
+        return None if isinstance(self.model, StoredModel) else self.model
 
     @cached_property
     def t(self) -> NDArray[np.float64]:

@@ -3,22 +3,44 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.arguments import numbers, positive, whole
+from fastslow.arguments import class_of, numbers, positive, shown, whole
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.model.model import Model
+from fastslow.results.stored_models import StoredModel
+
+if TYPE_CHECKING:
+    from fastslow.model.model import Model
+
+#: What a trajectory is simulated of.
+Simulated: TypeAlias = "Model | StoredModel"
 
 #: Samples of one run that can be asked for by their number.
 MOST_SAMPLES = 10**8
 
 
-def initial_state(model: Model, start: Any) -> NDArray[np.float64]:
+def simulated(name: str, value: Any) -> Simulated:
+    """The check of a model that is simulated: equations, or what was stored of them.
+
+    Raises
+    ------
+    ArgumentError
+        For anything else.
+    """
+    # of a class that was not imported there is no object
+    module = sys.modules.get("fastslow.model.model")
+    if isinstance(value, StoredModel) or (module and isinstance(value, module.Model)):
+        return value
+    received = shown(value) if value is None else class_of(value)
+    raise ArgumentError(f"{name}: expected a Model, received {received}")
+
+
+def initial_state(model: Simulated, start: Any) -> NDArray[np.float64]:
     """The initial state as an array in the order states, slow states.
 
     Parameters
@@ -137,7 +159,7 @@ def sample_times(
     return np.ascontiguousarray(times)
 
 
-def require_values(model: Model) -> None:
+def require_values(model: Simulated) -> None:
     """Raise unless every parameter has a value."""
     missing = [name for name in model.free if name not in model.parameters]
     if missing:
@@ -148,7 +170,7 @@ def require_values(model: Model) -> None:
         )
 
 
-def gap_regions(model: Model, gap: str | None) -> tuple[str, str, str] | None:
+def gap_regions(model: Simulated, gap: str | None) -> tuple[str, str, str] | None:
     """The regions below, inside and above the gap, None for a model without one.
 
     Parameters
@@ -167,9 +189,8 @@ def gap_regions(model: Model, gap: str | None) -> tuple[str, str, str] | None:
     """
     if gap is not None and str(gap) not in model.regions:
         raise unknown_name("region", gap, model.regions)
-    sides = {name: tuple(region.signs.values()) for name, region in model.regions.items()}
-    functions = [i.function for i in model.interfaces.values()]
-    if gap is None and not (len(sides) == 3 and len(functions) == 2 and _parallel(model)):
+    sides = model.operations.regions
+    if gap is None and not (len(sides) == 3 and model.traits.parallel):
         return None
     for inside in sides if gap is None else (str(gap),):
         below: list[str] = []
@@ -178,31 +199,10 @@ def gap_regions(model: Model, gap: str | None) -> tuple[str, str, str] | None:
             differ = [j for j, s in enumerate(signs) if s != sides[inside][j]]
             if len(differ) == 1:
                 j = differ[0]
-                rising = signs[j] * _growth(model, functions[j]) > 0
+                rising = signs[j] * model.traits.rising[j] > 0
                 (above if rising else below).append(name)
         if len(below) == len(above) == 1:
             return below[0], inside, above[0]
     if gap is None:
         return None
     raise ArgumentError(f"gap = {gap!r}; expected a region with one region below and one above it")
-
-
-def _parallel(model: Model) -> bool:
-    """Whether the two interfaces differ by a constant, apart from a factor."""
-    one, other = (i.function for i in model.interfaces.values())
-    moving = set(model.structure.moving)
-    shared = [s for s in model.structure.moving if s in one.free_symbols & other.free_symbols]
-    if not shared:
-        return False
-    factor = sp.cancel(other.diff(shared[0]) / one.diff(shared[0]))
-    rest = sp.expand(factor * one - other)
-    return not (factor.free_symbols | rest.free_symbols) & moving
-
-
-def _growth(model: Model, function: sp.Expr) -> int:
-    """Whether the first state in an interface function raises or lowers it."""
-    for symbol in model.structure.moving:
-        if symbol in function.free_symbols:
-            rate = function.diff(symbol).subs(model.values)
-            return -1 if rate.is_number and rate.is_negative else 1
-    return 1

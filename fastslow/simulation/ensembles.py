@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import finite, flag, instance, mapping, takes, text, whole
 from fastslow.compiled.generic import load_loop
-from fastslow.compiled.series import CompiledSeries
+from fastslow.compiled.series import CompiledSeries, compile_series
 from fastslow.compiled.steps import CompiledSteps, compile_steps
-from fastslow.model.derived import once, partition_of
 from fastslow.model.model import Model
 from fastslow.results.angles import periods_of as turns_of
 from fastslow.results.ensembles import Ensemble
@@ -28,6 +27,7 @@ from fastslow.results.regimes import (
     periods_at_the_end,
     repeats,
 )
+from fastslow.simulation.arguments import gap_regions
 from fastslow.simulation.driver import OUT_OF_WORK, REACHED_END
 from fastslow.simulation.grouping import alike
 from fastslow.simulation.lanes import LEFT, Runs, pool_for
@@ -51,17 +51,12 @@ from fastslow.simulation.settings import (
 )
 from fastslow.simulation.trajectories import (
     error_rules,
-    gap_of,
     problem_of,
-    series_of,
-    together_of,
-    vanishing_of,
 )
 from fastslow.simulation.workspace import MODE, STEPS, beginnings, workspace_for
 
 Floats = NDArray[np.float64]
 
-steps_of = once(partition_of)(compile_steps)
 
 #: Trajectories that a thread takes at a time, at most.
 _CHUNK = 512
@@ -167,10 +162,10 @@ def simulate_many(
     spans, since = spans_of(t, periods, start, settle, own)
     times = times_of(samples, spans, since)
     groups = [
-        (one, chosen, series_of(one, resolved.order), steps_of(one, resolved.order))
+        (one, chosen, compile_series(one, resolved.order), compile_steps(one, resolved.order))
         for one, chosen in alike(model, swept, count)
     ]
-    gaps = [gap_of(one, gap) for one, *_ in groups]
+    gaps = [gap_regions(one, gap) for one, *_ in groups]
     modes = tuple(dict.fromkeys(name for *_, compiled, _ in groups for name in compiled.modes))
     interfaces = tuple(dict.fromkeys(name for one, *_ in groups for name in one.interfaces))
     n = starts.shape[1]
@@ -254,7 +249,7 @@ def simulate_many(
         notes_on_noise(
             (*model.states, *model.slow_states),
             resolved,
-            (*vanishing_of(model), *(name for some in together_of(model) for name in some)),
+            (*model.traits.vanishing, *(name for some in model.traits.together for name in some)),
             starts,
             extremes,
             ends[:, 1:],
@@ -301,11 +296,11 @@ def arrivals(
     grid = np.empty((count, 0)) if times is None else times
     samples = np.empty((count, n, grid.shape[1]))
     for one, chosen in alike(model, swept, count):
-        compiled = series_of(one, resolved.order)
+        compiled = compile_series(one, resolved.order)
         problem = problem_of(model, compiled, resolved, error_rules(one, resolved, compiled))
         run = _run(
             compiled,
-            steps_of(one, resolved.order),
+            compile_steps(one, resolved.order),
             problem,
             threads,
             (

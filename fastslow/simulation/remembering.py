@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.model.model import Model
-from fastslow.model.structure import TIME, real
+from fastslow.results.arithmetic import UnknownOperationError, value_of
 from fastslow.results.outcome import Outcome, with_notes
+from fastslow.simulation.arguments import Simulated
 from fastslow.simulation.scales import SMALLEST
 from fastslow.simulation.settings import Resolved
 
@@ -22,7 +22,7 @@ LEFT = 1e3
 
 def with_noise(
     outcome: Outcome,
-    model: Model,
+    model: Simulated,
     resolved: Resolved,
     vanishing: tuple[str, ...],
     together: tuple[tuple[str, ...], ...],
@@ -84,7 +84,7 @@ def with_noise(
 
 
 def _grows(
-    model: Model,
+    model: Simulated,
     name: str,
     columns: dict[str, Floats],
     steps: Floats,
@@ -92,17 +92,21 @@ def _grows(
     below: NDArray[np.intp],
 ) -> Iterator[bool]:
     """Whether the growth rate at zero is positive after a state was lost, region by region."""
-    state = real(name)
-    symbols = [TIME, *(real(n) for n in columns)]
-    for region in model.regions.values():
-        rows = below[np.array([modes[int(k)] for k in steps[below, 2]]) == region.name]
-        if len(rows):
-            rate = region.rates[name].diff(state).subs(state, 0).subs(model.values)
-            rate = rate.subs({real(n): law for n, law in region.forcing.items()})
-            rate = rate.subs(model.values)
-            growth = sp.lambdify(symbols, rate, "numpy")
-            given = [steps[rows, 0], *(values[rows] for values in columns.values())]
-            yield bool(np.any(np.asarray(growth(*given)) > 0))
+    traits, names = model.traits, (*model.states, *model.slow_states)
+    values: dict[str, Any] = {f"y{k}": columns[n] for k, n in enumerate(names)}
+    values["t"] = steps[:, 0]
+    values = {n: column[below] for n, column in values.items()}
+    values |= {f"p{k}": model.parameters[n] for k, n in enumerate(traits.names)}
+    lost = np.array([modes[int(k)] for k in steps[below, 2]])
+    rates = traits.growth[traits.vanishing.index(name)]
+    for region, rate in zip(model.regions, rates, strict=True):
+        rows = lost == region
+        if rows.any():
+            try:
+                yield bool((np.broadcast_to(value_of(rate, values), rows.shape)[rows] > 0).any())
+            except UnknownOperationError:
+                # a special function: it may grow
+                yield True
 
 
 def notes_on_noise(

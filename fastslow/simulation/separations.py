@@ -18,7 +18,7 @@ from fastslow.simulation.arguments import initial_state, require_values, time_sp
 from fastslow.simulation.ensembles import arrivals
 from fastslow.simulation.many_arguments import threads_of
 from fastslow.simulation.settings import Integration, Resolved, integration_settings, resolve
-from fastslow.simulation.trajectories import period_of, simulate
+from fastslow.simulation.trajectories import simulate
 
 Floats = NDArray[np.float64]
 
@@ -133,7 +133,7 @@ def lyapunov_exponent(
     """
     require_values(model)
     begin = initial_state(model, state)
-    span, period = time_span(t, periods, start, period, lambda: period_of(model))
+    span, period = time_span(t, periods, start, period, model.period)
     unit = period if periods is not None and period is not None else 1.0
     whole_length = span[1] - span[0]
     left_out = 0.2 * whole_length if discard is None else discard * unit

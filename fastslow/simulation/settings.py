@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from fastslow.arguments import (
     Check,
@@ -18,7 +18,6 @@ from fastslow.arguments import (
     whole,
 )
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.model.model import Model
 from fastslow.results.named import Named
 
 #: Where a run ends that nothing else ends.
@@ -122,7 +121,17 @@ class Resolved:
         }
 
 
-def resolve(integration: Integration, model: Model, *, implicit: bool) -> Resolved:
+class HasStates(Protocol):
+    """A model, by the names that settings need."""
+
+    @property
+    def states(self) -> tuple[str, ...]: ...
+
+    @property
+    def slow_states(self) -> tuple[str, ...]: ...
+
+
+def resolve(integration: Integration, model: HasStates, *, implicit: bool) -> Resolved:
     """The settings with nothing left open.
 
     Parameters

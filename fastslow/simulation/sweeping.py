@@ -30,7 +30,7 @@ from fastslow.results.sweeps import Sweep, SweepPass
 from fastslow.results.trajectories import Trajectory
 from fastslow.simulation.arguments import initial_state
 from fastslow.simulation.settings import DEFAULT, Integration, integration_settings, resolve
-from fastslow.simulation.trajectories import period_of, simulate
+from fastslow.simulation.trajectories import simulate
 
 Array = NDArray[np.float64]
 
@@ -223,7 +223,7 @@ def _rule(settings: _Settings, name: str) -> str:
 def _try_first(model: Model, value: float, begin: Array, settings: _Settings) -> None:
     """A short run at the first value: a wrong argument is wrong at every value."""
     here = model.with_parameters({settings.parameter: value})
-    if settings.period is None and period_of(here) is None:
+    if settings.period is None and here.period() is None:
         raise ArgumentError(
             f"nothing in this model has a common period at {settings.parameter} = {value:g}; give "
             "the time that settle= and keep= count, as period="

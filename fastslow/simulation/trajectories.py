@@ -12,20 +12,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite, flag, instance, positive, takes, text
+from fastslow.arguments import finite, flag, positive, takes, text
 from fastslow.compiled.generic import load_loop
-from fastslow.compiled.series import CompiledSeries, compile_series
-from fastslow.model.derived import KEPT, once, partition_of, sloped, timed
-from fastslow.model.invariance import factor_states, states_together
-from fastslow.model.model import Model
+from fastslow.compiled.series import KEPT, CompiledSeries, compile_series
 from fastslow.results.endings import outcome_of
 from fastslow.results.immutable import fixed, read_only
 from fastslow.results.trajectories import Trajectory
 from fastslow.simulation.arguments import (
+    Simulated,
     gap_regions,
     initial_state,
     require_values,
     sample_times,
+    simulated,
     time_span,
 )
 from fastslow.simulation.driver import OUT_OF_WORK, TABLE_FULL
@@ -57,15 +56,9 @@ from fastslow.simulation.workspace import (
 #: No extremes, hits and times of modes: steps and crossings are listed instead.
 _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
 
-gap_of = once(sloped)(gap_regions)
-vanishing_of = once(partition_of)(factor_states)
-together_of = once(partition_of)(states_together)
-series_of = once(partition_of)(compile_series)
-period_of = once(timed)(Model.period)
-
 
 @takes(
-    model=instance(Model),
+    model=simulated,
     start=finite,
     period=positive,
     integration=integration_settings,
@@ -73,7 +66,7 @@ period_of = once(timed)(Model.period)
     gap=text,
 )
 def simulate(
-    model: Model,
+    model: Simulated,
     state: Sequence[float] | Mapping[Any, float] | NDArray[np.float64],
     *,
     t: tuple[float, float] | None = None,
@@ -95,8 +88,9 @@ def simulate(
 
     Parameters
     ----------
-    model : Model
-        With forcing, with slow states, or frozen with every parameter given.
+    model : Model or StoredModel
+        With forcing, with slow states, or frozen with every parameter given; the model of a
+        run that was loaded is a stored one, and needs no SymPy.
     state : sequence of float, shape (n,), or mapping
         Initial states and slow states, in order or by name.
     t : (float, float)
@@ -136,9 +130,9 @@ def simulate(
 
     Examples
     --------
-    >>> import sympy as sp
+    >>> import sympy as sp, fastslow as fs
     >>> x, v = sp.symbols("x v")
-    >>> oscillator = Model({x: v, v: -x})
+    >>> oscillator = fs.Model({x: v, v: -x})
     >>> fine = Integration(rtol=1e-12)
     >>> run = simulate(oscillator, [1, 0], t=(0, 2 * sp.pi), integration=fine)
     >>> run(sp.pi).round(10) + 0.0
@@ -234,7 +228,7 @@ class Prepared:
         See `with_noise`.
     """
 
-    model: Model
+    model: Simulated
     names: tuple[str, ...]
     compiled: CompiledSeries
     resolved: Resolved
@@ -246,7 +240,7 @@ class Prepared:
     @cached_property
     def period(self) -> float | None:
         """The common period of the forcing."""
-        return period_of(self.model)
+        return self.model.period()
 
     @cached_property
     def shared(self) -> dict[str, Any]:
@@ -292,12 +286,12 @@ class Prepared:
 
 
 @lru_cache(maxsize=KEPT)
-def prepared_run(model: Model, integration: Integration, gap: str | None) -> Prepared:
+def prepared_run(model: Simulated, integration: Integration, gap: str | None) -> Prepared:
     """What a run needs of its model, with every parameter given, and its settings."""
     require_values(model)
     resolved = resolve(integration, model, implicit=True)
-    between = gap_of(model, gap)
-    compiled = series_of(model, resolved.order)
+    between = gap_regions(model, gap)
+    compiled = compile_series(model, resolved.order)
     return Prepared(
         model,
         (*model.states, *model.slow_states),
@@ -305,8 +299,8 @@ def prepared_run(model: Model, integration: Integration, gap: str | None) -> Pre
         resolved,
         problem_of(model, compiled, resolved, error_rules(model, resolved, compiled)),
         between,
-        vanishing_of(model),
-        together_of(model),
+        model.traits.vanishing,
+        model.traits.together,
     )
 
 
@@ -405,7 +399,7 @@ def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
 
 
 def problem_of(
-    model: Model, compiled: CompiledSeries, resolved: Resolved, rules: NDArray[np.float64]
+    model: Simulated, compiled: CompiledSeries, resolved: Resolved, rules: NDArray[np.float64]
 ) -> Problem:
     """What the stepping loops need of a model, its series, and the errors allowed."""
     settling = resolved.implicit and compiled.order >= DEGREE and not compiled.values_only
@@ -427,11 +421,14 @@ def problem_of(
     )
 
 
-def error_rules(model: Model, resolved: Resolved, compiled: CompiledSeries) -> NDArray[np.float64]:
+def error_rules(
+    model: Simulated, resolved: Resolved, compiled: CompiledSeries
+) -> NDArray[np.float64]:
     """In what sizes the errors of a run are measured, from its tolerances."""
     names = (*model.states, *model.slow_states)
     fixed, lasting = np.zeros(len(names)), np.zeros(len(names))
-    vanishing = {*vanishing_of(model), *(n for some in together_of(model) for n in some)}
+    traits = model.traits
+    vanishing = {*traits.vanishing, *(n for some in traits.together for n in some)}
     for i, name in enumerate(names):
         given = resolved.atol[name]
         if given is not None:

@@ -16,9 +16,10 @@ from fastslow.arguments import instance, mapping, path, takes, text
 from fastslow.disk import reason, write_text
 from fastslow.errors import ArgumentError, FileError, unknown_name
 from fastslow.model.interfaces import Region
-from fastslow.model.model import Model, number
+from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
 from fastslow.results.named import Named
+from fastslow.results.stored_models import finite_number
 from fastslow.symbolic.stability import jacobian
 
 #: Places of PAR that AUTO-07p keeps for itself: the period and what belongs to it.
@@ -336,7 +337,7 @@ def _parts(
         for name, value in (given or {}).items():
             if str(name) not in known:
                 raise unknown_name(kind, name, known)
-            known[str(name)] = number(f"{kind} {name}", value)
+            known[str(name)] = finite_number(f"{kind} {name}", value)
     return model.regions[region], numbers, first
 
 

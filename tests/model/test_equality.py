@@ -10,10 +10,11 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.compiled.series import compile_series
 from fastslow.diagrams import tracing
 from fastslow.model import derived, structure
 from fastslow.model.motions import motions_of
-from fastslow.simulation.trajectories import gap_of, period_of, series_of
+from fastslow.simulation.arguments import gap_regions
 
 x, v, w, t, D, k = sp.symbols("x v w t D k")
 GAP = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
@@ -117,25 +118,25 @@ def test_a_model_is_no_record_to_replace_fields_of():
 
 def test_equal_models_share_what_was_derived():
     one, other = gear(), gear()
-    assert series_of(one, 20) is series_of(other, 20)
-    assert series_of(one, 20) is series_of(one.with_parameters(k=3), 20)
+    assert compile_series(one, 20) is compile_series(other, 20)
+    assert compile_series(one, 20) is compile_series(one.with_parameters(k=3), 20)
     assert motions_of(one) is motions_of(one.with_parameters(D=0.3))
     frozen = one.frozen(), other.frozen()
     assert tracing._field(frozen[0], "w") is tracing._field(frozen[1], "w")
-    assert gap_of(one, None) == ("S3", "S2", "S1")
+    assert gap_regions(one, None) == ("S3", "S2", "S1")
 
 
 def test_what_depends_on_values_is_not_shared():
     def model(rate):
         return fs.Model({x: w - x}, forcing={w: sp.sin(k * t)}, parameters={k: rate, D: 1})
 
-    assert period_of(model(1)) == pytest.approx(2 * sp.pi.evalf())
-    assert period_of(model(2)) == pytest.approx(sp.pi.evalf())
-    assert period_of(model(2).with_parameters(k=1)) == period_of(model(1))
+    assert model(1).period() == pytest.approx(2 * sp.pi.evalf())
+    assert model(2).period() == pytest.approx(sp.pi.evalf())
+    assert model(2).with_parameters(k=1).period() == model(1).period()
     # the sides of a gap change with the sign of the slope of its edges
     gap = sp.Piecewise((k * x - D, k * x > D), (k * x + D, k * x < -D), (0, True))
     rising, falling = (fs.Model({x: -gap}, parameters={D: 1, k: s}) for s in (1, -1))
-    assert gap_of(rising, None) == gap_of(falling, None)[::-1]
+    assert gap_regions(rising, None) == gap_regions(falling, None)[::-1]
     # an equilibrium follows its parameter
     frozen = fs.Model({x: k * w - x}, forcing={w: sp.sin(t)}, parameters={k: 1}).frozen()
     for value in (1.0, 2.0, 1.0):
@@ -163,7 +164,7 @@ def test_a_sweep_over_many_values_keeps_a_bounded_memory():
     for number in range(400):
         one = model.with_parameters(k=2 + number * 1e-3, D=0.5 + number * 1e-4)
         frozen.with_parameters(D=0.5 + number * 1e-4)
-        gap_of(one, None), period_of(one), series_of(one, 20)
+        gap_regions(one, None), one.period(), compile_series(one, 20)
     gc.collect()
     assert structure._partition.cache_info().currsize <= structure.PARTITIONS
     assert structure._partition_of.cache_info().currsize <= structure.PARTITIONS
@@ -176,7 +177,7 @@ def test_a_sweep_over_many_values_keeps_a_bounded_memory():
 
 def test_a_model_at_new_values_costs_no_derivation():
     model = gear()
-    series_of(model, 20)
+    compile_series(model, 20)
 
     def seconds(make, repeats=50):
         best = 1.0
@@ -189,4 +190,4 @@ def test_a_model_at_new_values_costs_no_derivation():
     # 0.01 to 0.04 ms on an idle machine; without shared structures 4 to 8 ms
     assert seconds(model.frozen) < 1e-3
     assert seconds(lambda: model.with_parameters(k=time.perf_counter())) < 1e-3
-    assert seconds(lambda: series_of(model.with_parameters(k=time.perf_counter()), 20)) < 1e-3
+    assert seconds(lambda: compile_series(model.with_parameters(k=time.perf_counter()), 20)) < 1e-3

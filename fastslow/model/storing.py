@@ -1,0 +1,92 @@
+"""A model as it is kept in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import sympy as sp
+
+from fastslow.model.model import Model
+from fastslow.model.periods import frequencies
+from fastslow.model.structure import TIME, real
+from fastslow.model.traits import first_slope, text_of
+from fastslow.results.stored_models import StoredModel, Validity
+
+
+def stored_form(model: Model) -> StoredModel:
+    """The model as operations and numbers, with what says where they hold.
+
+    Parameters
+    ----------
+    model : Model
+
+    Raises
+    ------
+    ModelError
+        If a function in the equations cannot be compiled.
+    """
+    return StoredModel(
+        model.states,
+        model.slow_states,
+        tuple(model.forcing),
+        tuple(model.interfaces),
+        model.free,
+        model.parameters,
+        model.periodic,
+        model.equations,
+        model.operations,
+        model.traits,
+        _validity(model),
+    )
+
+
+def _validity(model: Model) -> Validity:
+    structure, values = model.structure, model.parameters
+    names = tuple(sorted({*values, *model.free}))
+    new = {real(n): f"p{k}" for k, n in enumerate(names)}
+    loose = [z for z in structure.moving if z.name not in values or z == TIME]
+    steady: set[str] = set()
+
+    def texts(expressions: Iterable[sp.Expr]) -> tuple[str, ...]:
+        """Texts of expressions, or none: then their parameters must stay as they are."""
+        written = tuple(expressions)
+        found = tuple(text_of(e, new) for e in written)
+        if all(found):
+            return found
+        steady.update(s.name for e in written for s in e.free_symbols)
+        return ()
+
+    rows: list[tuple[str, ...]] = []
+    for interface in structure.interfaces:
+        h = interface.function
+        slopes = [h.diff(z) for z in loose]
+        inside = set().union(*(slope.free_symbols for slope in slopes))
+        if inside & set(loose):
+            # at other values of what stands in its slopes it might be affine
+            steady |= {s.name for s in inside | (h.free_symbols & set(loose))}
+            rows.append(())
+        else:
+            rows.append(texts([*slopes, h.subs(dict.fromkeys(loose, 0))]))
+    scales = tuple(texts([scale]) for scale in structure.scales)
+    moving = [first_slope(model, i.function) for i in model.interfaces.values()]
+    found = frequencies([*structure.forcing.values(), *structure.rates.values()], TIME)
+    period = None if found is None else texts(found)
+    deciding = {*structure.deciding, *structure.sloping, *structure.timed}
+    validity = Validity(
+        names,
+        {n: values[n] for n in names if n in values and n in deciding | steady},
+        (),
+        tuple(z.name if z.name in names else "" for z in loose),
+        tuple(rows),
+        structure.patterns({real(n): v for n, v in values.items()}),
+        tuple(text for (text,) in filter(None, scales)),
+        (),
+        tuple("" if s is None or set(loose) & s.free_symbols else text_of(s, new) for s in moving),
+        model.period(),
+        period,
+    )
+    if validity.patterns_at(values) != validity.patterns:
+        steady |= deciding
+    signs = validity.signs_at(values)
+    return replace(validity, steady=tuple(sorted(steady & set(names))), signs=signs)
