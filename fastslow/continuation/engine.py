@@ -148,7 +148,9 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
     signs, weight, lower, upper, low, high, middle, periods = region
     smallest, largest, turn, tolerance, iterations, closing = stepping
     rows, tangents, in_use, progress = traced
-    out, matrix, right, guess, turned, middle_point, h, slope, new_h, new_slope, local = space
+    out, beside, matrix, right, guess, turned, middle_point, h, slope, new_h, new_slope, local = (
+        space
+    )
     size = rows.shape[1]
     start = rows[0]
     tangent = tangents[0]
@@ -156,6 +158,7 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
     n = size - 1
     m = signs.shape[0]
     heights = n * (n + 2)
+    widest, wide = math.cos(turn), math.cos(0.5 * turn)
 
     count = progress[0]
     call_address(address, mode, rows[count - 1], parameters, out)
@@ -217,20 +220,19 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
             for j in range(size):
                 right[j] = guess[j] - last[j] - step * unit * direction[j]
             aside = _norm(right, local)
-            accepted = cosine > math.cos(turn) and aside <= max(ASIDE, turn) * step
+            accepted = cosine > widest and aside <= max(ASIDE, turn) * step
         if accepted and step > 4.0 * smallest:
             # where Newton's method has left for another curve, nothing lies between the two
             for j in range(size):
                 bend = direction[j] * unit - turned[j] * new_unit
                 middle_point[j] = 0.5 * (last[j] + guess[j]) + 0.125 * step * bend
-            call_address(address, mode, middle_point, parameters, out)
+            call_address(address, mode, middle_point, parameters, beside)
             for i in range(n):
-                right[i] = -out[i]
+                right[i] = -beside[i]
             right[n] = 0.0
-            _bordered(out, n, direction, local, matrix)
+            _bordered(beside, n, direction, local, matrix)
             if solve(matrix, right):
                 accepted = _norm(right, local) <= BETWEEN * step
-            call_address(address, mode, guess, parameters, out)
         if accepted:
             for k in range(m):
                 new_h[k] = signs[k] * out[heights + k]
@@ -301,7 +303,7 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
                 apart += off * off * local[j]
             if 0.0 < ahead <= step and math.sqrt(apart) < 0.2 * step and same > 0.9:
                 return CLOSED
-        if used <= 3 and cosine > math.cos(0.5 * turn):
+        if used <= 3 and cosine > wide:
             step = min(1.5 * step, largest * min(farthest, GROWTH))
         elif used >= 6:
             step *= 0.7

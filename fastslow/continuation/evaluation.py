@@ -11,6 +11,9 @@ from fastslow.compiled.pointers import call_address
 from fastslow.continuation.engine import solve
 from fastslow.continuation.location import DUST, ROUNDING
 
+#: Rounding of one operation.
+EPS = 2.220446049250313e-16
+
 
 @unfused_part
 def evaluate(address, modes, points, parameters, out):  # type: ignore[no-untyped-def]
@@ -171,8 +174,49 @@ def refine(  # type: ignore[no-untyped-def]
 
 
 @unfused_part
+def correct(  # type: ignore[no-untyped-def]
+    curve, points, scales, natural, limits, m, iterations, plain, space
+):
+    """Newton's method at a fixed last component, and whether it plainly solved the equations.
+
+    Parameters
+    ----------
+    points : ndarray, shape (N, n + 1)
+        The starts; where each leads is put in its place.
+    scales : ndarray, shape (N, n + 1)
+    natural : ndarray, shape (N, n)
+        Natural size of each equation.
+    limits : Limits
+    plain : ndarray of bool, shape (N,)
+        Filled in; of the others nothing is known.
+    """
+    address, mode, parameters = curve
+    out, start, normal = space.out, space.beside, space.constant
+    count, columns = points.shape
+    n = columns - 1
+    for j in range(columns):
+        normal[j] = 1.0 if j == n else 0.0
+    for k in range(count):
+        u, scale = points[k], scales[k]
+        for j in range(columns):
+            start[j] = u[j]
+        residual, size, good = refine(curve, u, scale, -1, normal, start, m, iterations, space)
+        good = good and math.isfinite(residual) and size < limits.correction
+        call_address(address, mode, u, parameters, out)
+        for i in range(n):
+            terms = 0.0
+            for j in range(n):
+                terms += abs(out[n + i * columns + j]) * abs(u[j])
+            good = good and abs(out[i]) <= limits.residual * natural[k, i]
+            good = good and EPS * terms <= limits.pole * natural[k, i]
+            good = good and abs(u[i] - start[i]) < limits.moved * scale[i]
+            good = good and abs(u[i]) <= limits.farthest * scale[i]
+        plain[k] = good and abs(u[n] - start[n]) <= limits.beside * scale[n]
+
+
+@unfused_part
 def survey(  # type: ignore[no-untyped-def]
-    curve, points, tangents, scale, reach, branching, jacobians, space
+    curve, points, tangents, scale, reach, vertical, branching, turning, jacobians, space
 ):
     """What is tested at every row of a piece.
 
@@ -183,6 +227,10 @@ def survey(  # type: ignore[no-untyped-def]
         `signed_distance` of [F_x F_p; tangent], columns in units of the scale, rows in units
         of their largest entry there and ``reach`` of the scale ahead and behind: at a branch
         point in an invariant plane a whole row vanishes.
+    turning : ndarray, shape (N,)
+        Filled in: the last component of the tangent in units of the scale. It is 0 where it is
+        below ``vertical`` over the distance from zero, as a branch far away bends over lengths
+        in proportion to it.
     jacobians : ndarray, shape (N, n, n)
         Filled in.
     """
@@ -218,6 +266,15 @@ def survey(  # type: ignore[no-untyped-def]
                 else:
                     matrix[i, j] = tangents[k, j] / scale[j]
         branching[k] = signed_distance(matrix, largest, space.constant)
+        far = 1.0
+        for j in range(n):
+            away = abs(points[k, j] / scale[j])
+            if not away <= far:
+                far = away
+                if far != far:
+                    break
+        along = tangents[k, n] / scale[n]
+        turning[k] = 0.0 if far * abs(along) < vertical else along
 
 
 @unfused_part
@@ -303,6 +360,90 @@ def pairs(jacobians, result):  # type: ignore[no-untyped-def]
         else:
             result[k, 0] = complex(0.5 * (a + d), math.sqrt(-inside))
             result[k, 1] = complex(0.5 * (a + d), -math.sqrt(-inside))
+
+
+@unfused_part
+def sums_of_two(pairs, rounding, result):  # type: ignore[no-untyped-def]
+    """Fill in the relative sums of two eigenvalues each, shape (N, 2).
+
+    0 where a sum is so to rounding, or they are no pair or not finite.
+    """
+    for k in range(pairs.shape[0]):
+        one, other = pairs[k, 0], pairs[k, 1]
+        result[k] = 0.0
+        total = one.real + other.real
+        if not math.isfinite(total + one.imag + other.imag) or total == 0.0:
+            continue
+        first, second = math.hypot(one.real, one.imag), math.hypot(other.real, other.imag)
+        noise = rounding * 2.0 * max(first, second)
+        # of a complex pair the noise is that of the real part
+        if one.imag != 0.0 or other.imag != 0.0:
+            noise *= 2.0
+        if abs(total) >= noise:
+            result[k] = total / (first + second)
+
+
+@unfused_part
+def _alike(one, other):  # type: ignore[no-untyped-def]
+    """Whether two numbers have the same sign, neither being zero."""
+    return (one > 0.0 and other > 0.0) or (one < 0.0 and other < 0.0)
+
+
+@unfused_part
+def _fall(test, length, row):  # type: ignore[no-untyped-def]
+    """How fast the modulus of a test falls on the step after a row; NaN where its sign changes."""
+    if not (_alike(test[row], test[row + 1]) and length[row] > 0.0):
+        return np.nan
+    return (abs(test[row]) - abs(test[row + 1])) / length[row]
+
+
+@unfused_part
+def dips(test, length, share, found):  # type: ignore[no-untyped-def]
+    """Rows after which a test that keeps its sign may reach zero and turn back.
+
+    The chords of both neighbouring steps are extended into the step: where the
+    modulus is convex they lie below it.
+
+    Parameters
+    ----------
+    test : ndarray, shape (N,)
+    length : ndarray, shape (N - 1,)
+        Of every step.
+    share : float
+        The part of the smaller of its two values to which the modulus must be able to fall.
+    found : ndarray of int, shape (N - 1,)
+        Filled in.
+
+    Returns
+    -------
+    int
+        How many.
+    """
+    number = 0
+    steps = length.shape[0]
+    for row in range(steps):
+        if not _alike(test[row], test[row + 1]):
+            continue
+        left, right, step = abs(test[row]), abs(test[row + 1]), length[row]
+        falls = _fall(test, length, row - 1) if row > 0 else np.nan
+        rises = -_fall(test, length, row + 1) if row + 1 < steps else np.nan
+        # a slope that is not known leaves it to the other one
+        if falls != falls and rises > 0.0:
+            least = right - rises * step
+        elif rises != rises and falls > 0.0:
+            least = left - falls * step
+        elif falls > 0.0 and rises > 0.0:
+            # where the two lines meet, within the step or at its nearer end
+            meet = (left - right + rises * step) / (falls + rises)
+            meet = 0.0 if meet < 0.0 else step if meet > step else meet
+            one, other = left - falls * meet, right - rises * (step - meet)
+            least = one if one > other or one != one else other
+        else:
+            continue
+        if least < share * min(left, right):
+            found[number] = row
+            number += 1
+    return number
 
 
 @unfused_part

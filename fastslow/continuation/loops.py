@@ -15,6 +15,7 @@ from fastslow.continuation.spaces import (
     Boxes,
     Curve,
     IsolationSpace,
+    Limits,
     NewtonSpace,
     Region,
     Stepping,
@@ -59,13 +60,33 @@ _LOOPS = [
     ),
     Loop(
         _EVALUATION,
+        "correct",
+        {
+            "curve": Curve, "points": Matrix, "scales": Matrix, "natural": Matrix,
+            "limits": Limits, "m": int, "iterations": int, "plain": Flags, "space": NewtonSpace,
+        },
+    ),
+    Loop(
+        _EVALUATION,
         "survey",
         {
             "curve": Curve, "points": Matrix, "tangents": Matrix, "scale": Vector, "reach": float,
-            "branching": Vector, "jacobians": Tensor, "space": NewtonSpace,
+            "vertical": float, "branching": Vector, "turning": Vector, "jacobians": Tensor,
+            "space": NewtonSpace,
         },
     ),
     Loop(_EVALUATION, "pairs", {"jacobians": Tensor, "result": ComplexMatrix}),
+    Loop(
+        _EVALUATION,
+        "sums_of_two",
+        {"pairs": ComplexMatrix, "rounding": float, "result": Vector},
+    ),
+    Loop(
+        _EVALUATION,
+        "dips",
+        {"test": Vector, "length": Vector, "share": float, "found": Integers},
+        results=(int,),
+    ),
     Loop(
         _EVALUATION,
         "passing",

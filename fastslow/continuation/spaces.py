@@ -85,6 +85,7 @@ class TraceSpace(NamedTuple):
     """Work space of `trace`."""
 
     out: Vector
+    beside: Vector
     matrix: Matrix
     right: Vector
     guess: Vector
@@ -99,13 +100,41 @@ class TraceSpace(NamedTuple):
 
 def trace_space(n: int, m: int) -> TraceSpace:
     """Work space for n states and m interfaces."""
-    size = n + 1
-    shapes = (n * (n + 2) + m * (n + 2), (size, size), *[size] * 4, *[m] * 4, size)
+    size, width = n + 1, n * (n + 2) + m * (n + 2)
+    shapes = (width, width, (size, size), *[size] * 4, *[m] * 4, size)
     return zeros(TraceSpace, *shapes)
 
 
+class Limits(NamedTuple):
+    """What solves equations plainly, as `correct` tells.
+
+    Parameters
+    ----------
+    residual : float
+        Largest residual, in natural units.
+    correction : float
+        Last correction of Newton's method, in units of the scale.
+    pole : float
+        By how much rounding of the state changes the equations at most, in natural units.
+    moved, farthest : float
+        How far the state may move and be, in units of the scale.
+    beside : float
+        How far off the last component may be, in units of its scale.
+    """
+
+    residual: float
+    correction: float
+    pole: float
+    moved: float
+    farthest: float
+    beside: float
+
+
 class NewtonSpace(NamedTuple):
-    """Work space of `newton_from`, `refine` and `survey`: vectors of n + 1 numbers and others."""
+    """Work space of `newton_from`, `refine`, `correct` and `survey`.
+
+    Vectors of n + 1 numbers, and others.
+    """
 
     out: Vector
     matrix: Matrix

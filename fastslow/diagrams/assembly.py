@@ -133,6 +133,8 @@ def _sizes(states: Array, scale: Array) -> Array:
 
 def _centred(field: FrozenField, u: Array, window: Window) -> Array:
     """Rows shifted by whole periods, so that angles without a window are about zero."""
+    if not field.periods.any():
+        return u
     low, high = u[:, :-1].min(axis=0), u[:, :-1].max(axis=0)
     middle = window.states.shifted(principal(0.5 * (low + high), field.periods))
     turns = field.periods > 0

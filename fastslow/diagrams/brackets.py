@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.location import Located
+from fastslow.continuation.loops import loop, writeable
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.walking import Piece, Window, beside
 
@@ -49,6 +50,8 @@ class Search:
     field : FrozenField
     piece : Piece
     window : Window
+    steps : ndarray, shape (N - 1,)
+        Lengths of the steps between the rows, in units of the window.
     at : callable
         A point u and the direction along the piece to the test there.
     """
@@ -56,6 +59,7 @@ class Search:
     field: FrozenField
     piece: Piece
     window: Window
+    steps: Array
     at: Callable[[Array, Array], float]
 
     def between(self, a: Array, b: Array, part: float) -> tuple[Array, float] | None:
@@ -72,7 +76,7 @@ class Search:
         u = self.piece.u
         for before, after in sign_changes(test):
             yield Bracket(before, (u[before], u[after]), (test[before], test[after]))
-        for row in _dips(test, self.piece.chords(self.window.scale)):
+        for row in _dips(test, self.steps):
             yield from self._dip(row, test)
 
     def _dip(self, row: int, test: Array) -> Iterator[Bracket]:
@@ -178,32 +182,12 @@ def sign_changes(test: Array) -> list[tuple[int, int]]:
     return [(before, after) for before, after in pairs if after - before <= 2]
 
 
-def _dips(test: Array, length: Array) -> list[int]:
-    """Rows after which a test that keeps its sign may reach zero and turn back.
-
-    The chords of both neighbouring steps are extended into the step: where the
-    modulus is convex they lie below it.
-    """
-    if len(test) < 3:
-        return []
-    size = np.abs(test)
-    kept = np.sign(test[1:]) * np.sign(test[:-1]) > 0
-    left, right = size[:-1], size[1:]
-    with np.errstate(all="ignore"):
-        # how fast the modulus falls on the step before, and rises on the one after
-        slopes = np.where(kept & (length > 0), np.diff(size) / length, np.nan)
-        falls = np.append(np.nan, -slopes[:-1])
-        rises = np.append(slopes[1:], np.nan)
-        # where the two lines meet, within the step or at its nearer end
-        meet = np.clip((left - right + rises * length) / (falls + rises), 0.0, length)
-        least = np.maximum(left - falls * meet, right - rises * (length - meet))
-        least = np.where(np.isnan(falls), right - rises * length, least)
-        least = np.where(np.isnan(rises), left - falls * length, least)
-        falling = (falls > 0) | (np.isnan(falls) & (rises > 0))
-        rising = (rises > 0) | (np.isnan(rises) & (falls > 0))
-        low = least < DIP * np.minimum(left, right)
-    found: list[int] = np.flatnonzero(kept & falling & rising & low).tolist()
-    return found
+def _dips(test: Array, steps: Array) -> list[int]:
+    """Rows after which a test that keeps its sign may reach zero and turn back."""
+    found = np.empty(len(steps), dtype=np.int64)
+    count = loop("dips")(writeable(test), steps, DIP, found)
+    rows: list[int] = found[:count].tolist()
+    return rows
 
 
 def _negative(

@@ -22,7 +22,7 @@ from fastslow.diagrams.row_tests import (
 )
 from fastslow.diagrams.walking import Piece, Window
 from fastslow.results.point_types import POINT_TYPES
-from fastslow.results.unexplained import unexplained_rows, unstable_range
+from fastslow.results.unexplained import unexplained_rows
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def special_points(
     for _ in range(DIVISIONS):
         finer = piece
         # from the last step on, so that the rows before it keep their numbers
-        for first, last in reversed(_unexplained(tests.eigenvalues, found)):
+        for first, last in reversed(_unexplained(tests, found)):
             finer = divided(field, finer, window, first, last)
         if len(finer.u) == len(piece.u):
             break
@@ -75,11 +75,9 @@ def special_points(
     return found, piece, tests.eigenvalues
 
 
-def _unexplained(
-    eigenvalues: NDArray[np.complex128], found: Sequence[Detected]
-) -> list[tuple[int, int]]:
+def _unexplained(tests: RowTests, found: Sequence[Detected]) -> list[tuple[int, int]]:
     """Pairs of rows between which the number of unstable eigenvalues changes unexplained."""
-    low, high = unstable_range(eigenvalues)
+    low, high = tests.unstable
     known = [d for d in found if POINT_TYPES[d.code].changes_stability]
     # a row for every point, at which the number is undecided
     places = [d.row + 1 for d in known]
@@ -94,11 +92,12 @@ def _between_rows(
     field: FrozenField, piece: Piece, window: Window, tests: RowTests, marks: Sequence[float]
 ) -> list[Detected]:
     """All special points between the rows of a piece, in order along it."""
+    steps = piece.chords(window.scale)
     found = [
-        *_folds(field, piece, window, tests),
-        *_branch_points(field, piece, window, tests),
-        *_turning_pairs(field, piece, window, tests),
-        *_marks(field, piece, window, marks),
+        *_folds(field, piece, window, steps, tests),
+        *_branch_points(field, piece, window, steps, tests),
+        *_turning_pairs(field, piece, window, steps, tests),
+        *_marks(field, piece, window, steps, marks),
     ]
     found = [d for d in found if _between(d.located.u, piece, d.row, window)]
     # where two branches cross the parameter may turn as well: that is no fold
@@ -112,14 +111,16 @@ def _between_rows(
     return sorted(found, key=lambda d: (d.row, _ahead(d.located.u, piece, d.row, window)))
 
 
-def _folds(field: FrozenField, piece: Piece, window: Window, tests: RowTests) -> Iterator[Detected]:
+def _folds(
+    field: FrozenField, piece: Piece, window: Window, steps: Array, tests: RowTests
+) -> Iterator[Detected]:
     def curve(u: Array) -> tuple[Array, Array]:
         return field.curve(piece.region, u)
 
     def turning(u: Array, along: Array) -> float:
         return float(_tangent(field, piece, u, along, window)[-1] / window.scale[-1])
 
-    search = Search(field, piece, window, turning)
+    search = Search(field, piece, window, steps, turning)
     for bracket in search.brackets(tests.turning):
         located = search.solve(bracket, lambda u: fold(curve, u, window.scale))
         if located is not None:
@@ -131,7 +132,7 @@ def _folds(field: FrozenField, piece: Piece, window: Window, tests: RowTests) ->
 
 
 def _branch_points(
-    field: FrozenField, piece: Piece, window: Window, tests: RowTests
+    field: FrozenField, piece: Piece, window: Window, steps: Array, tests: RowTests
 ) -> Iterator[Detected]:
     def locate(u: Array) -> Located:
         return branch_point(lambda z: field.curve(piece.region, z), u, window.scale)
@@ -140,7 +141,7 @@ def _branch_points(
         tangent = _tangent(field, piece, u, along, window)
         return float(field.branching(piece.region, u[None], tangent[None], window.scale)[0])
 
-    search = Search(field, piece, window, crossing)
+    search = Search(field, piece, window, steps, crossing)
     for bracket in search.brackets(tests.branching):
         located = search.solve(bracket, locate)
         if located is not None:
@@ -148,7 +149,7 @@ def _branch_points(
 
 
 def _turning_pairs(
-    field: FrozenField, piece: Piece, window: Window, tests: RowTests
+    field: FrozenField, piece: Piece, window: Window, steps: Array, tests: RowTests
 ) -> Iterator[Detected]:
     n, region = field.n, piece.region
 
@@ -163,7 +164,7 @@ def _turning_pairs(
     def sums(u: Array, along: Array) -> float:
         return float(pair_sums(field.finite_eigenvalues(region, u), rounding))
 
-    search = Search(field, piece, window, sums)
+    search = Search(field, piece, window, steps, sums)
     product = np.nan
 
     def locate(u: Array) -> Located:
@@ -195,12 +196,18 @@ def _tangent(field: FrozenField, piece: Piece, u: Array, along: Array, window: W
 
 
 def _marks(
-    field: FrozenField, piece: Piece, window: Window, marks: Sequence[float]
+    field: FrozenField, piece: Piece, window: Window, steps: Array, marks: Sequence[float]
 ) -> Iterator[Detected]:
     along = np.zeros(field.n + 1)
     along[-1] = 1.0
     for mark in marks:
-        search = Search(field, piece, window, lambda u, _, mark=mark: float(u[-1] - mark))  # type: ignore[misc]
+        search = Search(
+            field,
+            piece,
+            window,
+            steps,
+            lambda u, _, mark=mark: float(u[-1] - mark),  # type: ignore[misc]
+        )
         for bracket in search.brackets(piece.u[:, -1] - mark):
             located = search.solve(
                 bracket,

@@ -25,7 +25,7 @@ from fastslow.continuation.polynomial_systems import (
     at_value,
     solve_polynomials,
 )
-from fastslow.continuation.spaces import Curve, newton_space
+from fastslow.continuation.spaces import Curve, Limits, newton_space
 from fastslow.diagrams.exact_polynomials import (
     ParametricPolynomials,
     coefficient_function,
@@ -91,6 +91,11 @@ DEGREE = 60
 
 #: Newton's method moves a solution that is proved by less, in units of its size.
 MOVED = 1e-6
+
+#: What plainly is an equilibrium; all else is looked at closely.
+PLAIN = Limits(
+    residual=RESIDUAL, correction=1e-6, pole=0.5 * POLE, moved=1e6, farthest=FARTHEST, beside=1e-12
+)
 
 #: Unknowns up to which the roots of a polynomial system are isolated.
 UNKNOWNS = 3
@@ -512,26 +517,28 @@ class RegionEquations:
         Next to one that is proved the rates need not be small beside their slopes: near a pole
         the terms of both cancel.
         """
-        unit = self.unit(value)
-        target = np.append(np.zeros(len(state)), 1.0)
+        unit, natural, u = self.unit(value), self._natural(value), np.append(state, value)
         scale = np.append(np.maximum(unit, np.abs(state)), self._parameter_unit(value))
-        u = np.append(state, value)
+        points, plain = self.field.solved(self.region, u[None], scale[None], natural[None], PLAIN)
+        if plain[0]:
+            return np.asarray(points[0, :-1])
+        target = np.append(np.zeros(len(state)), 1.0)
         found = self.field.refined(self.region, u, scale, normal=target, point=value * target)
         # at a double root Newton's last corrections stay near the root of the rounding
-        if not (np.isfinite(found.residual) and found.correction < 1e-6):
+        if not (np.isfinite(found.residual) and found.correction < PLAIN.correction):
             return None
         solved = found.u[:-1]
         rates, slopes = self.field.curve(self.region, found.u)
         # not of the unit where a state is far below it: a slope that is large because another
         # state is far away would forgive any residual
-        natural, terms = self._natural(value), np.abs(slopes[:, :-1]) @ np.abs(solved)
+        terms = np.abs(slopes[:, :-1]) @ np.abs(solved)
         small = np.abs(rates) <= RESIDUAL * (natural + terms)
         if np.any(np.abs(rates) > RESIDUAL * natural):
             # steep slopes forgive a residual only where they determine the state
             small &= _determined(slopes[:, :-1], terms, scale[:-1])
-        near = np.abs(solved - state) < 1e6 * scale[:-1]
-        within = np.abs(solved) <= FARTHEST * np.maximum(unit, np.abs(state))
-        there = abs(found.u[-1] - value) <= 1e-12 * scale[-1]
+        near = np.abs(solved - state) < PLAIN.moved * scale[:-1]
+        within = np.abs(solved) <= PLAIN.farthest * scale[:-1]
+        there = abs(found.u[-1] - value) <= PLAIN.beside * scale[-1]
         here = bool(np.all(np.abs(solved - state) <= MOVED * scale[:-1]))
         on_pole = np.any(np.finfo(float).eps * terms > POLE * natural)
         good = small.all()
@@ -546,27 +553,15 @@ class RegionEquations:
         """
         n, field = self.field.n, self.field
         units = np.array([self.unit(v) for v in values.tolist()])
-        sizes = np.maximum(units, np.abs(states))
-        sizes_of_values = np.array([self._parameter_unit(v) for v in values.tolist()])
-        scales = np.column_stack([sizes, sizes_of_values])
-        target = np.append(np.zeros(n), 1.0)
-        found, plain = np.column_stack([states, values]), np.zeros(len(values), dtype=bool)
-        for k, value in enumerate(values.tolist()):
-            one = field.refined(
-                self.region, found[k], scales[k], normal=target, point=value * target
-            )
-            found[k] = one.u
-            plain[k] = np.isfinite(one.residual) and one.correction < 1e-6
-        solved = found[:, :n]
-        rates, _, _, _ = field.at(self.region, found)
+        sizes_of_values = [self._parameter_unit(v) for v in values.tolist()]
+        scales = np.column_stack([np.maximum(units, np.abs(states)), sizes_of_values])
         natural, slopes, _, _ = field.at(self.region, np.column_stack([units, values]))
         with np.errstate(all="ignore"):
             natural = np.abs(natural) + (np.abs(slopes[:, :, :n]) @ units[:, :, None])[:, :, 0]
             natural = np.where(np.isfinite(natural), natural, 0.0)
-            plain &= (np.abs(rates) <= RESIDUAL * natural).all(axis=1)
-        plain &= (np.abs(solved - states) < 1e6 * sizes).all(axis=1)
-        plain &= (np.abs(solved) <= FARTHEST * sizes).all(axis=1)
-        plain &= np.abs(found[:, n] - values) <= 1e-12 * sizes_of_values
+        starts = np.column_stack([states, values])
+        points, plain = field.solved(self.region, starts, scales, natural, PLAIN)
+        solved = points[:, :n]
         for k in np.flatnonzero(~plain).tolist():
             alone = self.corrected(states[k], float(values[k]))
             solved[k] = np.nan if alone is None else alone

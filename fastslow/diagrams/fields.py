@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastslow.compiled.fields import CompiledField, compile_field, parameter_array
 from fastslow.continuation.location import REACH, Located, with_condition
 from fastslow.continuation.loops import blocks, loop, writeable
-from fastslow.continuation.spaces import Curve, newton_space
+from fastslow.continuation.spaces import Curve, Limits, newton_space
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
@@ -39,6 +39,13 @@ DOUBTFUL = 1e-8
 
 #: An equation whose terms are all below this part of the largest is empty but for rounding.
 EMPTY = 1e-14
+
+#: A tangent's share of the parameter, times the distance from zero in units of the states, below
+#: which a segment is vertical to rounding.
+VERTICAL = 1e-10
+
+#: Of Newton's method at one point.
+ITERATIONS = 40
 
 #: A component of a state below this many times its rounding error counts as zero.
 NOISE = 100.0
@@ -254,30 +261,37 @@ class FrozenField:
 
     def survey(
         self, region: int, points: Array, tangents: Array, scale: Array
-    ) -> tuple[Array, NDArray[np.complex128]]:
-        """Distances from a branch point with sign (see `branching`), and finite eigenvalues."""
-        branching, jacobians = self._surveyed(region, points, tangents, scale)
+    ) -> tuple[Array, Array, NDArray[np.complex128]]:
+        """How far points are from a fold and a branch point, with signs, and finite eigenvalues.
+
+        The first is the tangent's component along the parameter, 0 on a vertical segment; see
+        `branching` for the second.
+        """
+        turning, branching, jacobians = self._surveyed(region, points, tangents, scale)
         if self.modes[region].sides is not None:
-            return branching, self.finite_eigenvalues(region, points)
-        return branching, self.spectrum(jacobians)
+            return turning, branching, self.finite_eigenvalues(region, points)
+        return turning, branching, self.spectrum(jacobians)
 
     def branching(self, region: int, points: Array, tangents: Array, scale: Array) -> Array:
         """How far [F_x F_p; tangent] is from singular, with its determinant's sign, at rows."""
-        return self._surveyed(region, points, tangents, scale)[0]
+        return self._surveyed(region, points, tangents, scale)[1]
 
     def _surveyed(
         self, region: int, points: Array, tangents: Array, scale: Array
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Array, Array, Array]:
         points = writeable(np.ascontiguousarray(points))
         tangents = writeable(np.ascontiguousarray(tangents))
-        branching, jacobians = np.empty(len(points)), np.empty((len(points), self.n, self.n))
+        count = len(points)
+        turning, branching = np.empty(count), np.empty(count)
+        jacobians = np.empty((count, self.n, self.n))
         space = newton_space(self.n, self.compiled.size)
         curve = Curve(self.compiled.address, region, self.values)
-        for s in blocks(len(points), 48 * self.compiled.size + 2 * self.n**3):
+        for s in blocks(count, 48 * self.compiled.size + 2 * self.n**3):
             loop("survey")(
-                curve, points[s], tangents[s], scale, REACH, branching[s], jacobians[s], space,
+                curve, points[s], tangents[s], scale, REACH, VERTICAL, branching[s], turning[s],
+                jacobians[s], space,
             )  # fmt: skip
-        return branching, jacobians
+        return turning, branching, jacobians
 
     def with_infinite(self, region: int, finite: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Eigenvalues with the infinite one of a sliding motion."""
@@ -323,7 +337,7 @@ class FrozenField:
         u = start.copy()
         residual, size, converged = loop("refine")(
             Curve(self.compiled.address, region, self.values), u, scale, row, normal, point,
-            self.compiled.m, 40, newton_space(self.n, self.compiled.size),
+            self.compiled.m, ITERATIONS, newton_space(self.n, self.compiled.size),
         )  # fmt: skip
         if converged:
             return Located(u, residual, True, _NONE, size)
@@ -336,6 +350,37 @@ class FrozenField:
 
         # least-norm steps where the equations are singular
         return with_condition(lambda u: self.curve(region, u), condition, start, scale)
+
+    def solved(
+        self, region: int, starts: Array, scales: Array, natural: Array, limits: Limits
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Where Newton's method at a fixed parameter leads, and what plainly is a solution.
+
+        Parameters
+        ----------
+        region : int
+        starts : ndarray, shape (N, n + 1)
+            Points u.
+        scales : ndarray, shape (N, n + 1)
+            Their units.
+        natural : ndarray, shape (N, n)
+            Natural size of every rate there.
+        limits : Limits
+
+        Returns
+        -------
+        points : ndarray, shape (N, n + 1)
+        plain : ndarray of bool, shape (N,)
+        """
+        points, plain = starts.copy(), np.empty(len(starts), dtype=bool)
+        space = newton_space(self.n, self.compiled.size)
+        curve = Curve(self.compiled.address, region, self.values)
+        for s in blocks(len(starts), ITERATIONS * (16 * self.compiled.size + self.n**3)):
+            loop("correct")(
+                curve, points[s], scales[s], natural[s], limits, self.compiled.m, ITERATIONS,
+                plain[s], space,
+            )  # fmt: skip
+        return points, plain
 
     def slides_into(self, region: int, beyond: int, point: Array, unit: Array) -> int | None:
         """The sliding or escaping motion that an equilibrium of a region on an interface enters.

@@ -7,10 +7,12 @@ of a matrix from the singular ones by the matrix's rows.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.continuation.loops import loop, writeable
 from fastslow.diagrams.brackets import sign_changes
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.walking import Piece, Window, beside
@@ -21,10 +23,6 @@ Complex = NDArray[np.complex128]
 
 #: Rounding of an eigenvalue computed by LAPACK, in units of n times the largest modulus.
 ROUNDING = 4.0 * float(np.finfo(float).eps)
-
-#: A tangent's share of the parameter, times the distance from zero in units of the states, below
-#: which a segment is vertical to rounding.
-VERTICAL = 1e-10
 
 #: A matrix with rows of length one is singular to rounding nearer to the singular ones than this.
 SINGULAR = 1e-14
@@ -69,7 +67,10 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     if n < 2:
         return np.zeros(values.shape[:-1])
     if n == 2:
-        return _sum_of_two(values[..., 0], values[..., 1], rounding)
+        pairs = writeable(np.ascontiguousarray(values).reshape(-1, 2))
+        sums = np.empty(len(pairs))
+        loop("sums_of_two")(pairs, rounding, sums)
+        return sums.reshape(values.shape[:-1])
     finite = np.isfinite(values).all(axis=-1)
     values = np.where(finite[..., None], values, 1.0)
     modulus = np.abs(values)
@@ -100,18 +101,6 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     count = real.sum(axis=-1)
     known = pair.sum(axis=-1) + count * (count - 1) // 2 - left_out.sum(axis=-1) > 0
     return np.where(known & finite, np.where(negative % 2 == 1, -least, least), 0.0)
-
-
-def _sum_of_two(one: Complex, other: Complex, rounding: float) -> Array:
-    """Relative sum of two eigenvalues; 0 to rounding, or where they are no pair or not finite."""
-    with np.errstate(invalid="ignore"):
-        total, sizes = (one + other).real, (np.abs(one), np.abs(other))
-        noise = rounding * 2.0 * np.maximum(*sizes)
-        # of a complex pair the noise is that of the real part
-        real = (one.imag == 0) & (other.imag == 0)
-        kept = np.isfinite(one) & np.isfinite(other) & (total != 0)
-        kept &= np.abs(total) >= np.where(real, noise, 2.0 * noise)
-        return np.where(kept, total / (sizes[0] + sizes[1]), 0.0)
 
 
 def product_of_pair(eigenvalues: Complex, rounding: float = ROUNDING) -> float:
@@ -161,6 +150,11 @@ class RowTests:
     pairs: Array
     eigenvalues: Complex
 
+    @cached_property
+    def unstable(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Least and largest number of unstable eigenvalues at the rows."""
+        return unstable_range(self.eigenvalues)
+
     def inserted(self, place: int, other: RowTests) -> RowTests:
         """With the rows of another before a place."""
         return RowTests(
@@ -173,12 +167,11 @@ class RowTests:
 
 def tests_at(field: FrozenField, piece: Piece, window: Window) -> RowTests:
     """The tests at every row of a piece."""
-    branching, eigenvalues = field.survey(piece.region, piece.u, piece.tangents, window.scale)
-    turning = piece.tangents[:, -1] / window.scale[-1]
-    # far away a branch bends over lengths in proportion to its distance
-    far = np.maximum(1.0, np.abs(piece.u[:, :-1] / window.scale[:-1]).max(axis=1, initial=0.0))
+    turning, branching, eigenvalues = field.survey(
+        piece.region, piece.u, piece.tangents, window.scale
+    )
     return RowTests(
-        np.where(far * np.abs(turning) < VERTICAL, 0.0, turning),
+        turning,
         np.where(np.abs(branching) < SINGULAR, 0.0, branching),
         pair_sums(eigenvalues),
         eigenvalues,
@@ -193,7 +186,7 @@ def resolved(field: FrozenField, piece: Piece, window: Window) -> tuple[Piece, R
     sum, some of them cancel within the step.
     """
     tests = tests_at(field, piece, window)
-    low, high = unstable_range(tests.eigenvalues)
+    low, high = tests.unstable
     known = np.flatnonzero(low == high)
     # where nothing changes and the branch does not turn there is nothing to explain
     turning = np.isin(
@@ -215,8 +208,7 @@ def resolved(field: FrozenField, piece: Piece, window: Window) -> tuple[Piece, R
         added += 1
         new = tests_at(field, extra, window)
         tests = tests.inserted(place, new)
-        ends = unstable_range(new.eigenvalues)
-        low, high = np.insert(low, place, ends[0]), np.insert(high, place, ends[1])
+        low, high = np.insert(low, place, new.unstable[0]), np.insert(high, place, new.unstable[1])
         piece = _inserted(piece, place, extra)
         # the pairs that wait lie after this one
         waiting = [(a + 1, b + 1) for a, b in waiting]

@@ -439,6 +439,8 @@ def _passes(
     if branch.admissible != start.admissible:
         return False
     rows = np.column_stack([branch.state, branch.parameter])
+    if not field.periods.any():
+        return _holds(field, branch, rows, np.append(start.state, value), window)
     low, high = branch.state.min(axis=0), branch.state.max(axis=0)
     ways = [copies(*entry) for entry in zip(start.state, low, high, field.periods, strict=True)]
     return any(_holds(field, branch, rows, np.array([*s, value]), window) for s in product(*ways))

@@ -78,8 +78,10 @@ class Piece:
 
     def chords(self, scale: Array) -> Array:
         """Lengths of the steps in units of the scale."""
-        steps = np.diff(self.u, axis=0) / scale
-        return np.asarray(np.sqrt((steps * steps).sum(axis=1)))
+        # NumPy reduces a short last axis slowly
+        columns = np.ascontiguousarray(self.u.T)
+        steps = np.diff(columns) / scale[:, None]
+        return np.asarray(np.sqrt((steps * steps).sum(axis=0)))
 
     def reversed(self) -> Piece:
         return Piece(self.region, self.u[::-1].copy(), -self.tangents[::-1])

@@ -68,12 +68,13 @@ def unstable_range(
     >>> least.tolist(), largest.tolist()
     ([1, 0], [1, 1])
     """
-    values = np.asarray(eigenvalues)
+    # NumPy reduces a short last axis slowly
+    values = np.ascontiguousarray(np.moveaxis(np.asarray(eigenvalues), -1, 0))
     size = np.where(np.isfinite(values), np.abs(values), 0.0)
-    small = NEUTRAL * size.max(axis=-1, initial=0.0, keepdims=True)
+    small = NEUTRAL * size.max(axis=0, initial=0.0)
     undecided = np.isnan(values) | (np.abs(values.real) <= small)
     certain = (values.real > 0) & ~undecided
-    return certain.sum(axis=-1), (certain | undecided).sum(axis=-1)
+    return certain.sum(axis=0), (certain | undecided).sum(axis=0)
 
 
 def unexplained_changes(branch: Branch, number: int = 0) -> tuple[UnexplainedChange, ...]:

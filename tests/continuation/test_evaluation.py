@@ -102,3 +102,27 @@ def test_the_chords_of_a_curve_nearest_to_a_point():
     assert passed(line, np.array([1.0, 10.0]), np.array([0.5, 0.4]), 0.05).tolist() == [0]
     assert passed(line, ones, np.array([1.4, 0.0]), 1e-9).tolist() == [1]
     assert passed(line, ones, np.array([9.0, 9.0]), 1.0).tolist() == []
+
+
+def dips(test, steps, share=0.5):
+    found = np.empty(len(steps), dtype=np.int64)
+    return found[: loop("dips")(np.array(test), np.array(steps), share, found)].tolist()
+
+
+def test_a_dip_is_where_both_neighbouring_chords_lead_below_the_smaller_value():
+    assert dips([5.0, 3.0, 1.0, 1.0, 3.0], [1.0] * 4) == [2]
+    assert dips([-5.0, -3.0, -1.0, -1.0, -3.0], [1.0] * 4) == [2]
+    # the lines meet at 0.8, above half of the smaller value
+    assert dips([1.4, 1.0, 1.0, 1.4], [1.0] * 3) == []
+    assert dips([1.4, 1.0, 1.0, 1.4], [1.0] * 3, share=0.9) == [1]
+    # the same in other units, in which the product of two values is zero
+    assert dips(np.multiply(1e-200, [5.0, 3.0, 1.0, 1.0, 3.0]), [1.0] * 4) == [2]
+
+
+def test_at_an_end_and_beside_a_change_of_sign_one_chord_alone_tells_a_dip():
+    assert dips([1.0, 2.0, 4.0], [1.0, 1.0]) == [0]
+    assert dips([4.0, 2.0, 1.0], [1.0, 1.0]) == [1]
+    assert dips([-1.0, 1.0, 3.0, 6.0], [1.0] * 3) == [1]
+    assert dips([2.0, 1.0], [1.0]) == dips([0.0, 0.0, 0.0], [1.0, 1.0]) == []
+    # a step without a length, as between two copies of one row, tells nothing
+    assert dips([3.0, 3.0, 1.0, 1.0, 3.0], [0.0, 1.0, 1.0, 0.0]) == [2]
