@@ -1,68 +1,57 @@
-"""A view drawn into a figure: time series, phase portrait and overlay."""
+"""A view drawn into axes: time series, phase portrait and overlay."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.text import Annotation
 
 from fastslow.interactive.picking import Curve, curves_of, run_curve
 from fastslow.interactive.views import View
-from fastslow.plot.branches import draw_branches
+from fastslow.plot.branches import DiagramDrawing, draw_branches
+from fastslow.plot.labels import place
 from fastslow.plot.motions import draw_motion, phase_portrait, time_series
 from fastslow.plot.passages import draw_passage
 from fastslow.plot.quantities import Quantity, along_run
-from fastslow.plot.style import GREY, MOTION, SMALL, TEXT, VERMILION, dressed
-from fastslow.plot.typesetting import paragraph, plain, typeset
-
-#: Size of a figure of our own, in inches, and places of its axes in it.
-SIZE = (9.0, 5.0)
-PLACES = ((0.065, 0.6, 0.36, 0.34), (0.065, 0.115, 0.36, 0.34), (0.5, 0.235, 0.485, 0.705))
+from fastslow.plot.style import GREY, MOTION, TEXT
+from fastslow.plot.typesetting import paragraph, typeset
 
 #: Where the label of a special point stands, in points from it.
 BESIDE = (13.0, 7.0)
 
 
-def own_figure() -> Figure:
-    """A figure of our own, outside pyplot."""
-    figure = Figure(figsize=SIZE, dpi=100)
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:
-    """Draw a view in place of what the figure shows.
+def draw_view(axes: Sequence[Axes], view: View) -> tuple[tuple[Curve, ...], list[Artist]]:
+    """Draw a view into three empty axes.
 
     Returns
     -------
     tuple of Curve
         What can be picked.
+    list of Artist
+        What a legend shows.
     """
-    figure.clear()
+    series, portrait, main = axes
     name, run, lay = view.setup.state, view.run, view.overlay
     values: Mapping[str, Any] = {} if view.diagram is None else view.diagram.interface_values
     curves: list[Curve] = []
-    series, portrait, main = (dressed(figure.add_axes(place)) for place in PLACES)
     handles: list[Any] = []
-    labels: tuple[Annotation, ...] = ()
+    below: DiagramDrawing | None = None
     if lay is not None:
         laid = draw_passage(main, lay, (Quantity(lay.parameter), Quantity(name)))
-        handles, labels = laid.handles, laid.diagram.labels
+        handles, below = laid.handles, laid.diagram
         curves += curves_of(laid, lay)
     elif view.diagram is not None:
         shown = Quantity(view.diagram.parameter), Quantity(name)
         below = draw_branches(main, view.diagram, shown, label=True, virtual=True, interfaces=True)
-        handles, labels = [*below.handles], below.labels
+        handles = [*below.handles]
         curves += curves_of(below, view.diagram)
         slow = view.diagram.parameter
         if run is not None and slow in run.columns:
-            axes = Quantity(slow), Quantity(name)
-            handles += draw_motion(main, run.t, along_run(run, *axes), axes, run, MOTION, {})
-            curves.append(run_curve(main, run, Quantity(slow), Quantity(name)))
+            shown = Quantity(slow), Quantity(name)
+            handles += draw_motion(main, run.t, along_run(run, *shown), shown, run, MOTION, {})
+            curves.append(run_curve(main, run, *shown))
         handles += _mark_value(main, view)
     else:
         _empty(main, "no diagram")
@@ -88,23 +77,12 @@ def draw_view(figure: Figure, view: View) -> tuple[Curve, ...]:
     else:
         _empty(series, "no trajectory")
         _empty(portrait, "no trajectory")
-    for label in labels:
-        # to place them freely would take as long as all the rest
-        label.set_position(BESIDE)
-    if handles:
-        figure.legend(
-            handles=handles,
-            loc="lower center",
-            bbox_to_anchor=(0.74, 0.05),
-            ncols=4,
-            fontsize=SMALL,
-            frameon=False,
-            columnspacing=1.0,
-            handlelength=1.8,
-        )
-    words = "  ".join(str(outcome) for outcome in view.outcomes)
-    figure.text(0.01, 0.012, plain(words), fontsize=SMALL, color=VERMILION, wrap=True)
-    return tuple(curves)
+    if below is not None:
+        place(main, bands=[below.bands])
+        for label in below.labels:
+            # to place them freely would take as long as all the rest
+            label.set_position(BESIDE)
+    return tuple(curves), handles
 
 
 def _other(states: tuple[str, ...], name: str) -> str:
@@ -117,6 +95,7 @@ def _empty(ax: Axes, words: str) -> None:
         0.5,
         0.5,
         paragraph(words),
+        transform=ax.transAxes,
         ha="center",
         va="center",
         fontsize=TEXT,

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from fastslow.arguments import formula, instance, interval, mapping, takes
 from fastslow.errors import MissingPackageError, unknown_name
-from fastslow.interactive.drawing import draw_view, own_figure
 from fastslow.interactive.picking import Pick
+from fastslow.interactive.pictures import Picture, own_figure
 from fastslow.interactive.pointers import Pointer, picture
 from fastslow.interactive.sliders import Slider, sliders_of
 from fastslow.interactive.views import Setup, View, at_start, setup_of, view_of
@@ -132,6 +132,7 @@ class Explorer:
         self.setup = setup
         self.sliders = sliders
         self.figure = figure
+        self._picture = Picture(figure)
         self.pointer = Pointer(figure, (), self._clicked)
         self._widget: Any = None
         self._picked_in: View | None = None
@@ -140,7 +141,7 @@ class Explorer:
         self.view = view_of(model, setup)
         if self.view.diagram is not None:
             self.setup = replace(setup, otherwise=self.view.diagram.over)
-        self._draw()
+        self._draw(moving=False)
 
     @property
     def selected(self) -> Pick | None:
@@ -184,7 +185,7 @@ class Explorer:
                     raise unknown_name("parameter or state", name, [*self.model.parameters, *begin])
             setup = at_start(self.setup, self.model, begin)
             self.view = view_of(self.model, setup, changes, measured=measured)
-            self._draw()
+            self._draw(moving=not measured)
             return self.view
 
     def glance(self, values: Mapping[Any, float]) -> View:
@@ -271,10 +272,10 @@ class Explorer:
             self._widget = Controls(self)
         return self._widget.box
 
-    def _draw(self) -> None:
-        self.pointer.curves = draw_view(self.figure, self.view)
-        self.pointer.near = None
-        self.figure.canvas.draw_idle()
+    def _draw(self, *, moving: bool) -> None:
+        self.pointer.renew(self._picture.draw(self.view, moving=moving))
+        if self._picture.show():
+            self.pointer.keep()
         if self._widget is not None:
             self._widget.follow()
 

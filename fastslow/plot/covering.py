@@ -187,9 +187,11 @@ def overlaid(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Points:
     -------
     ndarray, shape (K,)
     """
-    low, high = boxes[:, None, :2], boxes[:, None, 2:]
-    over = ((ink[:, :2] > low) & (ink[:, :2] < high)).all(axis=2) @ ink[:, 2]
-    met = ((taken[:, :2] < high) & (taken[:, 2:] > low)).all(axis=2).sum(axis=1)
+    left, low, right, high = (edge[:, None] for edge in boxes.T)
+    x, y, weight = ink.T
+    over = ((x > left) & (x < right) & (y > low) & (y < high)) @ weight
+    x0, y0, x1, y1 = taken.T
+    met = ((x0 < right) & (x1 > left) & (y0 < high) & (y1 > low)).sum(axis=1)
     inside = (boxes[:, 0] > frame.x0) & (boxes[:, 2] < frame.x1)
     inside &= (boxes[:, 1] > frame.y0) & (boxes[:, 3] < frame.y1)
     return np.asarray(over + 1e3 * met + 1e4 * ~inside, dtype=float)

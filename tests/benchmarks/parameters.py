@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import count
+from itertools import count, cycle
 from typing import Any
 
 import numpy as np
 
 import fastslow as fs
-from tests.benchmarks.measuring import Line, medians
+from fastslow.interactive.pictures import Picture, own_figure
+from fastslow.interactive.views import View, view_of
+from tests.benchmarks.measuring import Line, against, medians
 
 OVER = (-2.0, 6.0)
 
@@ -68,11 +70,31 @@ def _sweeps(gear: fs.Model) -> Iterator[Line]:
 
 def _frames(gear: fs.Model) -> Iterator[Line]:
     """A slider of the explorer moved, until the figure is drawn."""
-    explorer = fs.explore(gear, over=OVER, sliders={"D": (0.1, 0.5)})
-    places = count()
+    explorer, resting = (fs.explore(gear, over=OVER, sliders={"D": (0.1, 0.5)}) for _ in "12")
+    # up and down within the limits of the axes, which change every few frames on a longer way
+    values = cycle([*np.linspace(0.24, 0.26, 41), *np.linspace(0.26, 0.24, 41)[1:-1]])
 
-    def frame() -> None:
-        explorer.glance({"D": 0.1 + 0.01 * (next(places) % 40)})
-        explorer.figure.canvas.draw()
+    def computed() -> View:
+        return view_of(gear, explorer.setup, {"D": next(values)}, measured=False)
 
-    yield Line("a slider of explore moved", "fastslow", medians({"": frame})[""], "ms")
+    kept, views = Picture(own_figure()), cycle([computed() for _ in range(80)])
+
+    def drawn() -> None:
+        kept.draw(next(views), moving=True)
+        kept.show()
+
+    def from_nothing() -> None:
+        figure = own_figure()
+        Picture(figure).draw(next(views))
+        figure.canvas.draw()
+
+    timed: dict[str, Callable[[], Any]] = {
+        "fastslow": lambda: explorer.glance({"D": next(values)}),
+        "fastslow, computing alone": computed,
+        "fastslow, drawing alone": drawn,
+        "fastslow, a slider that rests": lambda: resting.set({"D": next(values)}),
+        "Matplotlib, the same axes from nothing": from_nothing,
+    }
+    note = {"Matplotlib, the same axes from nothing": "ratio to drawing alone"}
+    times = medians(timed)
+    yield from against("a slider of explore moved", "fastslow, drawing alone", times, note)

@@ -1,0 +1,147 @@
+"""What an explorer shows after a slider has moved is what a new one shows."""
+
+import numpy as np
+import pytest
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from PIL import Image
+
+import fastslow as fs
+from fastslow.interactive.pictures import Picture, own_figure
+
+OVER, SLIDERS = (-0.5, 0.5), {"D": (0.1, 0.5), "C": (0, 1)}
+
+
+def shown(explorer):
+    """The pixels of the canvas as they are."""
+    return np.array(explorer.figure.canvas.buffer_rgba()).astype(int)
+
+
+def new(model, **changes):
+    return fs.explore(model.with_parameters(changes), over=OVER, periods=1, sliders={})
+
+
+def far(one, other):
+    """How many pixels differ by more than a stroke at the edge of the axes may."""
+    return int((np.abs(one - other).max(axis=2) > 20).sum())
+
+
+@pytest.fixture
+def axis_draws(monkeypatch):
+    met, draw = [], Axis.draw
+
+    def counted(axis, renderer):
+        met.append(axis)
+        draw(axis, renderer)
+
+    monkeypatch.setattr(Axis, "draw", counted)
+    return met
+
+
+def test_at_rest_the_picture_is_that_of_a_new_explorer(folded, explorer):
+    for changes in ({"D": 0.4}, {"D": 0.4, "C": 0.7}, {"D": 0.12, "C": 0.4}, {"D": 0.25, "C": 0.4}):
+        explorer.glance(changes)
+        explorer.set(changes)
+        np.testing.assert_array_equal(shown(explorer), shown(new(folded, **changes)))
+
+
+def test_a_view_without_a_run_leaves_nothing_of_the_one_before(folded, explorer):
+    explorer.glance({"omega": 0.0})
+    explorer.set(omega=0.0)
+    other = fs.explore(folded, over=OVER, periods=1, sliders={})
+    other.set(omega=0.0)
+    fresh = own_figure()
+    Picture(fresh).draw(explorer.view)
+    fresh.canvas.draw()
+    np.testing.assert_array_equal(shown(explorer), np.array(fresh.canvas.buffer_rgba()))
+    explorer.set(omega=0.02)
+    np.testing.assert_array_equal(shown(explorer), shown(new(folded)))
+
+
+def test_within_their_limits_no_axis_is_drawn_anew(explorer, axis_draws):
+    explorer.glance({"D": 0.25})
+    axis_draws.clear()
+    for value in (0.251, 0.252, 0.249):
+        explorer.glance({"D": value})
+    assert axis_draws == []
+
+
+def test_a_moving_picture_shows_what_a_whole_drawing_shows(explorer):
+    for value in (0.25, 0.26, 0.24):
+        explorer.glance({"D": value})
+        moving = shown(explorer)
+        for ax in explorer.figure.axes:
+            for artist in ax.get_children():
+                artist.set_animated(False)
+        explorer._picture._moving = []
+        explorer.figure.canvas.draw()
+        assert far(moving, shown(explorer)) == 0
+
+
+@pytest.mark.parametrize("value", [0.5, 0.1])
+def test_limits_hold_all_that_moves(explorer, value):
+    for part in np.linspace(0.0, 1.0, 12):
+        explorer.glance({"D": 0.25 + part * (value - 0.25)})
+        for ax in explorer.figure.axes[:2]:
+            box, (left, right), (low, high) = ax.dataLim, ax.get_xlim(), ax.get_ylim()
+            assert left <= box.x0 < box.x1 <= right
+            assert low <= box.y0 < box.y1 <= high
+            assert box.height > 0.5 * (high - low)
+
+
+def test_few_frames_of_a_long_way_change_the_limits(explorer, axis_draws):
+    changed = 0
+    for value in np.linspace(0.1, 0.5, 41):
+        axis_draws.clear()
+        explorer.glance({"D": value})
+        changed += bool(axis_draws)
+    assert changed < 14
+
+
+def test_a_drawing_by_another_keeps_what_moves(explorer, tmp_path):
+    """As after a window was uncovered, or a zoom of the toolbar; and a file has all of it."""
+    explorer.glance({"D": 0.26})
+    before = shown(explorer)
+    explorer.figure.canvas.draw()
+    np.testing.assert_array_equal(shown(explorer), before)
+    explorer.figure.savefig(tmp_path / "a.png", dpi="figure")
+    with Image.open(tmp_path / "a.png") as image:
+        assert far(np.array(image), before) == 0
+    explorer.figure.axes[0].set_xlim(0.0, 50.0)
+    explorer.figure.canvas.draw()
+    explorer.glance({"D": 0.261})
+    assert explorer.figure.axes[0].get_xlim()[1] > 300.0
+
+
+def test_a_canvas_that_cannot_lay_over_is_drawn_as_a_whole(folded, axis_draws, monkeypatch):
+    figure = Figure(figsize=(8, 4))
+    explorer = fs.explore(folded, periods=1, over=OVER, sliders=SLIDERS, figure=figure)
+    assert not figure.canvas.supports_blit
+    explorer.glance({"D": 0.3})
+    assert not any(a.get_animated() for ax in figure.axes for a in ax.get_children())
+
+
+def test_the_pointer_lays_its_box_over_the_moving_picture(explorer, mouse):
+    explorer.glance({"D": 0.25})
+    explorer.glance({"D": 0.26})
+    before = shown(explorer)
+    (main,) = [ax for ax in explorer.figure.axes if ax.get_xlabel() == "$w$"]
+    fold = explorer.view.diagram.folds[0]
+    mouse("motion_notify_event", main, fold["w"], fold["x"])
+    assert (shown(explorer) != before).any()
+    mouse("motion_notify_event", main, -0.45, 0.9 * main.get_ylim()[1])
+    np.testing.assert_array_equal(shown(explorer), before)
+
+
+def test_a_figure_that_was_cleared_is_drawn_anew(folded, explorer):
+    explorer.figure.clear()
+    explorer.glance({"D": 0.3})
+    explorer.set(D=0.3)
+    np.testing.assert_array_equal(shown(explorer), shown(new(folded, D=0.3)))
+
+
+def test_what_was_written_on_the_figure_goes_with_the_view(folded, explorer):
+    explorer.figure.text(0.5, 0.5, "stale")
+    explorer.figure.axes[0].axhline(0.1)
+    explorer.set(D=0.3)
+    np.testing.assert_array_equal(shown(explorer), shown(new(folded, D=0.3)))
