@@ -194,7 +194,9 @@ def _refined(b: Array, low: Array, high: Array, sign: Array) -> Array:
         low, high = np.where(same, s, low), np.where(same, high, s)
         with np.errstate(divide="ignore", invalid="ignore"):
             new = s - value / slope
-        new = np.where((low < new) & (new < high), new, 0.5 * (low + high))
+        # where the correction is below rounding the root is found, if at an end of the bracket
+        kept = ((low < new) & (new < high)) | (new == s)
+        new = np.where(kept, new, 0.5 * (low + high))
         new = np.where(value == 0.0, s, new)
         done = np.abs(new - s) <= 2e-16 * new
         s = new

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fastslow.results.step_polynomials import StepPolynomials
-from fastslow.results.step_roots import find_roots
+from fastslow.results.step_roots import _refined, find_roots
 
 
 def cut(polynomial, steps):
@@ -74,3 +74,24 @@ def test_a_run_that_begins_on_zero_is_not_there_yet():
     where, direction = zeros(np.polynomial.Polynomial([-1, 1]), 3)
     assert where.tolist() == [1.0]
     assert direction.tolist() == [1]
+
+
+class Counted(np.ndarray):
+    """An array that counts how often it is read."""
+
+    reads = 0
+
+    def __getitem__(self, key):
+        Counted.reads += 1
+        return super().__getitem__(key)
+
+
+def test_a_root_at_the_end_of_its_bracket_ends_the_search():
+    """Where Newton's correction is below rounding, and not by halving the whole bracket again."""
+    roots = np.random.default_rng(3).uniform(0.05, 0.95, 2000)
+    # (s − r)(s + 1)(s + 2), of which rounding leaves something at most roots
+    b = np.column_stack([-2 * roots, 2 - 3 * roots, 3 - roots, np.ones(2000)]).view(Counted)
+    Counted.reads = 0
+    found = _refined(b, np.zeros(2000), np.ones(2000), -np.ones(2000))
+    assert Counted.reads <= 12 * 4
+    assert np.asarray(found) == pytest.approx(roots, rel=1e-14)
