@@ -134,34 +134,32 @@ def _from_modes(slow: SlowQuantity, courses: Sequence[Course], extent: Array) ->
     fixed = np.ptp(rows, axis=0) <= FLAT * np.maximum(np.abs(rows).max(axis=0), extent)
     if fixed.all() or not fixed.any():
         return extent
-    found: list[Array] = []
-    for course in courses:
-        for modes in _modes(slow, course):
-            moved = np.abs(modes / np.linalg.norm(modes / extent[:, None], axis=0))
-            reach = (moved[~fixed] / extent[~fixed, None]).max(axis=0)
-            mixed = moved[:, reach > PART] / reach[reach > PART]
-            mixed[mixed <= PART * extent[:, None]] = np.inf
-            if mixed.size:
-                found.append(mixed.min(axis=1))
-    if not found:
+    modes = np.concatenate([_modes(slow, course) for course in courses])
+    moved = np.abs(modes / np.linalg.norm(modes / extent[:, None], axis=1, keepdims=True))
+    reach = (moved[:, ~fixed] / extent[~fixed, None]).max(axis=1, keepdims=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mixed = np.where(reach > PART, moved / reach, np.inf)
+    mixed[mixed <= PART * extent[:, None]] = np.inf
+    found = mixed.min(axis=2)[(reach > PART).any(axis=(1, 2))]
+    if not len(found):
         return extent
     usual = np.median(found, axis=0)
     return np.where(fixed & np.isfinite(usual), np.maximum(extent, usual), extent)
 
 
-def _modes(slow: SlowQuantity, course: Course) -> list[NDArray[np.complex128]]:
-    """Eigenvectors of the Jacobian at rows of a course, each shape (n, n)."""
+def _modes(slow: SlowQuantity, course: Course) -> NDArray[np.complex128]:
+    """Eigenvectors of the Jacobian at rows of a course, in columns, shape (rows, n, n)."""
     branch = course.branch
     field = frozen_field(slow.run.symbolic_model, slow.name, branch.parameters)
-    rows = np.concatenate([np.arange(piece.start, piece.stop) for piece in course.pieces])
-    found = []
-    for row in rows[np.linspace(0, len(rows) - 1, ROWS).astype(int)]:
-        name = str(branch.region[row])
+    every = np.concatenate([np.arange(piece.start, piece.stop) for piece in course.pieces])
+    rows = every[np.linspace(0, len(every) - 1, ROWS).astype(int)]
+    found = [np.empty((0, field.n, field.n), dtype=complex)]
+    for name in dict.fromkeys(branch.region[rows].tolist()):
         if name not in field.regions:
             continue
-        u = np.append(branch.state[row], branch.parameter[row])
-        _, slopes, _, _ = field.at(field.regions.index(name), u)
-        jacobian = slopes[:, : field.n]
-        if np.isfinite(jacobian).all():
-            found.append(np.linalg.eig(jacobian)[1].astype(complex))
-    return found
+        on = rows[branch.region[rows] == name]
+        points = np.column_stack([branch.state[on], branch.parameter[on]])
+        jacobians = field.at(field.regions.index(name), points)[1][:, :, : field.n]
+        jacobians = jacobians[np.isfinite(jacobians).all(axis=(1, 2))]
+        found.append(np.linalg.eig(jacobians)[1].astype(complex))
+    return np.concatenate(found)

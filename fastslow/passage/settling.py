@@ -78,8 +78,9 @@ def _decay(p: Passage, t: Transition, start: float, stop: float) -> float:
     """∫ |Re λ| dt of the slowest eigenvalue along the branch that is left."""
     number = next(k for k, sheet in enumerate(p.sheets) if sheet.label == t.from_sheet)
     course = next(c for c in p.m.courses if number in c.sheets)
-    rows = (p.m.time >= start) & (p.m.time <= stop)
-    if rows.sum() < 2:
+    first = np.searchsorted(p.m.time, start)
+    rows = slice(first, np.searchsorted(p.m.time, stop, side="right"))
+    if rows.stop - first < 2:
         return 0.0
     rate = np.maximum(-course.relaxation(p.m.slow[rows]), 0.0)
     steps = np.diff(p.m.time[rows])

@@ -122,10 +122,11 @@ class Passage:
         def away(slow: Array, state: Array) -> Array:
             scaled = state / self.m.extent
             far = -self.m.nearness(stay.course, slow, scaled)
-            if other is not None:
+            there = None if other is None else other.present(slow)
+            if other is not None and there is not None and there.any():
                 old, new = (c.state(slow) / self.m.extent for c in (course, other))
                 way = way_done(scaled, old, new, self.m.periods)
-                far = np.where(other.present(slow), np.maximum(far, way - WAY), far)
+                far = np.where(there, np.maximum(far, way - WAY), far)
             return far
 
         return self.moment(self.first(float(time[stay.stop - 1]), float(time[stay.stop]), away))
