@@ -38,6 +38,7 @@ _LOOPS = [
             "space": TraceSpace,
         },
         results=(int,),
+        kept=("space",),
     ),
     Loop(
         _EVALUATION,
@@ -57,6 +58,7 @@ _LOOPS = [
             "point": Vector, "m": int, "iterations": int, "space": NewtonSpace,
         },
         results=(float, float, bool),
+        kept=("space",),
     ),
     Loop(
         _EVALUATION,
@@ -65,6 +67,7 @@ _LOOPS = [
             "curve": Curve, "points": Matrix, "scales": Matrix, "natural": Matrix,
             "limits": Limits, "m": int, "iterations": int, "plain": Flags, "space": NewtonSpace,
         },
+        kept=("space",),
     ),
     Loop(
         _EVALUATION,
@@ -74,6 +77,7 @@ _LOOPS = [
             "vertical": float, "branching": Vector, "turning": Vector, "jacobians": Tensor,
             "space": NewtonSpace,
         },
+        kept=("space",),
     ),
     Loop(_EVALUATION, "pairs", {"jacobians": Tensor, "result": ComplexMatrix}),
     Loop(
@@ -103,6 +107,7 @@ _LOOPS = [
             "curve": Curve, "states": Matrix, "converged": Flags, "value": float, "unit": Vector,
             "iterations": int, "space": NewtonSpace,
         },
+        kept=("space",),
     ),
     Loop(
         _ISOLATION,
@@ -114,6 +119,7 @@ _LOOPS = [
             "clusters": Tensor, "progress": Integers, "space": IsolationSpace,
         },
         results=(int,),
+        kept=("space",),
     ),
 ]  # fmt: skip
 

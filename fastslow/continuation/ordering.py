@@ -31,7 +31,7 @@ def in_order(points: ArrayLike, unit: ArrayLike) -> NDArray[np.intp]:
     [2, 1, 0]
     """
     table = np.asarray(points, dtype=float)
-    if table.size == 0:
+    if table.size == 0 or len(table) == 1:
         return np.arange(len(table))
     least = np.broadcast_to(np.asarray(unit, dtype=float), table.shape[1:])
     ranks = np.empty(table.shape, dtype=np.intp)

@@ -133,29 +133,28 @@ def solve_polynomials(
         if found is None:
             return Solutions(nothing, none, False)
         budget -= found[2]
-        points, boxes = found[:2]
-        simple += [_back(x, chart) for x in points]
-        sides = np.array(list(itertools.product((0, 1), repeat=count)))
-        for box in boxes:
-            corners = _back(box[sides, np.arange(count)], chart)
-            clusters.append(np.array([corners.min(axis=0), corners.max(axis=0)]))
-    system = [_arrays(q) for q in scaled]
-    distinct = _distinct([_polished(system, x) for x in simple], floor, 1e-10)
-    merged = _merged(clusters, floor)
-    decisive = np.array([m in ranges or not ranges for m in range(count)])
-    wide = np.where(decisive, floor, 1.0) if ranges else np.ones(count)
-    width = (merged[:, 1] - merged[:, 0]) / np.maximum(np.abs(merged).max(axis=1), wide)
-    inside = np.ones(len(distinct), dtype=bool)
+        simple += [_back(x, chart) for x in found[0]]
+        clusters += [_around(box, chart) for box in found[1]]
+    within = _distinct(_polished(scaled, simple), floor, 1e-10)
     for m, (low, high) in limits.items():
         slack = 1e-9 * floor[m]
-        inside &= (distinct[:, m] >= low - slack) & (distinct[:, m] <= high + slack)
+        within = within[(within[:, m] >= low - slack) & (within[:, m] <= high + slack)]
     unit = np.array([float(s) for s in scales])
-    within = distinct[inside]
+    merged = _merged(clusters, floor)
     return Solutions(
         within[in_order(within, np.ones(count))] * unit,
         merged * unit,
-        bool(np.all(width[:, decisive] <= RESOLUTION)),
+        not clusters or _narrow(merged, floor, ranges),
     )
+
+
+def _narrow(boxes: Array, floor: Array, ranges: Mapping[int, object]) -> bool:
+    """Whether boxes are as narrow as the resolution in the unknowns that decide."""
+    count = len(floor)
+    decisive = np.array([m in ranges or not ranges for m in range(count)])
+    wide = np.where(decisive, floor, 1.0) if ranges else np.ones(count)
+    width = (boxes[:, 1] - boxes[:, 0]) / np.maximum(np.abs(boxes).max(axis=1), wide)
+    return bool(np.all(width[:, decisive] <= RESOLUTION))
 
 
 def _isolated(
@@ -189,7 +188,8 @@ def _isolated(
             outer = bounds.get(m, COMPARABLE * farthest if chart else 1.0)
             inner = min(float(floor[m]), 0.5 * outer)
             intervals.append([(-outer, -inner), (-inner, inner), (inner, outer)])
-    boxes = np.array(list(itertools.product(*intervals)))
+    boxes = list(itertools.product(*intervals))
+    low, high = (np.array([[ends[k] for ends in box] for box in boxes]) for k in (0, 1))
     most = budget // (count * size)
     free = np.array([m not in limits for m in range(count)])
     inverse = chart[0] if chart else -1
@@ -206,9 +206,8 @@ def _isolated(
         # a box is looked at by products of all coefficients with those of every unknown
         progress[5] = max(1, WORK // (4 * count * count * size))
         code = loop("isolate")(
-            power, degrees, np.ascontiguousarray(boxes[:, :, 0]),
-            np.ascontiguousarray(boxes[:, :, 1]), free, floor, NARROWEST, most,
-            inverse, small, COMPARABLE, stack, solutions, clusters, progress, space,
+            power, degrees, low, high, free, floor, NARROWEST, most, inverse, small, COMPARABLE,
+            stack, solutions, clusters, progress, space,
         )  # fmt: skip
         if code == TABLE_FULL:
             solutions, clusters = (
@@ -252,6 +251,14 @@ def _back(points: Array, chart: tuple[int, ...]) -> Array:
         x[..., list(chart)] /= points[..., chart[:1]]
         x[..., chart[0]] = 1.0 / points[..., chart[0]]
     return x
+
+
+def _around(box: Array, chart: tuple[int, ...]) -> Array:
+    """A box of a chart as one in the unknowns themselves, which holds it."""
+    count = box.shape[1]
+    sides = np.array(list(itertools.product((0, 1), repeat=count)))
+    corners = _back(box[sides, np.arange(count)], chart)
+    return np.array([corners.min(axis=0), corners.max(axis=0)])
 
 
 def units(
@@ -365,17 +372,20 @@ def _log2_of_unit(unit: Fraction) -> int:
     return unit.numerator.bit_length() - unit.denominator.bit_length()
 
 
-def _arrays(terms: Mapping[tuple[int, ...], float]) -> tuple[NDArray[np.int64], Array]:
-    """Exponents (T, N) and coefficients (T,) of an equation."""
-    return np.array(list(terms), dtype=np.int64), np.array(list(terms.values()))
+def _polished(
+    equations: Sequence[Mapping[tuple[int, ...], float]], points: Sequence[Array]
+) -> list[Array]:
+    """Newton's last digits at simple solutions."""
+    if len(equations) == 1:
+        return [_polished_root(equations[0], float(point[0])) for point in points]
+    # exponents (T, N) and coefficients (T,) of every equation
+    system = [(np.array(list(q), dtype=np.int64), np.array(list(q.values()))) for q in equations]
+    return [_polished_point(system, point) for point in points]
 
 
 @np.errstate(all="ignore")
-def _polished(system: Sequence[tuple[NDArray[np.int64], Array]], point: Array) -> Array:
-    """Newton's last digits at a simple solution."""
+def _polished_point(system: Sequence[tuple[NDArray[np.int64], Array]], point: Array) -> Array:
     count = len(point)
-    if count == 1:
-        return _polished_root(*system[0], point)
     best, least = point, np.inf
     for _ in range(20):
         value, slopes = np.empty(count), np.empty((count, count))
@@ -398,12 +408,12 @@ def _polished(system: Sequence[tuple[NDArray[np.int64], Array]], point: Array) -
     return best
 
 
-def _polished_root(exponents: NDArray[np.int64], coefficients: Array, point: Array) -> Array:
+def _polished_root(terms: Mapping[tuple[int, ...], float], near: float) -> Array:
     """The same of one polynomial, by Horner's scheme."""
-    powers = [0.0] * (1 + int(exponents.max()))
-    for exponent, coefficient in zip(exponents[:, 0].tolist(), coefficients.tolist(), strict=True):
+    powers = [0.0] * (1 + max(e for (e,) in terms))
+    for (exponent,), coefficient in terms.items():
         powers[exponent] = coefficient
-    best = x = float(point[0])
+    best = x = near
     least = math.inf
     for _ in range(20):
         value = slope = 0.0

@@ -2,9 +2,37 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import threading
+from collections.abc import Callable
+from functools import wraps
+from typing import NamedTuple, ParamSpec, TypeVar
 
 from fastslow.compiled.records import Integers, Matrix, Tensor, Vector, zeros
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+#: Work spaces of one kind that a thread keeps.
+KEPT = 8
+
+
+def _kept(function: Callable[P, R]) -> Callable[P, R]:
+    """Make a work space once for every thread and size: no loop reads what another has left."""
+    own = threading.local()
+
+    @wraps(function)
+    def kept(*args: P.args, **kwargs: P.kwargs) -> R:
+        if not hasattr(own, "known"):
+            own.known = {}
+        known: dict[tuple[object, ...], R] = own.known
+        if args not in known:
+            if len(known) == KEPT:
+                known.clear()
+            known[args] = function(*args, **kwargs)
+        return known[args]
+
+    return kept
+
 
 #: How `trace` ends.
 FULL, RANGE, INTERFACE, SMALL_STEP, WINDOW, CLOSED = range(6)
@@ -98,6 +126,7 @@ class TraceSpace(NamedTuple):
     local: Vector
 
 
+@_kept
 def trace_space(n: int, m: int) -> TraceSpace:
     """Work space for n states and m interfaces."""
     size, width = n + 1, n * (n + 2) + m * (n + 2)
@@ -148,6 +177,7 @@ class NewtonSpace(NamedTuple):
     constant: Vector
 
 
+@_kept
 def newton_space(n: int, width: int) -> NewtonSpace:
     """Work space for n states, and so many numbers that the generated function fills in."""
     size = n + 1
@@ -184,6 +214,7 @@ class IsolationSpace(NamedTuple):
     sizes: Vector
 
 
+@_kept
 def isolation_space(n: int, size: int, most: int) -> IsolationSpace:
     """Work space for n unknowns and so many coefficients of each polynomial."""
     square, d = (n, n), most + 1

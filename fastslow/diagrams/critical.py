@@ -7,11 +7,8 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any
 
 import sympy as sp
-from sympy.polys.domains import ZZ
-from sympy.polys.rings import PolyElement, ring
 
 from fastslow.continuation.polynomial_systems import (
     FARTHEST,
@@ -23,10 +20,8 @@ from fastslow.continuation.polynomial_systems import (
 )
 from fastslow.diagrams.equations import RegionEquations
 from fastslow.diagrams.exact_polynomials import ratios, real_roots, terms_of
+from fastslow.diagrams.resultants import discriminant, resultant
 from fastslow.model.structure import real
-
-#: Polynomials in one unknown and the parameter.
-_PLANE = ring("x, p", ZZ)[0]
 
 #: Degree in the unknown up to which discriminants and resultants are formed.
 DEGREE = 8
@@ -136,25 +131,15 @@ def _resultants(
     degree = max(e for e, _ in equation)
     if degree > DEGREE:
         return None
-    polynomial = _PLANE.from_dict(_whole(equation))
     found = [_in_parameter({e: c for e, c in equation.items() if e[0] == degree})]
     if degree > 1:
-        found.append(_powers(polynomial.discriminant()))
+        found.append([*discriminant(equation)])
     for edge in edges:
         if any(e for e, _ in edge):
-            found.append(_powers(polynomial.resultant(_PLANE.from_dict(_whole(edge)))))
+            found.append([*resultant(equation, edge)])
         else:
             found.append(_in_parameter(edge))
     return found
-
-
-def _whole(terms: WholeTerms) -> dict[tuple[int, ...], Any]:
-    return {e: ZZ(c) for e, c in terms.items()}
-
-
-def _powers(polynomial: PolyElement) -> list[Fraction | int]:
-    """Coefficients of a polynomial in the parameter, the highest first."""
-    return _in_parameter({e: int(c) for e, c in polynomial.items()})
 
 
 def _isolated(

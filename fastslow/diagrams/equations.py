@@ -420,10 +420,14 @@ class RegionEquations:
         largest = max(abs(value), self._parameter_unit(0.0))
         if self.polynomials is not None:
             for q in self.polynomials:
-                at, far = Fraction(value), Fraction(largest)
-                total = sum((c * at ** e[-1] for e, c in q.items()), Fraction(0))
-                size = sum((abs(c) * far ** e[-1] for e, c in q.items()), Fraction(0))
-                if abs(total) > Fraction(VANISHING) * size:
+                over: WholeTerms = {e[-1:]: c for e, c in q.items()}
+                moduli: WholeTerms = {e: abs(c) for e, c in over.items()}
+                (total,) = values_at([over], [at := Fraction(value)])
+                (size,) = values_at([moduli], [far := Fraction(largest)])
+                # both are whole, in units of a power of a denominator
+                most = max((k for (k,) in over), default=0)
+                exact = Fraction(abs(total), at.denominator**most)
+                if exact > Fraction(VANISHING) * Fraction(size, far.denominator**most):
                     return False
             return True
         for e in self.elimination.remaining:
@@ -442,6 +446,9 @@ class RegionEquations:
             (polynomial,) = forms
             degrees = {e[0] for e in polynomial}
             forms = [{(k,): c for (i, k), c in polynomial.items() if i == j} for j in degrees]
+        if any(len(form) == 1 and not next(iter(form))[-1] for form in forms):
+            # a number, which vanishes nowhere
+            return []
         common = _RING.zero
         for form in forms:
             over = {(e[-1],): ZZ(c) for e, c in form.items()}

@@ -142,8 +142,9 @@ def coefficient_function(coefficient: sp.Expr, p: sp.Symbol) -> Callable[[float]
 
 def ratios(numbers: Sequence[Fraction | int]) -> Array:
     """Numbers in units of the largest, each rounded once."""
-    largest = max((abs(Fraction(number)) for number in numbers), default=Fraction(0))
-    return np.array([float(number / (largest or 1)) for number in numbers])
+    largest = max((max(number, -number) for number in numbers), default=0) or 1
+    # a quotient of whole numbers, too, is rounded once
+    return np.array([float(number / largest) for number in numbers])
 
 
 def real_roots(coefficients: Array) -> list[float]:
@@ -161,6 +162,8 @@ def real_roots(coefficients: Array) -> list[float]:
     if len(leading) == 0:
         return []
     shares = coefficients[leading[0] :] / coefficients[leading[0]]
+    if len(shares) < 3:
+        return [0.0 - float(share) for share in shares[1:]]
     powers = np.arange(len(shares))
     # Fujiwara's bound: in this unit no root is beyond two, and no coefficient beyond one
     bounds = np.abs(shares[1:]) ** (1.0 / powers[1:])

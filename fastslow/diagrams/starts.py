@@ -55,7 +55,7 @@ class Starts:
         between = [critical_values(e, lower, upper, self._edges) for e in equations]
         self.complete = all(b is not None for b in between) and all_known(field)
         self._continua = [
-            (equation.region, value)
+            (field.regions[equation.region], value)
             for equation in equations
             for value in equation.continua()
             if lower <= value <= upper
@@ -178,25 +178,20 @@ class Starts:
     def missed(self, branches: Sequence[Branch]) -> list[tuple[str, float]]:
         """Regions and values at which a continuum of equilibria is part of no branch."""
         near = 1e-9 * (self._over[1] - self._over[0])
-        return [
-            (self._field.regions[region], value)
-            for region, value in self._within
-            if not any(_upright(b, value, near, self.scale) for b in branches)
-        ]
-
-    @cached_property
-    def _within(self) -> list[tuple[int, float]]:
-        """Those continua that lie in their region, at least in part."""
-        bounded = bool(self._field.interfaces)
+        # most are seen at once to be part of a branch
         return [
             (region, value)
             for region, value in self._continua
-            if not bounded
-            or any(
-                e.continuum and e.admissible and e.region == self._field.regions[region]
-                for e in solve_at(self._field, value, virtual=True)
-            )
+            if not any(_upright(b, value, near, self.scale) for b in branches)
+            and self._lies_within(region, value)
         ]
+
+    def _lies_within(self, region: str, value: float) -> bool:
+        """Whether a continuum lies in its region, at least in part."""
+        return not self._field.interfaces or any(
+            e.continuum and e.admissible and e.region == region
+            for e in solve_at(self._field, value, virtual=True)
+        )
 
     @cached_property
     def scale(self) -> Array:

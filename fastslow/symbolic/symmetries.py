@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -227,6 +227,12 @@ def _function_of(
     return symbols, sp.lambdify(symbols, [list(r) for r in slopes], "numpy")
 
 
+@cache
+def _number(point: int, place: int) -> float:
+    """A quotient of primes for every place of a point."""
+    return float(sp.prime(3 * point + 2 * place + 5)) / float(sp.prime(place + 4))
+
+
 def _numbers(
     slopes: tuple[tuple[sp.Expr, ...], ...],
     states: Sequence[sp.Symbol],
@@ -236,11 +242,8 @@ def _numbers(
     symbols, function = _function_of(slopes)
     rows = []
     for k in range(max(POINTS, -(-2 * len(states) // len(slopes)))):
-        # quotients of primes, in the states' and free parameters' own order
-        place = [
-            values.get(s, float(sp.prime(3 * k + 2 * j + 5)) / float(sp.prime(j + 4)))
-            for j, s in enumerate(symbols)
-        ]
+        # in the states' and free parameters' own order
+        place = [values[s] if s in values else _number(k, j) for j, s in enumerate(symbols)]
         with np.errstate(all="ignore"):
             # as NumPy's numbers: a division by zero is no error here
             rows.append(np.array(function(*map(np.float64, place)), dtype=float))

@@ -1,5 +1,7 @@
 """The compiled loop and the extended systems against closed forms and NumPy."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -204,3 +206,11 @@ def test_two_crossings_of_an_interface_within_one_step_are_seen():
     diagram = fs.continue_equilibria(model, "p", (0, 1))
     values = [b["p"] for b in diagram.boundary_equilibria]
     np.testing.assert_allclose(values, [0.4999, 0.5001], atol=1e-13)
+
+
+def test_a_work_space_is_made_once_for_every_thread():
+    space = newton_space(3, 21)
+    assert newton_space(3, 21) is space
+    assert newton_space(3, 22) is not space
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(newton_space, 3, 21).result() is not space

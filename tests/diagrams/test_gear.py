@@ -10,6 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import fastslow as fs
+from fastslow.diagrams import starts
+from fastslow.diagrams.solving import solve_at
 
 FOLD_W = 0.0894402097712473068105567770438  # closed form, mpmath at 40 digits
 FOLD_X = 0.538244802131872687595973447891
@@ -180,3 +182,19 @@ def test_other_parameters(gear):
     x = fold["x"]
     assert 3 * x**2 + 2 * 0.25 * x + fold["A"] == pytest.approx(0, abs=1e-13)
     assert (x**2 + fold["A"]) * (x + 0.25) == pytest.approx(0.5, abs=1e-13)
+
+
+def test_a_continuum_on_a_branch_is_not_solved_for(monkeypatch):
+    """The gap of the gear at w = 0 is seen to be a part of the branch."""
+    values = []
+
+    def solved(field, value, *args, **kwargs):
+        values.append(value)
+        return solve_at(field, value, *args, **kwargs)
+
+    monkeypatch.setattr(starts, "solve_at", solved)
+    gear = fs.systems.harmonic_gear(D=0.2345).frozen()
+    diagram = fs.continue_equilibria(gear, "w", over=(-2, 6))
+    assert diagram.coverage == "complete"
+    assert 0.0 not in values
+    assert len(values) == len(set(values)) == 4
