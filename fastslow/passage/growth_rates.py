@@ -162,10 +162,14 @@ class Sheet:
         if not inside.any():
             return found
         self._extend_to(float(along[inside].max()))
-        for piece in self.pieces:
-            low, high = self._along(piece.start), self._along(piece.stop)
-            on = inside & (along >= low) & (along <= high)
-            if on.any():
+        rows = np.flatnonzero(inside)
+        # at a joint the later piece counts
+        starts = [self._along(piece.start) for piece in self.pieces]
+        number = np.searchsorted(starts, along[rows], side="right") - 1
+        rows = rows[np.argsort(number, kind="stable")]
+        ends = np.cumsum(np.bincount(number, minlength=len(starts)))
+        for piece, on in zip(self.pieces, np.split(rows, ends[:-1]), strict=True):
+            if len(on):
                 found[on] = piece.at(values[on])
         return found
 
