@@ -99,13 +99,15 @@ def find_zeros(quantity: StepPolynomials) -> list[Zero]:
     if b.shape[1] == 1:
         b = np.column_stack([b, np.zeros(len(b))])
     noise = 8.0 * np.finfo(float).eps * quantity.size
-    bernstein = b @ _to_bernstein(b.shape[1] - 1).T
+    # where the constant term outweighs the others there is no root
+    near = np.flatnonzero(np.abs(b[:, 0]) <= np.abs(b[:, 1:]).sum(axis=1) + noise)
+    transform = _to_bernstein(b.shape[1] - 1)
+    bernstein = b[near] @ transform.T
     # continuous by construction: the end of a step is the beginning of the next
-    bernstein[:-1, -1] = bernstein[1:, 0]
-    ends = np.append(bernstein[:, 0], bernstein[-1, -1])
+    ends = np.append(b[:, 0], b[-1] @ transform[-1])
     ends[np.abs(ends) <= np.append(noise, noise[-1])] = 0.0
-    bernstein[:, 0], bernstein[:, -1] = ends[:-1], ends[1:]
-    single, vague = _inside(bernstein, noise, b)
+    bernstein[:, 0], bernstein[:, -1] = ends[near], ends[near + 1]
+    single, vague = _inside(bernstein, near, noise, b)
     vague += [(float(j), float(j)) for j in np.flatnonzero(ends == 0.0)]
     zeros = single + [
         Zero(low, high, _sign_beyond(b, noise, low, -1), _sign_beyond(b, noise, high, 1))
@@ -140,11 +142,13 @@ def _changes(bernstein: Array) -> tuple[NDArray[np.int64], Array, Array]:
 
 
 def _inside(
-    bernstein: Array, noise: Array, b: Array
+    bernstein: Array, step: NDArray[np.intp], noise: Array, b: Array
 ) -> tuple[list[Zero], list[tuple[float, float]]]:
-    """Single roots in the open steps, and intervals that are zero to rounding."""
-    step = np.arange(len(b))
-    low, width = np.zeros(len(b)), np.ones(len(b))
+    """Single roots in open steps, and intervals that are zero to rounding.
+
+    The Bernstein coefficients are those of some steps only.
+    """
+    low, width = np.zeros(len(step)), np.ones(len(step))
     left, right = _halves(b.shape[1] - 1)
     single: list[tuple[Array, ...]] = []
     vague: list[tuple[float, float]] = []

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fastslow.results import step_roots
 from fastslow.results.step_polynomials import StepPolynomials
 from fastslow.results.step_roots import _refined, find_roots
 
@@ -95,3 +96,16 @@ def test_a_root_at_the_end_of_its_bracket_ends_the_search():
     found = _refined(b, np.zeros(2000), np.ones(2000), -np.ones(2000))
     assert Counted.reads <= 12 * 4
     assert np.asarray(found) == pytest.approx(roots, rel=1e-14)
+
+
+def test_steps_far_from_zero_are_not_divided(monkeypatch):
+    looked = []
+    changes = step_roots._changes
+    monkeypatch.setattr(
+        step_roots, "_changes", lambda table: looked.append(len(table)) or changes(table)
+    )
+    found, directions = zeros(np.polynomial.Polynomial([-0.505, 1.0]), 100)
+    assert found == pytest.approx([0.505])
+    assert directions.tolist() == [1]
+    # the step, and the next, of which only the size is compared
+    assert looked == [2]
