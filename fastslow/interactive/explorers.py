@@ -273,9 +273,9 @@ class Explorer:
         return self._widget.box
 
     def _draw(self, *, moving: bool) -> None:
-        self.pointer.renew(self._picture.draw(self.view, moving=moving))
-        if self._picture.show():
-            self.pointer.keep()
+        self.pointer.curves = self._picture.draw(self.view, moving=moving)
+        self.pointer.near = None
+        self.figure.canvas.draw_idle()
         if self._widget is not None:
             self._widget.follow()
 

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backend_bases import Event
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg
 from matplotlib.figure import Figure
 
 from fastslow.interactive.drawing import draw_view
@@ -41,11 +40,48 @@ def own_figure() -> Figure:
     return figure
 
 
+class Backdrop(Artist):
+    """Axes, ticks, names and legend beneath what moves: kept as pixels until they change.
+
+    Attributes
+    ----------
+    still : sequence of Artist
+        What is drawn by the backdrop alone, and hidden otherwise.
+    state : list
+        All that they depend on, but for the size of the figure.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.still: Sequence[Artist] = ()
+        self.state: list[Any] = []
+        self._kept: Any = None
+        self._seen: list[Any] = []
+        self.set_zorder(-1e9)
+
+    def draw(self, renderer: Any) -> None:
+        """Lay down what was kept, or draw it and keep it, if the renderer keeps pixels."""
+        figure: Any = self.get_figure(root=True)
+        limits = [(ax.get_xlim(), ax.get_ylim()) for ax in figure.axes]
+        seen = [*self.state, limits, figure.dpi, figure.bbox.extents.tolist()]
+        # to draw without output, Matplotlib replaces the methods of the renderer
+        keeps = isinstance(renderer, RendererAgg) and "draw_path" not in vars(renderer)
+        if keeps and seen == self._seen:
+            renderer.restore_region(self._kept)
+            return
+        for artist in self.still:
+            artist.set_visible(True)
+            artist.draw(renderer)
+            artist.set_visible(False)
+        if keeps:
+            self._kept, self._seen = renderer.copy_from_bbox(figure.bbox), seen
+
+
 class Picture:
     """A figure in which views are drawn one after the other.
 
-    At rest a view is drawn as a whole, as into a new figure. While a slider moves, axes,
-    ticks, names and legend are drawn only when they change; the rest is drawn over them.
+    At rest a view is drawn as a whole, as into a new figure. While a slider moves, limits
+    change only when they must, and a backdrop keeps what depends on nothing else.
 
     Parameters
     ----------
@@ -55,14 +91,11 @@ class Picture:
     def __init__(self, figure: Figure) -> None:
         self.figure = figure
         self._axes: tuple[Axes, ...] = ()
-        self._moving: list[Artist] = []
+        self._backdrop = Backdrop()
         self._explained: list[Any] = []
-        self._fixed: list[Any] = []
-        self._beneath: Any = None
-        figure.canvas.mpl_connect("draw_event", self._drawn)
 
     def draw(self, view: View, *, moving: bool = False) -> tuple[Curve, ...]:
-        """Draw a view in place of what the figure shows, to be seen after `show`.
+        """Draw a view in place of what the figure shows, to be seen when that is drawn.
 
         Parameters
         ----------
@@ -75,59 +108,32 @@ class Picture:
         tuple of Curve
             What can be picked.
         """
-        if not self._axes or tuple(self.figure.axes) != self._axes:
-            self.figure.clear()
-            self._axes = tuple(dressed(self.figure.add_axes(place)) for place in PLACES)
+        figure = self.figure
+        if not self._axes or tuple(figure.axes) != self._axes:
+            figure.clear()
+            self._axes = tuple(dressed(figure.add_axes(place)) for place in PLACES)
         before = _limits(self._axes)
         for ax in self._axes:
             _empty(ax)
         curves, handles = draw_view(self._axes, view)
-        moving = moving and bool(self.figure.canvas.supports_blit)
         if moving:
             _hold(self._axes, before)
         self._explain(handles, moving)
-        for text in list(self.figure.texts):
-            text.remove()
-        words = "  ".join(str(outcome) for outcome in view.outcomes)
-        self.figure.text(0.01, 0.012, plain(words), fontsize=SMALL, color=VERMILION, wrap=True)
-        self._moving = [artist for ax in self._axes for artist in _in_frame(ax)] if moving else []
-        for ax in self._axes:
-            for artist in _in_frame(ax):
-                artist.set_animated(moving)
+        for artist in (*figure.texts, *figure.artists):
+            artist.remove()
+        words = plain("  ".join(str(outcome) for outcome in view.outcomes))
+        said = figure.text(0.01, 0.012, words, fontsize=SMALL, color=VERMILION, wrap=True)
+        shown = [ax for ax in self._axes if ax.axison]
+        framing = [part for ax in shown for part in (ax.patch, ax.xaxis, ax.yaxis)]
+        still: list[Artist] = [*framing, *figure.legends, said]
+        for part in still:
+            part.set_visible(not moving)
+        if moving:
+            names = [(ax.axison, ax.get_xlabel(), ax.get_ylabel()) for ax in self._axes]
+            self._backdrop.still = still
+            self._backdrop.state = [names, self._explained, words]
+            figure.add_artist(self._backdrop)
         return curves
-
-    def show(self) -> bool:
-        """Bring what was drawn to the screen; whether that was done without a draw event."""
-        canvas: Any = self.figure.canvas
-        if not self._moving or self._beneath is None or self._fixed != self._furniture():
-            canvas.draw_idle()
-            return False
-        canvas.restore_region(self._beneath)
-        self._draw_moving()
-        canvas.blit(self.figure.bbox)
-        return True
-
-    def _drawn(self, _: Event) -> None:
-        """Keep the axes as they were drawn, and draw over them what moves."""
-        canvas: Any = self.figure.canvas
-        if canvas.is_saving():
-            return
-        self._beneath = None
-        if self._moving:
-            self._beneath, self._fixed = canvas.copy_from_bbox(self.figure.bbox), self._furniture()
-            self._draw_moving()
-
-    def _draw_moving(self) -> None:
-        for artist in self._moving:
-            self.figure.draw_artist(artist)
-
-    def _furniture(self) -> list[Any]:
-        """All that is drawn beneath what moves depends on."""
-        figure = self.figure
-        drawn: list[Any] = [figure.canvas, *figure.get_size_inches().tolist(), figure.dpi]
-        for ax in self._axes:
-            drawn += [ax.axison, ax.get_xlabel(), ax.get_ylabel(), ax.get_xlim(), ax.get_ylim()]
-        return [*drawn, self._explained, [text.get_text() for text in figure.texts]]
 
     def _explain(self, handles: Sequence[Any], moving: bool) -> None:
         """A legend of handles; one that explains the same serves on while a slider moves."""
@@ -152,22 +158,11 @@ class Picture:
 
 def _empty(ax: Axes) -> None:
     """Take everything out of axes, which are then as new ones are."""
-    for artist in _content(ax):
+    for artist in (*ax.lines, *ax.patches, *ax.collections, *ax.texts, *ax.artists):
         artist.remove()
     ax.relim()
     ax.set_autoscale_on(True)
     ax.set_axis_on()
-
-
-def _content(ax: Axes) -> list[Artist]:
-    """What was drawn into axes."""
-    return [*ax.lines, *ax.patches, *ax.collections, *ax.texts, *ax.artists]
-
-
-def _in_frame(ax: Axes) -> list[Artist]:
-    """What is drawn anew in every frame, in its order: the content and the frame about it."""
-    known = {*_content(ax), *(ax.spines.values() if ax.axison else ())}
-    return sorted((a for a in ax.get_children() if a in known), key=Artist.get_zorder)
 
 
 def _hold(axes: Sequence[Axes], before: Sequence[Limits]) -> None:

@@ -78,7 +78,7 @@ class Pointer:
     ----------
     figure : Figure
     curves : sequence of Curve
-        What can be meant.
+        What can be meant; may be replaced when the figure is drawn anew.
     on_click : callable, optional
         Called with every pick.
 
@@ -97,29 +97,18 @@ class Pointer:
         on_click: Callable[[Pick], object] | None = None,
     ) -> None:
         self.figure = figure
+        self.curves = tuple(curves)
         self.selected: Pick | None = None
+        self.near: Pick | None = None
         self._on_click = on_click
         self._live: Any = None
+        self._box: Annotation | None = None
         self._beneath: Any = None
-        self.renew(curves)
         self._connected = [
             figure.canvas.mpl_connect("motion_notify_event", self._moved),
             figure.canvas.mpl_connect("button_press_event", self._clicked),
-            figure.canvas.mpl_connect("draw_event", self.keep),
+            figure.canvas.mpl_connect("draw_event", self._drawn),
         ]
-
-    def renew(self, curves: Sequence[Curve]) -> None:
-        """Point at something else, drawn in place of what was there."""
-        self.curves = tuple(curves)
-        self.near: Pick | None = None
-        self._box: Annotation | None = None
-
-    def keep(self, _: Event | None = None) -> None:
-        """Keep what was drawn, without the box: to lay the next one over it is quick."""
-        canvas: Any = self.figure.canvas
-        self._beneath = canvas.copy_from_bbox(self.figure.bbox) if _blits(canvas) else None
-        if self._box is not None and self._box.axes is not None:
-            self.figure.draw_artist(self._box)
 
     def release(self) -> None:
         """Stop listening."""
@@ -170,6 +159,13 @@ class Pointer:
         if self._box is not None and self._box.axes is not None:
             self._box.remove()
         self._box = None
+
+    def _drawn(self, _: Event) -> None:
+        """Keep what was drawn, without the box: to lay the next one over it is quick."""
+        canvas: Any = self.figure.canvas
+        self._beneath = canvas.copy_from_bbox(self.figure.bbox) if _blits(canvas) else None
+        if self._box is not None and self._box.axes is not None:
+            self.figure.draw_artist(self._box)
 
     def _show(self) -> None:
         canvas: Any = self.figure.canvas

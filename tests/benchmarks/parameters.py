@@ -81,7 +81,7 @@ def _frames(gear: fs.Model) -> Iterator[Line]:
 
     def drawn() -> None:
         kept.draw(next(views), moving=True)
-        kept.show()
+        kept.figure.canvas.draw()
 
     def from_nothing() -> None:
         figure = own_figure()

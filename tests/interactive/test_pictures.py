@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 from matplotlib.axis import Axis
-from matplotlib.figure import Figure
 from PIL import Image
 
 import fastslow as fs
 from fastslow.interactive.pictures import Picture, own_figure
+
+#: ipympl 0.10 makes its toolbar in a way that traitlets will refuse one day
+IPYMPL = pytest.mark.filterwarnings("ignore:Passing unrecognized arguments:DeprecationWarning")
 
 OVER, SLIDERS = (-0.5, 0.5), {"D": (0.1, 0.5), "C": (0, 1)}
 
@@ -31,7 +33,8 @@ def axis_draws(monkeypatch):
     met, draw = [], Axis.draw
 
     def counted(axis, renderer):
-        met.append(axis)
+        if axis.get_visible():
+            met.append(axis)
         draw(axis, renderer)
 
     monkeypatch.setattr(Axis, "draw", counted)
@@ -66,14 +69,16 @@ def test_within_their_limits_no_axis_is_drawn_anew(explorer, axis_draws):
     assert axis_draws == []
 
 
-def test_a_moving_picture_shows_what_a_whole_drawing_shows(explorer):
+def test_a_moving_picture_shows_what_a_whole_drawing_shows(explorer, tmp_path):
     for value in (0.25, 0.26, 0.24):
         explorer.glance({"D": value})
         moving = shown(explorer)
-        for ax in explorer.figure.axes:
-            for artist in ax.get_children():
-                artist.set_animated(False)
-        explorer._picture._moving = []
+        explorer._picture._backdrop._seen = []
+        explorer.figure.canvas.draw()
+        np.testing.assert_array_equal(shown(explorer), moving)
+        explorer._picture._backdrop.remove()
+        for artist in explorer._picture._backdrop.still:
+            artist.set_visible(True)
         explorer.figure.canvas.draw()
         assert far(moving, shown(explorer)) == 0
 
@@ -113,12 +118,23 @@ def test_a_drawing_by_another_keeps_what_moves(explorer, tmp_path):
     assert explorer.figure.axes[0].get_xlim()[1] > 300.0
 
 
-def test_a_canvas_that_cannot_lay_over_is_drawn_as_a_whole(folded, axis_draws, monkeypatch):
-    figure = Figure(figsize=(8, 4))
-    explorer = fs.explore(folded, periods=1, over=OVER, sliders=SLIDERS, figure=figure)
-    assert not figure.canvas.supports_blit
-    explorer.glance({"D": 0.3})
-    assert not any(a.get_animated() for ax in figure.axes for a in ax.get_children())
+def test_a_drawing_without_output_is_not_kept(explorer):
+    explorer.glance({"D": 0.25})
+    before = shown(explorer)
+    explorer._picture._backdrop._seen = []
+    explorer.figure.draw_without_rendering()
+    explorer.figure.canvas.draw()
+    np.testing.assert_array_equal(shown(explorer), before)
+
+
+def test_a_file_of_another_format_has_the_axes_too(explorer, tmp_path):
+    explorer.glance({"D": 0.25})
+    explorer.figure.savefig(tmp_path / "moving.svg")
+    explorer.set(D=0.25)
+    explorer.figure.savefig(tmp_path / "resting.svg")
+    moving, resting = ((tmp_path / f"{n}.svg").read_text() for n in ("moving", "resting"))
+    for name in ("xtick", "ytick", "legend"):
+        assert moving.count(f'<g id="{name}') == resting.count(f'<g id="{name}') > 0
 
 
 def test_the_pointer_lays_its_box_over_the_moving_picture(explorer, mouse):
@@ -145,3 +161,23 @@ def test_what_was_written_on_the_figure_goes_with_the_view(folded, explorer):
     explorer.figure.axes[0].axhline(0.1)
     explorer.set(D=0.3)
     np.testing.assert_array_equal(shown(explorer), shown(new(folded, D=0.3)))
+
+
+@IPYMPL
+def test_the_canvas_of_a_notebook(folded, explorer, axis_draws):
+    """Its browser asks for drawings, also after it was moved to a finer screen."""
+    explorer.widget  # noqa: B018
+    canvas = explorer.figure.canvas
+    for ratio in (1, 2):
+        canvas.handle_set_device_pixel_ratio({"device_pixel_ratio": ratio})
+        explorer.glance({"D": 0.25})
+        canvas.draw()
+        assert shown(explorer).shape[0] == 500 * ratio
+        axis_draws.clear()
+        explorer.glance({"D": 0.251})
+        canvas.draw()
+        assert axis_draws == []
+    canvas.handle_set_device_pixel_ratio({"device_pixel_ratio": 1})
+    explorer.set(D=0.251)
+    canvas.draw()
+    np.testing.assert_array_equal(shown(explorer), shown(new(folded, D=0.251)))
