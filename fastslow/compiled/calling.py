@@ -28,7 +28,7 @@ def {function}(slots):
 
 _CALL = """def {function}({names}):
     _copies = []
-{parts}    _results = _create({size})
+{parts}    _results = _create()
     _code = _entry(_results, _error, {slots})
     for _array, _copy in _copies:
         _array[...] = _copy
@@ -39,7 +39,7 @@ _CALL = """def {function}({names}):
 _CHECK = """    {name} = {path}
     if not (
         {name}.__class__ is _ndarray
-        and {name}.dtype == {dtype}
+        and ({name}.dtype is {dtype} or {name}.dtype == {dtype})
         and {name}.ndim == {axes}
         and {flags}
     ):
@@ -108,7 +108,7 @@ def caller(
     """
     returned = struct.Struct("<" + "".join(_FORMATS[kind] for kind in results))
     known: dict[str, Any] = {
-        "_create": ctypes.create_string_buffer,
+        "_create": ctypes.c_char * max(returned.size, 8),
         "_entry": _SIGNATURE(address),
         "_error": ctypes.create_string_buffer(8),
         "_ended": _ENDED,
@@ -141,7 +141,6 @@ def caller(
         function=function,
         names=", ".join(arguments),
         parts="".join(parts),
-        size=max(returned.size, 8),
         slots=" + ".join(slots),
         end=_end(len(results)),
     )

@@ -222,13 +222,10 @@ def labels_of(touched: Bits, multiples: NDArray[np.int64]) -> list[str]:
     # both kinds of bilateral are one
     names = np.where(touched == 7, 5, touched)
     same = (names == names[:, :1]).all(axis=1)
-    found = []
-    for row, (one, multiple) in enumerate(zip(same, multiples, strict=True)):
-        if one or multiple:
-            bits = names[row, 0] if one else np.bitwise_or.reduce(touched[row, -multiple:])
-            found.append(REGIMES[int(bits)])
-        else:
-            found.append(NOT_SETTLED)
+    found = [REGIMES[bits] for bits in names[:, 0].tolist()]
+    for row in np.flatnonzero(~same).tolist():
+        last = touched[row, touched.shape[1] - multiples[row] :]
+        found[row] = REGIMES[int(np.bitwise_or.reduce(last))] if len(last) else NOT_SETTLED
     return found
 
 

@@ -30,7 +30,7 @@ from fastslow.results.regimes import (
 from fastslow.simulation.arguments import gap_regions
 from fastslow.simulation.driver import OUT_OF_WORK, REACHED_END
 from fastslow.simulation.grouping import alike
-from fastslow.simulation.lanes import LEFT, Runs, pool_for
+from fastslow.simulation.lanes import LEFT, Pool, Runs, pool_for
 from fastslow.simulation.loops import DRIVE_MANY
 from fastslow.simulation.many_arguments import (
     periods_of,
@@ -53,7 +53,7 @@ from fastslow.simulation.trajectories import (
     error_rules,
     problem_of,
 )
-from fastslow.simulation.workspace import MODE, STEPS, beginnings, workspace_for
+from fastslow.simulation.workspace import MODE, STEPS, Workspace, beginnings, workspace_for
 
 Floats = NDArray[np.float64]
 
@@ -455,16 +455,16 @@ def _run(
 
     def follow(chunk: tuple[int, int]) -> Iterator[int]:
         """Follow a chunk to its end; what is yielded on the way has to be provided."""
+        pool = pool_for(problem, lanes.regions, values.shape[1], count)
+        workspace = workspace_for(problem, compiled.n_rows)
         for stop in range(1 if kept is None else kept.stops(chunk)):
             if kept is not None:
                 kept.before(stop, chunk, stops, whole, codes)
-            yield from advance(chunk)
+            yield from advance(chunk, pool, workspace)
             if kept is not None:
                 kept.after(stop, chunk, places, seen, codes)
 
-    def advance(chunk: tuple[int, int]) -> Iterator[int]:
-        pool = pool_for(problem, lanes.regions, values.shape[1], count)
-        workspace = workspace_for(problem, compiled.n_rows)
+    def advance(chunk: tuple[int, int], pool: Pool, workspace: Workspace) -> Iterator[int]:
         pace = Pace(compiled.n_rows, compiled.order)
         while True:
             pool.progress[LEFT] = pace.begin()

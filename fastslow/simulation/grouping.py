@@ -47,6 +47,8 @@ def alike(model: Model, values: Values, count: int) -> list[tuple[Model, NDArray
         # the model's own values are one more set, whose group needs no other model
         values = {n: np.append(v, model.parameters[n]) for n, v in values.items()}
     key = _signs(model, values, own)
+    if complete and (key == key[-1]).all():
+        return [(model, everything)]
     _, first, which = np.unique(key, axis=0, return_index=True, return_inverse=True)
     which = which.reshape(-1)
     groups = []
@@ -135,7 +137,7 @@ def _patterns(table: NDArray[np.float64]) -> NDArray[np.float64]:
         else:
             leaders.append(j)
             edges.append([-offsets[:, j]])
-    if leaders and np.any(np.linalg.matrix_rank(slopes[:, leaders]) < len(leaders)):
+    if len(leaders) > 1 and np.any(np.linalg.matrix_rank(slopes[:, leaders]) < len(leaders)):
         return np.hstack([*key, _one_by_one(table)])
     for together in edges:
         edge = np.stack(together, axis=1)

@@ -136,12 +136,17 @@ def to_bernstein(b, first, n, stack):
     # divide by the binomials, then sum as in Pascal's triangle
     for k in range(n + 1):
         stack[0, k] = b[first + k] * _INVERSE_BINOMIALS[n, k]
-    for level in range(1, n + 1):
-        before = stack[0, level - 1]
-        for j in range(level, n + 1):
-            here = stack[0, j]
-            stack[0, j] = here + before
-            before = here
+    # two of its rows at a time, because every number that is put away has to be fetched again
+    for level in range(1, n, 2):
+        before, here = stack[0, level - 1], stack[0, level]
+        above = stack[0, level] = here + before
+        for j in range(level + 1, n + 1):
+            before, here = here, stack[0, j]
+            new = here + before
+            stack[0, j] = new + above
+            above = new
+    if n % 2 == 1:
+        stack[0, n] += stack[0, n - 1]
     stack[0, n + 1] = 0.0
     stack[0, n + 2] = 1.0
 

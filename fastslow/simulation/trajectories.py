@@ -166,8 +166,8 @@ def simulate(
             break
     _memory.workspaces[prepared.shape] = workspace
     steps, crossings, store = _memory.filled(tables, counted, stride)
-    end, reached = read_only(place[: 1 + compiled.n_states].copy()), int(counted[SAMPLES])
-    n_steps, mode = int(counted[STEPS]), int(counted[MODE])
+    end = read_only(place[: 1 + compiled.n_states].copy())
+    n_steps, reached, mode = len(steps), int(counted[SAMPLES]), int(counted[MODE])
     outcome = outcome_of(
         code,
         mode,
@@ -348,6 +348,7 @@ class _Memory(threading.local):
 
     def __init__(self) -> None:
         self.kept = (0, 0, 0)
+        self.sizes = (_LEAST, _LEAST, _LEAST)
         self.workspaces: dict[tuple[int, ...], Workspace] = {}
 
     def workspace(self, prepared: Prepared) -> Workspace:
@@ -361,7 +362,7 @@ class _Memory(threading.local):
 
     def tables(self, n_states: int, stride: int) -> _Tables:
         """Tables for a run that keeps as much as the last one."""
-        steps, crossings, store = (min(max(n + n // 8, _LEAST), _MOST) for n in self.kept)
+        steps, crossings, store = self.sizes
         # an empty store is for none
         return _Tables(
             np.empty((steps // 4, 4)),
@@ -374,7 +375,10 @@ class _Memory(threading.local):
         for table, used in zip(tables, tables.filled(counted, stride), strict=True):
             table.resize((used, *table.shape[1:]), refcheck=False)
             table.flags.writeable = False
-        self.kept = (tables.steps.size, tables.crossings.size, tables.store.size)
+        kept = (tables.steps.size, tables.crossings.size, tables.store.size)
+        if kept != self.kept:
+            steps, crossings, store = (min(max(n + n // 8, _LEAST), _MOST) for n in kept)
+            self.kept, self.sizes = kept, (steps, crossings, store)
         return tables
 
 

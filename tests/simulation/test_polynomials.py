@@ -1,5 +1,7 @@
 """The root finder of a step, against polynomials with known roots."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 from numba import njit
 from numpy.polynomial import polynomial as P
 
-from fastslow.simulation.polynomials import DEEPEST, first_root
+from fastslow.simulation.polynomials import DEEPEST, first_root, to_bernstein
 
 
 @njit
@@ -76,3 +78,15 @@ def test_every_root_is_located_to_rounding():
         s, touch = root(series, noise=1e-14)
         assert not touch
         assert abs(P.polyval(s, series)) < 1e-14 * np.abs(series).sum()
+
+
+@pytest.mark.parametrize("n", range(20))
+def test_bernstein_coefficients_are_summed_as_in_the_triangle_of_pascal(n):
+    """To the last bit: row after row, though two rows are made at a time."""
+    b = np.random.default_rng(n).normal(size=n + 3)
+    stack = np.zeros((2, n + 4))
+    to_bernstein(b, 2, n, stack)
+    row = [b[2 + k] * (1.0 / math.comb(n, k)) for k in range(n + 1)]
+    for level in range(1, n + 1):
+        row[level:] = [row[j] + row[j - 1] for j in range(level, n + 1)]
+    assert stack[0].tolist() == [*row, 0.0, 1.0, 0.0]
