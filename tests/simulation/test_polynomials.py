@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numba import njit
 from numpy.polynomial import polynomial as P
 
-from fastslow.simulation.polynomials import DEEPEST, first_root, to_bernstein
+from fastslow.simulation.polynomials import DEEPEST, first_root, take_samples, to_bernstein
 
 
 @njit
@@ -90,3 +90,38 @@ def test_bernstein_coefficients_are_summed_as_in_the_triangle_of_pascal(n):
     for level in range(1, n + 1):
         row[level:] = [row[j] + row[j - 1] for j in range(level, n + 1)]
     assert stack[0].tolist() == [*row, 0.0, 1.0, 0.0]
+
+
+@njit(fastmath={"contract"})
+def _four(W, columns, times, out):
+    """Blocks of four by Horner's rule, one number after the other."""
+    for i in range(out.shape[0]):
+        for c in range(times.shape[0] - times.shape[0] % 4):
+            value = W[i * columns + columns - 1]
+            for k in range(columns - 2, -1, -1):
+                value = value * times[c] + W[i * columns + k]
+            out[i, c] = value
+
+
+@njit
+def _taken(W, columns, step, times, out, first, offsets):
+    return take_samples(W, columns, step, times, out, first, offsets)
+
+
+@pytest.mark.parametrize("count", [0, 1, 3, 4, 11, 64, 203])
+def test_samples_are_those_of_one_number_after_the_other(count):
+    """In portions, and of the rest of a portion that is no block of four to rounding."""
+    columns, rng = 17, np.random.default_rng(count)
+    W, times = rng.normal(size=3 * columns), np.sort(rng.uniform(0.0, 0.9, count))
+    late = np.append(times, [1.5, 2.0])
+    got = np.full((3, 2 + len(late)), np.nan)
+    before = np.concatenate([[-2.0, -1.0], late])
+    # an end before the last two, and two that were taken before
+    assert _taken(W, columns, (0.0, 0.0, 1.0), before, got, 2, np.empty(8)) == 2 + count
+    assert np.isnan(got[:, [0, 1, -2, -1]]).all()
+    one = np.zeros((3, count))
+    _four(W, columns, times, one)
+    whole = count - count % 4
+    np.testing.assert_array_equal(got[:, 2 : 2 + whole], one[:, :whole])
+    exact = [P.polyval(times, row) for row in W.reshape(3, columns)]
+    np.testing.assert_allclose(got[:, 2:-2], exact, rtol=1e-13, atol=1e-14)
