@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import chain
 
@@ -13,46 +12,15 @@ from numpy.typing import NDArray
 from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.pycode import PythonCodePrinter
 
-from fastslow.compiled.model_code import load_function
+from fastslow.compiled.field_code import FILLED, CompiledField, load_field
 from fastslow.errors import ModelError
 from fastslow.model.known_functions import refusal, teach_functions
 from fastslow.model.model import Model
 from fastslow.model.structure import real
-
-#: Output entries from which zeros are written by a loop: every assignment is compiled by itself.
-FILLED = 200
+from fastslow.results.stored_fields import FieldOperations
 
 #: Rates and switching functions of one smooth motion.
 Equations = tuple[Sequence[sp.Expr], Sequence[sp.Expr]]
-
-
-@dataclass(frozen=True)
-class CompiledField:
-    """Address of a generated function and how its arrays are laid out.
-
-    The function fills, for u = (states, varying parameters) of length n + k: F (n),
-    the Jacobian (n, n + k) row by row, h (m) and the gradients of h (m, n + k).
-
-    Parameters
-    ----------
-    address : int
-        Of ``void(int64 region, double* u, double* parameters, double* out)``.
-    parameters : tuple of str
-        Order of the parameter array.
-    n, m, k : int
-        Numbers of states, interfaces and varying parameters.
-    """
-
-    address: int
-    parameters: tuple[str, ...]
-    n: int
-    m: int
-    k: int = 1
-
-    @property
-    def size(self) -> int:
-        """Length of the output array."""
-        return (self.n + self.m) * (self.n + self.k + 1)
 
 
 def compile_field(
@@ -74,17 +42,28 @@ def compile_field(
     ModelError
         If the rates depend on time.
     """
+    if modes is None:
+        heights = [i.function for i in model.interfaces.values()]
+        modes = [([r.rates[n] for n in model.states], heights) for r in model.regions.values()]
+    rows_of, renaming, others = named_rows(model, varying, modes)
+    unknowns = len(model.states) + len(varying)
+    address = _address(rows_of, len(model.states), renaming, unknowns, len(others))
+    n, m = len(model.states), max((len(f) for _, f in modes), default=0)
+    return CompiledField(address, others, n, m, len(varying))
+
+
+def named_rows(
+    model: Model, varying: Sequence[str], modes: Sequence[Equations]
+) -> tuple[
+    tuple[tuple[sp.Expr, ...], ...], tuple[tuple[sp.Symbol, sp.Symbol], ...], tuple[str, ...]
+]:
+    """Rows of every mode, the names of their symbols in code, and the parameters in order."""
     names = (*model.states, *varying)
     others = tuple(dict.fromkeys(n for n in (*model.parameters, *model.free) if n not in varying))
     rename = {real(n): sp.Symbol(f"u{k}") for k, n in enumerate(names)}
     rename |= {real(n): sp.Symbol(f"p{k}") for k, n in enumerate(others)}
-    if modes is None:
-        heights = [i.function for i in model.interfaces.values()]
-        modes = [([r.rates[n] for n in model.states], heights) for r in model.regions.values()]
     rows_of = tuple((*rates, *functions) for rates, functions in modes)
-    address = _address(rows_of, len(model.states), tuple(rename.items()), len(names), len(others))
-    n, m = len(model.states), max((len(f) for _, f in modes), default=0)
-    return CompiledField(address, others, n, m, len(varying))
+    return rows_of, tuple(rename.items()), others
 
 
 def compile_function(
@@ -119,6 +98,16 @@ def _address(
     parameters: int,
 ) -> int:
     """Address of the generated function of these rows."""
+    bodies = operations_of(rows_of, n, renaming)
+    return load_field(bodies, unknowns, parameters)
+
+
+def operations_of(
+    rows_of: tuple[tuple[sp.Expr, ...], ...],
+    n: int,
+    renaming: tuple[tuple[sp.Symbol, sp.Symbol], ...],
+) -> list[FieldOperations]:
+    """What computes rows and their slopes by the unknowns u0, u1 and so on."""
     rename = dict(renaming)
     bodies = []
     for rows in rows_of:
@@ -130,11 +119,11 @@ def _address(
                 "call frozen() on the model first"
             )
         bodies.append(_body(rows, n, rename))
-    return load_function(_source(bodies, unknowns, parameters), "field")
+    return bodies
 
 
-def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -> list[str]:
-    """Assignments that fill the output array for one region."""
+def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -> FieldOperations:
+    """What fills the output array for one region."""
     unknowns = [s for s, new in rename.items() if new.name.startswith("u")]
     values = [r.xreplace(rename) for r in rows]
     slopes = [_slopes(r, unknowns, rename) for r in rows]
@@ -145,13 +134,11 @@ def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -
     shared, results = sp.cse([ordered[k] for k in kept], symbols=sp.numbered_symbols("s"))
     printer = _Printer({"fully_qualified_modules": True})
     try:
-        lines = [f"{symbol} = {printer.doprint(value)}" for symbol, value in shared]
+        parts = [str(printer.doprint(value)) for _, value in shared]
         codes = [_float(printer.doprint(v)) for v in results]
     except PrintMethodNotImplementedError:
         raise refusal(ordered) from None
-    if filled:
-        lines += [f"for k in range({len(ordered)}):", "    out[k] = 0.0"]
-    return [*lines, *(f"out[{k}] = {code}" for k, code in zip(kept, codes, strict=True))]
+    return FieldOperations(tuple(parts), tuple(zip(kept, codes, strict=True)), len(ordered))
 
 
 def _slopes(
@@ -186,37 +173,3 @@ teach_functions(_Printer)
 
 def _float(code: str) -> str:
     return f"{code}.0" if code.lstrip("-").isdigit() else code
-
-
-def _source(bodies: Sequence[list[str]], unknowns: int, parameters: int) -> str:
-    lines = [
-        "def field(region, u, p, out):",
-        *(f"    u{k} = u[{k}]" for k in range(unknowns)),
-        *(f"    p{k} = p[{k}]" for k in range(parameters)),
-    ]
-    # sliding and escaping motion have the same equations
-    alike: dict[tuple[str, ...], list[int]] = {}
-    for number, body in enumerate(bodies):
-        alike.setdefault(tuple(body), []).append(number)
-    for lines_of, numbers in alike.items():
-        test = " or ".join(f"region == {number}" for number in numbers)
-        lines.append(f"    {'if' if numbers[0] == 0 else 'elif'} {test}:")
-        lines += [f"        {line}" for line in lines_of]
-    return "\n".join(lines) + "\n"
-
-
-def parameter_array(model: Model, compiled: CompiledField) -> np.ndarray:
-    """Parameter values in the order of the compiled function.
-
-    Raises
-    ------
-    ModelError
-        If a slow quantity has been given no value.
-    """
-    for name in compiled.parameters:
-        if name not in model.parameters:
-            raise ModelError(
-                f"the frozen slow quantity '{name}' has no value; "
-                f"give one with with_parameters({name}=…)"
-            )
-    return np.array([model.parameters[n] for n in compiled.parameters], dtype=float)

@@ -17,6 +17,7 @@ from fastslow.results.angles import principal
 from fastslow.results.branches import Branch
 from fastslow.results.outcome import Outcome
 from fastslow.results.points import NEUTRAL, ClarkePath, SpecialPoint, SpecialPoints
+from fastslow.results.stored_models import StoredModel
 
 Array = NDArray[np.float64]
 
@@ -106,7 +107,10 @@ def branch_of(
     region = np.repeat(names, [len(t[0]) for t in tables])
     if not curve.closed:
         special, at_row = _with_ends(field, curve, special, at_row, rows)
-    source = Source(field.model, _sizes(u[:, :-1], window.scale[:-1]), window.states)
+    size = _sizes(u[:, :-1], window.scale[:-1])
+    # curves of points take equations
+    stored = isinstance(field.model, StoredModel)
+    source = None if stored else Source(field.model, size, window.states)
     return Branch(
         field.model.states,
         field.parameter,

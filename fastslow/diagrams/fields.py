@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.compiled.fields import CompiledField, compile_field, parameter_array
+from fastslow.compiled.field_code import CompiledField, load_field, parameter_array
 from fastslow.continuation.location import REACH, Located, with_condition
 from fastslow.continuation.loops import blocks, loop, writeable
 from fastslow.continuation.spaces import Curve, Limits, newton_space
-from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ModelError
-from fastslow.model.model import Model
-from fastslow.model.structure import real
-from fastslow.model.units import natural_units
 from fastslow.results.angles import periods_of, principal
+from fastslow.results.stored_fields import FieldMode, StoredField
+from fastslow.results.stored_models import INSTEAD, StoredModel
+from fastslow.results.unit_equations import UnitEquations, negligible
 from fastslow.results.windows import StateWindow
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from fastslow.diagrams.derived_fields import DerivedField
+    from fastslow.model.model import Model
 
 Array = NDArray[np.float64]
 
@@ -51,7 +56,7 @@ ITERATIONS = 40
 NOISE = 100.0
 
 
-def require_frozen(model: Model, instead: str) -> None:
+def require_frozen(model: Model | StoredModel, instead: str) -> None:
     """Raise unless a model is frozen; ``instead`` begins what to do with the frozen one."""
     for quantity in (*model.forcing, *model.slow_states):
         raise ModelError(f"'{quantity}' still varies in time; {instead} model.frozen() instead")
@@ -74,6 +79,66 @@ class Source:
     window: StateWindow
 
 
+@dataclass(frozen=True, eq=False)
+class StoredFrozen:
+    """What a stored model says of its frozen rates, with the part of `DerivedField`."""
+
+    model: StoredModel
+    varying: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        field = self.model.field
+        if field is None or self.varying != (field.parameter,):
+            known = f"{field.parameter} alone varies" if field else "no parameter varies"
+            raise ModelError(f"in this model {known}: {INSTEAD}")
+        for equations, along in zip(field.unit_equations, (False, True), strict=True):
+            changed = [n for n in equations.fixed if self._changed(n)]
+            gone = {n for n, v in self.model.parameters.items() if negligible(v)}
+            if (
+                changed
+                or set(equations.gone) - {field.parameter} != gone
+                or (along and field.parameter in equations.fixed)
+            ):
+                raise ModelError(f"the units of the states are not known: {INSTEAD}")
+
+    def _changed(self, name: str) -> bool:
+        return self.field.values.get(name) != self.model.parameters.get(name)
+
+    @property
+    def field(self) -> StoredField:
+        field = self.model.field
+        assert field is not None
+        return field
+
+    @property
+    def modes(self) -> tuple[FieldMode, ...]:
+        return self.field.modes
+
+    @cached_property
+    def compiled(self) -> CompiledField:
+        field, n = self.field, len(self.model.states)
+        address = load_field([mode.operations for mode in field.modes], n + 1, len(field.names))
+        return CompiledField(address, field.names, n, len(field.modes[0].signs))
+
+    def unit_equations(self, values: Mapping[str, float]) -> UnitEquations:
+        return self.field.unit_equations[self.field.parameter in values]
+
+    def derivatives(self, region: int) -> tuple[Sequence[tuple[int, ...]], Callable[..., Any]]:
+        """Which second and third derivatives there are, and their values; see `DerivedField`."""
+        found = self.modes[region].derivatives
+        if found is None:
+            raise ModelError(f"the normal form of a special point is not known: {INSTEAD}")
+        return found.entries, found
+
+    def levels(self) -> dict[str, tuple[str, float]]:
+        """Interfaces that are a constant value of one state."""
+        return self.field.interface_values(self.model.parameters)
+
+    def path(self) -> dict[str, str]:
+        """Of a model frozen along a path, each slow quantity as text."""
+        return dict(self.field.path)
+
+
 @dataclass(frozen=True)
 class FrozenField:
     """The frozen rates of every region over (states, varying parameters).
@@ -83,7 +148,7 @@ class FrozenField:
 
     Parameters
     ----------
-    model : Model
+    model : Model or StoredModel
         With a value for every parameter but the one that varies.
     parameter : str
         The one that varies.
@@ -91,7 +156,7 @@ class FrozenField:
         One more that varies, along curves in a parameter plane.
     """
 
-    model: Model
+    model: Any
     parameter: str
     second: str | None = None
 
@@ -103,6 +168,9 @@ class FrozenField:
                 f"the frozen slow quantity '{missing[0]}' has no value; give one, "
                 f"as in with_parameters({missing[0]}=…)"
             )
+        if isinstance(self.model, StoredModel):
+            # what was not stored is said before anything is asked
+            object.__setattr__(self, "source", StoredFrozen(self.model, self.varying))
 
     @property
     def varying(self) -> tuple[str, ...]:
@@ -110,9 +178,23 @@ class FrozenField:
         return (self.parameter,) if self.second is None else (self.parameter, self.second)
 
     @cached_property
+    def source(self) -> DerivedField | StoredFrozen:
+        """Where its numbers come from: the equations, or what was stored of them.
+
+        Raises
+        ------
+        ModelError
+            If what was stored does not hold for this parameter or these values.
+        """
+        if isinstance(self.model, StoredModel):
+            return StoredFrozen(self.model, self.varying)
+        from fastslow.diagrams.derived_fields import DerivedField
+
+        return DerivedField(self.model, self.varying)
+
+    @cached_property
     def compiled(self) -> CompiledField:
-        modes = [(mode.rates, mode.rows) for mode in self.modes]
-        return compile_field(self.model, *self.varying, modes=modes)
+        return self.source.compiled
 
     @cached_property
     def values(self) -> Array:
@@ -120,8 +202,9 @@ class FrozenField:
         return parameter_array(self.model, self.compiled)
 
     @cached_property
-    def modes(self) -> tuple[Mode, ...]:
-        return modes_of(self.model)
+    def modes(self) -> tuple[Any, ...]:
+        """Every smooth motion, as `Mode`, or as `FieldMode` of a stored model."""
+        return self.source.modes
 
     @cached_property
     def regions(self) -> tuple[str, ...]:
@@ -158,11 +241,10 @@ class FrozenField:
         octave = None if not size else round(math.log2(size))
         if octave not in self._units:
             names = (*self.model.states, *self.varying)
-            functions = [i.function for i in self.model.interfaces.values()]
-            values = {real(n): v for n, v in self.model.parameters.items()}
+            values = dict(self.model.parameters)
             if octave is not None:
-                values[real(self.parameter)] = 2.0**octave
-            units = natural_units(names, self.model.regions.values(), functions, values)
+                values[self.parameter] = 2.0**octave
+            units = self.source.unit_equations(values).units(names, values)
             self._units[octave] = np.array([units[n] for n in names])
         return self._units[octave]
 

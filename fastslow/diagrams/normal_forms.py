@@ -1,23 +1,16 @@
-"""Normal-form coefficients of special points, from second and third derivatives of the rates.
-
-SymPy derives them once for each set of rates; entries that vanish are left out.
-"""
+"""Normal-form coefficients of special points, from second and third derivatives of the rates."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.diagrams.fields import FrozenField
-from fastslow.model.known_functions import CLOSED, IN_MPMATH, OPEN
-from fastslow.model.structure import real
 
 Array = NDArray[np.float64]
 Vector = NDArray[Any]  # real or complex
@@ -68,67 +61,12 @@ class Multilinear:
         return result
 
 
-Entries = list[tuple[int, ...]]
-
-
-@lru_cache(maxsize=64)
-def derivatives(
-    rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...], others: tuple[sp.Symbol, ...]
-) -> tuple[Entries, Callable[..., Any]]:
-    """Derive all second and third derivatives that do not vanish.
-
-    Parameters
-    ----------
-    rates : tuple of sympy.Expr
-    states : tuple of Symbol
-    others : tuple of Symbol
-        Every other symbol of the rates.
-
-    Returns
-    -------
-    entries : list of tuple
-        (i, j, k) or (i, j, k, l) with j ≤ k ≤ l.
-    values : callable
-        Numbers for states and others to the list of values.
-
-    Examples
-    --------
-    >>> x, y = real("x"), real("y")
-    >>> entries, values = derivatives((x**2 * y, y), (x, y), ())
-    >>> entries, values(3.0, 5.0)
-    ([(0, 0, 0), (0, 0, 1), (0, 0, 0, 1)], [10.0, 6.0, 2])
-    """
-    table: dict[tuple[int, ...], sp.Expr] = {}
-    number = {symbol: k for k, symbol in enumerate(states)}
-    for i, rate in enumerate(rates):
-        level: dict[tuple[int, ...], sp.Expr] = {(i,): rate}
-        for _ in range(3):
-            deeper = {}
-            for index, expression in level.items():
-                first = index[-1] if len(index) > 1 else 0
-                present = sorted(number[s] for s in expression.free_symbols if s in number)
-                for j in present:
-                    if j >= first and (slope := expression.diff(states[j])) != 0:
-                        deeper[(*index, j)] = slope
-            level = deeper
-            table |= {k: e for k, e in level.items() if len(k) > 2}
-    entries = sorted(table, key=lambda k: (len(k), k))
-    found = [table[k] for k in entries]
-    special = any(e.has(*CLOSED, *OPEN) for e in found)
-    modules = [IN_MPMATH, "mpmath"] if special else "numpy"
-    return entries, sp.lambdify((*states, *others), found, modules, cse=True)
-
-
 def forms_at(field: FrozenField, region: int, u: Array) -> Multilinear:
     """Give the derivatives of a region's rates by the states at u = (states, parameters)."""
     model, n = field.model, field.n
-    rates = field.rates(region)
-    names = [*field.varying, *(p for p in model.parameters if p not in field.varying)]
-    entries, values = derivatives(
-        tuple(rates), tuple(map(real, model.states)), tuple(map(real, names))
-    )
-    fixed = [model.parameters[p] for p in names[len(field.varying) :]]
-    found: dict[int, tuple[Entries, list[float]]] = {2: ([], []), 3: ([], [])}
+    entries, values = field.source.derivatives(region)
+    fixed = [v for p, v in model.parameters.items() if p not in field.varying]
+    found: dict[int, tuple[list[tuple[int, ...]], list[float]]] = {2: ([], []), 3: ([], [])}
     for index, value in zip(entries, values(*u, *fixed), strict=True):
         places, numbers = found[len(index) - 1]
         orders = set(itertools.permutations(index[1:]))

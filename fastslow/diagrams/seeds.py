@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import finite, shown
 from fastslow.continuation.settings import Continuation
-from fastslow.diagrams.equations import region_equations
+from fastslow.diagrams.correcting import corrections, point_at
 from fastslow.diagrams.fields import FrozenField
-from fastslow.diagrams.solving import point_at
 from fastslow.diagrams.walking import Window, walk
 from fastslow.diagrams.windows import known, size_of
 from fastslow.errors import ArgumentError, unknown_name
@@ -217,7 +216,7 @@ class Seeds:
     ) -> list[Equilibrium]:
         """The equilibrium at a value, in the region whose rates have it nearest to a state."""
         best: tuple[bool, float, Equilibrium] | None = None
-        for number, equations in enumerate(region_equations(self._field)):
+        for number, equations in enumerate(corrections(self._field)):
             if regions and self._field.regions[number] not in regions:
                 continue
             solved = equations.corrected(state, value)

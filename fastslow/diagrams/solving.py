@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import flag, instance, mapping, takes
+from fastslow.diagrams.correcting import point_at
 from fastslow.diagrams.equations import among, region_equations
 from fastslow.diagrams.equilibrium_sets import all_known, in_a_set, sets_of
 from fastslow.diagrams.fields import IDLE, FrozenField, require_frozen
@@ -151,23 +152,6 @@ def solve_at(
     complete &= all(one.exact for one in sets) and all_known(along)
     distinct = _distinct(found, unit[:-1], field.periods)
     return Equilibria(distinct, "complete" if complete else "found", sets)
-
-
-def point_at(
-    field: FrozenField, region: int, u: Array, admissible: bool = True, continuum: bool = False
-) -> Equilibrium:
-    """The equilibrium at a point u, with its eigenvalues."""
-    rates, _ = field.curve(region, u)
-    return Equilibrium(
-        field.model.states,
-        field.wrapped(u[:-1]),
-        {**field.model.parameters, field.parameter: float(u[-1])},
-        field.regions[region],
-        admissible,
-        field.eigenvalues(region, u),
-        float(np.abs(rates).max()),
-        continuum,
-    )
 
 
 def _distinct(points: list[Equilibrium], unit: Array, periods: Array) -> list[Equilibrium]:

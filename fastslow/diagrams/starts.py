@@ -7,6 +7,7 @@ from functools import cached_property, lru_cache
 from itertools import pairwise, product
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.diagrams.critical import critical_values
@@ -14,7 +15,8 @@ from fastslow.diagrams.equations import region_equations
 from fastslow.diagrams.equilibrium_sets import all_known, covered
 from fastslow.diagrams.fields import FrozenField
 from fastslow.diagrams.solving import solve_at
-from fastslow.diagrams.windows import Sides, edges_left, edges_of, known, size_of, within
+from fastslow.diagrams.windows import Sides, edges_left, known, size_of, within
+from fastslow.model.structure import real
 from fastslow.results.branches import Branch
 from fastslow.results.points import Equilibrium
 from fastslow.results.windows import ON_EDGE, ROUNDING, StateWindow, state_window, typical
@@ -229,3 +231,20 @@ def starts_of(
 ) -> Starts:
     """Where tracing starts, searched for once."""
     return Starts(field, lower, upper, inside, window)
+
+
+def edges_of(window: StateWindow, sides: Sides) -> tuple[sp.Expr, ...]:
+    """Functions that vanish on the finite edges among some bounds of a window.
+
+    Examples
+    --------
+    >>> from fastslow.results.windows import state_window
+    >>> edges_of(state_window(("x", "y"), {"y": (0, 0.5)}), ((True, True), (False, True)))
+    (y - 1/2,)
+    """
+    found = []
+    for k, name in enumerate(window.states):
+        for bound, meant in zip((window.lower[k], window.upper[k]), sides[k], strict=True):
+            if meant and np.isfinite(bound):
+                found.append(real(name) - sp.Rational(bound))
+    return tuple(found)

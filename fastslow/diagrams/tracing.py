@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.arguments import (
@@ -26,25 +24,24 @@ from fastslow.arguments import (
 from fastslow.continuation.loops import loop, writeable
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.assembly import Curve, branch_of, joined, rising
-from fastslow.diagrams.equations import region_equations
-from fastslow.diagrams.equilibrium_sets import bands_of
-from fastslow.diagrams.fields import FrozenField, require_frozen
+from fastslow.diagrams.correcting import corrections, point_at
+from fastslow.diagrams.fields import FrozenField, StoredFrozen, require_frozen
 from fastslow.diagrams.seeds import Seeds
-from fastslow.diagrams.solving import point_at
-from fastslow.diagrams.starts import Starts, starts_of
 from fastslow.diagrams.walking import Piece, Window, beside, on_interface, walk
-from fastslow.errors import ArgumentError
-from fastslow.model.derived import once, partition_of
-from fastslow.model.model import Model
-from fastslow.model.structure import real
+from fastslow.errors import ArgumentError, ModelError
 from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.branches import Branch
 from fastslow.results.diagrams import SEARCHED, Diagram
+from fastslow.results.equilibrium_sets import EquilibriumBand
 from fastslow.results.outcome import Outcome, with_ends
 from fastslow.results.points import Equilibrium, SpecialPoint, SpecialPoints
-from fastslow.results.windows import LEFT, state_window
-from fastslow.symbolic.conserved import conserved_quantities
-from fastslow.symbolic.symmetries import free_directions
+from fastslow.results.stored_models import StoredModel
+from fastslow.results.windows import LEFT, StateWindow, state_window
+from fastslow.simulation.arguments import simulated
+
+if TYPE_CHECKING:
+    from fastslow.diagrams.starts import Starts
+    from fastslow.model.model import Model
 
 Array = NDArray[np.float64]
 
@@ -66,7 +63,7 @@ ADMISSIBLE = Outcome(
 
 
 @takes(
-    model=instance(Model),
+    model=simulated,
     parameter=formula,
     over=interval,
     continuation=instance(Continuation),
@@ -76,7 +73,7 @@ ADMISSIBLE = Outcome(
     from_points=items(),
 )
 def continue_equilibria(
-    model: Model,
+    model: Model | StoredModel,
     parameter: Any,
     over: tuple[float, float],
     *,
@@ -97,8 +94,9 @@ def continue_equilibria(
 
     Parameters
     ----------
-    model : Model
-        A frozen model; every parameter but ``parameter`` has a value.
+    model : Model or StoredModel
+        A frozen model; every parameter but ``parameter`` has a value. That of a diagram from a
+        file is a stored one: its branches are traced ``from_points``, without SymPy.
     parameter : str or Symbol
         What varies.
     over : (float, float)
@@ -135,8 +133,9 @@ def continue_equilibria(
 
     Examples
     --------
+    >>> import sympy as sp, fastslow as fs
     >>> x, w, t = sp.symbols("x w t")
-    >>> model = Model({x: w + x - x**3}, forcing={w: sp.sin(t)}).frozen()
+    >>> model = fs.Model({x: w + x - x**3}, forcing={w: sp.sin(t)}).frozen()
     >>> diagram = continue_equilibria(model, "w", (-1, 1))
     >>> [round(p["w"], 12) for p in diagram.folds]
     [0.38490017946, -0.38490017946]
@@ -152,17 +151,28 @@ def continue_equilibria(
     field = _field(model, name)
     continuation = continuation or Continuation()
     asked = state_window(model.states, window, model.periodic)
-    if from_points is None and (free := free_directions(model)):
-        why = Outcome("free direction", f"no branch of equilibria is traced; {free[0]}.", False)
-        return _without_branches(field, name, (lower, upper), continuation, why)
-    if from_points is None and (same := conserved_quantities(model)):
-        why = Outcome("conserved quantity", f"no branch of equilibria is traced; {same[0]}.", False)
-        return _without_branches(field, name, (lower, upper), continuation, why)
-    starts = (
-        starts_of(field, lower, upper, continuation.starts, asked)
-        if from_points is None
-        else Seeds(field, (lower, upper), from_points, asked, virtual)
-    )
+    starts: Starts | Seeds
+    if from_points is None:
+        if isinstance(model, StoredModel):
+            raise ModelError(
+                "this is a stored model, which has no equations in which to look for equilibria: "
+                "give from_points=, points of the branches that are to be traced"
+            )
+        from fastslow.diagrams.starts import starts_of
+        from fastslow.symbolic.conserved import conserved_quantities
+        from fastslow.symbolic.symmetries import free_directions
+
+        if free := free_directions(model):
+            why = Outcome("free direction", f"no branch of equilibria is traced; {free[0]}.", False)
+            return _without_branches(field, name, (lower, upper), continuation, why)
+        if same := conserved_quantities(model):
+            why = Outcome(
+                "conserved quantity", f"no branch of equilibria is traced; {same[0]}.", False
+            )
+            return _without_branches(field, name, (lower, upper), continuation, why)
+        starts = starts_of(field, lower, upper, continuation.starts, asked)
+    else:
+        starts = Seeds(field, (lower, upper), from_points, asked, virtual)
     within = Window(lower, upper, starts.scale, starts.window)
     branches: list[Branch] = []
     for admissible in (True, False) if virtual else (True,):
@@ -197,7 +207,7 @@ def continue_equilibria(
         "complete" if traced and starts.prove(branches) else "found",
         field.interfaces,
         field.regions,
-        _interface_values(field),
+        field.source.levels(),
         _text(model),
         corrector,
         with_ends(
@@ -205,13 +215,21 @@ def continue_equilibria(
             [branch.outcomes for branch in branches],
             unexplained,
         ),
-        {quantity: str(law) for quantity, law in model.path.items()},
+        field.source.path(),
         asdict(continuation),
         starts.window,
-        bands_of(field, lower, upper, asked) if from_points is None else (),
+        _bands(field, lower, upper, asked) if from_points is None else (),
         dict(model.periodic),
         field.model,
     )
+
+
+def _bands(
+    field: FrozenField, lower: float, upper: float, asked: StateWindow
+) -> tuple[EquilibriumBand, ...]:
+    from fastslow.diagrams.equilibrium_sets import bands_of
+
+    return bands_of(field, lower, upper, asked)
 
 
 def _ending(
@@ -255,11 +273,11 @@ def _without_branches(
         "found",
         field.interfaces,
         field.regions,
-        _interface_values(field),
+        field.source.levels(),
         _text(field.model),
         corrector,
         outcome,
-        {quantity: str(law) for quantity, law in field.model.path.items()},
+        field.source.path(),
         asdict(continuation),
         model=field.model,
     )
@@ -284,13 +302,13 @@ def _too_many(continuation: Continuation) -> Outcome:
 
 
 @lru_cache(maxsize=64)
-def _field(model: Model, name: str) -> FrozenField:
+def _field(model: Model | StoredModel, name: str) -> FrozenField:
     """The field of a model, made once."""
     return FrozenField(model.freed(name), name)
 
 
 @lru_cache(maxsize=64)
-def _text(model: Model) -> str:
+def _text(model: Model | StoredModel) -> str:
     """The equations as they were written, printed once."""
     return model.equations
 
@@ -496,53 +514,25 @@ def _labelled(branches: list[Branch], name: str, window: Window) -> tuple[Branch
     return tuple(done)
 
 
-def _interface_values(field: FrozenField) -> dict[str, tuple[str, float]]:
-    """Interfaces that are a constant value of one state, for drawing them as lines."""
-    values = field.model.values
-    found = {}
-    zero = tuple(s for s, v in values.items() if v == 0)
-    for name, state, parameters, level in _levels(field.model, field.parameter, zero):
-        try:
-            at = float(level(*(values[p] for p in parameters)))
-        except (ArithmeticError, ValueError, TypeError):
-            continue
-        if math.isfinite(at):
-            found[name] = (state, at)
-    return found
-
-
-@once(partition_of)
-def _levels(
-    model: Model, parameter: str, zero: tuple[sp.Symbol, ...]
-) -> list[tuple[str, str, list[sp.Symbol], Callable[..., float]]]:
-    """Interfaces h = a x + b with a state x and no varying parameter, and −b/a as a function.
-
-    With some parameters zero.
-    """
-    found = []
-    for name, interface in model.interfaces.items():
-        h = sp.sympify(interface.function).subs(dict.fromkeys(zero, 0))
-        states = [n for n in model.states if h.has(real(n))]
-        if len(states) != 1 or h.has(real(parameter)):
-            continue
-        slope = h.diff(real(states[0]))
-        if not slope.has(real(states[0])):
-            level = -h.subs(real(states[0]), 0) / slope
-            symbols = sorted(level.free_symbols, key=str)
-            found.append((name, states[0], symbols, sp.lambdify(symbols, level, "math")))
-    return found
-
-
 @dataclass(frozen=True, eq=False)
 class _Corrector:
     """A `Corrector` by the equations of a field."""
 
     field: FrozenField
 
+    @property
+    def stored(self) -> StoredModel:
+        """The model as it is kept with a diagram: with what its branches are traced by."""
+        source, model = self.field.source, self.field.model
+        if isinstance(source, StoredFrozen):
+            return source.model
+        stored: StoredModel = model.stored
+        return replace(stored, field=source.stored())
+
     def __call__(self, region: str, state: Array, value: float, /) -> Equilibrium | None:
         field = self.field
         number = field.regions.index(region)
-        solved = region_equations(field)[number].corrected(state, value)
+        solved = corrections(field)[number].corrected(state, value)
         if solved is None:
             return None
         u = np.append(solved, value)
@@ -553,7 +543,7 @@ class _Corrector:
     ) -> tuple[Array, NDArray[np.complex128]]:
         field = self.field
         number = field.regions.index(region)
-        solved = region_equations(field)[number].corrected_many(states, values)
+        solved = corrections(field)[number].corrected_many(states, values)
         found = np.full(solved.shape, np.nan, dtype=complex)
         known = ~np.isnan(solved).any(axis=1)
         if known.any():

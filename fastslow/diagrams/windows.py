@@ -1,15 +1,13 @@
-"""Equilibria in a window of the states, and the edges of the window as equations."""
+"""Equilibria in a window of the states."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.diagrams.fields import FrozenField
-from fastslow.model.structure import real
 from fastslow.results.branches import Branch
 from fastslow.results.points import Equilibrium
 from fastslow.results.windows import LEFT, StateWindow
@@ -18,23 +16,6 @@ Array = NDArray[np.float64]
 
 #: For each state, whether its lower and its upper bound are meant.
 Sides = tuple[tuple[bool, bool], ...]
-
-
-def edges_of(window: StateWindow, sides: Sides) -> tuple[sp.Expr, ...]:
-    """Functions that vanish on the finite edges among some bounds of a window.
-
-    Examples
-    --------
-    >>> from fastslow.results.windows import state_window
-    >>> edges_of(state_window(("x", "y"), {"y": (0, 0.5)}), ((True, True), (False, True)))
-    (y - 1/2,)
-    """
-    found = []
-    for k, name in enumerate(window.states):
-        for bound, meant in zip((window.lower[k], window.upper[k]), sides[k], strict=True):
-            if meant and np.isfinite(bound):
-                found.append(real(name) - sp.Rational(bound))
-    return tuple(found)
 
 
 def known(field: FrozenField, points: Sequence[Equilibrium]) -> np.ndarray:

@@ -105,7 +105,11 @@ def _terms(model: Model, name: str) -> list[frozenset[str]] | None:
         for term in sp.Add.make_args(sp.expand(rate)):
             powers = term.as_powers_dict().items()
             found.append(
-                frozenset(known[base] for base, power in powers if base in known and power >= 1)
+                frozenset(
+                    known[base]
+                    for base, power in powers
+                    if base in known and power.is_number and power >= 1
+                )
             )
     return list(dict.fromkeys(found))
 

@@ -10,19 +10,13 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from fastslow.model.interfaces import Region
 from fastslow.model.structure import real
+from fastslow.results.unit_equations import UnitEquations, negligible
 
 #: Functions whose value has the magnitude of their argument.
 _ALIKE = (sp.Abs, sp.Max, sp.Min)
-
-#: Weight, beside that of the equations, by which a unit that they leave open is one.
-_UNDETERMINED = 1e-9
-
-#: Smaller coefficients count as zero: no choice of units brings a term that matters here.
-NEGLIGIBLE = 1e-60
 
 _CONSTANT = ""
 
@@ -70,43 +64,24 @@ def natural_units(
     >>> natural_units(["x", "w"], [region], [], {})
     {'x': 1048576.0, 'w': 1099511627776.0}
     """
+    return unit_equations(names, regions, functions, values).units(
+        names, {symbol.name: value for symbol, value in values.items()}
+    )
+
+
+def unit_equations(
+    names: Sequence[str],
+    regions: Iterable[Region],
+    functions: Iterable[sp.Expr],
+    values: Mapping[sp.Symbol, float],
+) -> UnitEquations:
+    """The equations that `natural_units` solves, which hold at other parameter values too."""
     rates = (r for region in regions for r in (*region.rates.values(), *region.forcing.values()))
     expressions = (*rates, *functions)
     unknowns = tuple(n for n in names if real(n) not in values)
-    gone = frozenset(s for s, v in values.items() if _constant(v) is None)
+    gone = frozenset(s for s, v in values.items() if negligible(v))
     fixed = tuple((s, values[s]) for s in _in_exponents(expressions) if s in values)
-    equations = _equations(expressions, unknowns, tuple(values), gone, fixed)
-    known = {s: math.log2(abs(v)) for s, v in values.items() if v}
-    logs = equations.solved(np.array([0.0 if s in gone else known[s] for s in values]))
-    return {n: _power(logs.get(n, known.get(real(n), 0.0))) for n in names}
-
-
-@dataclass(frozen=True, eq=False)
-class _Equations:
-    """Linear equations for the logarithms of units, with those of the parameters' sizes given.
-
-    Parameters
-    ----------
-    columns : tuple of str
-        What is solved for.
-    matrix : ndarray, shape (E, columns)
-    right : ndarray, shape (E, 1 + P)
-        Constants, and coefficients of the logarithms of P parameters.
-    """
-
-    columns: tuple[str, ...]
-    matrix: NDArray[np.float64]
-    right: NDArray[np.float64]
-
-    def solved(self, logs: NDArray[np.float64]) -> dict[str, float]:
-        """Least-squares solution of least norm."""
-        if not self.columns:
-            return {}
-        normal = self.matrix.T @ self.matrix
-        normal[np.diag_indices_from(normal)] += _UNDETERMINED * len(self.matrix)
-        right = -(self.right[:, 0] + self.right[:, 1:] @ logs)
-        found = np.linalg.solve(normal, self.matrix.T @ right)
-        return dict(zip(self.columns, found.tolist(), strict=True))
+    return _equations(expressions, unknowns, tuple(values), gone, fixed)
 
 
 @lru_cache(maxsize=256)
@@ -123,7 +98,7 @@ def _equations(
     parameters: tuple[sp.Symbol, ...],
     gone: frozenset[sp.Symbol],
     fixed: tuple[tuple[sp.Symbol, float], ...],
-) -> _Equations:
+) -> UnitEquations:
     """The equations for all values of the parameters but those in exponents.
 
     ``gone`` are the parameters that are too small or too large to count.
@@ -145,12 +120,14 @@ def _equations(
                 right[row, places[name]] += coefficient
             else:
                 matrix[row, columns.index(name)] += coefficient
-    return _Equations(columns, matrix, right)
-
-
-def _power(log: float) -> float:
-    """The nearest power of two, within the range of normal numbers with some to spare."""
-    return float(2.0 ** round(min(max(log, -500.0), 500.0)))
+    return UnitEquations(
+        columns,
+        tuple(s.name for s in parameters),
+        tuple(sorted(s.name for s in gone)),
+        tuple(s.name for s, _ in fixed),
+        matrix,
+        right,
+    )
 
 
 #: A logarithm to base two as a linear form: unknown, number of a parameter or constant to its
@@ -237,4 +214,4 @@ def _constant(value: Any) -> _Form | None:
         size = abs(complex(value))
     except (TypeError, ValueError, ArithmeticError):
         return None
-    return {_CONSTANT: math.log2(size)} if NEGLIGIBLE < size < 1.0 / NEGLIGIBLE else None
+    return None if negligible(size) else {_CONSTANT: math.log2(size)}

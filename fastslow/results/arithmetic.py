@@ -38,6 +38,9 @@ _CONSTANTS = {"pi": np.pi, "e": np.e, "nan": np.nan, "inf": np.inf}
 #: Longest text, and the deepest one.
 LONGEST, DEEPEST = 10**6, 90
 
+#: Highest power that is written as one.
+HIGHEST = 2**16
+
 
 class UnknownOperationError(ValueError):
     """An operation that is none of the vocabulary; the message says which."""
@@ -48,6 +51,7 @@ _OPERATIONS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
 }
 _COMPARISONS: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Eq: np.equal,
@@ -122,6 +126,8 @@ def _check(node: ast.expr, names: set[str], depth: int, number: bool) -> None:
     while number and isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
         # a long sum is no deep one
         all_of([node.right], True)
+        if isinstance(node.op, ast.Pow):
+            _check_power(node)
         node = node.left
     match node:
         case ast.Constant(value=bool()) if not number:
@@ -149,6 +155,30 @@ def _check(node: ast.expr, names: set[str], depth: int, number: bool) -> None:
             if _may_call(function, arguments):
                 return all_of(arguments, True)
     raise UnknownOperationError(f"expected arithmetic, received {ast.unparse(node)[:80]}")
+
+
+def _check_power(node: ast.BinOp) -> None:
+    """Refuse high powers, and powers of powers of literals, whole numbers without end."""
+    base, exponent = (_holds(side, ast.Name) for side in (node.left, node.right))
+    high = not exponent and not _low(node.right)
+    if high or (not base and _holds(node.left, ast.Pow)):
+        raise UnknownOperationError(f"expected a low power, received {ast.unparse(node)[:80]}")
+
+
+def _holds(node: ast.expr, kind: type[ast.AST]) -> bool:
+    return any(isinstance(part, kind) for part in ast.walk(node))
+
+
+def _low(node: ast.expr) -> bool:
+    """Whether a literal, or a fraction of two, is a power that is written as one."""
+    match node:
+        case ast.UnaryOp(operand=operand):
+            return _low(operand)
+        case ast.BinOp(left=above, op=ast.Div(), right=ast.Constant()):
+            return _low(above)
+        case ast.Constant(value=float() | int() as value):
+            return abs(value) <= HIGHEST
+    return False
 
 
 def _may_call(function: ast.expr, arguments: list[ast.expr]) -> bool:
@@ -188,20 +218,36 @@ def value_of(text: str, values: Mapping[str, Any]) -> NDArray[np.float64]:
     >>> value_of("math.sqrt(p0) / 2.0", {"p0": np.array([4.0, 16.0])})
     array([1., 2.])
     """
-    with np.errstate(all="ignore"):
-        return np.asarray(_value(_parsed(text), values), dtype=float)
+    given = {name: np.asarray(value, dtype=float) for name, value in values.items()}
+    try:
+        with np.errstate(all="ignore"):
+            return np.asarray(evaluated(text, given), dtype=float)
+    except ArithmeticError:
+        # of literals alone
+        return np.asarray(np.nan)
+
+
+def evaluated(text: str, values: Mapping[str, Any]) -> Any:
+    """The value of arithmetic, of the kind that Python and NumPy give for the kinds of the values.
+
+    Raises
+    ------
+    UnknownOperationError
+        As `value_of`.
+    ArithmeticError
+        As Python's own numbers raise.
+    """
+    return _value(_parsed(text), values)
 
 
 def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
     match node:
-        case ast.Constant(value=bool() as value):
+        case ast.Constant(value=value):
             return value
-        case ast.Constant(value=float() | int() as value):
-            return np.float64(value)
         case ast.Name(id=name) if name in values:
-            return np.asarray(values[name], dtype=float)
+            return values[name]
         case ast.Attribute(attr=name):
-            return np.float64(_CONSTANTS[name])
+            return _CONSTANTS[name]
         case ast.UnaryOp(op=ast.USub(), operand=a):
             return -_value(a, values)
         case ast.UnaryOp(op=ast.Not(), operand=a):

@@ -24,6 +24,7 @@ from fastslow.results.outcome import CUT_SHORT, Outcome
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.result import LIVE, STORED, Result
 from fastslow.results.selecting import limits_of
+from fastslow.results.stored_models import StoredModel
 from fastslow.results.tables import Table
 from fastslow.results.unexplained import UnexplainedChange, unexplained_changes
 from fastslow.results.windows import LEFT, StateWindow
@@ -111,6 +112,12 @@ class Diagram(Table, Result):
     bands: tuple[EquilibriumBand, ...] = ()
     periods: Mapping[str, float] = field(default_factory=dict)
     model: Any = field(default=None, repr=False, metadata=STORED)
+
+    @property
+    def stored_model(self) -> StoredModel | None:
+        """The model as a file keeps it, with what its branches are traced by."""
+        source = self.model if self.corrector is None else self.corrector
+        return getattr(source, "stored", None)
 
     def __len__(self) -> int:
         return len(self.branches)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
@@ -19,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.errors import ArgumentError, ModelError
+from fastslow.errors import ArgumentError, raised_by_handler
 from fastslow.results.named import Named
 from fastslow.results.points import Equilibria, SpecialPoints
 from fastslow.results.stored_models import StoredModel
@@ -174,7 +175,7 @@ def _record(value: Any, path: str, arrays: dict[str, Array]) -> Any:
             continue
         part = getattr(value, entry.name)
         if _is_stored(entry):
-            part = _stored(part)
+            part = _stored(value)
             if part is None:
                 continue
         where = f"{path}/{entry.name}" if path else entry.name
@@ -182,12 +183,24 @@ def _record(value: Any, path: str, arrays: dict[str, Array]) -> Any:
     return {"class": type(value).__name__, "fields": kept}
 
 
-def _stored(model: Any) -> StoredModel | None:
-    """The stored form of a model, None where there is none or it cannot be simulated."""
+def _stored(value: Any) -> StoredModel | None:
+    """The stored model of a result, None where there is none.
+
+    Where it cannot be made the result is kept without it, with a warning: numbers are not lost
+    because of equations.
+    """
     try:
-        return None if model is None else model.stored
-    except ModelError:
+        found = value.stored_model
+    except Exception as error:
+        if raised_by_handler(error):
+            raise
+        warnings.warn(
+            f"the model of this {type(value).__name__} is not kept in the file: {error}",
+            RuntimeWarning,
+            stacklevel=2,
+        )
         return None
+    return found if isinstance(found, StoredModel) else None
 
 
 def _is_stored(entry: Field[Any]) -> bool:

@@ -21,6 +21,7 @@ from fastslow.results.immutable import Immutable
 from fastslow.results.operations import Operations
 from fastslow.results.result import Result
 from fastslow.results.sign_patterns import Pattern, possible_patterns, scaled_row
+from fastslow.results.stored_fields import StoredField
 from fastslow.results.typed import has_types
 
 #: What a stored model cannot do, and what to do then.
@@ -152,7 +153,8 @@ def _sign(text: str, numbers: Mapping[str, float]) -> int | None:
 class StoredModel(Result):
     """A model from a file, which runs without SymPy.
 
-    `fastslow.simulate` takes it in place of the `Model` that it was, with the same
+    `fastslow.simulate` takes it in place of the `Model` that it was, and so does
+    `fastslow.continue_equilibria` from points of a diagram's branches, with the same
     results bit for bit. It has that model's equations as text alone: what needs them in
     SymPy says so. ``Model.stored`` makes one; runs are saved with the one of their model.
 
@@ -171,6 +173,8 @@ class StoredModel(Result):
     operations : Operations
     traits : Traits
     validity : Validity
+    field : StoredField, optional
+        Of a frozen model that is kept with a diagram: its rates over the parameter.
 
     Examples
     --------
@@ -197,6 +201,7 @@ class StoredModel(Result):
     operations: Operations
     traits: Traits
     validity: Validity
+    field: StoredField | None = None
 
     #: Why it is not what is asked for where a `Model` is.
     not_enough = INSTEAD
@@ -261,6 +266,21 @@ class StoredModel(Result):
             traits = replace(traits, rising=self.validity.rising_at(values))
         return replace(self, parameters=values, traits=traits)
 
+    def freed(self, name: object) -> StoredModel:
+        """The model without the value of a slow quantity that was frozen.
+
+        Raises
+        ------
+        ModelError
+            For any other parameter.
+        """
+        key = normalised(str(name))
+        if key not in self.free:
+            raise ModelError(
+                f"whether the regions stay the same over {key} is not known: {INSTEAD}"
+            )
+        return replace(self, parameters={n: v for n, v in self.parameters.items() if n != key})
+
     def _check_regions(self, changed: Sequence[str], values: Mapping[str, float]) -> None:
         """Raise where the model has other regions, or that cannot be told."""
         now, blocked = self.validity, [n for n in changed if n in self.validity.steady]
@@ -290,6 +310,10 @@ class StoredModel(Result):
         ):
             raise UnknownOperationError("expected the names and sizes of one model")
         self.operations.check()
+        if self.field is not None:
+            if not known.issuperset((self.field.parameter, *self.field.names)):
+                raise UnknownOperationError("expected names of parameters")
+            self.field.check(self.states, self.interfaces)
         self._check_traits(sizes)
         self._check_validity(sizes)
 
@@ -341,9 +365,7 @@ class StoredModel(Result):
 
 
 #: What a `Model` can do by its equations alone.
-_OF_MODELS = frozenset(
-    ("continuous", "freed", "frozen", "path", "ramped", "rates", "to_latex", "vanished")
-)
+_OF_MODELS = frozenset(("continuous", "frozen", "path", "ramped", "rates", "to_latex", "vanished"))
 
 
 def finite_number(what: str, value: object) -> float:

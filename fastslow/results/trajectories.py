@@ -124,6 +124,11 @@ class Trajectory(Queries, Recurrence, Table, Result):
     _places = ("t",)
 
     @property
+    def stored_model(self) -> StoredModel | None:
+        """The model as a file keeps it."""
+        return None if self.model is None else self.model.stored
+
+    @property
     def symbolic_model(self) -> Any:
         """The model with its equations in SymPy, None of a run from a file."""
         return None if isinstance(self.model, StoredModel) else self.model

@@ -8,6 +8,8 @@ from functools import cache
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
+import numpy as np
+
 
 def has_types(value: Any) -> bool:
     """Whether the fields of a dataclass, and all inside of them, are of exactly their types.
@@ -40,6 +42,8 @@ def _is(value: Any, hint: Any) -> bool:
         if inner[1:] == (...,):
             return all(_is(item, inner[0]) for item in value)
         return len(value) == len(inner) and all(map(_is, value, inner))
+    if origin is np.ndarray:
+        return isinstance(value, np.ndarray)
     if origin is Mapping:
         kind, of = inner
         return isinstance(value, Mapping) and all(

@@ -6,7 +6,8 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.compiled.fields import compile_field, parameter_array
+from fastslow.compiled.field_code import parameter_array
+from fastslow.compiled.fields import compile_field
 from fastslow.diagrams.fields import FrozenField
 
 
