@@ -316,6 +316,8 @@ def test_an_epidemic_passes_below_its_threshold_and_back(rtol):
 
 def test_states_that_vanish_together_are_told_from_an_oscillation():
     assert states_together(Model({x: v, v: -x, y: 1 - y})) == ()
+    # a power that is not known may be less than one
+    assert states_together(Model({x: v - x**a, v: x - v, y: 1 - y}, parameters={a: 2})) == ()
     assert states_together(Model({x: v - x, v: x - 2 * v})) == ()
     assert states_together(Model({x: v - x, v: x - 2 * v, y: 1 - y + x})) == (("x", "v"),)
     fractions = Model({S: 1 - S * sick / (S + E), E: S * sick / (S + E) - E, sick: E - 2 * sick})

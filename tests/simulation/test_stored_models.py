@@ -231,13 +231,13 @@ def test_what_needs_equations_says_so():
     stored = gear().stored
     what = "stored as numbers, without its equations; build the Model from its equations"
     for call in (
-        lambda: fs.continue_equilibria(stored, "w", (0, 1)),
+        lambda: fs.equilibria(stored),
         lambda: fs.simulate_many(stored, [[0, 0]], t=(0, 1)),
         lambda: fs.derive(stored),
     ):
         with pytest.raises(fs.ArgumentError, match=f"expected a Model, received a Stored.*{what}"):
             call()
-    for name in ("frozen", "freed", "ramped", "rates", "to_latex"):
+    for name in ("frozen", "ramped", "rates", "to_latex"):
         with pytest.raises(AttributeError, match=f"a stored model has no {name}: .*{what}"):
             getattr(stored, name)
     with pytest.raises(AttributeError, match="no attribute 'frozn'"):
