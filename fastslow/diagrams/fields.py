@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -265,7 +265,7 @@ class FrozenField:
         size, natural = largest[:-1], self.units_at(float(largest[-1]))[: self.n]
         doubtful = size <= DOUBTFUL * natural
         if doubtful.any():
-            known = np.any([self.certain(*point) for point in points], axis=0)
+            known = self.certain(points).any(axis=0)
             size = np.where(doubtful & ~known, natural, size)
         return size
 
@@ -276,6 +276,8 @@ class FrozenField:
 
     def wrapped(self, state: Array) -> Array:
         """A state with angles in their principal range."""
+        if not self.model.periodic:
+            return np.array(state, dtype=float)
         return principal(state, self.periods)
 
     @cached_property
@@ -520,7 +522,7 @@ class FrozenField:
         Told by their ratio at points in general position, as x − D and x + D at D = 0.
         """
         count = len(self.interfaces)
-        points = np.random.default_rng(0).normal(size=(6, self.n + self.compiled.k)) * self.units
+        points = _points(self.n + self.compiled.k) * self.units
         points *= 10.0 ** np.arange(0.0, -24.0, -4.0)[:, None]
         with np.errstate(all="ignore"):
             h = self.at(0, points)[2][:, :count]
@@ -529,25 +531,32 @@ class FrozenField:
         same = (np.abs(crossed) <= 1e-12 * np.abs(products)).all(axis=0)
         return [np.flatnonzero(same[k] | (np.arange(count) == k)).tolist() for k in range(count)]
 
-    def certain(self, region: int, u: Array) -> NDArray[np.bool_]:
-        """Which states of an equilibrium are more than rounding, shape (n,)."""
-        return np.asarray(np.abs(u[: self.n]) > NOISE * self.rounding(region, u))
+    def certain(self, points: Sequence[tuple[int, Array]]) -> NDArray[np.bool_]:
+        """Which states of equilibria, as `sizes` is given them, are more than rounding."""
+        found = np.zeros((len(points), self.n), dtype=bool)
+        for region in {region for region, _ in points}:
+            rows = [k for k, (number, _) in enumerate(points) if number == region]
+            table = np.array([points[k][1] for k in rows])
+            found[rows] = np.abs(table[:, : self.n]) > NOISE * self._rounding(region, table)
+        return found
 
     @np.errstate(all="ignore")
-    def rounding(self, region: int, u: Array) -> Array:
-        """Bound on the error of each state at an equilibrium, shape (n,).
+    def _rounding(self, region: int, table: Array) -> Array:
+        """Bound on the error of each state at equilibria of a region, shape (N, n).
 
         |J⁻¹| (|F| + ε (|J| |x| + |F_p| |p|)), of what is left and of rounding, in the
         units of the states; infinite where J is singular.
         """
-        rates, slopes, _, _ = self.at(region, u)
-        jacobian = slopes[:, : self.n]
+        rates, slopes, _, _ = self.at(region, table)
+        rounding = np.finfo(float).eps * (np.abs(slopes) @ np.abs(table)[:, :, None])
+        left = np.abs(rates)[:, :, None] + rounding
         try:
-            inverse = np.linalg.inv(jacobian)
+            inverses = np.linalg.inv(slopes[:, :, : self.n])
         except np.linalg.LinAlgError:
-            return np.full(self.n, np.inf)
-        rounding = np.finfo(float).eps * (np.abs(slopes) @ np.abs(u))
-        return np.asarray(np.abs(inverse) @ (np.abs(rates) + rounding))
+            if len(table) > 1:
+                return np.concatenate([self._rounding(region, row[None]) for row in table])
+            return np.full((1, self.n), np.inf)
+        return np.asarray((np.abs(inverses) @ left)[:, :, 0])
 
     def tangent(self, region: int, u: Array, weight: Array) -> tuple[Array, bool]:
         """Null vector of [F_x F_p], unit in the weighted norm, and whether it is the only one."""
@@ -561,3 +570,9 @@ class FrozenField:
         least = max(EMPTY * sizes.max(initial=0.0), np.finfo(float).tiny)
         _, singular, right = np.linalg.svd(matrix / np.maximum(sizes, least)[:, None])
         return right[-1] * scale, bool(singular[-1] > 1e-9)
+
+
+@cache
+def _points(columns: int) -> Array:
+    """Points in general position, shape (6, columns)."""
+    return np.random.default_rng(0).normal(size=(6, columns))

@@ -152,9 +152,9 @@ class Seeds:
                 if moved[-1] == 0:
                     moved = np.arange(len(piece.u), dtype=float)
                 places = np.searchsorted(moved, np.linspace(0, moved[-1], SAMPLES))
-                for row in piece.u[places]:
-                    certain = field.certain(piece.region, row)
-                    samples.append(np.where(certain, row[:-1], 0.0))
+                rows = piece.u[places]
+                certain = field.certain([(piece.region, row) for row in rows])
+                samples += [*np.where(certain, rows[:, :-1], 0.0)]
         return np.array(samples)
 
     def _read(self, name: str, given: Any, window: StateWindow) -> list[Equilibrium]:

@@ -143,8 +143,13 @@ def solve_at(
         for state in states:
             u = np.append(state, value)
             admissible = field.admissible(number, u, unit)
-            wanted = virtual and not (sides and sides.escaping) and field.virtual(number, u, unit)
-            if (admissible and not in_a_set(along, u, unit[:-1])) or (wanted and not admissible):
+            if admissible:
+                wanted = not in_a_set(along, u, unit[:-1])
+            elif sides is None:
+                wanted = virtual
+            else:
+                wanted = virtual and not sides.escaping and field.virtual(number, u, unit)
+            if wanted:
                 found.append(point_at(field, number, u, admissible, continuum=whole))
     sets = sets_of(along, value) if with_sets else []
     corners = [corner for one in sets for corner in one.equilibria]

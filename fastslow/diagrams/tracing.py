@@ -195,7 +195,7 @@ def continue_equilibria(
     missed = starts.missed(branches)
     sound = all(o.success or o.code == LEFT for branch in branches for o in branch.outcomes)
     corrector = _Corrector(field)
-    labelled = _labelled(branches, name, within)
+    labelled = _labelled(branches, name, within, corrector)
     unexplained = sum(len(branch.unexplained) for branch in labelled)
     traced = sound and not full and not missed and not unexplained
     return Diagram(
@@ -203,7 +203,7 @@ def continue_equilibria(
         name,
         (lower, upper),
         dict(field.model.parameters),
-        tuple(replace(branch, corrector=corrector) for branch in labelled),
+        labelled,
         "complete" if traced and starts.prove(branches) else "found",
         field.interfaces,
         field.regions,
@@ -488,8 +488,13 @@ def _holds(field: FrozenField, branch: Branch, rows: Array, u: Array, window: Wi
     return False
 
 
-def _labelled(branches: list[Branch], name: str, window: Window) -> tuple[Branch, ...]:
-    """Labels LP1, LP2, … in order along the branches; a shared branch point has one label."""
+def _labelled(
+    branches: list[Branch], name: str, window: Window, corrector: _Corrector
+) -> tuple[Branch, ...]:
+    """The branches with their corrector and the labels of special points.
+
+    Labels LP1, LP2, … in order along the branches; a shared branch point has one label.
+    """
 
     def near(one: SpecialPoint, other: SpecialPoint) -> bool:
         here, there = (np.append(p.state, p.parameters[name]) for p in (one, other))
@@ -510,7 +515,7 @@ def _labelled(branches: list[Branch], name: str, window: Window) -> tuple[Branch
             points.append(replace(point, label=label))
             if point.code == "BP":
                 shared.append(points[-1])
-        done.append(replace(branch, special=SpecialPoints(points)))
+        done.append(replace(branch, special=SpecialPoints(points), corrector=corrector))
     return tuple(done)
 
 

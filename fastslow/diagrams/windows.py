@@ -20,23 +20,22 @@ Sides = tuple[tuple[bool, bool], ...]
 
 def known(field: FrozenField, points: Sequence[Equilibrium]) -> np.ndarray:
     """Which components of equilibria are more than rounding, shape (m, n)."""
-    found = []
-    for e in points:
-        # sliding along several interfaces is no mode of the field
-        if e.region in field.regions:
-            u = np.append(e.state, e.parameters.get(field.parameter, 0.0))
-            found.append(field.certain(field.regions.index(e.region), u))
-        else:
-            found.append(np.abs(e.state) > 0)
-    return np.reshape(found, (-1, field.n)).astype(bool)
+    found = np.reshape([np.abs(e.state) > 0 for e in points], (-1, field.n)).astype(bool)
+    # sliding along several interfaces is no mode of the field
+    rows = [k for k, e in enumerate(points) if e.region in field.regions]
+    found[rows] = field.certain([_place(field, points[k]) for k in rows])
+    return found
+
+
+def _place(field: FrozenField, point: Equilibrium) -> tuple[int, Array]:
+    """Number of the region, and the point u."""
+    value = point.parameters.get(field.parameter, 0.0)
+    return field.regions.index(point.region), np.append(point.state, value)
 
 
 def size_of(field: FrozenField, points: Sequence[Equilibrium]) -> Array:
     """Unit of each state by some equilibria, shape (n,)."""
-    name = field.parameter
-    return field.sizes(
-        [(field.regions.index(e.region), np.append(e.state, e.parameters[name])) for e in points]
-    )
+    return field.sizes([_place(field, e) for e in points])
 
 
 def within(

@@ -45,6 +45,7 @@ Cell = frozenset[tuple[sp.Expr, int]]
 Values = Mapping[sp.Symbol, float]
 
 
+@lru_cache(maxsize=4096)
 def real(name: str) -> sp.Symbol:
     """The real symbol of a name: the one that every expression inside uses."""
     return sp.Symbol(normalised(name), real=True)

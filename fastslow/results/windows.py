@@ -160,6 +160,8 @@ class StateWindow:
 
     def shifted(self, states: Array) -> Array:
         """States, shape (…, n), shifted by whole periods into the window's ranges."""
+        if not self.periods:
+            return np.array(states, dtype=float)
         low, high = np.array(self.lower), np.array(self.upper)
         bounded = (self._periods > 0) & np.isfinite(low)
         middle = np.where(bounded, low, 0.0) / 2.0 + np.where(bounded, high, 0.0) / 2.0

@@ -170,7 +170,7 @@ def constant_null_space(
     >>> constant_null_space([[k * x * y, -x * y]], [x, y], {k: 2})
     [[1, k]]
     """
-    distinct = tuple(row for row in dict.fromkeys(map(tuple, rows)) if any(e != 0 for e in row))
+    distinct = _distinct(tuple(map(tuple, rows)))
     if not distinct:
         return []
     numbers = _numbers(distinct, states, values)
@@ -193,6 +193,12 @@ def constant_null_space(
         if not any(e.free_symbols & set(states) for e in constant) and not any(along):
             found.append(constant)
     return found
+
+
+@lru_cache(maxsize=64)
+def _distinct(rows: tuple[tuple[sp.Expr, ...], ...]) -> tuple[tuple[sp.Expr, ...], ...]:
+    """Every row that is not zero, once."""
+    return tuple(row for row in dict.fromkeys(rows) if any(e != 0 for e in row))
 
 
 def _by_kernels(row: Sequence[sp.Expr], states: Sequence[sp.Symbol]) -> list[list[sp.Expr]]:
