@@ -249,9 +249,12 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
                     accepted = False
             if step > 4.0 * smallest:
                 for i in range(n):
-                    slack = TANGENT / math.sqrt(local[i])
                     before = step * unit * direction[i]
                     after = step * new_unit * turned[i]
+                    if not (before < 0.0 < after or after < 0.0 < before):
+                        # no turn, and so no dip
+                        continue
+                    slack = TANGENT / math.sqrt(local[i])
                     if guess[i] > low[i] and _dips(
                         max(last[i] - low[i], 0.0) + slack,
                         before,
@@ -282,12 +285,12 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
         if guess[n] < lower or guess[n] > upper:
             return RANGE
         for i in range(n):
-            slack = TANGENT / math.sqrt(local[i])
-            if guess[i] < low[i] - slack or guess[i] > high[i] + slack:
-                return WINDOW
+            if guess[i] < low[i] or guess[i] > high[i]:
+                slack = TANGENT / math.sqrt(local[i])
+                if guess[i] < low[i] - slack or guess[i] > high[i] + slack:
+                    return WINDOW
         if closing and count > 4:
             ahead = 0.0
-            apart = 0.0
             same = 0.0
             for j in range(size):
                 gap = start[j] - last[j]
@@ -295,14 +298,16 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
                     gap -= periods[j] * np.round(gap / periods[j])
                 ahead += gap * local[j] * direction[j] * unit
                 same += tangent[j] * weight[j] * turned[j]
-            for j in range(size):
-                gap = start[j] - last[j]
-                if j < n and periods[j] > 0.0:
-                    gap -= periods[j] * np.round(gap / periods[j])
-                off = gap - ahead * direction[j] * unit
-                apart += off * off * local[j]
-            if 0.0 < ahead <= step and math.sqrt(apart) < 0.2 * step and same > 0.9:
-                return CLOSED
+            if 0.0 < ahead <= step and same > 0.9:
+                apart = 0.0
+                for j in range(size):
+                    gap = start[j] - last[j]
+                    if j < n and periods[j] > 0.0:
+                        gap -= periods[j] * np.round(gap / periods[j])
+                    off = gap - ahead * direction[j] * unit
+                    apart += off * off * local[j]
+                if math.sqrt(apart) < 0.2 * step:
+                    return CLOSED
         if used <= 3 and cosine > wide:
             step = min(1.5 * step, largest * min(farthest, GROWTH))
         elif used >= 6:

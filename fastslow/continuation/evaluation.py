@@ -363,6 +363,11 @@ def pairs(jacobians, result):  # type: ignore[no-untyped-def]
 
 
 @unfused_part
+def _modulus(value):  # type: ignore[no-untyped-def]
+    return abs(value.real) if value.imag == 0.0 else math.hypot(value.real, value.imag)
+
+
+@unfused_part
 def sums_of_two(pairs, rounding, result):  # type: ignore[no-untyped-def]
     """Fill in the relative sums of two eigenvalues each, shape (N, 2).
 
@@ -374,7 +379,8 @@ def sums_of_two(pairs, rounding, result):  # type: ignore[no-untyped-def]
         total = one.real + other.real
         if not math.isfinite(total + one.imag + other.imag) or total == 0.0:
             continue
-        first, second = math.hypot(one.real, one.imag), math.hypot(other.real, other.imag)
+        first = _modulus(one)
+        second = first if other == one.conjugate() else _modulus(other)
         noise = rounding * 2.0 * max(first, second)
         # of a complex pair the noise is that of the real part
         if one.imag != 0.0 or other.imag != 0.0:

@@ -15,6 +15,7 @@ from fastslow.diagrams.two_folds import two_fold_residual
 from fastslow.diagrams.walking import Piece, Walk, Window
 from fastslow.results.angles import principal
 from fastslow.results.branches import Branch
+from fastslow.results.immutable import read_only
 from fastslow.results.outcome import Outcome
 from fastslow.results.points import NEUTRAL, ClarkePath, SpecialPoint, SpecialPoints
 from fastslow.results.stored_models import StoredModel
@@ -101,8 +102,9 @@ def branch_of(
             special.append(_corner(field, curve, number))
             at_row.append(rows - 1)
     u = _centred(field, np.concatenate([t[0] for t in tables]), window)
-    tangents = np.concatenate([t[1] for t in tables])
-    eigenvalues = np.concatenate([t[2] for t in tables])
+    # nobody else has these: a read-only array is kept as it is
+    tangents = read_only(np.concatenate([t[1] for t in tables]))
+    eigenvalues = read_only(np.concatenate([t[2] for t in tables]))
     names = np.array(field.regions)[[t[3] for t in tables]]
     region = np.repeat(names, [len(t[0]) for t in tables])
     if not curve.closed:
