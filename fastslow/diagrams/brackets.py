@@ -18,6 +18,10 @@ Array = NDArray[np.float64]
 #: Steps by which a bracket is narrowed, beyond which it is at rounding.
 NARROWINGS = 80
 
+#: Newton's method is tried after each of so many narrowings, and then after twice as many as the
+#: last time, as it costs more than they do.
+TRIED_EACH = 4
+
 #: A minimum is computed where less than this fraction of the smallest value may be left.
 DIP = 0.5
 
@@ -120,10 +124,12 @@ class Search:
         side = 0
         for count in range(NARROWINGS):
             part = weight_a * f / (weight_a * f - weight_b * g)
-            if count >= narrowings:
-                located = locate(a + part * (b - a))
-                if located.converged and self._inside(located.u, a, b):
-                    return located
+            tried = count - narrowings
+            if tried >= 0:
+                if tried < TRIED_EACH or tried.bit_count() == 1:
+                    located = locate(a + part * (b - a))
+                    if located.converged and self._inside(located.u, a, b):
+                        return located
                 # regula falsi may hold on to one end
                 part = 0.5 if count % 2 else part
             found = self.between(a, b, part)

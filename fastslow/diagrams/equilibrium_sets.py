@@ -22,6 +22,7 @@ from fastslow.continuation.ordering import in_order
 from fastslow.diagrams.equations import region_equations
 from fastslow.diagrams.exact_polynomials import real_roots
 from fastslow.diagrams.fields import IDLE, FrozenField
+from fastslow.model.functions import numpy_function
 from fastslow.model.motions import Motion, motions_of
 from fastslow.model.rational import exact
 from fastslow.model.structure import real
@@ -113,11 +114,11 @@ class Family:
 
     @cached_property
     def _states(self) -> Callable[..., Any]:
-        return sp.lambdify(self._symbols, list(self.solved), "numpy")
+        return numpy_function(self._symbols, list(self.solved))
 
     @cached_property
     def _bounds(self) -> Callable[..., Any]:
-        return sp.lambdify(self._symbols, list(self.bounds), "numpy")
+        return numpy_function(self._symbols, list(self.bounds))
 
     @cached_property
     def _turned(self) -> Callable[..., Any]:
@@ -252,7 +253,7 @@ class Family:
         rates = sp.Matrix([exact(r).subs(numbers) for r in self.motion.rates])
         heights = sp.Matrix([exact(h).subs(numbers) for h in _heights(self.field, self.motion)])
         both = [rates.jacobian(names).tolist(), heights.jacobian(names).tolist()]
-        return sp.lambdify([*names, real(self.field.parameter)], both, "numpy")
+        return numpy_function([*names, real(self.field.parameter)], both)
 
     def _polytope(self, value: float) -> EquilibriumSet | None:
         """Ranges of the states by linear programming, corners by solving for the weights."""
@@ -345,7 +346,7 @@ class Family:
         """The weights and their derivatives by the free states, at places along a last axis."""
         weights = sp.Matrix([1 - e for e in self.bounds[: 2 * len(self.motion.slides) : 2]])
         both = [list(weights), list(weights.jacobian(self.free))]
-        return sp.lambdify(self._symbols, both, "numpy")
+        return numpy_function(self._symbols, both)
 
     def _newton(
         self, value: float, places: Array, targets: Array

@@ -20,6 +20,7 @@ from fastslow.diagrams.exact_polynomials import real_roots
 from fastslow.diagrams.fields import require_frozen
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.errors import ArgumentError, ModelError
+from fastslow.model.functions import numpy_function
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.model import Model
 from fastslow.model.motions import drift
@@ -182,7 +183,7 @@ class Contact:
 
     @cached_property
     def _function(self) -> Any:
-        return sp.lambdify([real(n) for n in self.unknown], list(self.equations), "numpy")
+        return numpy_function([real(n) for n in self.unknown], list(self.equations))
 
     @cached_property
     def _details(self) -> Any:
@@ -194,7 +195,7 @@ class Contact:
         rows = [i.function for i in self.model.interfaces.values()]
         whole = [second, drift(h, names, other), *rows]
         exact = [e.subs(self.numbers) for e in whole]
-        return sp.lambdify([real(n) for n in self.unknown], exact, "numpy")
+        return numpy_function([real(n) for n in self.unknown], exact)
 
     @cached_property
     def _jumps(self) -> bool:
@@ -225,7 +226,7 @@ class Contact:
         if any(v is None for v in values):
             return self._searched(), False
         guesses = []
-        formula = sp.lambdify(left.unknowns, left.state({}, names), "numpy")
+        formula = numpy_function(left.unknowns, left.state({}, names))
         for roots in product(*(v for v in values if v is not None)):
             with np.errstate(all="ignore"):
                 guesses.append(np.array(formula(*roots), dtype=float))

@@ -11,6 +11,7 @@ import sympy as sp
 from fastslow.arguments import shown
 from fastslow.errors import ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
+from fastslow.model.functions import numpy_function
 from fastslow.model.structure import Structure, real, sympified
 
 #: Random states and parameter values at which an expression is compared with its copy.
@@ -89,7 +90,7 @@ def _repeats(expression: sp.Expr, name: str, period: sp.Expr, values: Mapping[st
     for row, one in enumerate(symbols):
         if one.name in values:
             table[row] = values[one.name]
-    both = sp.lambdify(symbols, [expression, moved], "numpy")
+    both = numpy_function(symbols, [expression, moved])
     with np.errstate(all="ignore"):
         try:
             first, second = (np.broadcast_to(v, POINTS).astype(float) for v in both(*table))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.formulas.columns import evaluated
+from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.branches import Branch
@@ -94,7 +95,7 @@ def _agrees(model: Model, branch: Branch, diagram: Diagram) -> bool | None:
     if any(symbol.name not in known for symbol in symbols):
         return False
     columns = [np.broadcast_to(known[symbol.name], len(rows)) for symbol in symbols]
-    both = sp.lambdify(symbols, [*rates, *slopes], "numpy", cse=True)
+    both = numpy_function(symbols, [*rates, *slopes], cse=True)
     with np.errstate(all="ignore"):
         found = [[float(v) for v in both(*numbers)] for numbers in zip(*columns, strict=True)]
     n = len(states)

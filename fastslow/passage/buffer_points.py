@@ -12,6 +12,7 @@ import sympy as sp
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from fastslow.model.functions import numpy_function
 from fastslow.model.structure import real
 from fastslow.passage.critical_modes import CriticalMode
 from fastslow.passage.roots import sign_change
@@ -130,7 +131,7 @@ def _functions(mode: CriticalMode) -> Callable[..., Any]:
     # real symbols would let SymPy simplify what is complex here
     plain = {n: sp.Dummy(n.name) for n in names}
     matrix = sp.Matrix([rate.xreplace(plain) for rate in rates])
-    return sp.lambdify(list(plain.values()), matrix.jacobian(list(plain.values())), "numpy")
+    return numpy_function(list(plain.values()), matrix.jacobian(list(plain.values())))
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.compiled.fields import compile_function
+from fastslow.model.functions import numpy_function
 from fastslow.model.structure import TIME, read_expression, real
 
 Array = NDArray[np.float64]
@@ -56,7 +57,7 @@ class DriftLaw:
     @cached_property
     def _function(self) -> Callable[..., Any]:
         symbols = [*map(real, self.names), TIME]
-        function: Callable[..., Any] = sp.lambdify(symbols, self.expression, "numpy")
+        function: Callable[..., Any] = numpy_function(symbols, self.expression)
         return function
 
     def at(self, u: Array, time: float) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from fastslow.model.functions import numpy_function
 from fastslow.model.structure import TIME, real
 from fastslow.passage.critical_modes import CriticalMode
 from fastslow.passage.entry_exits import NUMERICAL, SAFETY
@@ -107,13 +108,13 @@ def path_of(mode: CriticalMode, slow: SlowQuantity, start: float, left: float) -
         beyond = None
         if model is not None and not slow.laws:
             law = _numbers(model, model.forcing[name])
-            beyond = _vectorised(sp.lambdify(TIME, law, "numpy"))
+            beyond = _vectorised(numpy_function(TIME, law))
         return SlowPath(slow, start, end, beyond, "the forcing")
     law = None if model is None else _numbers(model, model.rates[name])
     names = [real(n) for n in (*slow.states, name)]
     if law is None or not law.free_symbols <= {*names, TIME}:
         return SlowPath(slow, start, left, None, "")
-    rate = sp.lambdify([*names, TIME], law, "numpy")
+    rate = numpy_function([*names, TIME], law)
     return SlowPath(slow, start, left, _along_the_branch(mode, slow, rate, left), "the branch")
 
 
@@ -379,7 +380,7 @@ def _feedback(growth: Growth, at: float) -> float:
     names = [real(n) for n in (*slow.states, name)]
     others = [n for n in slow.run.columns if n not in (*slow.states, name)]
     symbols = [*names, *map(real, others), TIME]
-    slopes = sp.lambdify(symbols, [law.diff(n) for n in names], "numpy")
+    slopes = numpy_function(symbols, [law.diff(n) for n in names])
     edges = np.linspace(growth.path.start, at, FEEDBACK + 1)
     times = 0.5 * (edges[1:] + edges[:-1])
     total = 0.0

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import finite_numbers, flag, instance, mapping, numbers, shown, takes, text
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.periods import frequencies
 from fastslow.model.structure import TIME, real
@@ -203,7 +204,7 @@ def slow_load_criterion(
     def number(expression: sp.Expr, **more: Floats) -> Floats:
         used = sorted(expression.free_symbols, key=lambda s: s.name)
         given = {**values, **more}
-        result = sp.lambdify(used, expression, "numpy")(*(given[s.name] for s in used))
+        result = numpy_function(used, expression)(*(given[s.name] for s in used))
         return np.broadcast_to(np.asarray(result, dtype=float), shape)
 
     rate = np.abs(number(omega))

@@ -12,6 +12,7 @@ import sympy as sp
 
 from fastslow.errors import ArgumentError
 from fastslow.model.derived import once, partition_of
+from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.named import Named
@@ -230,7 +231,7 @@ def _function_of(
 ) -> tuple[list[sp.Symbol], Callable[..., Any]]:
     """The symbols in slopes, and the slopes as a function of these."""
     symbols = sorted(set().union(*(e.free_symbols for r in slopes for e in r)), key=str)
-    return symbols, sp.lambdify(symbols, [list(r) for r in slopes], "numpy")
+    return symbols, numpy_function(symbols, [list(r) for r in slopes])
 
 
 @cache

@@ -27,7 +27,7 @@ NAMES = (
     "quantity_named_q",
 )
 
-TRIALS = 60
+TRIALS = 20
 
 
 @cache
