@@ -17,13 +17,14 @@ class Keyed(Generic[V]):
     (True, False)
     """
 
-    __slots__ = ("key", "value")
+    __slots__ = ("_hash", "key", "value")
 
     def __init__(self, key: Hashable, value: V) -> None:
-        self.key, self.value = key, value
+        # once: a dictionary asks for it again when the process ends, where SymPy has none
+        self.key, self.value, self._hash = key, value, hash(key)
 
     def __hash__(self) -> int:
-        return hash(self.key)
+        return self._hash
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Keyed) and bool(self.key == other.key)

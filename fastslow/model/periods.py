@@ -38,7 +38,7 @@ def common_period(
     Examples
     --------
     >>> t = sp.Symbol("t", real=True)
-    >>> common_period([sp.sin(2*t) + sp.cos(3*t)], t, {}) == 2 * math.pi
+    >>> common_period([sp.sin(2*t) + sp.cos(3*t)], t, {}) == 2 * np.pi
     True
     >>> common_period([sp.sin(t) + sp.sin(sp.sqrt(2)*t)], t, {}) is None
     True

@@ -366,18 +366,18 @@ class Structure:
         return shared(structure), frozenset(s.name for s in used)
 
 
-_structures: WeakValueDictionary[Any, Structure] = WeakValueDictionary()
-_partitions: WeakValueDictionary[Any, Partition] = WeakValueDictionary()
+_structures: WeakValueDictionary[Keyed[None], Structure] = WeakValueDictionary()
+_partitions: WeakValueDictionary[Keyed[None], Partition] = WeakValueDictionary()
 
 
 def shared(structure: Structure) -> Structure:
     """The structure in use that is equal to this one, so that they are compared in no time."""
-    return _structures.setdefault(structure.content, structure)
+    return _structures.setdefault(Keyed(structure.content, None), structure)
 
 
 def _shared_partition(one: Partition) -> Partition:
     content = (one.structure, tuple(one.interfaces.items()), tuple(one.regions.items()))
-    return _partitions.setdefault(content, one)
+    return _partitions.setdefault(Keyed(content, None), one)
 
 
 @lru_cache(maxsize=PARTITIONS)
