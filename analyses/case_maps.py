@@ -34,8 +34,8 @@ from analyses.passages import OMEGA
 from analyses.regime_maps import critical_ratio
 from fastslow.passage.regimes import regimes_at
 from fastslow.plot.areas import FILLS
-from fastslow.plot.style import FULL, MM, SMALL, TEXT, VERMILION, dressed, new_figure
-from fastslow.results.refined_maps import MapComparison
+from fastslow.plot.layout.style import FULL, MM, SMALL, TEXT, VERMILION, dressed, new_figure
+from fastslow.results.maps.adaptive_map import MapComparison
 from fastslow.systems.gears import SCALINGS
 
 Floats = NDArray[np.float64]

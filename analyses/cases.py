@@ -10,7 +10,7 @@ import numpy as np
 import fastslow as fs
 from analyses.output import Output
 from analyses.passages import OMEGA, PERIODS, Case, Setting, laid
-from fastslow.plot.style import FULL, MM, SMALL, TEXT, dressed, new_figure
+from fastslow.plot.layout.style import FULL, MM, SMALL, TEXT, dressed, new_figure
 from fastslow.systems.gears import Scaling, gear_scales
 
 #: Gap of figure 5; the source leaves it out.

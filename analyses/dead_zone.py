@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 import fastslow as fs
 from analyses.claims import Claim, Finding
 from analyses.output import Output
-from fastslow.plot.bands import draw_bands
-from fastslow.plot.style import BRANCH, LINES, axes_for
-from fastslow.plot.typesetting import typeset
+from fastslow.plot.layout.bands import draw_bands
+from fastslow.plot.layout.style import BRANCH, LINES, axes_for
+from fastslow.plot.layout.typesetting import typeset
 
 GAP = 0.25
 

@@ -18,7 +18,7 @@ from analyses.cases import GAP, gear, laid_cases
 from analyses.claims import Claim, Finding
 from analyses.output import Output
 from analyses.passages import Case
-from fastslow.plot.style import (
+from fastslow.plot.layout.style import (
     BLACK,
     BLUE,
     FULL,

@@ -17,7 +17,7 @@ import fastslow as fs
 from analyses.cases import FASTEST, WIDTHS, gear
 from analyses.output import Output
 from analyses.regime_maps import critical_ratio
-from fastslow.plot.style import FULL, MM, TEXT, dressed, new_figure
+from fastslow.plot.layout.style import FULL, MM, TEXT, dressed, new_figure
 from fastslow.systems.gears import SCALINGS
 
 Floats = NDArray[np.float64]

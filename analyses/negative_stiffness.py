@@ -20,7 +20,7 @@ from analyses.claims import Claim, Finding
 from analyses.output import Output
 from analyses.passages import OMEGA, Case, Setting, draw, laid
 from analyses.physical_route import within
-from fastslow.plot.style import FULL, MM, SMALL, TEXT, dressed, new_figure
+from fastslow.plot.layout.style import FULL, MM, SMALL, TEXT, dressed, new_figure
 from fastslow.systems.gears import SCALINGS
 
 Floats = NDArray[np.float64]

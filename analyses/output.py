@@ -7,7 +7,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from fastslow.plot.style import save
+from fastslow.plot.layout.style import save
 
 #: Dots per inch of the figures that the pages show.
 SHOWN = 150

@@ -21,7 +21,7 @@ from analyses.cases import FASTEST, GAP, NARROW, STIFFNESSES, WIDTHS, gear
 from analyses.claims import Claim, Finding
 from analyses.output import Output
 from fastslow.model.structure import real
-from fastslow.plot.style import (
+from fastslow.plot.layout.style import (
     BLACK,
     BLUE,
     FULL,

@@ -22,7 +22,7 @@ from analyses.gap_region import STATED
 from analyses.output import Output
 from fastslow.passage.regimes import regimes_at
 from fastslow.plot.areas import FILLS
-from fastslow.plot.style import FULL, GREY, MM, SMALL, TEXT, dressed, new_figure
+from fastslow.plot.layout.style import FULL, GREY, MM, SMALL, TEXT, dressed, new_figure
 
 Floats = NDArray[np.float64]
 

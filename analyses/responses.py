@@ -29,7 +29,7 @@ from analyses.claims import Claim, Finding
 from analyses.output import Output
 from analyses.passages import OMEGA, REST
 from analyses.stiffness import flank
-from fastslow.plot.style import (
+from fastslow.plot.layout.style import (
     BLACK,
     BLUE,
     FULL,

@@ -28,7 +28,7 @@ from analyses.claims import LITTLE, Claim, Finding
 from analyses.output import Output
 from analyses.passages import PERIODS, Case
 from analyses.physical_route import within
-from fastslow.plot.style import (
+from fastslow.plot.layout.style import (
     BLACK,
     BLUE,
     FULL,

@@ -19,7 +19,7 @@ from analyses.claims import Claim, Finding
 from analyses.negative_stiffness import case as folded_case
 from analyses.output import Output
 from analyses.passages import PERIODS, Case
-from fastslow.plot.style import (
+from fastslow.plot.layout.style import (
     BLACK,
     BLUE,
     FULL,
@@ -33,7 +33,7 @@ from fastslow.plot.style import (
     dressed,
     new_figure,
 )
-from fastslow.results.delays import GapTransit
+from fastslow.results.overlay.delays import GapTransit
 from fastslow.systems.gears import SCALINGS
 
 FIGURES = ("gap_width", "stiffness", "load_amplitude")

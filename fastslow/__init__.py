@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fastslow import plot, systems
     from fastslow.continuation.settings import Continuation
-    from fastslow.diagrams.point_curves import continue_points
-    from fastslow.diagrams.solving import equilibria
-    from fastslow.diagrams.tangency_points import tangencies
-    from fastslow.diagrams.tracing import continue_equilibria
+    from fastslow.diagrams.curves.point_curves import continue_points
+    from fastslow.diagrams.curves.tangency_points import tangencies
+    from fastslow.diagrams.solve.solving import equilibria
+    from fastslow.diagrams.trace.tracing import continue_equilibria
     from fastslow.errors import (
         ArgumentError,
         FastSlowError,
@@ -26,110 +26,110 @@ if TYPE_CHECKING:
         OutOfRangeError,
         UnknownNameError,
     )
+    from fastslow.exporters.sources import export
     from fastslow.interactive.explorers import explore
     from fastslow.interactive.pointers import inspect
     from fastslow.model.model import Model
-    from fastslow.passage.delay_laws import predict_delay
-    from fastslow.passage.hopf_delays import hopf_exit
-    from fastslow.passage.overlays import overlay
+    from fastslow.passage.delays.delay_laws import predict_delay
+    from fastslow.passage.delays.hopf_delays import hopf_exit
+    from fastslow.passage.delays.scaling_runs import delay_scaling
+    from fastslow.passage.overlay.overlays import overlay
     from fastslow.passage.regimes import classify_regime, regime_map
-    from fastslow.passage.scaling_runs import delay_scaling
     from fastslow.passage.slow_loads import slow_load_criterion, slow_load_gap
     from fastslow.precompilation import precompile
-    from fastslow.results.auto_files import read_auto
-    from fastslow.results.branches import Branch
-    from fastslow.results.delay_scalings import DelayScaling
-    from fastslow.results.diagrams import Diagram
-    from fastslow.results.drifts import Drift
-    from fastslow.results.ensembles import Ensemble
-    from fastslow.results.files import load
-    from fastslow.results.lyapunov import LyapunovExponent
-    from fastslow.results.overlays import Overlay
-    from fastslow.results.point_branches import PointBranch, PointCurves
+    from fastslow.results.branch.branch import Branch
+    from fastslow.results.branch.diagram import Diagram
+    from fastslow.results.branch.point_branch import PointBranch, PointCurves
+    from fastslow.results.io.auto_files import read_auto
+    from fastslow.results.io.files import load
+    from fastslow.results.maps.adaptive_map import RefinedMap
+    from fastslow.results.overlay.delay_scaling import DelayScaling
+    from fastslow.results.overlay.drifts import Drift
+    from fastslow.results.overlay.overlay import Overlay
+    from fastslow.results.overlay.slow_loads import SlowLoad
     from fastslow.results.points import Equilibrium, SpecialPoint
-    from fastslow.results.refined_maps import RefinedMap
-    from fastslow.results.regimes import Regimes, RegimeSet
-    from fastslow.results.sections import Section
-    from fastslow.results.slow_loads import SlowLoad
-    from fastslow.results.spectra import Spectrum
-    from fastslow.results.steady import SteadyState
-    from fastslow.results.sweeps import Sweep
-    from fastslow.results.trajectories import Trajectory
-    from fastslow.simulation.ensembles import simulate_many
-    from fastslow.simulation.separations import lyapunov_exponent
+    from fastslow.results.trajectory.ensemble import Ensemble
+    from fastslow.results.trajectory.lyapunov import LyapunovExponent
+    from fastslow.results.trajectory.periodicity import SteadyState
+    from fastslow.results.trajectory.regimes import Regimes, RegimeSet
+    from fastslow.results.trajectory.section import Section
+    from fastslow.results.trajectory.spectrum import Spectrum
+    from fastslow.results.trajectory.sweep import Sweep
+    from fastslow.results.trajectory.trajectory import Trajectory
+    from fastslow.simulation.lyapunov import lyapunov_exponent
+    from fastslow.simulation.many import simulate_many
+    from fastslow.simulation.one import simulate
     from fastslow.simulation.settings import Integration
-    from fastslow.simulation.sweeping import bifurcation_sweep
-    from fastslow.simulation.trajectories import simulate
+    from fastslow.simulation.sweep import bifurcation_sweep
     from fastslow.sweeps.refinement import refined_map
     from fastslow.symbolic.derivation import Derivation, derive
     from fastslow.symbolic.reduction import reduce_states
     from fastslow.symbolic.scaling import disagreements, nondimensionalise
-    from fastslow.symbolic.sources import export
 
 __version__ = "0.1.0"
 
 _HOME = {
     "ArgumentError": "errors",
-    "Branch": "results.branches",
+    "Branch": "results.branch.branch",
     "Continuation": "continuation.settings",
-    "DelayScaling": "results.delay_scalings",
+    "DelayScaling": "results.overlay.delay_scaling",
     "Derivation": "symbolic.derivation",
-    "Diagram": "results.diagrams",
-    "Drift": "results.drifts",
-    "Ensemble": "results.ensembles",
+    "Diagram": "results.branch.diagram",
+    "Drift": "results.overlay.drifts",
+    "Ensemble": "results.trajectory.ensemble",
     "Equilibrium": "results.points",
     "FastSlowError": "errors",
     "FileError": "errors",
     "Integration": "simulation.settings",
     "IncompleteWarning": "errors",
-    "LyapunovExponent": "results.lyapunov",
+    "LyapunovExponent": "results.trajectory.lyapunov",
     "MissingPackageError": "errors",
     "Model": "model.model",
     "ModelError": "errors",
     "OutOfRangeError": "errors",
-    "Overlay": "results.overlays",
-    "PointBranch": "results.point_branches",
-    "PointCurves": "results.point_branches",
-    "RefinedMap": "results.refined_maps",
-    "RegimeSet": "results.regimes",
-    "Regimes": "results.regimes",
-    "Section": "results.sections",
-    "SlowLoad": "results.slow_loads",
+    "Overlay": "results.overlay.overlay",
+    "PointBranch": "results.branch.point_branch",
+    "PointCurves": "results.branch.point_branch",
+    "RefinedMap": "results.maps.adaptive_map",
+    "RegimeSet": "results.trajectory.regimes",
+    "Regimes": "results.trajectory.regimes",
+    "Section": "results.trajectory.section",
+    "SlowLoad": "results.overlay.slow_loads",
     "SpecialPoint": "results.points",
-    "Spectrum": "results.spectra",
-    "SteadyState": "results.steady",
-    "Sweep": "results.sweeps",
-    "Trajectory": "results.trajectories",
+    "Spectrum": "results.trajectory.spectrum",
+    "SteadyState": "results.trajectory.periodicity",
+    "Sweep": "results.trajectory.sweep",
+    "Trajectory": "results.trajectory.trajectory",
     "UnknownNameError": "errors",
-    "bifurcation_sweep": "simulation.sweeping",
+    "bifurcation_sweep": "simulation.sweep",
     "classify_regime": "passage.regimes",
-    "continue_equilibria": "diagrams.tracing",
-    "continue_points": "diagrams.point_curves",
-    "delay_scaling": "passage.scaling_runs",
+    "continue_equilibria": "diagrams.trace.tracing",
+    "continue_points": "diagrams.curves.point_curves",
+    "delay_scaling": "passage.delays.scaling_runs",
     "derive": "symbolic.derivation",
     "disagreements": "symbolic.scaling",
-    "equilibria": "diagrams.solving",
+    "equilibria": "diagrams.solve.solving",
     "explore": "interactive.explorers",
-    "export": "symbolic.sources",
-    "hopf_exit": "passage.hopf_delays",
+    "export": "exporters.sources",
+    "hopf_exit": "passage.delays.hopf_delays",
     "inspect": "interactive.pointers",
-    "load": "results.files",
-    "lyapunov_exponent": "simulation.separations",
+    "load": "results.io.files",
+    "lyapunov_exponent": "simulation.lyapunov",
     "nondimensionalise": "symbolic.scaling",
-    "overlay": "passage.overlays",
+    "overlay": "passage.overlay.overlays",
     "plot": "",
     "precompile": "precompilation",
-    "predict_delay": "passage.delay_laws",
-    "read_auto": "results.auto_files",
+    "predict_delay": "passage.delays.delay_laws",
+    "read_auto": "results.io.auto_files",
     "reduce_states": "symbolic.reduction",
     "refined_map": "sweeps.refinement",
     "regime_map": "passage.regimes",
-    "simulate": "simulation.trajectories",
-    "simulate_many": "simulation.ensembles",
+    "simulate": "simulation.one",
+    "simulate_many": "simulation.many",
     "slow_load_criterion": "passage.slow_loads",
     "slow_load_gap": "passage.slow_loads",
     "systems": "",
-    "tangencies": "diagrams.tangency_points",
+    "tangencies": "diagrams.curves.tangency_points",
 }
 
 __all__ = [

@@ -8,14 +8,14 @@ import numpy as np
 import sympy as sp
 
 from fastslow.arguments import instance, takes
-from fastslow.compiled.store import writable_directory
 from fastslow.continuation.settings import Continuation
-from fastslow.diagrams.tracing import continue_equilibria
+from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import FileError
+from fastslow.kernels.cache.store import writable_directory
 from fastslow.model.model import Model
-from fastslow.simulation.ensembles import simulate_many
+from fastslow.simulation.many import simulate_many
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.simulation.trajectories import simulate
 
 
 @takes(models=instance(Model))

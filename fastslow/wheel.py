@@ -7,11 +7,11 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from fastslow.compiled import shipped, store
-from fastslow.compiled.generic import Entry
-from fastslow.compiled.loop_compiler import compiled_object
-from fastslow.compiled.loop_target import platform_name
 from fastslow.disk import write_file, write_text
+from fastslow.kernels.cache import shipped, store
+from fastslow.kernels.loop_compiler import compiled_object
+from fastslow.kernels.loop_target import platform_name
+from fastslow.kernels.loops import Entry
 
 
 def entries() -> Iterator[Entry]:

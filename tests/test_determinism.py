@@ -11,7 +11,7 @@ PROGRAM = """
 import hashlib, json, sys
 import sympy as sp
 import fastslow as fs
-from fastslow.results.encoding import encoded
+from fastslow.results.io.encoding import encoded
 
 backwards, threads = sys.argv[1] == "backwards", int(sys.argv[2])
 gear = fs.systems.harmonic_gear(omega=0.1)

@@ -15,15 +15,15 @@ from matplotlib.figure import Figure
 
 import fastslow as fs
 from fastslow.disk import read_file, write_file, write_text
-from fastslow.plot.style import save
-from fastslow.results.spectra import Spectrum
+from fastslow.plot.layout.style import save
+from fastslow.results.trajectory.spectrum import Spectrum
 
 ROOT = Path(fs.__file__).parent
 
 #: The calls of each file that open something else than a file on disk.
 OTHER = {
-    "results/storage.py": {"archive.open"},  # a member of an archive in memory
-    "plot/style.py": {"figure.savefig"},  # into memory
+    "results/io/npz_netcdf.py": {"archive.open"},  # a member of an archive in memory
+    "plot/layout/style.py": {"figure.savefig"},  # into memory
 }
 
 

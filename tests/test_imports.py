@@ -12,7 +12,7 @@ import fastslow
 
 ROOT = Path(fastslow.__file__).parent
 #: Run by what builds wheels, and by nothing of this package.
-HOOK = ROOT / "compiled" / "build.py"
+HOOK = ROOT / "kernels" / "build.py"
 FILES = sorted(path for path in ROOT.rglob("*.py") if path != HOOK)
 PACKAGE_INIT = ROOT / "__init__.py"
 
@@ -29,7 +29,8 @@ LAYERS = [
     "diagrams",
     "continuation",
     "simulation",
-    "compiled",
+    "kernels",
+    "exporters",
     "symbolic",
     "model",
     "results",

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 import fastslow as fs
-from fastslow.compiled import store
+from fastslow.kernels.cache import store
 
 MODEL = """
 import sympy as sp, fastslow as fs

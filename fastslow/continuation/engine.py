@@ -10,8 +10,6 @@ import math
 
 import numpy as np
 
-from fastslow.compiled.parts import unfused_part
-from fastslow.compiled.pointers import call_address
 from fastslow.continuation.spaces import (
     CLOSED,
     FULL,
@@ -21,6 +19,8 @@ from fastslow.continuation.spaces import (
     SMALL_STEP,
     WINDOW,
 )
+from fastslow.kernels.decorators import unfused_part
+from fastslow.kernels.pointers import call_address
 
 #: A state is measured by this part of its distance from the middle of the equilibria at which
 #: branches start, once that exceeds its unit: a branch to infinity has rows equal in log(x).

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from fastslow.compiled.parts import unfused_part
-from fastslow.compiled.pointers import call_address
 from fastslow.continuation.engine import solve
 from fastslow.continuation.location import DUST, ROUNDING
+from fastslow.kernels.decorators import unfused_part
+from fastslow.kernels.pointers import call_address
 
 #: Rounding of one operation.
 EPS = 2.220446049250313e-16

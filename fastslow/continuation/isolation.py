@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastslow.compiled.parts import unfused_part
 from fastslow.continuation.spaces import PAUSED, TABLE_FULL
+from fastslow.kernels.decorators import unfused_part
 
 #: By how much a box is enlarged on either side before Krawczyk's test, in units of its width.
 #: A solution on the face of two boxes is then inside both.

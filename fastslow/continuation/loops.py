@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.compiled.generic import Loop, load_loop
-from fastslow.compiled.records import ComplexMatrix, Flags, Integers, Matrix, Tensor, Vector
 from fastslow.continuation.spaces import (
     Boxes,
     Curve,
@@ -22,6 +20,8 @@ from fastslow.continuation.spaces import (
     Traced,
     TraceSpace,
 )
+from fastslow.kernels.loops import Loop, load_loop
+from fastslow.kernels.records import ComplexMatrix, Flags, Integers, Matrix, Tensor, Vector
 
 _ENGINE = "fastslow.continuation.engine"
 _EVALUATION = "fastslow.continuation.evaluation"

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import wraps
 from typing import NamedTuple, ParamSpec, TypeVar
 
-from fastslow.compiled.records import Integers, Matrix, Tensor, Vector, zeros
+from fastslow.kernels.records import Integers, Matrix, Tensor, Vector, zeros
 
 P = ParamSpec("P")
 R = TypeVar("R")

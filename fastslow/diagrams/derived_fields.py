@@ -12,18 +12,18 @@ from typing import Any
 
 import sympy as sp
 
-from fastslow.compiled.field_code import CompiledField
-from fastslow.compiled.fields import compile_field, named_rows, operations_of
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.diagrams.rate_derivatives import derivatives
+from fastslow.kernels.field_code import CompiledField
+from fastslow.kernels.fields import compile_field, named_rows, operations_of
 from fastslow.model.derived import once, partition_of
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.model.traits import text_of
 from fastslow.model.units import unit_equations
-from fastslow.results.arithmetic import UnknownOperationError, check_number
-from fastslow.results.stored_fields import Derivatives, FieldMode, FieldSides, StoredField
-from fastslow.results.unit_equations import UnitEquations
+from fastslow.results.stored.arithmetic import UnknownOperationError, check_number
+from fastslow.results.stored.fields import Derivatives, FieldMode, FieldSides, StoredField
+from fastslow.results.stored.unit_equations import UnitEquations
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,7 +71,7 @@ def modes_of(model: Model) -> tuple[Mode, ...]:
     """Every region of a frozen model, then sliding and escaping along each discontinuity.
 
     Sliding along several interfaces at once is no mode of a branch; the equilibria
-    within it are found one value at a time (see `fastslow.diagrams.equilibrium_sets`).
+    within it are found one value at a time (see `fastslow.diagrams.solve.equilibrium_sets`).
 
     Examples
     --------

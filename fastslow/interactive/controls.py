@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from fastslow.errors import FastSlowError
 from fastslow.interactive.sliders import Slider
-from fastslow.results.tables import extra
+from fastslow.results.base.table import extra
 
 if TYPE_CHECKING:
     from fastslow.interactive.explorers import Explorer

@@ -11,12 +11,12 @@ from matplotlib.axes import Axes
 from fastslow.interactive.picking import Curve, curves_of, run_curve
 from fastslow.interactive.views import View
 from fastslow.plot.branches import DiagramDrawing, draw_branches
-from fastslow.plot.labels import place
+from fastslow.plot.layout.labels import place
+from fastslow.plot.layout.style import GREY, MOTION, TEXT
+from fastslow.plot.layout.typesetting import paragraph, typeset
 from fastslow.plot.motions import draw_motion, phase_portrait, time_series
 from fastslow.plot.passages import draw_passage
 from fastslow.plot.quantities import Quantity, along_run
-from fastslow.plot.style import GREY, MOTION, TEXT
-from fastslow.plot.typesetting import paragraph, typeset
 
 #: Where the label of a special point stands, in points from it.
 BESIDE = (13.0, 7.0)

@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 
 from fastslow.interactive.tooltips import text_of
 from fastslow.interactive.views import View
-from fastslow.plot.quantities import Quantity, at_crossings
-from fastslow.plot.stretches import runs, worth_a_marker
-from fastslow.plot.style import (
+from fastslow.plot.layout.style import (
     BANDS,
     BRANCH,
     GREY,
@@ -25,12 +23,14 @@ from fastslow.plot.style import (
     VERMILION,
     point_colour,
 )
-from fastslow.plot.typesetting import GREEK
-from fastslow.results.branches import Branch
-from fastslow.results.crossings import regions_at
+from fastslow.plot.layout.typesetting import GREEK
+from fastslow.plot.quantities import Quantity, at_crossings
+from fastslow.plot.stretches import runs, worth_a_marker
+from fastslow.results.branch.branch import Branch
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import type_of
-from fastslow.results.trajectories import Trajectory
+from fastslow.results.trajectory.crossings import regions_at
+from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

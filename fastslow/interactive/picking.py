@@ -14,7 +14,8 @@ from fastslow.arguments import class_of
 from fastslow.errors import ArgumentError
 from fastslow.interactive.tooltips import text_of
 from fastslow.plot.branches import DiagramDrawing
-from fastslow.plot.marks import at_moments
+from fastslow.plot.layout.marks import at_moments
+from fastslow.plot.layout.style import root
 from fastslow.plot.motions import MotionDrawing
 from fastslow.plot.panels import PanelDrawing
 from fastslow.plot.passages import OverlayDrawing
@@ -27,13 +28,12 @@ from fastslow.plot.quantities import (
     at_points,
     at_times,
 )
-from fastslow.plot.style import root
-from fastslow.results.branches import Branch
-from fastslow.results.diagrams import Diagram
-from fastslow.results.moments import Moment
-from fastslow.results.overlays import Overlay
+from fastslow.results.branch.branch import Branch
+from fastslow.results.branch.diagram import Diagram
+from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.points import Equilibrium
-from fastslow.results.trajectories import Trajectory
+from fastslow.results.trajectory.state_at import Moment
+from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

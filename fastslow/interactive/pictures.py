@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from fastslow.interactive.drawing import draw_view
 from fastslow.interactive.picking import Curve
 from fastslow.interactive.views import View
-from fastslow.plot.style import SMALL, VERMILION, dressed
-from fastslow.plot.typesetting import plain
+from fastslow.plot.layout.style import SMALL, VERMILION, dressed
+from fastslow.plot.layout.typesetting import plain
 
 #: Size of a figure of our own, in inches, and places of its axes in it.
 SIZE = (9.0, 5.0)

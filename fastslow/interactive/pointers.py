@@ -13,11 +13,11 @@ from matplotlib.text import Annotation
 from fastslow.arguments import function, takes
 from fastslow.errors import MissingPackageError
 from fastslow.interactive.picking import Curve, Pick, curves_of, pick
-from fastslow.plot.style import BLACK, GREY, SMALL, printed
-from fastslow.plot.typesetting import paragraph
-from fastslow.results.diagrams import Diagram
-from fastslow.results.overlays import Overlay
-from fastslow.results.trajectories import Trajectory
+from fastslow.plot.layout.style import BLACK, GREY, SMALL, printed
+from fastslow.plot.layout.typesetting import paragraph
+from fastslow.results.branch.diagram import Diagram
+from fastslow.results.overlay.overlay import Overlay
+from fastslow.results.trajectory.trajectory import Trajectory
 
 
 @takes(on_click=function)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.results.crossings import Crossing
+from fastslow.results.overlay.transitions import Transition
 from fastslow.results.points import Equilibrium, SpecialPoint
-from fastslow.results.transitions import Transition
+from fastslow.results.trajectory.crossings import Crossing
 
 #: Letters in a line of a sentence.
 WIDTH = 44

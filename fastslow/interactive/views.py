@@ -10,17 +10,17 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fastslow.arguments import interval
-from fastslow.diagrams.tracing import continue_equilibria
+from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import ArgumentError, FastSlowError, unknown_name
 from fastslow.model.model import Model
-from fastslow.passage.overlays import overlay
-from fastslow.results.diagrams import Diagram
-from fastslow.results.outcome import Outcome
-from fastslow.results.overlays import Overlay
-from fastslow.results.trajectories import Trajectory
+from fastslow.passage.overlay.overlays import overlay
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.branch.diagram import Diagram
+from fastslow.results.overlay.overlay import Overlay
+from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import initial_state, time_span
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import DEFAULT, Integration
-from fastslow.simulation.trajectories import simulate
 
 R = TypeVar("R")
 Range = tuple[float, float]

@@ -8,7 +8,7 @@ from random import Random
 import mpmath
 import sympy as sp
 
-from fastslow.results.named import Named
+from fastslow.results.base.named_mapping import Named
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,9 @@ from fastslow.model.structure import (
     real,
     shared,
 )
-from fastslow.results.named import Named
-from fastslow.results.operations import Operations
-from fastslow.results.stored_models import StoredModel, Traits, finite_number
+from fastslow.results.base.named_mapping import Named
+from fastslow.results.stored.model import StoredModel, Traits, finite_number
+from fastslow.results.stored.operations import Operations
 
 Written = Mapping[Any, Any]
 

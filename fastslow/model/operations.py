@@ -12,7 +12,7 @@ from fastslow.model.model import Model
 from fastslow.model.motions import Motion, drift, motions_of, regions_of
 from fastslow.model.recurrences import Recurrences, scalar_code
 from fastslow.model.structure import TIME, real
-from fastslow.results.operations import Operations, SeriesOperations, ValueOperations
+from fastslow.results.stored.operations import Operations, SeriesOperations, ValueOperations
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.model.functions import KEPT, function_of
-from fastslow.results.harmonics import period_of
+from fastslow.results.stored.harmonics import period_of
 
 
 def common_period(

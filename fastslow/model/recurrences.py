@@ -2,7 +2,7 @@
 
 Along a solution every subexpression is a power series in time, which has a row of
 coefficients. What an operation does to rows is written in
-`fastslow.compiled.recurrences`.
+`fastslow.kernels.taylor.recurrences`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.pycode import PythonCodePrinter
 
 from fastslow.model.known_functions import refusal, slope_of, teach_functions, value_code
-from fastslow.results.operations import (
+from fastslow.results.stored.operations import (
     FUNCTION,
     LOGARITHM,
     MULTIPLE,

@@ -11,7 +11,7 @@ from fastslow.model.model import Model
 from fastslow.model.periods import frequencies
 from fastslow.model.structure import TIME, real
 from fastslow.model.traits import first_slope, text_of
-from fastslow.results.stored_models import StoredModel, Validity
+from fastslow.results.stored.model import StoredModel, Validity
 
 
 def stored_form(model: Model) -> StoredModel:

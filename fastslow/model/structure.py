@@ -31,8 +31,8 @@ from fastslow.model.reading import (
     switching_expressions,
     with_piecewise,
 )
-from fastslow.results.named import Named
-from fastslow.results.sign_patterns import Pattern, possible_patterns, scaled_row
+from fastslow.results.base.named_mapping import Named
+from fastslow.results.stored.sign_patterns import Pattern, possible_patterns, scaled_row
 
 TIME = sp.Symbol("t", real=True)
 

@@ -12,7 +12,7 @@ from fastslow.model.invariance import factor_states, states_together
 from fastslow.model.model import Model
 from fastslow.model.recurrences import scalar_code
 from fastslow.model.structure import TIME, real
-from fastslow.results.stored_models import Traits
+from fastslow.results.stored.model import Traits
 
 
 @once(sloped)

@@ -13,7 +13,7 @@ import sympy as sp
 
 from fastslow.model.interfaces import Region
 from fastslow.model.structure import real
-from fastslow.results.unit_equations import UnitEquations, negligible
+from fastslow.results.stored.unit_equations import UnitEquations, negligible
 
 #: Functions whose value has the magnitude of their argument.
 _ALIKE = (sp.Abs, sp.Max, sp.Min)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from fastslow.compiled.generic import Loop
-from fastslow.compiled.records import Flags, Matrix, Tensor, Vector
-from fastslow.passage.radau_passages import End, Law, Motion, Space
+from fastslow.kernels.loops import Loop
+from fastslow.kernels.records import Flags, Matrix, Tensor, Vector
+from fastslow.passage.delays.radau_passages import End, Law, Motion, Space
 
 PASS_THROUGH = Loop(
-    "fastslow.passage.radau_passages",
+    "fastslow.passage.delays.radau_passages",
     "pass_through",
     {
         "motion": Motion, "law": Law, "end": End, "z": Vector, "times": Vector, "unit": Vector,
@@ -17,21 +17,21 @@ PASS_THROUGH = Loop(
 )  # fmt: skip
 
 NEARNESS = Loop(
-    "fastslow.passage.chain_distances",
+    "fastslow.passage.overlay.chain_distances",
     "nearness_to_chain",
     {"points": Matrix, "chain": Matrix, "radius": float, "near": Vector},
     read=("points", "chain"),
 )
 
 BESIDE = Loop(
-    "fastslow.passage.chain_distances",
+    "fastslow.passage.overlay.chain_distances",
     "beside_chain",
     {"points": Matrix, "chain": Matrix, "radius": float, "beside": Flags},
     read=("points", "chain"),
 )
 
 STEP_VALUES = Loop(
-    "fastslow.passage.step_values",
+    "fastslow.passage.overlay.step_values",
     "values_in_steps",
     {
         "series": Tensor, "starts": Vector, "begin": float, "end": float, "times": Vector,

@@ -22,11 +22,12 @@ from fastslow.arguments import (
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import evaluated, names_in
 from fastslow.model.model import Model
-from fastslow.results.ensembles import Ensemble
-from fastslow.results.lyapunov import LyapunovExponent
-from fastslow.results.outcome import Outcome
-from fastslow.results.refined_maps import RefinedMap
-from fastslow.results.regimes import (
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.maps.adaptive_map import RefinedMap
+from fastslow.results.overlay.slow_loads import NO_GAP
+from fastslow.results.trajectory.ensemble import Ensemble
+from fastslow.results.trajectory.lyapunov import LyapunovExponent
+from fastslow.results.trajectory.regimes import (
     CHAOTIC,
     NOT_SETTLED,
     REGIMES,
@@ -35,12 +36,11 @@ from fastslow.results.regimes import (
     coexisting,
     ending_of,
 )
-from fastslow.results.slow_loads import NO_GAP
-from fastslow.simulation.ensembles import simulate_many
+from fastslow.simulation.lyapunov import FINE, Exponents, exponents
+from fastslow.simulation.many import simulate_many
 from fastslow.simulation.many_arguments import starts_and_parameters
-from fastslow.simulation.separations import FINE, Exponents, exponents
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import DEFAULT, Integration, integration_settings
-from fastslow.simulation.trajectories import simulate
 from fastslow.sweeps.refinement import refined_map
 
 Floats = NDArray[np.float64]

@@ -15,7 +15,7 @@ from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.periods import frequencies
 from fastslow.model.structure import TIME, real
-from fastslow.results.slow_loads import SlowLoad
+from fastslow.results.overlay.slow_loads import SlowLoad
 from fastslow.simulation.arguments import gap_regions
 
 Floats = NDArray[np.float64]

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from fastslow.errors import unknown_name
 from fastslow.plot.arguments import line_colour
-from fastslow.plot.style import GREY
-from fastslow.plot.typesetting import as_given
-from fastslow.results.refined_maps import FAILED, RefinedMap
+from fastslow.plot.layout.style import GREY
+from fastslow.plot.layout.typesetting import as_given
+from fastslow.results.maps.adaptive_map import FAILED, RefinedMap
 
 Floats = NDArray[np.float64]
 

@@ -24,7 +24,7 @@ from fastslow.arguments import (
     word,
 )
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.plot.style import WIDTHS
+from fastslow.plot.layout.style import WIDTHS
 
 #: What an axis shows: a name, an expression, or a function of the columns.
 axis_quantity = either(function, formula)

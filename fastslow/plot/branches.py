@@ -14,18 +14,18 @@ from matplotlib.text import Annotation
 
 from fastslow.arguments import flag, instance, takes
 from fastslow.plot.arguments import axis_quantity, figure_width, line_colour, line_style
-from fastslow.plot.bands import Bands, draw_bands
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.equilibrium_sets import draw_sets
-from fastslow.plot.labels import place
-from fastslow.plot.legends import explained
+from fastslow.plot.layout.bands import Bands, draw_bands
+from fastslow.plot.layout.labels import place
+from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.style import BRANCH, LINES, axes_for, spatial
 from fastslow.plot.quantities import Quantity, along_branch, joined, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
 from fastslow.plot.stretches import draw_points, runs, worth_a_marker
-from fastslow.plot.style import BRANCH, LINES, axes_for, spatial
-from fastslow.results.branches import Branch
-from fastslow.results.diagrams import Diagram
-from fastslow.results.windows import LEFT
+from fastslow.results.branch.branch import Branch
+from fastslow.results.branch.diagram import Diagram
+from fastslow.results.branch.windows import LEFT
 
 
 @dataclass(frozen=True, eq=False, repr=False)

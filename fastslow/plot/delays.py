@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from fastslow.arguments import flag, instance, takes
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import figure_width, line_style
-from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.legends import explained
-from fastslow.plot.style import BLUE, GREY, SMALL, VERMILION, axes_for
-from fastslow.plot.typesetting import typeset
-from fastslow.results.delay_scalings import DelayScaling
+from fastslow.plot.layout.covering import settle
+from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.style import BLUE, GREY, SMALL, VERMILION, axes_for
+from fastslow.plot.layout.typesetting import typeset
+from fastslow.results.overlay.delay_scaling import DelayScaling
 
 Array = NDArray[np.float64]
 

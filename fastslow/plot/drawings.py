@@ -16,8 +16,8 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from fastslow.arguments import path, takes, within
-from fastslow.plot.style import SHOWN, printed, root, save
-from fastslow.results.immutable import fixed
+from fastslow.plot.layout.style import SHOWN, printed, root, save
+from fastslow.results.base.immutable import fixed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,7 +53,7 @@ class Drawing:
         --------
         >>> import numpy as np
         >>> import fastslow as fs
-        >>> from fastslow.results.spectra import Spectrum
+        >>> from fastslow.results.trajectory.spectrum import Spectrum
         >>> lines = Spectrum("x", "hann", (0.0, 1.0), np.arange(4.0), np.array([0, 1, 0.5, 0]))
         >>> fs.plot.spectrum(lines).data["amplitude"][0][:2].tolist()
         [[1.0, 1.0], [2.0, 0.5]]

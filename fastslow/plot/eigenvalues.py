@@ -21,12 +21,12 @@ from fastslow.arguments import flag, instance, takes
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.labels import place, tag
-from fastslow.plot.legends import explained
-from fastslow.plot.style import GREY, SMALL, TEXT, VERMILION, axes_for, point_colour, root
-from fastslow.plot.typesetting import plain, typeset
-from fastslow.results.branches import Branch
-from fastslow.results.overlays import Overlay
+from fastslow.plot.layout.labels import place, tag
+from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.style import GREY, SMALL, TEXT, VERMILION, axes_for, point_colour, root
+from fastslow.plot.layout.typesetting import plain, typeset
+from fastslow.results.branch.branch import Branch
+from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
 

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from fastslow.plot.quantities import Quantity
-from fastslow.results.diagrams import Diagram
-from fastslow.results.equilibrium_sets import EquilibriumBand
+from fastslow.results.branch.diagram import Diagram
+from fastslow.results.branch.equilibrium_sets import EquilibriumBand
 
 Array = NDArray[np.float64]
 

@@ -17,13 +17,13 @@ from numpy.typing import ArrayLike
 from fastslow.arguments import flag, instance, mapping, takes
 from fastslow.plot.areas import draw_areas, samples
 from fastslow.plot.arguments import figure_width, line_style, lines_in_plane, points_in_plane
-from fastslow.plot.covering import covered, settle
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.labels import place, tag
-from fastslow.plot.legends import explained
-from fastslow.plot.style import BLACK, GREY, SMALL, VERMILION, axes_for
-from fastslow.plot.typesetting import as_given, typeset
-from fastslow.results.refined_maps import RefinedMap
+from fastslow.plot.layout.covering import covered, settle
+from fastslow.plot.layout.labels import place, tag
+from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.style import BLACK, GREY, SMALL, VERMILION, axes_for
+from fastslow.plot.layout.typesetting import as_given, typeset
+from fastslow.results.maps.adaptive_map import RefinedMap
 
 #: Hatches of areas too small for their names, in turn.
 HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----", "||||")

@@ -23,20 +23,20 @@ from fastslow.plot.arguments import (
     line_colour,
     line_style,
 )
-from fastslow.plot.arrows import draw_arrows, length_along
-from fastslow.plot.bands import Bands, Values, draw_bands
-from fastslow.plot.covering import at_draw, settle
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.labels import place
-from fastslow.plot.legends import explained
-from fastslow.plot.marks import draw_dots
+from fastslow.plot.layout.arrows import draw_arrows, length_along
+from fastslow.plot.layout.bands import Bands, Values, draw_bands
+from fastslow.plot.layout.covering import at_draw, settle
+from fastslow.plot.layout.labels import place
+from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.marks import draw_dots
+from fastslow.plot.layout.style import MOTION, axes_for, note_early_end, spatial
 from fastslow.plot.phases import draw_phases, fit_words, strip_height
 from fastslow.plot.quantities import Array, Quantity, along_run, at_crossings, joined, of_run
 from fastslow.plot.spaces import HEIGHT, dress_space
-from fastslow.plot.style import MOTION, axes_for, note_early_end, spatial
-from fastslow.results.outcome import early_end
-from fastslow.results.trajectories import Trajectory
-from fastslow.results.transitions import Phase
+from fastslow.results.base.outcome import early_end
+from fastslow.results.overlay.transitions import Phase
+from fastslow.results.trajectory.trajectory import Trajectory
 
 LINE: dict[str, Any] = {"linewidth": 0.8, "zorder": 3.0}
 

@@ -14,14 +14,14 @@ from fastslow.arguments import flag, formula, instance, items, takes, text
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.labels import place
-from fastslow.plot.legends import legend_below, legend_inside
+from fastslow.plot.layout.labels import place
+from fastslow.plot.layout.legends import legend_below, legend_inside
+from fastslow.plot.layout.style import MM, PHASES, TEXT, dressed, inches, new_figure
+from fastslow.plot.layout.typesetting import as_given
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.passages import OverlayDrawing, draw_passage
 from fastslow.plot.quantities import of_diagram
-from fastslow.plot.style import MM, PHASES, TEXT, dressed, inches, new_figure
-from fastslow.plot.typesetting import as_given
-from fastslow.results.overlays import Overlay
+from fastslow.results.overlay.overlay import Overlay
 
 #: Figures narrower than this have their three parts one below the other.
 NARROW = 120 * MM

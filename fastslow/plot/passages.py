@@ -14,18 +14,18 @@ from matplotlib.text import Annotation
 
 from fastslow.arguments import flag, instance, takes
 from fastslow.plot.arguments import axis_quantity, figure_width, line_colour, line_style
-from fastslow.plot.arrows import draw_heads, points
 from fastslow.plot.branches import DiagramDrawing, draw_branches
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.labels import place
-from fastslow.plot.legends import explained
-from fastslow.plot.marks import draw_crossings, draw_transitions, draw_turning
+from fastslow.plot.layout.arrows import draw_heads, points
+from fastslow.plot.layout.labels import place
+from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.marks import draw_crossings, draw_transitions, draw_turning
+from fastslow.plot.layout.style import MOTION, axes_for, note, spatial
 from fastslow.plot.motions import draw_motion
 from fastslow.plot.quantities import Array, Quantity, along_overlay, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
-from fastslow.plot.style import MOTION, axes_for, note, spatial
-from fastslow.results.outcome import early_end
-from fastslow.results.overlays import Overlay
+from fastslow.results.base.outcome import early_end
+from fastslow.results.overlay.overlay import Overlay
 
 #: What a figure says of an overlay that does not tell all, by the code of its outcome.
 CAVEATS = {

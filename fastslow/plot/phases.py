@@ -9,9 +9,9 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
-from fastslow.plot.style import BLACK, PHASES, WHITE_WORDS, root
-from fastslow.plot.typesetting import plain
-from fastslow.results.transitions import Phase
+from fastslow.plot.layout.style import BLACK, PHASES, WHITE_WORDS, root
+from fastslow.plot.layout.typesetting import plain
+from fastslow.results.overlay.transitions import Phase
 
 #: Height of the strip and size of its words, in points.
 HEIGHT, WORDS = 10.0, 6.0

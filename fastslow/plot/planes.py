@@ -21,11 +21,9 @@ from fastslow.errors import ArgumentError
 from fastslow.plot.areas import draw_areas, samples
 from fastslow.plot.arguments import axis_quantity, figure_width, line_style
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.labels import place, tag
-from fastslow.plot.legends import explained
-from fastslow.plot.quantities import Quantity, at_points, quantity_of
-from fastslow.plot.spaces import HEIGHT, dress_space
-from fastslow.plot.style import (
+from fastslow.plot.layout.labels import place, tag
+from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.style import (
     HOPF_CURVES,
     VIRTUAL_CURVE,
     axes_for,
@@ -34,10 +32,12 @@ from fastslow.plot.style import (
     point_colour,
     spatial,
 )
-from fastslow.results.point_branches import PointBranch
+from fastslow.plot.quantities import Quantity, at_points, quantity_of
+from fastslow.plot.spaces import HEIGHT, dress_space
+from fastslow.results.branch.point_branch import PointBranch
+from fastslow.results.maps.adaptive_map import RefinedMap
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
-from fastslow.results.refined_maps import RefinedMap
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import evaluated, names_in, written_formula
-from fastslow.plot.typesetting import plain, written
+from fastslow.plot.layout.typesetting import plain, written
 from fastslow.results.angles import principal
-from fastslow.results.branches import Branch
-from fastslow.results.diagrams import Diagram
-from fastslow.results.overlays import Overlay
+from fastslow.results.branch.branch import Branch
+from fastslow.results.branch.diagram import Diagram
+from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.points import SpecialPoint
-from fastslow.results.trajectories import Trajectory
+from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

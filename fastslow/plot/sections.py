@@ -13,10 +13,10 @@ from fastslow.arguments import flag, instance, positive, takes
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import axis_quantity, figure_width, line_style
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.legends import explained
+from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.style import BLACK, BLUE, VERMILION, axes_for, note_early_end, widen
 from fastslow.plot.quantities import quantity_of
-from fastslow.plot.style import BLACK, BLUE, VERMILION, axes_for, note_early_end, widen
-from fastslow.results.sections import Section
+from fastslow.results.trajectory.section import Section
 
 #: Marker, colour and words by direction.
 LOOKS = {

@@ -12,17 +12,17 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.plot.arrows import draw_arrows, length_along
-from fastslow.plot.covering import settle
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.labels import place
-from fastslow.plot.legends import explained
-from fastslow.plot.marks import draw_crossings, draw_transitions, draw_turning
+from fastslow.plot.layout.arrows import draw_arrows, length_along
+from fastslow.plot.layout.covering import settle
+from fastslow.plot.layout.labels import place
+from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.marks import draw_crossings, draw_transitions, draw_turning
+from fastslow.plot.layout.style import BRANCH, LINES, SMALL, TEXT, axes_for
 from fastslow.plot.quantities import Quantity, along_branch, along_overlay, joined
 from fastslow.plot.stretches import draw_points, runs, worth_a_marker
-from fastslow.plot.style import BRANCH, LINES, SMALL, TEXT, axes_for
-from fastslow.results.diagrams import Diagram
-from fastslow.results.overlays import Overlay
+from fastslow.results.branch.diagram import Diagram
+from fastslow.results.overlay.overlay import Overlay
 
 #: Size of the box of axes in space, which leaves room for the names of its axes.
 ZOOM = 0.86

@@ -15,11 +15,11 @@ from fastslow.arguments import flag, instance, interval, takes, whole
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import figure_width, line_colour, line_style
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.labels import place, tag
-from fastslow.plot.legends import explained
-from fastslow.plot.style import MOTION, VERMILION, axes_for, note_early_end
-from fastslow.plot.typesetting import typeset
-from fastslow.results.spectra import Spectrum
+from fastslow.plot.layout.labels import place, tag
+from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.style import MOTION, VERMILION, axes_for, note_early_end
+from fastslow.plot.layout.typesetting import typeset
+from fastslow.results.trajectory.spectrum import Spectrum
 
 #: Amplitudes below this part of the largest are not looked for when the axes are chosen.
 FLOOR = 1e-4

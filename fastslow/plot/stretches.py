@@ -9,14 +9,14 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.plot.labels import tag
+from fastslow.plot.layout.labels import tag
+from fastslow.plot.layout.style import dot_look
+from fastslow.plot.layout.typesetting import plain
 from fastslow.plot.quantities import Quantity, at_points
-from fastslow.plot.style import dot_look
-from fastslow.plot.typesetting import plain
-from fastslow.results.branches import Branch
+from fastslow.results.branch.branch import Branch
+from fastslow.results.branch.windows import LEFT
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
-from fastslow.results.windows import LEFT
 
 #: What is written beside an end point is no longer than this; a sentence is for the hover.
 WORDY = 24

@@ -13,10 +13,10 @@ from matplotlib.lines import Line2D
 from fastslow.arguments import flag, instance, positive, takes
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.legends import explained
-from fastslow.plot.style import BLACK, BLUE, GREY, VERMILION, axes_for, widen
-from fastslow.plot.typesetting import typeset
-from fastslow.results.sweeps import Sweep, SweepPass
+from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.style import BLACK, BLUE, GREY, VERMILION, axes_for, widen
+from fastslow.plot.layout.typesetting import typeset
+from fastslow.results.trajectory.sweep import Sweep, SweepPass
 
 #: More points than this are stored as pixels, in files of vectors too.
 MANY = 20_000

@@ -41,7 +41,7 @@ class PointType:
     marker : str
         Marker of Matplotlib in figures.
     colour : str
-        Name of a colour of the palette in `fastslow.plot.style`.
+        Name of a colour of the palette in `fastslow.plot.layout.style`.
     line : tuple, optional
         Matplotlib's line style and width of a curve of such points.
 

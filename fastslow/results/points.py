@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import position, word
 from fastslow.errors import unknown_name
-from fastslow.results.immutable import Immutable, ImmutableSequence
-from fastslow.results.markup import points_html
-from fastslow.results.point_columns import columns_of_points
+from fastslow.results.base.immutable import Immutable, ImmutableSequence
+from fastslow.results.base.result import LIVE, Result, Saved
+from fastslow.results.base.table import Table
+from fastslow.results.branch.point_columns import columns_of_points
+from fastslow.results.io.html import points_html
 from fastslow.results.point_types import POINT_TYPES, point_name
-from fastslow.results.result import LIVE, Result, Saved
-from fastslow.results.tables import Table
 
 if TYPE_CHECKING:
-    from fastslow.results.equilibrium_sets import EquilibriumSet
+    from fastslow.results.branch.equilibrium_sets import EquilibriumSet
 
 #: An eigenvalue counts as zero when its real part is below this times the largest modulus.
 NEUTRAL = 1e-10

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import class_of, numbers, positive, shown, whole
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.results.stored_models import StoredModel
+from fastslow.results.stored.model import StoredModel
 
 if TYPE_CHECKING:
     from fastslow.model.model import Model

@@ -13,7 +13,7 @@ from fastslow.model.functions import KEPT, function_of
 from fastslow.model.model import Model
 from fastslow.model.reading import factorise, switching_expressions
 from fastslow.model.structure import Structure, real
-from fastslow.results.sign_patterns import possible_patterns
+from fastslow.results.stored.sign_patterns import possible_patterns
 
 Values = Mapping[str, NDArray[np.float64]]
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from fastslow.compiled.generic import Loop
-from fastslow.compiled.late import Late
-from fastslow.simulation.lanes import Pool, Runs
-from fastslow.simulation.problems import Problem, Record, Run
-from fastslow.simulation.workspace import Workspace
+from fastslow.kernels.lazy_callback import Late
+from fastslow.kernels.loops import Loop
+from fastslow.simulation.stepper.lanes import Pool, Runs
+from fastslow.simulation.stepper.problems import Problem, Record, Run
+from fastslow.simulation.stepper.workspace import Workspace
 
 DRIVE = Loop(
-    "fastslow.simulation.driver",
+    "fastslow.simulation.stepper.driver",
     "drive",
     {"problem": Problem, "run": Run, "record": Record, "workspace": Workspace, "handed": int},
     results=(int,),
@@ -17,7 +17,7 @@ DRIVE = Loop(
 )
 
 DRIVE_MANY = Loop(
-    "fastslow.simulation.lanes",
+    "fastslow.simulation.stepper.lanes",
     "drive_many",
     {
         "problem": Problem, "steps": int, "regions": int, "runs": Runs, "pool": Pool,
@@ -26,7 +26,7 @@ DRIVE_MANY = Loop(
     results=(int,),
 )  # fmt: skip
 
-COLLOCATION = Late("fastslow.simulation.collocation", "collocate", "CollocationStep")
-RADAU = Late("fastslow.simulation.radau", "radau_step", "RadauStep")
+COLLOCATION = Late("fastslow.simulation.stepper.collocation", "collocate", "CollocationStep")
+RADAU = Late("fastslow.simulation.stepper.radau", "radau_step", "RadauStep")
 
 LOOPS = (DRIVE, DRIVE_MANY, COLLOCATION, RADAU)

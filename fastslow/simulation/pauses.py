@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import time
 
-from fastslow.compiled.generic import load_address
-from fastslow.simulation.driver import NEEDS_COLLOCATION, NEEDS_RADAU
+from fastslow.kernels.loops import load_address
 from fastslow.simulation.loops import COLLOCATION, RADAU
-from fastslow.simulation.problems import Problem
+from fastslow.simulation.stepper.driver import NEEDS_COLLOCATION, NEEDS_RADAU
+from fastslow.simulation.stepper.problems import Problem
 
 #: Seconds between two pauses, about.
 SLICE = 0.02

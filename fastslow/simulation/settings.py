@@ -18,7 +18,7 @@ from fastslow.arguments import (
     whole,
 )
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.results.named import Named
+from fastslow.results.base.named_mapping import Named
 
 #: Where a run ends that nothing else ends.
 MOST = 1_000_000

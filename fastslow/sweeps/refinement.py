@@ -21,8 +21,8 @@ from fastslow.arguments import (
     whole,
 )
 from fastslow.errors import ArgumentError, raised_by_handler
-from fastslow.results.map_boundaries import MapEdges
-from fastslow.results.refined_maps import FAILED, Label, RefinedMap, label_of
+from fastslow.results.maps.adaptive_map import FAILED, Label, RefinedMap, label_of
+from fastslow.results.maps.boundaries import MapEdges
 
 Floats = NDArray[np.float64]
 Position = tuple[int, int]

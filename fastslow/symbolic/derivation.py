@@ -13,23 +13,23 @@ from fastslow.arguments import formula, instance, takes
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
-from fastslow.results.named import Named
-from fastslow.symbolic.assumptions import read_signs
-from fastslow.symbolic.boundaries import BoundaryForm, boundary_forms
-from fastslow.symbolic.candidates import Candidates
-from fastslow.symbolic.conserved import ConservedQuantity, conserved_quantities
-from fastslow.symbolic.critical import Setting
-from fastslow.symbolic.equilibrium_sets import (
+from fastslow.results.base.named_mapping import Named
+from fastslow.symbolic.closed_forms.boundaries import BoundaryForm, boundary_forms
+from fastslow.symbolic.closed_forms.conserved import ConservedQuantity, conserved_quantities
+from fastslow.symbolic.closed_forms.critical import Setting
+from fastslow.symbolic.closed_forms.equilibrium_sets import (
     EDGE,
     EquilibriumSetForm,
     equilibrium_set_forms,
 )
-from fastslow.symbolic.forms import Continuum, CriticalPoint
-from fastslow.symbolic.inequalities import needed
-from fastslow.symbolic.regions import RegionForms, derive_region
-from fastslow.symbolic.signs import Signs
-from fastslow.symbolic.symmetries import FreeDirection, free_directions
-from fastslow.symbolic.verification import weakest
+from fastslow.symbolic.closed_forms.forms import Continuum, CriticalPoint
+from fastslow.symbolic.closed_forms.regions import RegionForms, derive_region
+from fastslow.symbolic.closed_forms.symmetries import FreeDirection, free_directions
+from fastslow.symbolic.signs.assumptions import read_signs
+from fastslow.symbolic.signs.inequalities import needed
+from fastslow.symbolic.signs.signs import Signs
+from fastslow.symbolic.solving.candidates import Candidates
+from fastslow.symbolic.solving.verification import weakest
 
 
 @dataclass(frozen=True)
@@ -101,17 +101,17 @@ class Derivation:
 
     def to_latex(self) -> str:
         """All of it as LaTeX paragraphs with displayed formulas."""
-        from fastslow.symbolic.typesetting import derivation_latex
+        from fastslow.symbolic.report.typesetting import derivation_latex
 
         return derivation_latex(self)
 
     def _repr_latex_(self) -> str:
-        from fastslow.symbolic.typesetting import derivation_display
+        from fastslow.symbolic.report.typesetting import derivation_display
 
         return derivation_display(self)
 
     def __repr__(self) -> str:
-        from fastslow.symbolic.wording import summary
+        from fastslow.symbolic.report.wording import summary
 
         return summary(self)
 

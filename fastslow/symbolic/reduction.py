@@ -10,8 +10,8 @@ import sympy as sp
 from fastslow.arguments import mapping, takes
 from fastslow.errors import ArgumentError
 from fastslow.model.structure import read_expression, real, sympified
-from fastslow.results.named import Named
-from fastslow.symbolic.algebra import tidy
+from fastslow.results.base.named_mapping import Named
+from fastslow.symbolic.solving.algebra import tidy
 
 
 @takes(rates=mapping, combinations=mapping, conserved=mapping)

@@ -12,9 +12,9 @@ from fastslow.arguments import formula, instance, items, mapping, refusal, takes
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real, sympified
-from fastslow.results.named import Named
-from fastslow.symbolic.algebra import light, spread
-from fastslow.symbolic.verification import vanishes
+from fastslow.results.base.named_mapping import Named
+from fastslow.symbolic.solving.algebra import light, spread
+from fastslow.symbolic.solving.verification import vanishes
 
 
 def scale_symbol(name: str) -> sp.Symbol:

@@ -15,7 +15,7 @@ import sympy as sp
 from fastslow.arguments import finite, positive, takes
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
-from fastslow.results.named import Named
+from fastslow.results.base.named_mapping import Named
 from fastslow.symbolic.reduction import reduce_states
 from fastslow.symbolic.scaling import (
     Identification,
@@ -24,7 +24,7 @@ from fastslow.symbolic.scaling import (
     nondimensionalise,
     scale_symbol,
 )
-from fastslow.symbolic.verification import vanishes
+from fastslow.symbolic.solving.verification import vanishes
 from fastslow.systems.gears import dead_zone, gear_scales, harmonic_gear
 
 #: What the physical values of the gear must be.

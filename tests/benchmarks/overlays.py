@@ -14,8 +14,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.passage.local_passages import Event, Place, reached_delay
-from fastslow.passage.sites import site_of
+from fastslow.passage.delays.local_field import site_of
+from fastslow.passage.delays.local_passages import Event, Place, reached_delay
 from tests.benchmarks.measuring import Line, used
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import fastslow as fs
-from fastslow.results.outcome import Outcome
+from fastslow.results.base.outcome import Outcome
 from fastslow.results.points import SpecialPoints
 from tests.benchmarks.measuring import Line, against, medians
 

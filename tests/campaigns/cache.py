@@ -15,8 +15,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fastslow.compiled import store
 from tests.compiled.forks import prepare, run, use
+
+from fastslow.kernels.cache import store
 
 NUMBERS = [1, 2, 3, 4]
 

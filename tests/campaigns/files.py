@@ -27,7 +27,7 @@ from pathlib import Path
 import sympy as sp
 
 import fastslow as fs
-from fastslow.results.storage import SEAL_SIZE, sealed
+from fastslow.results.io.npz_netcdf import SEAL_SIZE, sealed
 from tests.results.conftest import same
 
 ROOT = Path(__file__).parents[2]

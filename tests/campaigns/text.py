@@ -25,7 +25,7 @@ import numpy as np
 import sympy as sp
 
 import fastslow as fs
-from fastslow.plot.typesetting import typeset, written
+from fastslow.plot.layout.typesetting import typeset, written
 
 #: Processor time that one call may take.
 SECONDS = 1.0

@@ -9,8 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fastslow as fs
-from fastslow.compiled.generic import Loop, load_loop
-from fastslow.compiled.records import Matrix, Vector
 from fastslow.continuation import engine
 from fastslow.continuation.location import (
     branch_point,
@@ -21,7 +19,9 @@ from fastslow.continuation.location import (
 )
 from fastslow.continuation.loops import loop
 from fastslow.continuation.spaces import Curve, newton_space
-from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.field import FrozenField
+from fastslow.kernels.loops import Loop, load_loop
+from fastslow.kernels.records import Matrix, Vector
 
 #: The compiled elimination, of which loops are made.
 SOLVE = Loop("fastslow.continuation.engine", "solve", {"matrix": Matrix, "right": Vector}, (bool,))

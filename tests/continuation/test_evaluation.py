@@ -4,9 +4,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from fastslow.compiled.generic import Loop, load_loop
-from fastslow.compiled.records import Matrix, Vector
 from fastslow.continuation.loops import loop
+from fastslow.kernels.loops import Loop, load_loop
+from fastslow.kernels.records import Matrix, Vector
 
 GENERATOR = np.random.default_rng(7)
 

@@ -5,7 +5,9 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.diagrams.center_manifolds import (
+from fastslow.diagrams.curves.codimension_two import _form
+from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.points.center_manifolds import (
     bogdanov_takens,
     double_hopf,
     double_hopf_case,
@@ -13,9 +15,7 @@ from fastslow.diagrams.center_manifolds import (
     zero_hopf,
     zero_hopf_case,
 )
-from fastslow.diagrams.codimension_two import _form
-from fastslow.diagrams.fields import FrozenField
-from fastslow.diagrams.jets import JetSpace
+from fastslow.diagrams.points.jets import JetSpace
 
 u = sp.symbols("u0:5", real=True)
 p, q = sp.symbols("p q", real=True)

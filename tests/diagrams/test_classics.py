@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.diagrams import starts
+from fastslow.diagrams.solve import starts
 from fastslow.results.points import Equilibria
 
 x, y, z, p, q, rho, u1, u2, p1, p2, p3 = sp.symbols("x y z p q rho u1 u2 p1 p2 p3")

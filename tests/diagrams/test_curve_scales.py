@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 import fastslow as fs
 from fastslow.continuation.zeros import brackets
-from fastslow.diagrams.fields import FrozenField, Source
+from fastslow.diagrams.field import FrozenField, Source
+from fastslow.results.branch.windows import state_window
 from fastslow.results.points import SpecialPoint
-from fastslow.results.windows import state_window
 
 x, y, p, q, e, d, tau = sp.symbols("x y p q e d tau")
 X, Y, Z, U, F, T = states = sp.symbols("X Y Z U F T")

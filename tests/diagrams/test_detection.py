@@ -13,12 +13,12 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import brentq
 
 import fastslow as fs
-from fastslow.diagrams.detection import special_points
-from fastslow.diagrams.fields import FrozenField
-from fastslow.diagrams.row_tests import pair_sums
-from fastslow.diagrams.walking import Piece, Window
+from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.points.detection import special_points
+from fastslow.diagrams.points.row_tests import pair_sums
+from fastslow.diagrams.trace.across_regions import Piece, Window
+from fastslow.results.branch.windows import state_window
 from fastslow.results.points import stability_of
-from fastslow.results.windows import state_window
 from tests.campaigns.detection import campaign
 from tests.diagrams.models import LENGTH, brusselator, chafee_infante, crossing_model
 

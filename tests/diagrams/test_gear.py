@@ -10,8 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import fastslow as fs
-from fastslow.diagrams import starts
-from fastslow.diagrams.solving import solve_at
+from fastslow.diagrams.solve import starts
+from fastslow.diagrams.solve.solving import solve_at
 
 FOLD_W = 0.0894402097712473068105567770438  # closed form, mpmath at 40 digits
 FOLD_X = 0.538244802131872687595973447891

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fastslow as fs
-from fastslow.diagrams.normal_forms import Multilinear, first_lyapunov, fold_form
+from fastslow.diagrams.points.normal_forms import Multilinear, first_lyapunov, fold_form
 
 x, y, z, p, q = sp.symbols("x y z p q")
 u1, u2, p1 = sp.symbols("u1 u2 p1")

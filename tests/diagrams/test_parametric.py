@@ -7,11 +7,11 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.diagrams.critical import critical_values
-from fastslow.diagrams.equations import SlidingEquations, region_equations
-from fastslow.diagrams.exact_polynomials import polynomials_of
-from fastslow.diagrams.fields import FrozenField
-from fastslow.diagrams.parametric import eliminations_of
+from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.solve.critical import critical_values
+from fastslow.diagrams.solve.equations import SlidingEquations, region_equations
+from fastslow.diagrams.solve.exact_polynomials import polynomials_of
+from fastslow.diagrams.solve.parametric import eliminations_of
 
 x, y, v, w, t, a, b, c, k = sp.symbols("x y v w t a b c k")
 

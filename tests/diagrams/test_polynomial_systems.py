@@ -10,9 +10,9 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.continuation.polynomial_systems import solve_polynomials
-from fastslow.diagrams.critical import _exact_roots, critical_values
-from fastslow.diagrams.equations import region_equations
-from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.solve.critical import _exact_roots, critical_values
+from fastslow.diagrams.solve.equations import region_equations
 from tests.campaigns.polynomial_systems import campaign
 
 x, y, z, p, q = sp.symbols("x y z p q")

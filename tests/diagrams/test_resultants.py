@@ -6,7 +6,7 @@ import pytest
 from sympy.polys.domains import ZZ
 from sympy.polys.rings import ring
 
-from fastslow.diagrams.resultants import discriminant, resultant
+from fastslow.diagrams.solve.resultants import discriminant, resultant
 
 PLANE = ring("x, p", ZZ)[0]
 

@@ -4,7 +4,7 @@ import numpy as np
 import sympy as sp
 
 import fastslow as fs
-from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.field import FrozenField
 
 x, y, w = sp.symbols("x y w")
 

@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 import fastslow as fs
-from fastslow.results.encoding import encoded
-from fastslow.results.storage import write_archive
+from fastslow.results.io.encoding import encoded
+from fastslow.results.io.npz_netcdf import write_archive
 from tests.results.conftest import same
 
 x, y, z, v, p, a = sp.symbols("x y z v p a")

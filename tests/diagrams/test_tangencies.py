@@ -7,8 +7,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import fastslow as fs
+from fastslow.diagrams.curves.tangency_points import Contact
 from fastslow.diagrams.modes import modes_of
-from fastslow.diagrams.tangency_points import Contact
 
 x, y, z, p, v, w = sp.symbols("x y z p v w")
 

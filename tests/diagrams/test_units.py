@@ -7,8 +7,8 @@ import sympy as sp
 import fastslow as fs
 from fastslow.continuation.location import branch_point
 from fastslow.continuation.ordering import in_order
-from fastslow.diagrams.exact_polynomials import real_roots
-from fastslow.diagrams.fields import FrozenField
+from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.solve.exact_polynomials import real_roots
 from fastslow.model.units import natural_units
 from fastslow.results.points import stability_of
 from tests.unit_systems import PARAMETER, SYSTEMS, TIME, drawn, single

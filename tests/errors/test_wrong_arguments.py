@@ -5,7 +5,7 @@ import inspect
 import pytest
 
 import fastslow as fs
-from fastslow.results.tables import Table
+from fastslow.results.base.table import Table
 from tests.errors.subjects import RESULTS, SPECIAL, subjects
 from tests.errors.wrong_arguments import BY_FUNCTION, rows_of
 from tests.errors.wrong_by_parameter import BY_PARAMETER

@@ -35,7 +35,7 @@ def test_set_shows_other_values(explorer):
 
 def test_nothing_is_compiled_anew_by_a_slider(explorer, monkeypatch):
     explorer.set(D=0.4)
-    from fastslow.compiled import store
+    from fastslow.kernels.cache import store
 
     monkeypatch.setattr(store, "read", None)
     assert explorer.set(D=0.35).outcomes == ()

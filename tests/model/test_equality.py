@@ -10,8 +10,8 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.compiled.series import compile_series
-from fastslow.diagrams import tracing
+from fastslow.diagrams.trace import tracing
+from fastslow.kernels.taylor.series import compile_series
 from fastslow.model import derived, structure
 from fastslow.model.motions import motions_of
 from fastslow.simulation.arguments import gap_regions

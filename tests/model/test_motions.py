@@ -5,8 +5,8 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.compiled.series import compile_series
 from fastslow.diagrams.modes import modes_of
+from fastslow.kernels.taylor.series import compile_series
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.motions import _vanishes, motions_of
 

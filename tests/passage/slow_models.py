@@ -16,7 +16,7 @@ from scipy.optimize import brentq, fsolve
 
 import fastslow as fs
 from fastslow.model.structure import TIME, real
-from fastslow.passage.drifts import drift_of_law
+from fastslow.passage.delays.drifts import drift_of_law
 
 x, y, v, p, w, e, t = sp.symbols("x y v p w epsilon t")
 

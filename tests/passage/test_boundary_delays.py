@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.passage import boundary_delays
-from fastslow.passage.boundary_delays import boundary_delay, gap_transit
+from fastslow.passage.delays import boundary_delays
+from fastslow.passage.delays.boundary_delays import boundary_delay, gap_transit
 
 
 def corner_point(model):

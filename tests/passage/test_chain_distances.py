@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fastslow.passage import chain_distances
-from fastslow.passage.chain_distances import beside_chain, nearness_to_chain
-from fastslow.passage.stays import _resampled
+from fastslow.passage.overlay import chain_distances
+from fastslow.passage.overlay.chain_distances import beside_chain, nearness_to_chain
+from fastslow.passage.overlay.following import _resampled
 
 
 @pytest.mark.parametrize("radius", [0.02, 0.1, 0.5])

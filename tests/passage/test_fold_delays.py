@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.passage.fold_delays import (
+from fastslow.passage.delays.fold_delays import (
     MATCHING,
     OMEGA_0,
     airy_passage,
@@ -22,7 +22,7 @@ from fastslow.passage.fold_delays import (
     jump_time,
     slow_part,
 )
-from fastslow.passage.sites import site_of
+from fastslow.passage.delays.local_field import site_of
 
 x, y, p, q = sp.symbols("x y p q")
 

@@ -11,8 +11,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import fastslow as fs
-from fastslow.passage.buffer_points import LevelCurve
-from fastslow.passage.hopf_delays import hopf_mode
+from fastslow.passage.delays.buffer_points import LevelCurve
+from fastslow.passage.delays.hopf_delays import hopf_mode
 
 RADIUS, EPS = 1e-3, 0.05
 

@@ -5,8 +5,8 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.passage import predictions
-from fastslow.passage.drifts import drift_at
+from fastslow.passage.delays.drifts import drift_at
+from fastslow.passage.overlay import predictions
 from tests.passage import slow_models
 
 x, y, p, t = sp.symbols("x y p t")

@@ -8,12 +8,12 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.diagrams.fields import FrozenField
-from fastslow.passage import local_passages
-from fastslow.passage.drift_laws import drift_law
-from fastslow.passage.fold_delays import airy_passage
-from fastslow.passage.local_passages import Event, Place, follow, reached_delay
-from fastslow.passage.sites import TURN, Site
+from fastslow.diagrams.field import FrozenField
+from fastslow.passage.delays import local_passages
+from fastslow.passage.delays.drift_laws import drift_law
+from fastslow.passage.delays.fold_delays import airy_passage
+from fastslow.passage.delays.local_field import TURN, Site
+from fastslow.passage.delays.local_passages import Event, Place, follow, reached_delay
 
 x, y, p = sp.symbols("x y p")
 

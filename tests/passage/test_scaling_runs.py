@@ -8,7 +8,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.results.delays import GapTransit
+from fastslow.results.overlay.delays import GapTransit
 
 SLOW = np.logspace(-7, -5, 5)
 

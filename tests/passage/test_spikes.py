@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fastslow.passage.spikes import refined, turns_of
+from fastslow.passage.overlay.spikes import refined, turns_of
 
 steps = st.lists(st.floats(-10, 10), min_size=3, max_size=60)
 

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fastslow.passage.sticking import along_edges, with_sticking
-from fastslow.results.transitions import Phase
+from fastslow.passage.overlay.sticking import along_edges, with_sticking
+from fastslow.results.overlay.transitions import Phase
 
 #: One band −1 ≤ x ≤ 1 at every value of the parameter.
 BAND = SimpleNamespace(

@@ -5,8 +5,8 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.passage.slow_quantities import slow_quantity
-from fastslow.passage.transitions import Passage
+from fastslow.passage.overlay.slow_quantities import slow_quantity
+from fastslow.passage.overlay.transitions import Passage
 
 x, v, w, t, omega = sp.symbols("x v w t omega")
 

@@ -8,12 +8,12 @@ import numpy as np
 import sympy as sp
 
 import fastslow as fs
-from fastslow.results.branches import Branch
-from fastslow.results.delay_scalings import DelayScaling
-from fastslow.results.delays import FoldDelay
-from fastslow.results.outcome import Outcome
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.branch.branch import Branch
+from fastslow.results.overlay.delay_scaling import DelayScaling
+from fastslow.results.overlay.delays import FoldDelay
 from fastslow.results.points import SpecialPoint
-from fastslow.results.sweeps import Sweep, SweepPass
+from fastslow.results.trajectory.sweep import Sweep, SweepPass
 
 END = Outcome("end of range", "reached the end of the range.", True)
 

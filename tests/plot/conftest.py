@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import fastslow as fs
-from fastslow.results.branches import Branch
-from fastslow.results.outcome import Outcome
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.branch.branch import Branch
 from fastslow.results.points import SpecialPoint
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from fastslow.plot.arrows import draw_arrows, draw_heads, length_along
+from fastslow.plot.layout.arrows import draw_arrows, draw_heads, length_along
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.7, 2.5, -1.2])

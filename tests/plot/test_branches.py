@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 import fastslow as fs
 from fastslow.plot.branches import runs
-from fastslow.results.outcome import Outcome
+from fastslow.results.base.outcome import Outcome
 
 from .conftest import cubic, diagram_of
 

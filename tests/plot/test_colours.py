@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from fastslow.plot import style
 from fastslow.plot.areas import FILLS, OTHERS
+from fastslow.plot.layout import style
 from fastslow.results.point_types import POINT_TYPES
 
 # linear sRGB as a dichromat sees it (Machado, Oliveira and Fernandes 2009, severity 1), and grey

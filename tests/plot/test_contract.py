@@ -13,8 +13,8 @@ from matplotlib.text import Text
 
 import fastslow as fs
 from fastslow.plot.drawings import Drawing
-from fastslow.results.branches import Branch
-from fastslow.results.result import Result
+from fastslow.results.base.result import Result
+from fastslow.results.branch.branch import Branch
 
 from .cases import CASES, results_by_name
 

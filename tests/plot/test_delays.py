@@ -6,8 +6,8 @@ import pytest
 
 import fastslow as fs
 from fastslow.plot.delays import DelayDrawing
-from fastslow.results.delays import BoundaryDelay, FoldDelay
-from fastslow.results.outcome import Outcome
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.overlay.delays import BoundaryDelay, FoldDelay
 
 from .conftest import special
 

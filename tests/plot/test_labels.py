@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 import fastslow as fs
-from fastslow.plot.bands import draw_bands
-from fastslow.plot.labels import place, tag
+from fastslow.plot.layout.bands import draw_bands
+from fastslow.plot.layout.labels import place, tag
 
 from .cases import crowd, swept
 from .conftest import cubic, diagram_of

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
-from fastslow.plot.legends import legend_below, legend_inside
+from fastslow.plot.layout.legends import legend_below, legend_inside
 
 
 def handles(count, words):

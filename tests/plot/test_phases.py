@@ -6,7 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import fastslow as fs
-from fastslow.results.transitions import Phase
+from fastslow.results.overlay.transitions import Phase
 
 
 def test_a_figure_of_its_own_names_what_has_room(folded_lay):

@@ -5,10 +5,10 @@ import pytest
 from matplotlib.figure import Figure
 
 import fastslow as fs
-from fastslow.results.outcome import Outcome
-from fastslow.results.sections import Section
-from fastslow.results.spectra import Spectrum
-from fastslow.results.sweeps import Sweep, SweepPass
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.trajectory.section import Section
+from fastslow.results.trajectory.spectrum import Spectrum
+from fastslow.results.trajectory.sweep import Sweep, SweepPass
 
 FINE = Outcome("end of time", "reached the end.", True)
 LOST = Outcome("blow-up", "the state grew.", False)

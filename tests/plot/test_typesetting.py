@@ -5,7 +5,7 @@ import sympy as sp
 from matplotlib.figure import Figure
 
 import fastslow as fs
-from fastslow.plot.typesetting import as_given, plain, typeset, written
+from fastslow.plot.layout.typesetting import as_given, plain, typeset, written
 
 #: Names that Matplotlib, LaTeX or Python read as more than letters.
 HOSTILE = ("m%", "a'b\"c", "x^2", "a&b", "$", "\\", "{", "}", "line\nfeed", "_", "#", "x_", "~")

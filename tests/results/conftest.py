@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fastslow as fs
-from fastslow.results.outcome import Outcome
+from fastslow.results.base.outcome import Outcome
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 END = Outcome("end of range", "reached the end of the range.", True)

@@ -5,9 +5,9 @@ import re
 
 import pytest
 
-from fastslow.compiled import native, special
+from fastslow.kernels import native, special
 from fastslow.model.known_functions import CLOSED, ELEMENTARY, OPEN
-from fastslow.results import arithmetic
+from fastslow.results.stored import arithmetic
 
 
 def test_the_vocabulary_is_that_of_the_compiler():

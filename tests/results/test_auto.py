@@ -8,7 +8,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.results.auto_files import _tangents
+from fastslow.results.io.auto_files import _tangents
 
 DATA = Path(__file__).parent / "data"
 

@@ -6,7 +6,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.results.regimes import REGIMES, in_words
+from fastslow.results.trajectory.regimes import REGIMES, in_words
 
 x, v, w, t = sp.symbols("x v w t")
 D, k, a, B, C, omega = sp.symbols("D k a B C omega")

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import fastslow as fs
-from fastslow.results.spectra import Spectrum
+from fastslow.results.trajectory.spectrum import Spectrum
 from tests.campaigns import files
 
 DATA = Path(__file__).parent / "data"

@@ -116,7 +116,7 @@ def test_stability_is_computed_once(gear_diagram, monkeypatch):
     def again(*_):
         raise AssertionError("computed again")
 
-    monkeypatch.setattr("fastslow.results.stretches.multistable", again)
-    monkeypatch.setattr("fastslow.results.stretches.stable_intervals", again)
+    monkeypatch.setattr("fastslow.results.branch.stability_intervals.multistable", again)
+    monkeypatch.setattr("fastslow.results.branch.stability_intervals.stable_intervals", again)
     assert np.array_equal(gear_diagram.bistable(1), known)
     assert np.array_equal(branch.stable_intervals(), intervals)

@@ -6,7 +6,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.results import dense
+from fastslow.results.trajectory import dense
 
 x, v, w, t = sp.symbols("x v w t")
 FORCED = fs.Model({x: v, v: sp.sin(t) - x - v})

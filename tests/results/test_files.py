@@ -17,14 +17,14 @@ import numpy as np
 import pytest
 
 import fastslow as fs
-from fastslow.results import files
-from fastslow.results.branches import Branch
-from fastslow.results.encoding import classes
-from fastslow.results.outcome import Outcome
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.base.result import Result
+from fastslow.results.branch.branch import Branch
+from fastslow.results.io import files
+from fastslow.results.io.encoding import classes
+from fastslow.results.io.npz_netcdf import sealed, write_archive
 from fastslow.results.points import SpecialPoints
-from fastslow.results.result import Result
-from fastslow.results.spectra import Spectrum
-from fastslow.results.storage import sealed, write_archive
+from fastslow.results.trajectory.spectrum import Spectrum
 
 FORMATS = [".npz", ".nc"]
 

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import fastslow as fs
-from fastslow.results.storage import read_archive, write_archive
+from fastslow.results.io.npz_netcdf import read_archive, write_archive
 
 x, v, w, t, a, k, D = sp.symbols("x v w t a k D")
 

@@ -14,8 +14,8 @@ import xarray
 
 import fastslow as fs
 from fastslow.continuation.loops import writeable
-from fastslow.results.immutable import fixed
-from fastslow.results.result import Saved
+from fastslow.results.base.immutable import fixed
+from fastslow.results.base.result import Saved
 from tests.errors.subjects import results
 
 #: Ways to the same result.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fastslow.results.map_boundaries import MapEdges, boundaries_of
+from fastslow.results.maps.boundaries import MapEdges, boundaries_of
 
 
 def lines(labels, width=0.0):

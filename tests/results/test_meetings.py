@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import fastslow as fs
-from fastslow.results.meetings import _met, _overlapping
-from fastslow.results.outcome import Outcome
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.branch.intersections import _met, _overlapping
 from fastslow.results.points import SpecialPoints
 
 END = Outcome("end of range", "reached the end of the range.", True)

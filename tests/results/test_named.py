@@ -7,7 +7,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.errors import unknown_name
-from fastslow.results.named import Named
+from fastslow.results.base.named_mapping import Named
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import fastslow as fs
-from fastslow.results.moments import Moment
+from fastslow.results.overlay.transitions import Phase, StableSheet, Transition
 from fastslow.results.points import SpecialPoint
-from fastslow.results.transitions import Phase, StableSheet, Transition
+from fastslow.results.trajectory.state_at import Moment
 
 
 def special(code):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fastslow.plot import style
+from fastslow.plot.layout import style
 from fastslow.results.point_types import POINT_TYPES, point_name
 
 

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import fastslow as fs
-from fastslow.results import levels
-from fastslow.results.levels import pieces_of
+from fastslow.results.branch import lookup
+from fastslow.results.branch.lookup import pieces_of
 from fastslow.results.points import SpecialPoints
 
 FOLD = 1 / np.sqrt(3)
@@ -182,7 +182,7 @@ def test_a_value_costs_a_search_on_the_pieces_that_hold_it(cubic, monkeypatch):
             searches.append(len(args[0]))
             return search(*args, **more)
 
-    monkeypatch.setattr(levels, "np", Counting())
+    monkeypatch.setattr(lookup, "np", Counting())
     assert len(branch.pieces.first) == 3
     known = branch.pieces
     assert len(branch.at(p=0.2)) == 3

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fastslow.results.sign_patterns import possible_patterns
+from fastslow.results.stored.sign_patterns import possible_patterns
 
 #: a x + b y + c, in general position.
 LINES = np.array([[1, 0, 0], [0, 1, 0], [1, 1, -1], [1, -2, 3], [3, 1, 5]], dtype=float)

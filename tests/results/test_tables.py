@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.results.markup import LONGEST, table
+from fastslow.results.io.html import LONGEST, table
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ import sympy as sp
 
 from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.model.model import Model
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.simulation.trajectories import simulate
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fastslow.results.branch.unexplained import (
+    unexplained_changes,
+    unexplained_rows,
+    unstable_range,
+)
 from fastslow.results.points import SpecialPoints
-from fastslow.results.unexplained import unexplained_changes, unexplained_rows, unstable_range
 
 
 def test_a_branch_whose_folds_were_lost_says_where_its_stability_changes(cubic):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fastslow.results.windows import state_window
+from fastslow.results.branch.windows import state_window
 
 
 @pytest.mark.parametrize("size", [1.0, 1e6, 1e-6])

@@ -8,9 +8,9 @@ import sympy as sp
 
 from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.model.model import Model
-from fastslow.simulation.ensembles import simulate_many
+from fastslow.simulation.many import simulate_many
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.simulation.trajectories import simulate
 
 
 @pytest.mark.parametrize(

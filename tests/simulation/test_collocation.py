@@ -8,9 +8,9 @@ from scipy.integrate import solve_ivp
 from scipy.special import gamma, j0
 
 from fastslow.model.model import Model
-from fastslow.simulation.ensembles import simulate_many
+from fastslow.simulation.many import simulate_many
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.simulation.trajectories import simulate
 
 x, y, v, t, w = sp.symbols("x y v t w")
 k, c, D = sp.symbols("k c D")

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.model.model import Model
-from fastslow.results.ensembles import Ensemble
-from fastslow.simulation.ensembles import simulate_many
+from fastslow.results.trajectory.ensemble import Ensemble
+from fastslow.simulation.many import simulate_many
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.simulation.trajectories import simulate
 
 x, v, t = sp.symbols("x v t")
 D = np.array([0.1, 0.25, 0.4, 0.25, 0.3, 0.05, 0.2])

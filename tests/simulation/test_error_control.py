@@ -12,9 +12,9 @@ from scipy.integrate import solve_ivp
 
 from fastslow.model.invariance import states_together
 from fastslow.model.model import Model
-from fastslow.simulation.ensembles import simulate_many
+from fastslow.simulation.many import simulate_many
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.simulation.trajectories import simulate
 
 x, y, z, v, t = sp.symbols("x y z v t")
 a, mu, k, c, D = sp.symbols("a mu k c D")

@@ -7,8 +7,8 @@ import pytest
 import sympy as sp
 
 from fastslow.model.model import Model
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.simulation.trajectories import simulate
 
 x, y, v, t = sp.symbols("x y v t")
 

@@ -8,8 +8,8 @@ import pytest
 import sympy as sp
 
 from fastslow.model.model import Model
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.simulation.trajectories import simulate
 
 # quadruple-precision Taylor series of order 40, tolerance 1e-30
 P1 = json.loads((Path(__file__).parent / "gear_p1.json").read_text())

@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from numba import njit
 
 from fastslow.model.model import Model
-from fastslow.simulation.implicit_steps import DEGREE, P, Q, join, weights
-from fastslow.simulation.matrices import (
+from fastslow.simulation.one import simulate
+from fastslow.simulation.settings import Integration
+from fastslow.simulation.stepper.implicit import DEGREE, P, Q, join, weights
+from fastslow.simulation.stepper.matrices import (
     contracts,
     factorise_in_place,
     solve_in_place,
     spectrum_for,
 )
-from fastslow.simulation.settings import Integration
-from fastslow.simulation.trajectories import simulate
 
 x, y, z, v, t, w = sp.symbols("x y z v t w")
 a, b, c, k, omega = sp.symbols("a b c k omega")

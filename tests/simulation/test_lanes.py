@@ -8,15 +8,15 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastslow.compiled import steps
-from fastslow.compiled.lanes import WIDTH
+from fastslow.kernels.simd import steps
+from fastslow.kernels.simd.lanes import WIDTH
 from fastslow.model.model import Model
-from fastslow.results.ensembles import Ensemble
-from fastslow.simulation import ensembles
-from fastslow.simulation.ensembles import simulate_many
-from fastslow.simulation.lanes import UNDER_WAY
+from fastslow.results.trajectory.ensemble import Ensemble
+from fastslow.simulation import many
+from fastslow.simulation.many import simulate_many
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.simulation.trajectories import simulate
+from fastslow.simulation.stepper.lanes import UNDER_WAY
 
 x, v, y, t = sp.symbols("x v y t")
 
@@ -96,7 +96,7 @@ def test_neighbours_order_and_threads_change_no_bit(gear, gears, table, data):
 
 def test_chunks_change_no_bit(gear, gears, table, monkeypatch):
     for size in (1, WIDTH - 1, UNDER_WAY + 1):
-        monkeypatch.setattr(ensembles, "_CHUNK", size)
+        monkeypatch.setattr(many, "_CHUNK", size)
         assert_same_bits(gears, many_gears(gear, table, threads=2))
 
 
@@ -251,14 +251,14 @@ def test_a_model_too_large_for_lanes_is_that_of_simulate(gear, table, monkeypatc
     monkeypatch.setattr(steps, "_LARGEST", 0)
     # nothing that is kept
     monkeypatch.setattr(steps, "_compiled", steps._compiled.__wrapped__)
-    many = many_gears(gear, table, slice(0, 9))
+    ensemble = many_gears(gear, table, slice(0, 9))
     for i in range(9):
         one = gear.with_parameters(**{name: table[name][i] for name in ("D", "C", "omega")})
         run = simulate(one, table["states"][i], t=(0, 60), integration=Integration(implicit=False))
         if 2 * np.pi / table["omega"][i] > 60:
-            assert np.array_equal(many.final[i], run.end[1:])
-            assert many.n_steps[i] == len(run.steps)
+            assert np.array_equal(ensemble.final[i], run.end[1:])
+            assert ensemble.n_steps[i] == len(run.steps)
         else:
             # an ensemble stops at the ends of the last periods, to see what is done in each
-            assert many.final[i] == pytest.approx(run.end[1:], abs=1e-11)
-            assert abs(many.n_steps[i] - len(run.steps)) <= 3
+            assert ensemble.final[i] == pytest.approx(run.end[1:], abs=1e-11)
+            assert abs(ensemble.n_steps[i] - len(run.steps)) <= 3

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from fastslow.model.model import Model
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.simulation.trajectories import simulate
 
 numbers = st.floats(-1.5, 1.5, allow_nan=False).map(lambda z: round(z, 3))
 stiffness = st.floats(0.1, 30.0)

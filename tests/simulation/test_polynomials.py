@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numba import njit
 from numpy.polynomial import polynomial as P
 
-from fastslow.simulation.polynomials import DEEPEST, first_root, take_samples, to_bernstein
+from fastslow.simulation.stepper.polynomials import DEEPEST, first_root, take_samples, to_bernstein
 
 
 @njit

@@ -10,10 +10,10 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from fastslow.model.model import Model
-from fastslow.simulation import radau
-from fastslow.simulation.ensembles import simulate_many
+from fastslow.simulation.many import simulate_many
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.simulation.trajectories import simulate
+from fastslow.simulation.stepper import radau
 
 x, y, z, v, w, t = sp.symbols("x y z v w t")
 p, mu = sp.symbols("p mu")

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import trapezoid
 
 from fastslow.errors import ArgumentError, UnknownNameError
-from fastslow.results.outcome import Outcome
+from fastslow.results.base.outcome import Outcome
 from fastslow.sweeps.refinement import refined_map
 
 UNIT = {"x": (0, 1), "y": (0, 1)}

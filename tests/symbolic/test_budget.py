@@ -8,10 +8,10 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.model.structure import real
-from fastslow.symbolic.candidates import Candidates
-from fastslow.symbolic.naming import named
-from fastslow.symbolic.signs import Signs
-from fastslow.symbolic.solution_families import OPEN, PAST, families
+from fastslow.symbolic.report.naming import named
+from fastslow.symbolic.signs.signs import Signs
+from fastslow.symbolic.solving.candidates import Candidates
+from fastslow.symbolic.solving.solution_families import OPEN, PAST, families
 from tests.symbolic.field_models import daisyworld
 
 

@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 from fastslow.model.structure import real
-from fastslow.symbolic.conditions import simplified
+from fastslow.symbolic.signs.conditions import simplified
 
 A, B, C = map(real, "ABC")
 EXPRESSIONS = (A - B, B - A, 2 * A - 2 * B, C, -C + 1, C - 2, A * C - B, B - A * C, A**2 - 1)

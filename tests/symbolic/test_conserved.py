@@ -7,7 +7,7 @@ import sympy as sp
 import fastslow as fs
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.structure import real
-from fastslow.symbolic.conserved import conserved_quantities
+from fastslow.symbolic.closed_forms.conserved import conserved_quantities
 
 t = sp.Symbol("t")
 

@@ -6,8 +6,8 @@ import sympy as sp
 
 from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.model.structure import real
-from fastslow.symbolic.elimination import eliminate
-from fastslow.symbolic.signs import Signs
+from fastslow.symbolic.signs.signs import Signs
+from fastslow.symbolic.solving.elimination import eliminate
 
 x, y, z, v, w, A, D = map(real, ["x", "y", "z", "v", "w", "A", "D"])
 

@@ -11,7 +11,7 @@ import fastslow as fs
 from fastslow.errors import ModelError, UnknownNameError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
-from fastslow.symbolic.symmetries import free_directions
+from fastslow.symbolic.closed_forms.symmetries import free_directions
 from fastslow.systems import harmonic_gear_two_inertias
 from tests.symbolic import field_models
 

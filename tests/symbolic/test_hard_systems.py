@@ -6,9 +6,9 @@ import pytest
 import sympy as sp
 
 from fastslow.model.structure import real
-from fastslow.symbolic.linear import NOTE, cramer
-from fastslow.symbolic.signs import Signs
-from fastslow.symbolic.verification import checked, weakest
+from fastslow.symbolic.signs.signs import Signs
+from fastslow.symbolic.solving.linear import NOTE, cramer
+from fastslow.symbolic.solving.verification import checked, weakest
 from tests.symbolic.symbolic_models import dense_linear, food_chain, law
 
 x, y, a = map(real, ("x", "y", "a"))

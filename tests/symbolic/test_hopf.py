@@ -6,7 +6,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.model.structure import real
-from fastslow.symbolic.stability import (
+from fastslow.symbolic.closed_forms.stability import (
     frequency_squared,
     hurwitz,
     irreducible_blocks,

@@ -8,15 +8,15 @@ from hypothesis import strategies as st
 
 from fastslow.errors import ArgumentError
 from fastslow.model.structure import real
-from fastslow.symbolic.assumptions import read_signs
-from fastslow.symbolic.inequalities import (
+from fastslow.symbolic.signs.assumptions import read_signs
+from fastslow.symbolic.signs.inequalities import (
     conjunction,
     implied,
     needed,
     positive,
     sign_within,
 )
-from fastslow.symbolic.signs import Signs
+from fastslow.symbolic.signs.signs import Signs
 
 A, B, D, x = map(real, ["A", "B", "D", "x"])
 

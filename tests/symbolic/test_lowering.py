@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 from fastslow.model.structure import real
-from fastslow.symbolic.lowering import lower_degrees
+from fastslow.symbolic.solving.lowering import lower_degrees
 
 X, Y, L = map(real, "xyL")
 

@@ -9,8 +9,8 @@ import pytest
 import sympy as sp
 
 from fastslow.errors import ArgumentError, UnknownNameError
+from fastslow.exporters.sources import export
 from fastslow.model.model import Model
-from fastslow.symbolic.sources import export
 from tests.symbolic.symbolic_models import auto_ab, gear, lorenz
 
 

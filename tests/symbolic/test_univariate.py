@@ -5,11 +5,11 @@ import pytest
 import sympy as sp
 
 from fastslow.model.structure import real
-from fastslow.symbolic.algebra import growth, light, spread, tidy
-from fastslow.symbolic.signs import Signs
-from fastslow.symbolic.stability import hurwitz
-from fastslow.symbolic.univariate import roots, solved_for, squares_out
-from fastslow.symbolic.verification import vanishes
+from fastslow.symbolic.closed_forms.stability import hurwitz
+from fastslow.symbolic.signs.signs import Signs
+from fastslow.symbolic.solving.algebra import growth, light, spread, tidy
+from fastslow.symbolic.solving.univariate import roots, solved_for, squares_out
+from fastslow.symbolic.solving.verification import vanishes
 
 a, b, x, w = map(real, ["a", "b", "x", "w"])
 

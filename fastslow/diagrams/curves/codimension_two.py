@@ -1,0 +1,590 @@
+"""Codimension-two points on curves of folds, Hopf points and boundary equilibria.
+
+Each has a test function that changes sign along the curve; the point itself is
+solved for as the curve's equations and the test together (Kuznetsov 2004,
+sections 8.7 and 10.3). Every test is a pure number: it does not change with the
+units of states and time, nor with the rates of states that do not take part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation import curves
+from fastslow.continuation.curves import Frame
+from fastslow.continuation.location import newton, slope_sizes
+from fastslow.continuation.settings import Continuation
+from fastslow.continuation.zeros import ROUNDING, Bracket, Node, brackets
+from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.points.center_manifolds import (
+    NoNormalForm,
+    bogdanov_takens,
+    double_hopf,
+    double_hopf_case,
+    generalized_hopf,
+    zero_hopf,
+    zero_hopf_case,
+)
+from fastslow.diagrams.points.defining import Defining, OnInterface, Pair, row_sizes
+from fastslow.diagrams.points.normal_forms import (
+    Vector,
+    cusp_form,
+    fold_form,
+    forms_at,
+    lyapunov_terms,
+)
+from fastslow.diagrams.points.row_tests import pair_sums
+
+Array = NDArray[np.float64]
+
+#: A pair is imaginary where the product of both is more than this part of their sizes.
+IMAGINARY = 1e-9
+
+#: Halvings of a bracket after which Newton's method is tried again.
+TRIALS = (0, 2, 5, 10, 20, 40)
+
+#: A test that is still this large after the last halvings jumps there and has no zero.
+JUMP = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Criterion:
+    """What is watched along a curve.
+
+    Parameters
+    ----------
+    code : str
+        What its zero is.
+    value : callable
+        z to the test, which is smooth near its zeros, and the size of the terms that it
+        is the sum of: less than rounding of that size is zero.
+    genuine : callable
+        Whether a zero at z is one of that kind.
+    region : int
+        The region that it belongs to.
+    interface : int, optional
+        The interface it is about.
+    beyond : int, optional
+        The region, or sliding motion, that meets the first one there.
+    note : str
+        What else a reader should know.
+    """
+
+    code: str
+    value: Callable[[Array], tuple[float, float]]
+    genuine: Callable[[Array], bool]
+    region: int
+    interface: int | None = None
+    beyond: int | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A codimension-two point after a row of a curve."""
+
+    row: int
+    criterion: Criterion
+    z: Array
+    residual: float
+    converged: bool
+    correction: float
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A traced curve: its equations, its rows, and how points between them are computed."""
+
+    system: Defining
+    z: Array
+    frame: Frame
+    continuation: Continuation
+
+    def between(self, row: int, part: float) -> Array | None:
+        """The point of the curve after a part of the step behind a row."""
+        a, b = self.z[row], self.z[row + 1]
+        chord = b - a
+        length = float(np.sqrt((chord**2) @ self.frame.weight))
+        if length == 0.0:
+            return None
+        guess = a + part * chord
+        found = curves.corrected(self.system, guess, chord / length, self.frame, self.continuation)
+        return None if found is None else found[0]
+
+    def at(self, node: Node) -> Array:
+        """The point of a node, from the chord where the curve cannot be reached."""
+        if node.part == 0.0:
+            return np.asarray(self.z[node.row])
+        z = self.between(node.row, node.part)
+        if z is None:
+            z = self.z[node.row] + node.part * (self.z[node.row + 1] - self.z[node.row])
+        return np.asarray(z)
+
+    def solved(self, row: int, part: float, entry: int, value: float) -> Array | None:
+        """The point beside a part of the step behind a row at which an entry has a value."""
+        guess = self.z[row]
+        if part > 0:
+            guess = guess + part * (self.z[row + 1] - guess)
+        guide = self.system.renewed(guess)
+
+        def equations(z: Array) -> Array:
+            return np.append(self.system.residual(z, guide), z[entry] - value)
+
+        z, _, converged, _ = newton(equations, guess, self.frame.scale)
+        near = np.abs((z - guess) / self.frame.scale)[: self.frame.size].max()
+        if not converged or near > 2.0 * self.continuation.largest_step:
+            return None
+        z[entry] = value
+        return self.system.renewed(z)
+
+    def passes(self, u: Array) -> bool:
+        """Whether the curve goes through a point (states, parameters)."""
+        scale = self.frame.scale[: self.frame.size]
+        line, target = self.z[:, : self.frame.size] / scale, u / scale
+        if len(line) < 2:
+            return bool(np.abs(line - target).max() < SAME)
+        chords = np.diff(line, axis=0)
+        lengths = np.maximum((chords**2).sum(axis=1), 1e-300)
+        part = np.clip(((target - line[:-1]) * chords).sum(axis=1) / lengths, 0.0, 1.0)
+        apart = np.linalg.norm(line[:-1] + part[:, None] * chords - target, axis=1)
+        # a chord leaves the curve by less than its length times the turn within it
+        for row in np.flatnonzero(apart < 0.2 * np.sqrt(lengths) + SAME):
+            z = self.between(int(row), float(part[row]))
+            if z is not None and np.abs(z[: self.frame.size] / scale - target).max() < SAME:
+                return True
+        return False
+
+
+#: Points nearer to each other than this, in scaled units, are one.
+SAME = 1e-6
+
+
+def criteria(
+    system: Defining, others: list[int], marks: Sequence[tuple[int, float]] = ()
+) -> list[Criterion]:
+    """Give the tests for a curve of one kind.
+
+    Parameters
+    ----------
+    system : Defining
+    others : list of int
+        For boundary equilibria the regions that meet there, else empty.
+    marks : sequence of (int, float)
+        Number of a parameter, 0 or 1, and a value of it that is a point UZ.
+    """
+    at_marks = [_mark(system, k, value) for k, value in marks]
+    if isinstance(system, OnInterface):
+        found: list[Criterion] = []
+        for region in others:
+            found += _boundary_tests(system, region)
+        return [*found, *at_marks]
+    found = list(_interface_tests(system))
+    if system.code == "LP":
+        found += _fold_tests(system)
+    if isinstance(system, Pair):
+        found += _pair_tests(system)
+    return [*found, *at_marks]
+
+
+def _mark(system: Defining, k: int, value: float) -> Criterion:
+    place, span = system.n + k, system.span[k]
+    return Criterion("UZ", lambda z: (float(z[place] - value) / span, 1.0), _always, system.region)
+
+
+def search(rows: Rows, watched: list[Criterion]) -> Iterator[Found]:
+    """All points at which a test vanishes with a change of sign, solved for.
+
+    Parameters
+    ----------
+    rows : Rows
+    watched : list of Criterion
+    """
+    for criterion in watched:
+        table = np.array([criterion.value(z) for z in rows.z])
+        unit = _unit(table)
+        if unit == 0.0:
+            # one that vanishes all along says nothing
+            continue
+
+        def value(z: Array, criterion: Criterion = criterion, unit: float = unit) -> float:
+            test, size = criterion.value(z)
+            return 0.0 if abs(test) <= ROUNDING * size else test / unit
+
+        def at(row: int, part: float, value: Callable[[Array], float] = value) -> float | None:
+            z = rows.between(row, part)
+            return None if z is None else value(z)
+
+        for bracket in brackets(np.array([value(z) for z in rows.z]), at):
+            point = _solved(rows, bracket, criterion, unit, at)
+            if point is not None:
+                yield point
+
+
+def _unit(table: Array) -> float:
+    """Typical size of a test's terms along a curve; 0 where the test is rounding throughout."""
+    tests, sizes = table.T
+    known = np.isfinite(tests) & np.isfinite(sizes)
+    if not np.any(np.abs(tests[known]) > ROUNDING * sizes[known]):
+        return 0.0
+    # the median, because some tests have poles
+    return float(np.median(sizes[known])) or float(sizes[known].max())
+
+
+def _solved(
+    rows: Rows,
+    bracket: Bracket,
+    criterion: Criterion,
+    unit: float,
+    at: Callable[[int, float], float | None],
+) -> Found | None:
+    """The zero within a bracket, which is halved until Newton's method stays inside."""
+    low, high = bracket.before, bracket.after
+    first: Found | None = None
+    for halvings in range(TRIALS[-1] + 1):
+        if halvings in TRIALS:
+            found, inside = _newton(rows, low, high, criterion, unit)
+            if inside and found.converged:
+                return found if criterion.genuine(found.z) else None
+            first = first or found
+        place = 0.5 * (low.place + high.place)
+        row = min(int(place), high.row if high.part > 0 else high.row - 1)
+        test = at(row, place - row)
+        if test is None or not np.isfinite(test):
+            break
+        middle = Node(row, place - row, test)
+        if test * low.value > 0:
+            low = middle
+        else:
+            high = middle
+    if first is None or min(abs(low.value), abs(high.value)) > JUMP:
+        # a pole, or a jump from one sign to the other
+        return None
+    return replace(first, converged=False) if criterion.genuine(first.z) else None
+
+
+def _newton(
+    rows: Rows, low: Node, high: Node, criterion: Criterion, unit: float
+) -> tuple[Found, bool]:
+    """Newton's method from within a bracket of tests in some unit, and whether it stayed there."""
+    system, frame = rows.system, rows.frame
+    a, b = rows.at(low), rows.at(high)
+    share = low.value / (low.value - high.value)
+    guess = a + share * (b - a)
+    guide = system.renewed(guess)
+    unit *= abs(low.value - high.value)
+
+    def equations(z: Array) -> Array:
+        return np.append(system.residual(z, guide), criterion.value(z)[0] / unit)
+
+    z, residual, converged, correction = newton(equations, guess, frame.scale)
+    if not np.all(np.isfinite(z)):
+        return Found(low.row, criterion, guess, residual, False, correction), False
+    z = system.renewed(z)
+    chord, gap = ((p - a)[: frame.size] / frame.scale[: frame.size] for p in (b, z))
+    length = float(np.linalg.norm(chord))
+    part = float(gap @ chord) / length**2 if length > 0 else 0.0
+    aside = float(np.linalg.norm(gap - part * chord))
+    inside = -0.05 <= part <= 1.05 and aside <= 0.5 * length + 1e-9
+    return Found(low.row, criterion, z, residual, converged, correction), inside
+
+
+def _always(_: Array) -> bool:
+    return True
+
+
+def _interface_tests(system: Defining) -> Iterator[Criterion]:
+    """Where folds and Hopf points meet an interface, or the edge of sliding along it."""
+    field, region = system.field, system.region
+    code = {"LP": "BF", "HB": "BH"}.get(system.code)
+    if code is None:
+        return
+    sides = field.modes[region].sides
+    for k in range(field.signs.shape[1]):
+        if field.signs[region, k] == 0:
+            continue
+
+        def height(z: Array, k: int = k) -> tuple[float, float]:
+            return float(system.heights(z)[k]), 1.0
+
+        def genuine(z: Array, k: int = k) -> bool:
+            imaginary = not isinstance(system, Pair) or z[system.width] > 0
+            return bool(imaginary) and system.inside(z, but=k)
+
+        if sides is None or k < len(field.interfaces):
+            yield Criterion(code, height, genuine, region, k, field.neighbour(region, k))
+        else:
+            # the last two rows of a sliding motion are the drifts of both sides: where one
+            # vanishes the point is an equilibrium of that side, on the interface
+            side = sides.above if k == field.signs.shape[1] - 2 else sides.below
+            yield Criterion(code, height, genuine, region, sides.interface, side)
+
+
+def left_null(slopes: Array, v: Array) -> Array:
+    """Left null vector of F_x, in a direction that is smooth along the curve.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (n, n + 2)
+        [F_x F_p], by which the rows are scaled, so that fast states do not blur it.
+    v : ndarray, shape (n,)
+        The right null vector.
+    """
+    size = row_sizes(slopes)
+    matrix = slopes[:, : len(v)] / size[:, None]
+    left, _, _ = np.linalg.svd(matrix)
+    w = left[:, -1] / size
+    # bordering by the right null vector orients it: the determinant keeps its sign
+    bordered = np.block([[matrix, left[:, -1:]], [v[None, :], np.zeros((1, 1))]])
+    side = np.linalg.slogdet(bordered)[0]
+    return np.asarray(w / np.linalg.norm(w) * (side if side != 0 else 1.0))
+
+
+def smallest_sum(values: Vector) -> tuple[float, float]:
+    """`pair_sums` of some eigenvalues as the test of a criterion."""
+    return float(pair_sums(values, rounding=0.0)), 1.0
+
+
+def smallest_value(matrix: Array, rate: Array | float = 0.0) -> float:
+    """The smallest singular value of a matrix with rows of length one, with its determinant's sign.
+
+    Rows far shorter than ``rate``, one number or one for each, stay short: in a plane that is
+    invariant for all parameters the whole row of the state that leaves it vanishes.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (n, n + 2)
+        [F_x F_p]; the determinant is that of F_x, a row's length that of all.
+    """
+    size = np.hypot(row_sizes(matrix), rate)
+    inner = (matrix / size[:, None])[:, : len(matrix)]
+    least = float(np.linalg.svd(inner, compute_uv=False)[-1])
+    return float(np.linalg.slogdet(inner)[0]) * least
+
+
+def _fold_tests(system: Defining) -> Iterator[Criterion]:
+    n, w, region = system.n, system.width, system.region
+
+    def quadratic(z: Array) -> tuple[float, float]:
+        v = z[w : w + n]
+        raw = (system.unit * v).astype(complex)
+        bent = forms_at(system.field, region, z[:w]).form(raw, raw).real / system.unit
+        null = left_null(system.at(z)[1], v)
+        return float(null @ bent), float(np.abs(null) @ np.abs(bent))
+
+    def overlap(z: Array) -> tuple[float, float]:
+        v = z[w : w + n]
+        return float(left_null(system.at(z)[1], v) @ v), 1.0
+
+    yield Criterion("CP", quadratic, _always, region)
+    if n < 2:
+        return
+    yield Criterion("BT", overlap, _always, region)
+    if n < 3:
+        return
+
+    def rest(z: Array) -> Vector:
+        values = np.linalg.eigvals(system.jacobian(z))
+        return np.asarray(values[np.argsort(np.abs(values))[1:]])
+
+    yield Criterion("ZH", lambda z: smallest_sum(rest(z)), lambda z: _imaginary(rest(z)), region)
+
+
+def _pair_tests(system: Pair) -> Iterator[Criterion]:
+    n, w, region = system.n, system.width, system.region
+
+    def turning(z: Array) -> tuple[float, float]:
+        rate = system.rate(z)
+        return float(z[w]) / (rate**2 if rate > 0 else 1.0), 1.0
+
+    def hopf(z: Array) -> bool:
+        return turning(z)[0] > IMAGINARY
+
+    def lyapunov(z: Array) -> tuple[float, float]:
+        return _lyapunov(system, z)
+
+    yield Criterion("BT", turning, _always, region)
+    yield Criterion("GH", lyapunov, hopf, region)
+    if n < 3:
+        return
+    yield Criterion(
+        "ZH", lambda z: (smallest_value(system.at(z)[1], system.rate(z)), 1.0), hopf, region
+    )
+    if n < 4:
+        return
+
+    def rest(z: Array) -> Vector:
+        values = np.linalg.eigvals(system.jacobian(z))
+        root = np.sqrt(complex(-z[w]))
+        kept = list(values)
+        for target in (root, -root):
+            kept.pop(int(np.argmin(np.abs(np.array(kept) - target))))
+        return np.array(kept)
+
+    yield Criterion(
+        "HH",
+        lambda z: smallest_sum(rest(z)),
+        lambda z: hopf(z) and _imaginary(rest(z)),
+        region,
+    )
+
+
+def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
+    field, n, width = system.field, system.n, system.width
+
+    def matrix(z: Array) -> Array:
+        slopes = field.curve(region, z[:width])[1]
+        return np.asarray(slopes * system.scales / system.unit[:, None])
+
+    def least(z: Array) -> Array:
+        sizes = slope_sizes(lambda u: field.curve(region, u), z[:width], system.scales)
+        return sizes / system.unit
+
+    def eigenvalues(z: Array) -> Vector:
+        return np.linalg.eigvals(matrix(z)[:, :n])
+
+    interface = system.interface
+    beyond = field.neighbour(region, interface)
+    yield Criterion(
+        "BF",
+        lambda z: (smallest_value(matrix(z), least(z)), 1.0),
+        _always,
+        region,
+        interface,
+        beyond,
+    )
+    sliding = None if beyond is None else _sliding(field, region, beyond)
+    if beyond is not None and sliding is not None:
+        other = beyond
+
+        def bordered(z: Array) -> tuple[float, float]:
+            """[[F_x, E], [h_x, 0]] with the jump E: singular where pseudo-equilibria fold."""
+            u = z[:width]
+            here, _, _, gradients = field.at(region, u)
+            inner, jump = matrix(z), (field.curve(other, u)[0] - here) / system.unit
+            size = float(np.abs(jump / row_sizes(inner)).max()) or 1.0
+            edge = gradients[interface] * system.scales
+            rows = np.column_stack([inner[:, :n], jump / size, inner[:, n:]])
+            last = np.concatenate([edge[:n], [0.0], edge[n:]])
+            return smallest_value(np.vstack([rows, last]), np.append(least(z), 0.0)), 1.0
+
+        yield Criterion("BF", bordered, _always, sliding, interface, region)
+    if n < 2:
+        return
+    yield Criterion(
+        "BH",
+        lambda z: smallest_sum(eigenvalues(z)),
+        lambda z: _imaginary(eigenvalues(z)),
+        region,
+        interface,
+        beyond,
+    )
+
+
+def _sliding(field: FrozenField, region: int, beyond: int) -> int | None:
+    """The sliding motion between two regions, None where the field is continuous."""
+    pair = {region, beyond}
+    for number, mode in enumerate(field.modes):
+        if mode.sides is not None and {mode.sides.above, mode.sides.below} == pair:
+            return number
+    return None
+
+
+def _imaginary(values: Vector) -> bool:
+    """Whether the pair with the smallest sum, in units of itself, is imaginary."""
+    first, second = (values[k] for k in np.triu_indices(len(values), 1))
+    size = np.maximum(np.abs(first), np.abs(second))
+    size[size == 0] = 1.0
+    k = int(np.argmin(np.abs(first + second) / size))
+    return bool((first[k] * second[k]).real > IMAGINARY * size[k] ** 2)
+
+
+def coefficients(system: Defining, found: Found) -> dict[str, Any]:
+    """Normal-form data of a point, by the names of a special point's fields."""
+    n, w = system.n, system.width
+    code, u, region = found.criterion.code, found.z[:w], found.criterion.region
+    field = system.field
+    if code not in ("CP", "BT", "GH", "ZH", "HH", "BH"):
+        return {}
+    raw = field.curve(region, u)[1][:, :n]
+    if code == "CP":
+        return {"coefficient": cusp_form(forms_at(field, region, u), raw, system.unit)}
+    values = np.linalg.eigvals(raw)
+    if code == "GH":
+        frequency = float(np.sqrt(found.z[w]))
+        form = _form(("l2",), generalized_hopf, field, region, u, frequency)
+        return {"frequency": frequency, **form}
+    if code == "HH":
+        own = float(np.sqrt(found.z[w]))
+        others = sorted(values[values.imag > 0].imag, key=lambda f: -abs(f - own))
+        other = float(others[0])
+        listed = ("p11", "p12", "p21", "p22", "theta", "delta")
+        form = _form(listed, double_hopf, field, region, u, (own, other), system.unit)
+        return {"frequency": other, "subtype": double_hopf_case(form["normal_form"]), **form}
+    if code == "BT":
+        return _form(("a", "b"), bogdanov_takens, field, region, u, system.unit)
+    turning = values[values.imag > 0]
+    pair = turning[np.argmin(np.abs(turning.real / turning))]
+    frequency = float(abs(pair.imag))
+    if code == "BH":
+        return {"frequency": frequency}
+    names = ("s", "theta", "E")
+    form = _form(names, zero_hopf, field, region, u, frequency, system.unit)
+    return {"frequency": frequency, "subtype": zero_hopf_case(form["normal_form"]), **form}
+
+
+def _form(
+    names: Sequence[str], compute: Callable[..., dict[str, float]], *given: Any
+) -> dict[str, Any]:
+    """Coefficients of a normal form, and which of them are undefined and why."""
+    listed = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+    form: dict[str, float] = {}
+    reason = ""
+    try:
+        with np.errstate(all="ignore"):
+            form = compute(*given)
+    except NoNormalForm as error:
+        reason = str(error)
+        if reason.startswith("undefined"):
+            reason = f"{listed} {reason}"
+    except np.linalg.LinAlgError:
+        reason = f"{listed} undefined because the equations of the normal form are singular"
+    except NotImplementedError as error:
+        reason = f"{listed} undefined because a rate has no Taylor polynomial here: {error}"
+    if not reason:
+        lost = [n for n in names if not np.isfinite(form.get(n, np.nan))]
+        if lost == ["theta", "delta"]:
+            reason = "theta and delta undefined because p11 or p22 vanishes"
+        elif lost:
+            reason = f"{' and '.join(lost)} undefined because a term is not finite"
+    kept = {n: v for n, v in form.items() if np.isfinite(v)}
+    return {"normal_form": kept, "degeneracy": reason}
+
+
+def along(system: Defining, rows: Array) -> Array:
+    """Coefficient at every row: a of folds, l₁ of Hopf points; NaN where there is none."""
+    return np.array([_coefficient(system, z) for z in rows])
+
+
+def _coefficient(system: Defining, z: Array) -> float:
+    if isinstance(system, Pair):
+        value, size = _lyapunov(system, z)
+        return 0.0 if abs(value) <= ROUNDING * size else value
+    if system.code != "LP":
+        return np.nan
+    u = z[: system.width]
+    raw = system.field.curve(system.region, u)[1][:, : system.n]
+    return fold_form(forms_at(system.field, system.region, u), raw, system.unit)
+
+
+def _lyapunov(system: Pair, z: Array) -> tuple[float, float]:
+    """First Lyapunov coefficient and the size of its terms; NaN for neutral saddles."""
+    w, region = system.width, system.region
+    if not z[w] > 0:
+        return np.nan, np.nan
+    raw = system.field.curve(region, z[:w])[1][:, : system.n]
+    return lyapunov_terms(forms_at(system.field, region, z[:w]), raw, float(np.sqrt(z[w])))

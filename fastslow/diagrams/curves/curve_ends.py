@@ -1,0 +1,71 @@
+"""Why a curve of special points ended, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation import curves
+from fastslow.diagrams.points.defining import ON, Crossing, Defining, TwoFold
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.branch.windows import StateWindow, left_window
+
+Array = NDArray[np.float64]
+
+
+def outcome_of(
+    status: str, system: Defining, z: Array, names: tuple[str, str], window: StateWindow
+) -> Outcome:
+    """What the status of a trace means, in words."""
+    plane = z[system.width - 2 : system.width]
+    where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, plane, strict=True))
+    if status == curves.RANGE:
+        return Outcome("end of range", f"reached the end of the range at {where}.", True)
+    if status == curves.CLOSED:
+        return Outcome("closed loop", "the curve returned to its start: a closed loop.", True)
+    if status == curves.BOUND and isinstance(system, TwoFold):
+        share, sides = float(z[system.width]), system.sides
+        reason = f"beyond it the points leave {_region(system)}"
+        for side, weight in ((sides.above, share), (sides.below, 1.0 - share)):
+            if abs(weight) <= ON:
+                reason = (
+                    f"it is an equilibrium of region {system.field.regions[side]} there, and "
+                    "beyond it both fields point in one direction"
+                )
+        return Outcome("left the region", f"the two-fold is at {where}; {reason}.", True)
+    if status == curves.BOUND:
+        return Outcome(
+            "interfaces meet",
+            f"another interface of region {_region(system)} is met at {where}; beyond it other "
+            "regions join there.",
+            True,
+        )
+    if status == curves.STOPPED and isinstance(system, Crossing):
+        return Outcome(
+            "no branch point",
+            f"branch points do not persist beyond {where}: the model has no symmetry that keeps "
+            "them, so they are isolated in this plane.",
+            False,
+        )
+    if status == curves.STOPPED:
+        return Outcome(
+            "left the region", f"the points leave region {_region(system)} at {where}.", True
+        )
+    if status == curves.WINDOW:
+        return left_window(window, z[: system.n], system.unit, where)
+    if status == curves.FULL:
+        return Outcome(
+            "too many points",
+            f"the curve goes on at {where}; raise Continuation(points=…) or largest_step.",
+            False,
+        )
+    return Outcome(
+        "step too small",
+        f"no next point was found from {where}: the curve is singular there, or the rates are not "
+        "defined beyond.",
+        False,
+    )
+
+
+def _region(system: Defining) -> str:
+    return system.field.regions[system.region]

@@ -1,0 +1,309 @@
+"""All points at which the fields of a frozen model are tangent to its interfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.arguments import instance, mapping, takes
+from fastslow.continuation.location import newton
+from fastslow.continuation.ordering import in_order
+from fastslow.diagrams.field import require_frozen
+from fastslow.diagrams.modes import Mode, modes_of
+from fastslow.diagrams.solve.equations import DEGREE, STARTS
+from fastslow.diagrams.solve.exact_polynomials import real_roots
+from fastslow.errors import ArgumentError, ModelError
+from fastslow.model.functions import numpy_function
+from fastslow.model.interfaces import vanishes_on
+from fastslow.model.model import Model
+from fastslow.model.motions import drift
+from fastslow.model.structure import real
+from fastslow.model.units import natural_units
+from fastslow.results.branch.tangencies import Tangencies, Tangency
+from fastslow.results.stored.model import finite_number
+from fastslow.symbolic.solving.elimination import eliminate
+
+Array = NDArray[np.float64]
+
+#: What counts as zero, relative to the size of the terms.
+SMALL = 1e-9
+
+#: How far, relative to the state, Newton's method may move a root of a polynomial.
+MOVED = 1e-3
+
+
+@takes(model=instance(Model), values=mapping)
+def tangencies(
+    model: Model, values: Mapping[Any, float] | None = None, /, **named: float
+) -> Tangencies:
+    """All tangency points of a frozen model: h = 0 and ∇h·f = 0 for the field of one side.
+
+    In the plane they are isolated. With n > 2 states they form surfaces of n − 2
+    dimensions; as many states must be given values. Where both equations are
+    polynomials all solutions are found and the list's ``coverage`` is
+    ``"complete"``; else Newton's method from many starts, and it is ``"found"``.
+    An interface that a field is tangent to everywhere has no such points.
+
+    Parameters
+    ----------
+    model : Model
+        A frozen model.
+    values : mapping, optional
+        Slow quantity, parameter, or state to be held (symbol or name) to its value.
+    **named : float
+        The same by name.
+
+    Returns
+    -------
+    Tangencies
+        A list of Tangency, interface by interface and region by region.
+
+    Raises
+    ------
+    UnknownNameError
+        For a name that is neither a parameter nor a state.
+    ModelError
+        For a slow quantity without value.
+    ArgumentError
+        If not exactly n − 2 states are held, or the model has one state only.
+
+    Examples
+    --------
+    A belt at speed 1 drags a block by friction; tangencies bound where it sticks.
+
+    >>> x, v = sp.symbols("x v")
+    >>> block = Model({x: v, v: -x - sp.sign(v - 1) / 2})
+    >>> for point in tangencies(block):
+    ...     print(point)
+    Tangency(x = -0.5, v = 1; of S1 to v - 1; invisible)
+    Tangency(x = 0.5, v = 1; of S2 to v - 1; visible)
+    """
+    changes = {str(k): v for k, v in {**(values or {}), **named}.items()}
+    held = {n: finite_number(f"state {n}", changes.pop(n)) for n in model.states if n in changes}
+    require_frozen(model, "look for the tangencies of")
+    given = model.with_parameters(changes)
+    _check(given, held)
+    modes = [mode for mode in modes_of(given) if mode.sides is None]
+    found: list[Tangency] = []
+    complete = True
+    for k in range(len(given.interfaces)):
+        for mode in modes:
+            contact = Contact(given, mode, _opposite(modes, mode, k), k, held)
+            complete &= contact.solved[1]
+            found += contact.points()
+    return Tangencies(found, "complete" if complete else "found")
+
+
+def _check(model: Model, held: Mapping[str, float]) -> None:
+    free = [n for n in model.free if n not in model.parameters]
+    if free:
+        raise ModelError(
+            f"the frozen slow quantity '{free[0]}' has no value; give one, "
+            f"as in tangencies(model, {free[0]}=…)"
+        )
+    wanted = len(model.states) - 2
+    if wanted < 0:
+        raise ArgumentError(
+            "tangency points need two states; a model of one state is tangent to an interface "
+            "only at a boundary equilibrium, which continue_equilibria finds"
+        )
+    if len(held) != wanted:
+        left = [n for n in model.states if n not in held]
+        received = ", ".join(held) or "none"
+        raise ArgumentError(
+            f"tangencies of a model with {wanted + 2} states: expected values for {wanted} of "
+            f"its states {', '.join(model.states)}, received {received}"
+            + (f"; as in tangencies(model, {left[-1]}=0)" if len(held) < wanted else "")
+        )
+
+
+def _opposite(modes: Sequence[Mode], mode: Mode, interface: int) -> Mode | None:
+    """The region across an interface."""
+    for other in modes:
+        pairs = zip(mode.signs, other.signs, strict=True)
+        if [k for k, (s, o) in enumerate(pairs) if s != o] == [interface]:
+            return other
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """One interface seen from one region, with n − 2 states held.
+
+    Parameters
+    ----------
+    model : Model
+    mode : Mode
+        The region.
+    across : Mode, optional
+        The region beyond the interface.
+    interface : int
+    held : mapping
+        State to its value.
+    """
+
+    model: Model
+    mode: Mode
+    across: Mode | None
+    interface: int
+    held: Mapping[str, float]
+
+    @cached_property
+    def numbers(self) -> dict[sp.Symbol, sp.Rational]:
+        """Exact values of all parameters and held states."""
+        both = {**self.model.parameters, **self.held}
+        return {real(n): sp.Rational(v) for n, v in both.items()}
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """The two states to solve for."""
+        return tuple(n for n in self.model.states if n not in self.held)
+
+    @cached_property
+    def units(self) -> Array:
+        """Natural units of the two unknown states."""
+        functions = [i.function for i in self.model.interfaces.values()]
+        values = {real(n): float(v) for n, v in {**self.model.parameters, **self.held}.items()}
+        units = natural_units(self.unknown, self.model.regions.values(), functions, values)
+        return np.array([units[name] for name in self.unknown])
+
+    @cached_property
+    def equations(self) -> tuple[sp.Expr, sp.Expr]:
+        """Functions h and L h of the two unknown states."""
+        h = self.mode.rows[self.interface]
+        first = drift(h, self.model.states, self.mode.rates)
+        return tuple(sp.expand(e.subs(self.numbers)) for e in (h, first))
+
+    @cached_property
+    def _function(self) -> Any:
+        return numpy_function([real(n) for n in self.unknown], list(self.equations))
+
+    @cached_property
+    def _details(self) -> Any:
+        """L²h, L h across the interface, and every h, of the unknowns."""
+        h, rates = self.mode.rows[self.interface], self.mode.rates
+        names = self.model.states
+        second = drift(drift(h, names, rates), names, rates)
+        other = self.across.rates if self.across is not None else rates
+        rows = [i.function for i in self.model.interfaces.values()]
+        whole = [second, drift(h, names, other), *rows]
+        exact = [e.subs(self.numbers) for e in whole]
+        return numpy_function([real(n) for n in self.unknown], exact)
+
+    @cached_property
+    def _jumps(self) -> bool:
+        """Whether the rates differ across the interface."""
+        h, other = self.mode.rows[self.interface], self.across
+        if other is None:
+            return False
+        pairs = zip(self.mode.rates, other.rates, strict=True)
+        return any(not vanishes_on(sp.expand(g - f), h) for f, g in pairs)
+
+    @cached_property
+    def solved(self) -> tuple[list[Array], bool]:
+        """Solutions for the unknown states, and whether these are sure to be all."""
+        names, symbols = self.unknown, [real(n) for n in self.unknown]
+        left = eliminate(dict(zip(names, self.equations, strict=True)), names)
+        if any(e.is_number and e.is_nonzero for e in left.remaining):
+            return [], True
+        if left.unknowns and len(left.remaining) < len(left.unknowns):
+            # tangent along the whole interface
+            return [], True
+        if not left.is_polynomial or left.divisors:
+            return self._searched(), False
+        if len(left.unknowns) < 2:
+            values = [self._roots(e, s) for e, s in zip(left.remaining, left.unknowns, strict=True)]
+        else:
+            values = [self._roots(sp.resultant(*left.remaining, o), s)
+                      for s, o in zip(symbols, symbols[::-1], strict=True)]  # fmt: skip
+        if any(v is None for v in values):
+            return self._searched(), False
+        guesses = []
+        formula = numpy_function(left.unknowns, left.state({}, names))
+        for roots in product(*(v for v in values if v is not None)):
+            with np.errstate(all="ignore"):
+                guesses.append(np.array(formula(*roots), dtype=float))
+        return self._polished(guesses, MOVED), True
+
+    @staticmethod
+    def _roots(equation: sp.Expr, symbol: sp.Symbol) -> list[float] | None:
+        """Real roots of a polynomial; None where it is zero or its degree is too high."""
+        polynomial = sp.Poly(equation, symbol)
+        if polynomial.is_zero or polynomial.degree() > DEGREE:
+            return None
+        first = polynomial.LC()
+        return real_roots(np.array([float(c / first) for c in polynomial.all_coeffs()]))
+
+    def _searched(self) -> list[Array]:
+        """From many states, a fixed sequence spread over several scales."""
+        generator = np.random.default_rng(20231)
+        spread = 10.0 ** generator.uniform(-2, 1.5, (STARTS, 1))
+        starts = generator.standard_normal((STARTS, 2)) * spread * self.units
+        return self._polished([np.zeros(2), *starts], np.inf)
+
+    @np.errstate(all="ignore")
+    def _polished(self, guesses: Sequence[Array], reach: float) -> list[Array]:
+        """Newton's last digits; what leads away or nowhere was no solution."""
+        kept: list[Array] = []
+        for guess in guesses:
+            scale = np.maximum(self.units, np.abs(guess))
+            state, _, _, size = newton(lambda z: self._values(z), guess, scale)
+            near = bool(np.all(np.abs(state - guess) <= reach * scale))
+            # at a double root the last corrections stay near the root of the rounding
+            if not (near and size < 1e-6 and self._holds(state)):
+                continue
+            gaps = (np.abs(state - o) / np.maximum(self.units, np.abs(o)) for o in kept)
+            apart = (float(gap.max()) for gap in gaps)
+            if min(apart, default=1.0) > 1e-6:
+                kept.append(state)
+        return [kept[k] for k in in_order(np.reshape(kept, (-1, 2)), self.units)]
+
+    def _values(self, state: Array) -> Array:
+        return np.array(self._function(*state), dtype=float)
+
+    def _holds(self, state: Array) -> bool:
+        """Whether both equations hold, up to rounding in their terms."""
+        terms = self._terms(self._function, state)
+        return bool(np.all(np.abs(self._values(state)) <= SMALL * terms))
+
+    def _terms(self, function: Any, state: Array) -> Array:
+        """What the terms of functions of the unknowns amount to at a state, by differences."""
+        step = 1e-6 * np.maximum(self.units, np.abs(state))
+        value = np.array(function(*state), dtype=float)
+        moved = [np.array(function(*(state + step * e)), dtype=float) for e in np.eye(2)]
+        return np.abs(value) + sum(np.abs(m - value) for m in moved) / 1e-6
+
+    @np.errstate(all="ignore")
+    def points(self) -> list[Tangency]:
+        """The solutions in the closure of the region, with what they are."""
+        found = []
+        for state in self.solved[0]:
+            second, other, *heights = np.array(self._details(*state), dtype=float)
+            size = self._terms(self._details, state)
+            bounds = np.array(self.mode.signs[: len(heights)]) * np.array(heights)
+            outside = bounds < -SMALL * size[2:]
+            if np.any(np.delete(outside, self.interface)):
+                continue
+            bends = self.mode.signs[self.interface] * second
+            place = dict(zip(self.unknown, state, strict=True)) | dict(self.held)
+            found.append(
+                Tangency(
+                    list(self.model.interfaces)[self.interface],
+                    self.mode.name,
+                    self.model.states,
+                    np.array([place[name] for name in self.model.states]),
+                    dict(self.model.parameters),
+                    float(second),
+                    bool(bends > 0) if abs(bends) > SMALL * size[0] else None,
+                    self._jumps and abs(float(other)) <= SMALL * size[1],
+                    float(np.abs(self._values(state)).max()),
+                )
+            )
+        return found

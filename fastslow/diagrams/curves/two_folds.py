@@ -1,0 +1,104 @@
+"""Two-folds, at which a branch of pseudo-equilibria ends: both fields are tangent there.
+
+The sliding field is 0/0 at a = b = 0. Without division the point solves
+(1 − α) f₁ + α f₂ = 0, h = 0, a = b for (states, α, parameter), which is regular;
+over two parameters the same equations define a curve (`defining.TwoFold`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation.location import newton
+from fastslow.diagrams.field import FrozenField
+
+Array = NDArray[np.float64]
+
+#: Farthest, in scaled units, that a two-fold lies from where steps became too small.
+NEAR = 1e-3
+
+#: Rows nearer to the two-fold than this are lost in the rounding of 0/0.
+BLURRED = 1e-6
+
+
+def two_fold_ahead(field: FrozenField, region: int, u: Array, scale: Array) -> Array | None:
+    """The two-fold that the last step of a sliding motion's branch reached or passed.
+
+    Parameters
+    ----------
+    region : int
+        Number of the sliding motion; a region has no two-fold.
+    u : ndarray, shape (N, n + 1)
+        Points of the branch.
+    scale : ndarray, shape (n + 1,)
+        Unit of each state and of the parameter.
+
+    Returns
+    -------
+    ndarray or None
+        The point u, solved for to rounding.
+    """
+    sides = field.modes[region].sides
+    if sides is None or len(u) < 2:
+        return None
+    signs = field.signs[region][-2:]
+    first, second = signs * field.at(region, u[-2:])[2][:, -2:]
+    passed = bool(np.all(second < 0))
+    if not passed and np.any(second < 0):
+        return None
+    reach = 2.0 * float(np.linalg.norm((u[-1] - u[-2]) / scale)) if passed else NEAR
+    part = float(np.clip(first.sum() / max((first - second).sum(), 1e-300), 0.0, 1.0))
+    near = u[-2] + part * (u[-1] - u[-2]) if passed else u[-1]
+    share = float(first[0] / first.sum()) if first.sum() else 0.5
+
+    def equations(z: Array) -> Array:
+        return _regular(field, region, np.delete(z, -2), float(z[-2]))
+
+    z, _, converged, _ = newton(equations, np.insert(near, -1, share), np.insert(scale, -1, 1.0))
+    found = np.delete(z, -2)
+    apart = np.linalg.norm((found - (u[-2] if passed else u[-1])) / scale)
+    return found if converged and apart <= reach else None
+
+
+def cut_at_two_fold(u: Array, tangents: Array, end: Array, scale: Array) -> tuple[Array, Array]:
+    """The rows before a two-fold, then the two-fold itself."""
+    apart = np.linalg.norm((u - end) / scale, axis=1)
+    ahead = ((end - u) / scale**2 * tangents).sum(axis=1)
+    keep = (apart > BLURRED) & (ahead > 0)
+    keep[:-2] |= apart[:-2] > 10 * BLURRED
+    keep[0] = True
+    u, tangents = u[keep], tangents[keep]
+    chord = (end - u[-1]) / scale
+    length = float(np.linalg.norm(chord))
+    last = tangents[-1] / scale
+    if length > 0:
+        # the direction at the other end of a circle's arc
+        chord = chord / length
+        last = 2.0 * (last @ chord) * chord - last
+    return np.vstack([u, end]), np.vstack([tangents, last * scale])
+
+
+def two_fold_residual(field: FrozenField, region: int, u: Array) -> float:
+    """What is left of the equations of a two-fold at a point, with the best weight α."""
+    return float(np.abs(_regular(field, region, u, weight_of(field, region, u))).max())
+
+
+def weight_of(field: FrozenField, region: int, u: Array) -> float:
+    """The weight α that makes (1 − α) f₁ + α f₂ smallest at a point."""
+    sides = field.modes[region].sides
+    assert sides is not None
+    above, below = field.curve(sides.above, u)[0], field.curve(sides.below, u)[0]
+    jump = below - above
+    return -float(above @ jump) / float(jump @ jump) if jump.any() else 0.5
+
+
+def _regular(field: FrozenField, region: int, u: Array, share: float) -> Array:
+    """(1 − α) f₁ + α f₂, h and a − b at a point."""
+    sides = field.modes[region].sides
+    assert sides is not None
+    above, _, h, gradients = field.at(sides.above, u)
+    below, _ = field.curve(sides.below, u)
+    normal = gradients[sides.interface, : field.n]
+    weighted = (1.0 - share) * above + share * below
+    return np.concatenate([weighted, [h[sides.interface], normal @ (above - below)]])

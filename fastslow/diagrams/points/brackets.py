@@ -1,0 +1,254 @@
+"""Where test functions vanish between the rows of a piece, pairs within one step included."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation.location import Located
+from fastslow.continuation.loops import loop, writeable
+from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.trace.across_regions import Piece, Window, beside
+
+Array = NDArray[np.float64]
+
+#: Steps by which a bracket is narrowed, beyond which it is at rounding.
+NARROWINGS = 80
+
+#: Newton's method is tried after each of so many narrowings, and then after twice as many as the
+#: last time, as it costs more than they do.
+TRIED_EACH = 4
+
+#: A minimum is computed where less than this fraction of the smallest value may be left.
+DIP = 0.5
+
+#: Evaluations spent on one minimum of a test function.
+EVALUATIONS = 40
+
+#: A minimum is known well enough at this fraction of the step: the test is above its minimum
+#: by the square of it.
+SETTLED = 1e-8
+
+#: The golden section, by which a minimum is bracketed where no parabola helps.
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Bracket:
+    """Two points of a piece between which a test changes sign, after row ``row``."""
+
+    row: int
+    u: tuple[Array, Array]
+    values: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """A test function on a piece.
+
+    Parameters
+    ----------
+    field : FrozenField
+    piece : Piece
+    window : Window
+    steps : ndarray, shape (N - 1,)
+        Lengths of the steps between the rows, in units of the window.
+    at : callable
+        A point u and the direction along the piece to the test there.
+    """
+
+    field: FrozenField
+    piece: Piece
+    window: Window
+    steps: Array
+    at: Callable[[Array, Array], float]
+
+    def between(self, a: Array, b: Array, part: float) -> tuple[Array, float] | None:
+        """The point of the curve above a part of a chord, with its test."""
+        chord = b - a
+        guess = a + part * chord
+        found = beside(
+            self.field, self.piece.region, guess, chord * self.window.weight, guess, self.window
+        )
+        return (found.u, self.at(found.u, chord)) if found.converged else None
+
+    def brackets(self, test: Array) -> Iterator[Bracket]:
+        """Changes of sign between rows next to each other but for one zero, and within dips."""
+        u = self.piece.u
+        for before, after in sign_changes(test):
+            yield Bracket(before, (u[before], u[after]), (test[before], test[after]))
+        for row in _dips(test, self.steps):
+            yield from self._dip(row, test)
+
+    def _dip(self, row: int, test: Array) -> Iterator[Bracket]:
+        """Two changes of sign around a minimum of the modulus after a row, if there are."""
+        a, b, sign = self.piece.u[row], self.piece.u[row + 1], float(np.sign(test[row]))
+
+        def value(part: float) -> tuple[Array, float] | None:
+            found = self.between(a, b, part)
+            return None if found is None else (found[0], found[1] * sign)
+
+        lowest = _negative(value, float(abs(test[row])), float(abs(test[row + 1])))
+        if lowest is not None:
+            point, at = lowest
+            yield Bracket(row, (a, point), (test[row], at * sign))
+            yield Bracket(row, (point, b), (at * sign, test[row + 1]))
+
+    def solve(
+        self, bracket: Bracket, locate: Callable[[Array], Located], *, narrowings: int = 0
+    ) -> Located | None:
+        """The special point within a bracket, which is narrowed until Newton's method stays in it.
+
+        Where Newton's method never does, the bracket itself is narrowed to rounding.
+
+        Parameters
+        ----------
+        bracket : Bracket
+        locate : callable
+            Newton's method for the point from a start u.
+        narrowings : int
+            How often the bracket is narrowed before the first attempt.
+
+        Returns
+        -------
+        Located or None
+            None where the test jumps from one sign to the other and does not vanish.
+        """
+        (a, b), (f, g) = bracket.u, bracket.values
+        size = min(abs(f), abs(g))
+        # weights of the ends by the Illinois variant of regula falsi (Dowell & Jarratt 1971)
+        weight_a = weight_b = 1.0
+        side = 0
+        for count in range(NARROWINGS):
+            part = weight_a * f / (weight_a * f - weight_b * g)
+            tried = count - narrowings
+            if tried >= 0:
+                if tried < TRIED_EACH or tried.bit_count() == 1:
+                    located = locate(a + part * (b - a))
+                    if located.converged and self._inside(located.u, a, b):
+                        return located
+                # regula falsi may hold on to one end
+                part = 0.5 if count % 2 else part
+            found = self.between(a, b, part)
+            if found is None:
+                break
+            if found[1] == 0:
+                located = locate(found[0])
+                good = located.converged and self._inside(located.u, a, b)
+                return located if good else self._at_rounding(found[0], 0.0)
+            if np.all(found[0] == a) or np.all(found[0] == b):
+                break
+            if found[1] * f > 0:
+                (a, f), weight_a = found, 1.0
+                weight_b = weight_b * 0.5 if side == 1 else 1.0
+                side = 1
+            else:
+                (b, g), weight_b = found, 1.0
+                weight_a = weight_a * 0.5 if side == -1 else 1.0
+                side = -1
+        return self._narrowed(a, b, f, g, size)
+
+    def _narrowed(self, a: Array, b: Array, f: float, g: float, size: float) -> Located | None:
+        """The middle of a bracket narrowed to rounding; None if the test jumps across it."""
+        length = float(np.abs((b - a) / self.window.scale).max())
+        if length > 1e-9 or min(abs(f), abs(g)) > 1e-3 * size:
+            return None
+        return self._at_rounding(a + f / (f - g) * (b - a), length)
+
+    def _at_rounding(self, u: Array, length: float) -> Located:
+        rates, _ = self.field.curve(self.piece.region, u)
+        return Located(u, float(np.abs(rates).max()), True, np.empty(0), length)
+
+    def _inside(self, u: Array, a: Array, b: Array) -> bool:
+        chord = (b - a) / self.window.scale
+        length = float(chord @ chord)
+        gap = (u - a) / self.window.scale
+        if length == 0 or not np.all(np.isfinite(gap)):
+            return False
+        part = float(gap @ chord) / length
+        aside = float(np.linalg.norm(gap - part * chord))
+        return -1e-9 <= part <= 1.0 + 1e-9 and aside <= 0.5 * np.sqrt(length) + 1e-9
+
+
+def sign_changes(test: Array) -> list[tuple[int, int]]:
+    """Rows before and after every change of sign, at most one zero between them.
+
+    Examples
+    --------
+    >>> sign_changes(np.array([1.0, -2.0, -1.0, 0.0, 3.0]))
+    [(0, 1), (2, 4)]
+    """
+    known = np.flatnonzero(test != 0)
+    signs = np.sign(test[known])
+    changes = np.flatnonzero(signs[:-1] * signs[1:] < 0)
+    pairs = [(int(known[k]), int(known[k + 1])) for k in changes]
+    return [(before, after) for before, after in pairs if after - before <= 2]
+
+
+def _dips(test: Array, steps: Array) -> list[int]:
+    """Rows after which a test that keeps its sign may reach zero and turn back."""
+    found = np.empty(len(steps), dtype=np.int64)
+    count = loop("dips")(writeable(test), steps, DIP, found)
+    rows: list[int] = found[:count].tolist()
+    return rows
+
+
+def _negative(
+    value: Callable[[float], tuple[Array, float] | None], left: float, right: float
+) -> tuple[Array, float] | None:
+    """A point between 0 and 1 at which a function with positive values there is negative.
+
+    Brent's minimization (1973, chapter 5), ended as soon as the function is
+    negative, or its minimum is known well enough and is not.
+    """
+    low, high = 0.0, 1.0
+    # best, second and third best place so far, with their values
+    second, third = ((low, left), (high, right))[:: 1 if left <= right else -1]
+    best = (float("nan"), np.inf)
+    step = earlier = np.inf
+    place = 0.5
+    for count in range(EVALUATIONS):
+        found = value(place)
+        if found is None or found[1] < 0:
+            return found
+        here = (place, found[1])
+        if count == 0:
+            best = here
+        elif here[1] <= best[1]:
+            low, high = (best[0], high) if place > best[0] else (low, best[0])
+            best, second, third = here, best, second
+        else:
+            low, high = (low, place) if place > best[0] else (place, high)
+            if here[1] <= second[1]:
+                second, third = here, second
+            elif here[1] <= third[1]:
+                third = here
+        x, f = best
+        vertex, least = _parabola(best, second, third)
+        if (count > 0 and abs(vertex - x) < SETTLED) or (count > 2 and least > DIP * f):
+            return None
+        aimed = vertex - x
+        if not low < vertex < high or abs(aimed) > 0.5 * earlier:
+            aimed = (1.0 - GOLDEN) * ((high if high - x > x - low else low) - x)
+            earlier = np.inf
+        else:
+            earlier = step
+        step = max(abs(aimed), SETTLED)
+        place = x + float(np.copysign(step, aimed))
+    return None
+
+
+def _parabola(*points: tuple[float, float]) -> tuple[float, float]:
+    """Vertex of the parabola through three points, with its value there; (∞, −∞) for none."""
+    (x, f), (y, g), (z, h) = points
+    if len({x, y, z}) < 3:
+        return np.inf, -np.inf
+    first, second = (g - f) / (y - x), (h - f) / (z - x)
+    bend = (second - first) / (z - y)
+    if not bend > 0:
+        return np.inf, -np.inf
+    slope = first - bend * (y - x)
+    return x - 0.5 * slope / bend, f - 0.25 * slope**2 / bend

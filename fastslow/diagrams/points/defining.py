@@ -1,0 +1,312 @@
+"""Equations that define folds, Hopf points, branch points, boundary equilibria and two-folds.
+
+In all of them z = (states, two parameters, extra unknowns), and each is a
+regular system at a generic point (Kuznetsov 2004, chapter 10). Rates and
+Jacobian are scaled by the units of the states and the spans of the parameters,
+so that what is left has no unit but that of time, in which the equations are
+homogeneous: neither the units of a model nor its time scale matter.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.diagrams.curves.two_folds import weight_of
+from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.modes import Sides
+
+Array = NDArray[np.float64]
+
+#: A point this near to an interface, relative to the terms of its function, is on it.
+ON = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Defining(ABC):
+    """What every kind of point has: a field with two varying parameters, a region, units.
+
+    Parameters
+    ----------
+    field : FrozenField
+        With two varying parameters.
+    region : int
+    unit : ndarray, shape (n,)
+        Unit of every state.
+    span : ndarray, shape (2,)
+        Length of the range of both parameters.
+    """
+
+    field: FrozenField
+    region: int
+    unit: Array
+    span: Array
+
+    #: What the points are.
+    code: ClassVar[str]
+
+    @abstractmethod
+    def start(self, u: Array) -> Array:
+        """Give z for a point u = (states, parameters)."""
+
+    @abstractmethod
+    def residual(self, z: Array, guide: Array) -> Array:
+        """Left-hand sides at points z of shape (…, N + 1), shape (…, N)."""
+
+    @property
+    def n(self) -> int:
+        return self.field.n
+
+    @property
+    def width(self) -> int:
+        """Length of (states, parameters)."""
+        return self.n + 2
+
+    @property
+    def scales(self) -> Array:
+        """Units of (states, parameters)."""
+        return np.append(self.unit, self.span)
+
+    def extras(self, z: Array) -> Array:
+        """Units of the extra unknowns, by their values at a first point."""
+        return np.ones(len(z) - self.width)
+
+    def at(self, z: Array) -> tuple[Array, Array]:
+        """Rates and their derivatives in units of states and parameters, at z (…, N + 1)."""
+        u = z[..., : self.width]
+        rows = u.reshape(-1, self.width)
+        rates, slopes, _, _ = self.field.at(self.region, rows)
+        scaled = slopes * self.scales / self.unit[:, None]
+        lead = u.shape[:-1]
+        return (rates / self.unit).reshape(*lead, self.n), scaled.reshape(*lead, self.n, self.width)
+
+    def jacobian(self, z: Array) -> Array:
+        """The state Jacobian in the units of the states, shape (…, n, n)."""
+        return self.at(z)[1][..., : self.n]
+
+    def balanced(self, z: Array) -> Array:
+        """The state Jacobian at one point, every row in units of [F_x F_p]."""
+        slopes = self.at(z)[1]
+        return np.asarray(slopes[:, : self.n] / row_sizes(slopes)[:, None])
+
+    def renewed(self, z: Array) -> Array:
+        return z
+
+    def inside(self, z: Array, but: int | None = None) -> bool:
+        """Whether a point lies in the closure of the region, one interface left aside.
+
+        Of sliding, also where both fields point away from the interface: the
+        pseudo-equilibria of escaping are those of the same equations.
+        """
+        heights = self.heights(z)
+        if but is not None:
+            heights[but] = 0.0
+        if self.field.modes[self.region].sides is not None:
+            drifts = heights[-2:]
+            one_way = np.all(drifts >= -ON) or np.all(drifts <= ON)
+            return bool(one_way and np.all(heights[:-2] >= -ON))
+        return bool(np.all(heights >= -ON))
+
+    def heights(self, z: Array) -> Array:
+        """What bounds the region, positive inside and relative to its terms, at a point."""
+        u = z[: self.width]
+        _, _, h, gradients = self.field.at(self.region, u)
+        size = np.abs(gradients) @ np.maximum(np.abs(u), self.scales)
+        return np.asarray(self.field.signs[self.region] * h / np.where(size > 0, size, 1.0))
+
+
+def row_sizes(matrix: Array) -> Array:
+    """Length of every row, 1 where there is none: fast states are as long as slow ones then."""
+    size = np.linalg.norm(matrix, axis=1)
+    return np.where(size > 0, size, 1.0)
+
+
+class Fold(Defining):
+    """F = 0, J v = 0, |v| = 1; the extra unknowns are v."""
+
+    code: ClassVar[str] = "LP"
+
+    def start(self, u: Array) -> Array:
+        _, _, right = np.linalg.svd(self.balanced(u))
+        return np.concatenate([u, right[-1]])
+
+    def residual(self, z: Array, guide: Array) -> Array:
+        rates, slopes = self.at(z)
+        v = z[..., self.width :]
+        null = np.einsum("...ij,...j->...i", slopes[..., : self.n], v)
+        length = v @ guide[self.width :] - 1.0
+        return np.concatenate([rates, null, length[..., None]], axis=-1)
+
+    def renewed(self, z: Array) -> Array:
+        v = z[self.width :]
+        return np.concatenate([z[: self.width], v / np.linalg.norm(v)])
+
+
+class Pair(Defining):
+    """F = 0, (J² + κ) v = 0, |v| = 1, ⟨c, v⟩ = 0: two eigenvalues with sum zero.
+
+    The extra unknowns are κ, v and c, a vector that completes v to the plane
+    of the two and is carried along as it is. κ > 0 is a Hopf point with
+    frequency √κ, κ < 0 a neutral saddle.
+    """
+
+    code: ClassVar[str] = "HB"
+
+    def start(self, u: Array, squared: float | None = None) -> Array:
+        """Give z for a point, with the product of the pair.
+
+        By default the pair is the one with the smallest sum in units of itself.
+        """
+        if squared is None:
+            values = np.linalg.eigvals(self.jacobian(u))
+            first, second = (values[k] for k in np.triu_indices(self.n, 1))
+            size = np.maximum(np.abs(first) + np.abs(second), np.finfo(float).tiny)
+            squared = float((first * second).real[np.argmin(np.abs(first + second) / size)])
+        plane = self._plane(u, squared)
+        return np.concatenate([u, [squared], plane[0], plane[1]])
+
+    def _plane(self, z: Array, kappa: float) -> Array:
+        """Two vectors that span the null plane of J² + κ, shape (2, n)."""
+        matrix = self.jacobian(z)
+        square = matrix @ matrix + kappa * np.eye(self.n)
+        # the rows in units of their terms, so that fast states do not blur the plane
+        size = (np.abs(matrix) @ np.abs(matrix)).sum(axis=1, keepdims=True) + abs(kappa)
+        _, _, right = np.linalg.svd(square / np.where(size > 0, size, 1.0))
+        return np.asarray(right[[-1, -2]])
+
+    def rate(self, z: Array) -> float:
+        """How fast the pair is: the norm of the Jacobian in its plane, at least √|κ|."""
+        plane = np.linalg.qr(self._plane(z[: self.width], float(z[self.width])).T)[0]
+        inner = plane.T @ self.jacobian(z) @ plane
+        return float(max(np.linalg.norm(inner), np.sqrt(abs(z[self.width]))))
+
+    def extras(self, z: Array) -> Array:
+        units = np.ones(len(z) - self.width)
+        rate = self.rate(z)
+        units[0] = rate**2 if rate > 0 else 1.0
+        return units
+
+    def residual(self, z: Array, guide: Array) -> Array:
+        rates, slopes = self.at(z)
+        n, w = self.n, self.width
+        matrix, kappa, v = slopes[..., :n], z[..., w], z[..., w + 1 : w + 1 + n]
+        double = np.einsum("...ij,...jk,...k->...i", matrix, matrix, v) + kappa[..., None] * v
+        ends = [
+            v @ guide[w + 1 : w + 1 + n] - 1.0,
+            v @ guide[w + 1 + n :],
+        ]
+        kept = z[..., w + 1 + n :] - guide[w + 1 + n :]
+        return np.concatenate([rates, double, np.stack(ends, axis=-1), kept], axis=-1)
+
+    def renewed(self, z: Array) -> Array:
+        n, w = self.n, self.width
+        u, kappa, v = z[:w], z[w], z[w + 1 : w + 1 + n]
+        v = v / np.linalg.norm(v)
+        # the other direction of the null plane, at right angles to v
+        plane = self._plane(u, kappa)
+        plane = plane - np.outer(plane @ v, v)
+        other = plane[np.argmax(np.linalg.norm(plane, axis=1))]
+        other = other / np.linalg.norm(other)
+        if other @ z[w + 1 + n :] < 0:
+            other = -other
+        return np.concatenate([u, [kappa], v, other])
+
+
+class Crossing(Defining):
+    """F + βψ = 0, [F_x F_p]ᵀψ = 0, |ψ| = 1: a branch point over the first parameter.
+
+    The extra unknowns are ψ and β. In a model without symmetry β does not stay
+    zero: branch points are then isolated in the parameter plane.
+    """
+
+    code: ClassVar[str] = "BP"
+
+    def start(self, u: Array) -> Array:
+        left, _, _ = np.linalg.svd(self.at(u)[1][:, : self.n + 1])
+        return np.concatenate([u, left[:, -1], [0.0]])
+
+    def extras(self, z: Array) -> Array:
+        units = np.ones(len(z) - self.width)
+        rate = np.abs(z[self.width : -1]) @ np.abs(self.at(z)[1]).sum(axis=1)
+        units[-1] = rate if rate > 0 else 1.0
+        return units
+
+    def residual(self, z: Array, guide: Array) -> Array:
+        rates, slopes = self.at(z)
+        n, w = self.n, self.width
+        psi, beta = z[..., w : w + n], z[..., -1:]
+        null = np.einsum("...ij,...i->...j", slopes[..., : n + 1], psi)
+        length = psi @ guide[w : w + n] - 1.0
+        return np.concatenate([rates + beta * psi, null, length[..., None]], axis=-1)
+
+    def renewed(self, z: Array) -> Array:
+        n, w = self.n, self.width
+        psi = z[w : w + n]
+        return np.concatenate([z[:w], psi / np.linalg.norm(psi), z[-1:]])
+
+
+@dataclass(frozen=True, eq=False)
+class OnInterface(Defining):
+    """F = 0, h = 0: a boundary equilibrium; no extra unknowns."""
+
+    code: ClassVar[str] = "BE"
+    interface: int = 0
+
+    def start(self, u: Array) -> Array:
+        return u.copy()
+
+    def residual(self, z: Array, guide: Array) -> Array:
+        rows = z.reshape(-1, self.width)
+        rates, _, h, _ = self.field.at(self.region, rows)
+        both = np.column_stack([rates, h[:, self.interface]])
+        return both.reshape(*z.shape[:-1], self.n + 1)
+
+
+class TwoFold(Defining):
+    """(1 − α) f₁ + α f₂ = 0, h = 0, a = b: a pseudo-equilibrium at which both drifts vanish.
+
+    With the first equation a = ∇h·f₁ and b = ∇h·f₂ are both zero where they are equal. The extra
+    unknown is α; from 0 to 1 the fields point in opposite directions, and the point is one of
+    sliding. Its region is the sliding motion, whose own field is 0/0 there.
+    """
+
+    code: ClassVar[str] = "TF"
+
+    @property
+    def sides(self) -> Sides:
+        sides = self.field.modes[self.region].sides
+        assert sides is not None
+        return sides
+
+    def start(self, u: Array) -> Array:
+        return np.append(u, weight_of(self.field, self.region, u))
+
+    def residual(self, z: Array, guide: Array) -> Array:
+        rows = z.reshape(-1, self.width + 1)
+        u, share = rows[:, : self.width], rows[:, self.width :]
+        above, _, h, gradients = self.field.at(self.sides.above, u)
+        below = self.field.at(self.sides.below, u)[0]
+        interface, n = self.sides.interface, self.n
+        # the gradient in units of its own length, so that no unit of h matters
+        edge = gradients[:, interface] * self.scales
+        size = np.linalg.norm(edge[:, :n], axis=1, keepdims=True)
+        size = np.where(size > 0, size, 1.0)
+        first, second = above / self.unit, below / self.unit
+        drifts = np.einsum("ij,ij->i", edge[:, :n] / size, first - second)
+        both = np.column_stack(
+            [(1.0 - share) * first + share * second, h[:, interface] / size[:, 0], drifts]
+        )
+        return both.reshape(*z.shape[:-1], self.n + 2)
+
+    def edges(self, z: Array) -> Array:
+        """α, 1 − α and the heights of interfaces, positive where the point is one of sliding."""
+        share = z[self.width]
+        return np.append([share, 1.0 - share], self.heights(z)[: len(self.field.interfaces)])
+
+    def inside(self, z: Array, but: int | None = None) -> bool:
+        """Whether the fields point in opposite directions, within all other interfaces."""
+        return bool(np.all(self.edges(z) >= -ON))

@@ -1,0 +1,233 @@
+"""Special points between the rows of a piece, solved for to rounding."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation.location import Located, branch_point, fold, turning_pair
+from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.points.brackets import Search
+from fastslow.diagrams.points.normal_forms import first_lyapunov, fold_form, forms_at
+from fastslow.diagrams.points.row_tests import (
+    ROUNDING,
+    RowTests,
+    divided,
+    pair_sums,
+    product_of_pair,
+    resolved,
+)
+from fastslow.diagrams.trace.across_regions import Piece, Window
+from fastslow.results.branch.unexplained import unexplained_rows
+from fastslow.results.point_types import POINT_TYPES
+
+Array = NDArray[np.float64]
+
+#: How often a bracket of a Hopf point is narrowed before Newton's method for it is tried,
+#: which costs as much as dozens of evaluations where there are many states.
+NARROWED_FIRST = 3
+
+#: How often the steps are divided whose special points do not explain how many eigenvalues are
+#: unstable: neutral saddles may hide a Hopf point among them.
+DIVISIONS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Detected:
+    """A special point after row ``row`` of a piece."""
+
+    row: int
+    code: str
+    located: Located
+    coefficient: float | None = None
+    frequency: float | None = None
+    lyapunov: float | None = None
+
+
+@np.errstate(all="ignore")
+def special_points(
+    field: FrozenField, piece: Piece, window: Window, marks: Sequence[float]
+) -> tuple[list[Detected], Piece, NDArray[np.complex128]]:
+    """All special points of a piece, in order along it.
+
+    Returns
+    -------
+    found : list of Detected
+    piece : Piece
+        The piece, with rows added where one step hid several points.
+    eigenvalues : ndarray of complex
+        The finite ones of its rows.
+    """
+    piece, tests = resolved(field, piece, window)
+    found = _between_rows(field, piece, window, tests, marks)
+    for _ in range(DIVISIONS):
+        finer = piece
+        # from the last step on, so that the rows before it keep their numbers
+        for first, last in reversed(_unexplained(tests, found)):
+            finer = divided(field, finer, window, first, last)
+        if len(finer.u) == len(piece.u):
+            break
+        piece, tests = resolved(field, finer, window)
+        found = _between_rows(field, piece, window, tests, marks)
+    return found, piece, tests.eigenvalues
+
+
+def _unexplained(tests: RowTests, found: Sequence[Detected]) -> list[tuple[int, int]]:
+    """Pairs of rows between which the number of unstable eigenvalues changes unexplained."""
+    low, high = tests.unstable
+    known = [d for d in found if POINT_TYPES[d.code].changes_stability]
+    # a row for every point, at which the number is undecided
+    places = [d.row + 1 for d in known]
+    row_of = np.insert(np.arange(len(low)), places, -1)
+    points = np.flatnonzero(row_of < 0).tolist()
+    steps = {k: [POINT_TYPES[d.code].unstable] for k, d in zip(points, known, strict=True)}
+    rows = unexplained_rows(np.insert(low, places, 0), np.insert(high, places, high.max()), steps)
+    return [(int(row_of[since]), int(row_of[row])) for since, row in rows]
+
+
+def _between_rows(
+    field: FrozenField, piece: Piece, window: Window, tests: RowTests, marks: Sequence[float]
+) -> list[Detected]:
+    """All special points between the rows of a piece, in order along it."""
+    steps = piece.chords(window.scale)
+    found = [
+        *_folds(field, piece, window, steps, tests),
+        *_branch_points(field, piece, window, steps, tests),
+        *_turning_pairs(field, piece, window, steps, tests),
+        *_marks(field, piece, window, steps, marks),
+    ]
+    found = [d for d in found if _between(d.located.u, piece, d.row, window)]
+    # where two branches cross the parameter may turn as well: that is no fold
+    crossings = [d.located.u for d in found if d.code == "BP"]
+    found = [
+        d
+        for d in found
+        if d.code != "LP"
+        or all(np.abs((d.located.u - c) / window.scale).max() > 1e-4 for c in crossings)
+    ]
+    return sorted(found, key=lambda d: (d.row, _ahead(d.located.u, piece, d.row, window)))
+
+
+def _folds(
+    field: FrozenField, piece: Piece, window: Window, steps: Array, tests: RowTests
+) -> Iterator[Detected]:
+    def curve(u: Array) -> tuple[Array, Array]:
+        return field.curve(piece.region, u)
+
+    def turning(u: Array, along: Array) -> float:
+        return float(_tangent(field, piece, u, along, window)[-1] / window.scale[-1])
+
+    search = Search(field, piece, window, steps, turning)
+    for bracket in search.brackets(tests.turning):
+        located = search.solve(bracket, lambda u: fold(curve, u, window.scale))
+        if located is not None:
+            jacobian = curve(located.u)[1][:, : field.n]
+            coefficient = fold_form(
+                forms_at(field, piece.region, located.u), jacobian, window.scale[:-1]
+            )
+            yield Detected(bracket.row, "LP", located, coefficient=coefficient)
+
+
+def _branch_points(
+    field: FrozenField, piece: Piece, window: Window, steps: Array, tests: RowTests
+) -> Iterator[Detected]:
+    def locate(u: Array) -> Located:
+        return branch_point(lambda z: field.curve(piece.region, z), u, window.scale)
+
+    def crossing(u: Array, along: Array) -> float:
+        tangent = _tangent(field, piece, u, along, window)
+        return float(field.branching(piece.region, u[None], tangent[None], window.scale)[0])
+
+    search = Search(field, piece, window, steps, crossing)
+    for bracket in search.brackets(tests.branching):
+        located = search.solve(bracket, locate)
+        if located is not None:
+            yield Detected(bracket.row, "BP", located)
+
+
+def _turning_pairs(
+    field: FrozenField, piece: Piece, window: Window, steps: Array, tests: RowTests
+) -> Iterator[Detected]:
+    n, region = field.n, piece.region
+
+    def curve(u: Array) -> tuple[Array, Array]:
+        return field.curve(region, u)
+
+    # a sum that is rounding at most rows, as that of a conservative oscillator, is left out; any
+    # other is near zero only beside the point that is looked for
+    lost = tests.pairs != pair_sums(tests.eigenvalues, rounding=0.0)
+    rounding = ROUNDING if 2 * np.count_nonzero(lost) > len(lost) else 0.0
+
+    def sums(u: Array, along: Array) -> float:
+        return float(pair_sums(field.finite_eigenvalues(region, u), rounding))
+
+    search = Search(field, piece, window, steps, sums)
+    product = np.nan
+
+    def locate(u: Array) -> Located:
+        nonlocal product
+        here = product_of_pair(field.finite_eigenvalues(region, u), rounding)
+        product = product if np.isnan(here) else here
+        return turning_pair(curve, u, window.scale, product)
+
+    for bracket in search.brackets(tests.pairs):
+        nearer = int(abs(bracket.values[1]) < abs(bracket.values[0]))
+        product = product_of_pair(field.finite_eigenvalues(region, bracket.u[nearer]), rounding)
+        located = search.solve(bracket, locate, narrowings=NARROWED_FIRST)
+        if located is None:
+            continue
+        kappa = float(located.extra[0]) if located.extra.size else product
+        if kappa > 0:
+            frequency = float(np.sqrt(kappa))
+            jacobian = curve(located.u)[1][:, :n]
+            lyapunov = first_lyapunov(forms_at(field, region, located.u), jacobian, frequency)
+            yield Detected(bracket.row, "HB", located, frequency=frequency, lyapunov=lyapunov)
+        else:
+            yield Detected(bracket.row, "NSD", located)
+
+
+def _tangent(field: FrozenField, piece: Piece, u: Array, along: Array, window: Window) -> Array:
+    """The unit tangent at a point, in a direction along the piece."""
+    tangent, _ = field.tangent(piece.region, u, window.weight)
+    return tangent if (tangent * window.weight) @ along >= 0 else -tangent
+
+
+def _marks(
+    field: FrozenField, piece: Piece, window: Window, steps: Array, marks: Sequence[float]
+) -> Iterator[Detected]:
+    along = np.zeros(field.n + 1)
+    along[-1] = 1.0
+    for mark in marks:
+        search = Search(
+            field,
+            piece,
+            window,
+            steps,
+            lambda u, _, mark=mark: float(u[-1] - mark),  # type: ignore[misc]
+        )
+        for bracket in search.brackets(piece.u[:, -1] - mark):
+            located = search.solve(
+                bracket,
+                lambda u, mark=mark: field.refined(  # type: ignore[misc]
+                    piece.region, u, window.scale, normal=along, point=mark * along
+                ),
+            )
+            if located is not None:
+                yield Detected(bracket.row, "UZ", located)
+
+
+def _ahead(u: Array, piece: Piece, row: int, window: Window) -> float:
+    return float(((u - piece.u[row]) * window.weight) @ piece.tangents[row])
+
+
+def _between(u: Array, piece: Piece, row: int, window: Window) -> bool:
+    """Whether a solution stayed near the rows that bracketed it."""
+    if not np.all(np.isfinite(u)):
+        return False
+    here = piece.u[row]
+    there = piece.u[min(row + 2, len(piece.u) - 1)]
+    length = float(np.linalg.norm((there - here) / window.scale))
+    return float(np.linalg.norm((u - here) / window.scale)) <= 2.0 * length

@@ -1,0 +1,268 @@
+"""Test functions of special points at the rows of a piece, and steps that hide some of them.
+
+Every test is free of units: a pair sum is measured by its own pair, the distance
+of a matrix from the singular ones by the matrix's rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation.loops import loop, writeable
+from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.points.brackets import sign_changes
+from fastslow.diagrams.trace.across_regions import Piece, Window, beside
+from fastslow.results.branch.unexplained import unstable_range
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: Rounding of an eigenvalue computed by LAPACK, in units of n times the largest modulus.
+ROUNDING = 4.0 * float(np.finfo(float).eps)
+
+#: A matrix with rows of length one is singular to rounding nearer to the singular ones than this.
+SINGULAR = 1e-14
+
+#: Rows that may be added to one piece, and the shortest step that is divided, in scaled units.
+ADDED, SHORTEST = 400, 1e-10
+
+
+def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
+    """Smallest relative sum of two eigenvalues, with the sign of the product of all sums.
+
+    The product of λᵢ + λⱼ over i < j vanishes at Hopf points and neutral saddles
+    (Guckenheimer, Myers & Sturmfels 1997), but underflows for many eigenvalues and
+    loses small ones beside large ones. Its sign is that of the real sums alone,
+    those of complex pairs and of two real eigenvalues, and it vanishes where one of
+    them does. Here each is divided by |λᵢ| + |λⱼ|. A sum that is zero to rounding,
+    as that of a conservative oscillator, is left out.
+
+    Parameters
+    ----------
+    eigenvalues : ndarray of complex, shape (..., n)
+    rounding : float
+        A sum below n times this part of the largest modulus is left out. With 0 none
+        is, so that the test is smooth at its zeros, as Newton's method needs it.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        From −1 to 1; 0 where no sum is left or an eigenvalue is not finite.
+
+    Examples
+    --------
+    >>> pair_sums(np.array([[-0.5, 1.0, 1e6], [-2.0, 1.0, 1e6]])).round(6).tolist()
+    [0.333333, -0.333333]
+    >>> float(pair_sums(np.array([3.0 + 4.0j, 3.0 - 4.0j])))
+    0.6
+    >>> float(pair_sums(np.array([1e-9 + 1.0j, 1e-9 - 1.0j, -1e9]), rounding=0.0))
+    1e-09
+    """
+    values = np.asarray(eigenvalues, dtype=complex)
+    n = values.shape[-1]
+    if n < 2:
+        return np.zeros(values.shape[:-1])
+    if n == 2:
+        pairs = writeable(np.ascontiguousarray(values).reshape(-1, 2))
+        sums = np.empty(len(pairs))
+        loop("sums_of_two")(pairs, rounding, sums)
+        return sums.reshape(values.shape[:-1])
+    finite = np.isfinite(values).all(axis=-1)
+    values = np.where(finite[..., None], values, 1.0)
+    modulus = np.abs(values)
+    noise = rounding * n * modulus.max(axis=-1, keepdims=True)
+
+    # complex pairs, each by its upper member
+    pair = (values.imag > 0) & (np.abs(values.real) >= noise)
+    relative = np.where(pair, np.abs(values.real) / np.where(pair, modulus, 1.0), 1.0)
+    negative = (pair & (values.real < 0)).sum(axis=-1)
+
+    # two real ones: in order of modulus, the sum has the sign of the second
+    size = np.where(values.imag == 0, modulus, np.inf)
+    order = np.argsort(size, axis=-1, kind="stable")
+    size = np.take_along_axis(size, order, axis=-1)
+    below = np.take_along_axis(values.real < 0, order, axis=-1)
+    real = np.isfinite(size)
+    negative = negative + np.where(real & below, np.arange(n), 0).sum(axis=-1)
+    # the smallest relative sum is one of neighbours with opposite signs
+    one, other = np.where(real, size, 0.0)[..., :-1], np.where(real, size, 0.0)[..., 1:]
+    both = real[..., 1:]
+    opposite = both & (below[..., 1:] != below[..., :-1])
+    left_out = (opposite & (other - one < noise)) | (both & (other < noise))
+    negative = negative - (left_out & below[..., 1:]).sum(axis=-1)
+    opposite &= ~left_out
+    apart = np.where(opposite, (other - one) / np.where(opposite, other + one, 1.0), 1.0)
+
+    least = np.minimum(relative.min(axis=-1), apart.min(axis=-1))
+    count = real.sum(axis=-1)
+    known = pair.sum(axis=-1) + count * (count - 1) // 2 - left_out.sum(axis=-1) > 0
+    return np.where(known & finite, np.where(negative % 2 == 1, -least, least), 0.0)
+
+
+def product_of_pair(eigenvalues: Complex, rounding: float = ROUNDING) -> float:
+    """Product of the two eigenvalues that decide `pair_sums`, positive for a complex pair.
+
+    NaN where no sum is left.
+
+    Examples
+    --------
+    >>> product_of_pair(np.array([-0.1 + 2.0j, -0.1 - 2.0j, -1.0, 5.0])).__round__(12)
+    4.01
+    """
+    values = np.asarray(eigenvalues, dtype=complex)
+    if not np.all(np.isfinite(values)) or len(values) < 2:
+        return np.nan
+    first, second = np.triu_indices(len(values), 1)
+    sums = values[first] + values[second]
+    noise = rounding * len(values) * np.abs(values).max()
+    kept = (sums.imag == 0) & (np.abs(sums.real) >= noise)
+    if not kept.any():
+        return np.nan
+    first, second, sums = first[kept], second[kept], sums[kept]
+    size = np.maximum(np.abs(values[first]) + np.abs(values[second]), np.finfo(float).tiny)
+    k = int(np.argmin(np.abs(sums) / size))
+    return float((values[first[k]] * values[second[k]]).real)
+
+
+@dataclass(frozen=True, eq=False)
+class RowTests:
+    """Test functions at the rows of a piece, each of shape (N,).
+
+    Parameters
+    ----------
+    turning : ndarray
+        The tangent's component along the parameter, zero at folds.
+    branching : ndarray
+        Distance of [F_x F_p; tangent] from the singular matrices with the sign of its
+        determinant, zero at branch points.
+    pairs : ndarray
+        `pair_sums`, zero at Hopf points and neutral saddles.
+    eigenvalues : ndarray of complex, shape (N, n)
+        The finite ones.
+    """
+
+    turning: Array
+    branching: Array
+    pairs: Array
+    eigenvalues: Complex
+
+    @cached_property
+    def unstable(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Least and largest number of unstable eigenvalues at the rows."""
+        return unstable_range(self.eigenvalues)
+
+    def inserted(self, place: int, other: RowTests) -> RowTests:
+        """With the rows of another before a place."""
+        return RowTests(
+            np.insert(self.turning, place, other.turning),
+            np.insert(self.branching, place, other.branching),
+            np.insert(self.pairs, place, other.pairs),
+            np.insert(self.eigenvalues, place, other.eigenvalues, axis=0),
+        )
+
+
+def tests_at(field: FrozenField, piece: Piece, window: Window) -> RowTests:
+    """The tests at every row of a piece."""
+    turning, branching, eigenvalues = field.survey(
+        piece.region, piece.u, piece.tangents, window.scale
+    )
+    return RowTests(
+        turning,
+        np.where(np.abs(branching) < SINGULAR, 0.0, branching),
+        pair_sums(eigenvalues),
+        eigenvalues,
+    )
+
+
+def resolved(field: FrozenField, piece: Piece, window: Window) -> tuple[Piece, RowTests]:
+    """A piece with steps divided until the tests explain how many eigenvalues are unstable.
+
+    Between two rows that number changes by one at a fold or branch point and by
+    two at a Hopf point. Where the changes of sign between them allow no such
+    sum, some of them cancel within the step.
+    """
+    tests = tests_at(field, piece, window)
+    low, high = tests.unstable
+    known = np.flatnonzero(low == high)
+    # where nothing changes and the branch does not turn there is nothing to explain
+    turning = np.isin(
+        np.arange(len(low)), [k for pair in sign_changes(tests.turning) for k in pair]
+    )
+    turned = np.append(0, np.cumsum(turning))
+    first, last = known[:-1], known[1:]
+    open_steps = (low[first] != low[last]) | (turned[last + 1] - turned[first] > 1)
+    waiting = list(zip(first[open_steps].tolist(), last[open_steps].tolist(), strict=True))[::-1]
+    added = 0
+    while waiting:
+        first, last = waiting.pop()
+        change = int(low[last]) - int(low[first])
+        if added >= ADDED or _explains(tests, slice(first, last + 1), change):
+            continue
+        place, extra = _middle(field, piece, window, first, last)
+        if extra is None:
+            continue
+        added += 1
+        new = tests_at(field, extra, window)
+        tests = tests.inserted(place, new)
+        low, high = np.insert(low, place, new.unstable[0]), np.insert(high, place, new.unstable[1])
+        piece = _inserted(piece, place, extra)
+        # the pairs that wait lie after this one
+        waiting = [(a + 1, b + 1) for a, b in waiting]
+        if low[place] == high[place]:
+            waiting += [(place, last + 1), (first, place)]
+        else:
+            waiting.append((first, last + 1))
+    return piece, tests
+
+
+def _explains(tests: RowTests, rows: slice, change: int) -> bool:
+    """Whether the changes of sign among some rows can sum up to a change of the number."""
+    possible = {0}
+    for test, steps in ((tests.turning, (-1, 1)), (tests.branching, (-1, 0, 1))):
+        for _ in sign_changes(test[rows]):
+            possible = {p + s for p in possible for s in steps}
+    for _ in sign_changes(tests.pairs[rows]):
+        possible = {p + s for p in possible for s in (-2, 0, 2)}
+    return change in possible
+
+
+def divided(field: FrozenField, piece: Piece, window: Window, first: int, last: int) -> Piece:
+    """With a row in the middle of the longest step between two rows, if one is found there."""
+    place, extra = _middle(field, piece, window, first, last)
+    return piece if extra is None else _inserted(piece, place, extra)
+
+
+def _inserted(piece: Piece, place: int, extra: Piece) -> Piece:
+    return replace(
+        piece,
+        u=np.insert(piece.u, place, extra.u, axis=0),
+        tangents=np.insert(piece.tangents, place, extra.tangents, axis=0),
+    )
+
+
+def _middle(
+    field: FrozenField, piece: Piece, window: Window, first: int, last: int
+) -> tuple[int, Piece | None]:
+    """A row in the middle of the longest step between two, and the row before which it comes.
+
+    None where the step is too short or no point of the curve is found.
+    """
+    chords = np.linalg.norm(np.diff(piece.u[first : last + 1], axis=0) / window.scale, axis=1)
+    before = first + int(np.argmax(chords))
+    if not chords.max() > SHORTEST:
+        return before + 1, None
+    a, b = piece.u[before], piece.u[before + 1]
+    guess, chord = 0.5 * (a + b), (b - a) * window.weight
+    found = beside(field, piece.region, guess, chord, guess, window)
+    if not found.converged:
+        return before + 1, None
+    tangent, single = field.tangent(piece.region, found.u, window.weight)
+    if not single:
+        tangent = piece.tangents[before]
+    elif tangent @ chord < 0:
+        tangent = -tangent
+    return before + 1, Piece(piece.region, found.u[None], tangent[None])

@@ -1,0 +1,707 @@
+"""Equilibrium equations of regions and of sliding motions, and their roots."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
+from fractions import Fraction
+from functools import cached_property, lru_cache
+from itertools import product
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike, NDArray
+from sympy.polys.domains import ZZ
+from sympy.polys.rings import ring
+
+from fastslow.continuation.loops import blocks, loop
+from fastslow.continuation.ordering import in_order
+from fastslow.continuation.polynomial_systems import (
+    FARTHEST,
+    Terms,
+    WholeTerms,
+    at_value,
+    solve_polynomials,
+)
+from fastslow.continuation.spaces import Curve, newton_space
+from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.modes import Sides
+from fastslow.diagrams.points.correcting import POLE, Corrections
+from fastslow.diagrams.solve.exact_polynomials import (
+    ParametricPolynomials,
+    coefficient_function,
+    exactly,
+    multiple_root,
+    numerator,
+    polynomials_of,
+    ratios,
+    real_roots,
+    terms_of,
+    values_at,
+)
+from fastslow.diagrams.solve.parametric import (
+    STATES,
+    Decisions,
+    ParametricElimination,
+    eliminations_of,
+)
+from fastslow.model.rational import exact
+from fastslow.model.structure import real
+from fastslow.results.angles import apart
+from fastslow.symbolic.solving.elimination import Elimination, eliminate
+from fastslow.symbolic.solving.lowering import lower_degrees
+
+Array = NDArray[np.float64]
+
+#: Starting states tried by Newton's method where a region has no univariate polynomial.
+STARTS = 200
+
+#: Starts times the cube of the number of states, up to which all of them are tried.
+COST = 1.6e8
+
+#: Starts that are tried in any case.
+FEWEST = 10
+
+#: A condition on the parameter holds below this part of its terms: rounding of a value.
+VANISHING = 1e-14
+
+#: Batches of starts, as long as each of them finds more.
+BATCHES = 100
+
+#: For every so many equilibria one more batch must find nothing until the search ends.
+FEW = 10
+
+#: The search ends beyond this number of equilibria.
+MANY = 500
+
+#: States nearer to each other than this part of their size are one, as a double root may be off.
+SAME = 1e-8
+
+#: Stands for the weight of the field below in a sliding field.
+SHARE = "(alpha)"
+
+#: Degree up to which the roots of a univariate polynomial are trusted to be complete.
+DEGREE = 60
+
+#: Unknowns up to which the roots of a polynomial system are isolated.
+UNKNOWNS = 3
+
+#: Polynomials in the parameter.
+_RING = ring("p", ZZ)[0]
+
+#: Choices of a factor of every rate, up to which each is solved by itself.
+CHOICES = 32
+
+
+@dataclass(frozen=True, eq=False)
+class RegionEquations(Corrections):
+    """The equilibrium equations of one region, eliminated, at fixed other parameters.
+
+    Parameters
+    ----------
+    field : FrozenField
+    region : int
+        Number of the region.
+    decisions : Decisions, optional
+        With it the other parameters are symbols, and this says which expressions vanish.
+    """
+
+    _: KW_ONLY
+    decisions: Decisions | None = None
+
+    @cached_property
+    def numbers(self) -> dict[sp.Symbol, sp.Rational]:
+        """Exact value of every parameter but the one that varies."""
+        values = self.field.model.parameters
+        return {real(n): sp.Rational(v) for n, v in values.items() if n != self.field.parameter}
+
+    @cached_property
+    def equations(self) -> dict[str, sp.Expr]:
+        """What vanishes at an equilibrium, by unknown, with numbers for the other parameters."""
+        states = self.field.model.states
+        rates = [self._number(rate) for rate in self.field.modes[self.region].rates]
+        return dict(zip(states, rates, strict=True))
+
+    def _number(self, expression: sp.Expr) -> sp.Expr:
+        """An expression with exact numbers for the other parameters, or for those that are 0."""
+        if self.decisions is None:
+            return exact(expression).subs(self.numbers)
+        zero = {s: v for s, v in self.numbers.items() if v == 0}
+        return exact(expression).subs(zero)
+
+    @cached_property
+    def general(self) -> ParametricElimination | None:
+        """The elimination for all values of the other parameters, if one unknown is left at most.
+
+        Which one it is depends on these values alone, not on those that came before.
+        """
+        moving = {s: v for s, v in self.numbers.items() if v != 0}
+        if not moving or self.field.n > STATES:
+            return None
+        zero = tuple(s.name for s, v in self.numbers.items() if v == 0)
+        known = eliminations_of(self.field.model, self.field.parameter, self.region, zero)
+        kind = type(self)
+        return known.at(moving, lambda a: kind(self.field, self.region, decisions=a)._parametric())
+
+    def _parametric(self) -> ParametricElimination | None:
+        """The elimination with symbols for those parameters that are not 0, if it is of use."""
+        assert self.decisions is not None
+        left, parameters = self.elimination, tuple(self.decisions.values)
+        symbols = [*left.unknowns, real(self.field.parameter)]
+        if len(left.unknowns) > 1:
+            return None
+
+        inserted = {real(n): e for n, e in left.solved.items()}
+        edges = [sp.expand(numerator(h.subs(inserted))) for h in self.bounds]
+        remaining = polynomials_of([numerator(e) for e in left.remaining], symbols, parameters)
+        bounds = polynomials_of(edges, symbols, parameters)
+        solved: list[ParametricPolynomials] = []
+        for state in left.state({}, self.field.model.states):
+            quotient = sp.together(state).as_numer_denom()
+            if (read := polynomials_of(quotient, symbols, parameters)) is None:
+                return None
+            solved.append(read)
+        if remaining is None or bounds is None:
+            return None
+        return ParametricElimination(left, parameters, remaining, bounds, tuple(solved))
+
+    @cached_property
+    def _values(self) -> list[Fraction]:
+        """Exact values of the parameters of `general`."""
+        assert self.general is not None
+        return exactly({s: self.numbers[s] for s in self.general.parameters})
+
+    @cached_property
+    def elimination(self) -> Elimination:
+        """Of the rates with every other parameter a number, so that its sign is known."""
+        if self.decisions is None and self.general is not None:
+            return self.general.elimination.at(self.numbers)
+        return self._eliminated()
+
+    def _eliminated(self) -> Elimination:
+        return eliminate(self.equations, tuple(self.equations), nonzero=self.decisions)
+
+    @cached_property
+    def unknowns(self) -> tuple[sp.Symbol, ...]:
+        """The states that were not solved for."""
+        return (self.general or self).elimination.unknowns
+
+    @cached_property
+    def polynomials(self) -> list[WholeTerms] | None:
+        """What remains, if it is polynomials in unknowns and parameter."""
+        if self.general is not None:
+            return [terms for terms in self.general.remaining.at(self._values) if terms]
+        return terms_of(self.elimination.remaining, self._symbols)
+
+    @property
+    def _symbols(self) -> list[sp.Symbol]:
+        return [*self.unknowns, real(self.field.parameter)]
+
+    @property
+    def bounds(self) -> list[sp.Expr]:
+        """Functions one of which vanishes where an equilibrium leaves the region."""
+        return [self._number(i.function) for i in self.field.model.interfaces.values()]
+
+    @cached_property
+    def edge_polynomials(self) -> list[WholeTerms] | None:
+        """The `bounds` along equilibria as polynomials in unknowns and parameter, if they are."""
+        if self.general is not None:
+            return self.general.bounds.at(self._values)
+        return self.along(self.bounds)
+
+    def along(self, functions: Sequence[sp.Expr]) -> list[WholeTerms] | None:
+        """Functions of the states along equilibria, over unknowns and parameter.
+
+        None if one is no polynomial. A denominator has been shown not to vanish, or is a zero of
+        the rates' own.
+        """
+        solved = {real(n): e for n, e in self.elimination.solved.items()}
+        found = []
+        for function in functions:
+            h = function.subs(solved)
+            if not h.is_polynomial(*self._symbols):
+                h = numerator(h)
+            if not h.is_polynomial(*self._symbols):
+                return None
+            found.append(sp.expand(h))
+        return terms_of(found, self._symbols)
+
+    @cached_property
+    def univariate(self) -> bool:
+        """Whether one polynomial in one unknown remains, of a degree that can be trusted."""
+        if len(self.unknowns) != 1:
+            return False
+        if self.polynomials is not None:
+            first = self.polynomials[:1]
+            alone = len(self.polynomials) == 1
+            return alone and all(e <= DEGREE for terms in first for e, _ in terms)
+        left = self.elimination
+        whole = left.is_univariate and left.is_polynomial
+        return bool(whole and sp.degree(left.remaining[0], left.unknowns[0]) <= DEGREE)
+
+    @cached_property
+    def isolated(self) -> bool:
+        """Whether as many polynomials in few unknowns remain, so that all roots are found."""
+        count = len(self.unknowns)
+        if count == 1:
+            return self.univariate
+        left = self.elimination
+        square = len(left.remaining) == count
+        return square and 1 < count <= UNKNOWNS and left.is_polynomial
+
+    @cached_property
+    def factors(self) -> tuple[FactorEquations, ...]:
+        """The equations for each choice of a factor of every rate, where states are factors.
+
+        A rate x g(x, …) vanishes where x or g does. With several unknowns each choice is
+        solved by itself: of lower degree, and regular where two equilibria meet at x = 0.
+        Empty where there is one choice, or no finite number of solutions for one of them.
+        """
+        if len(self.unknowns) < 2 or self.impossible:
+            return ()
+        states = tuple(map(real, self.equations))
+        choices = [state_factors(e, states) for e in self.equations.values()]
+        if math.prod(map(len, choices)) > CHOICES:
+            return ()
+        found = tuple(
+            FactorEquations(self.field, self.region, chosen, lowered)
+            for chosen in product(*choices)
+            for lowered in lower_degrees(chosen, states)
+        )
+        return found if len(found) > 1 and all(map(_finite, found)) else ()
+
+    @cached_property
+    def _coefficients(self) -> list[list[tuple[tuple[int, ...], Any]]]:
+        """Exponents in every equation, and their coefficients over the parameter."""
+        p = real(self.field.parameter)
+        system = [sp.Poly(e, *self.unknowns) for e in self.elimination.remaining]
+        return [[(e, coefficient_function(c, p)) for e, c in q.terms()] for q in system]
+
+    def _terms_at(self, value: float) -> list[Terms]:
+        """The polynomials in the unknowns at a value of the parameter."""
+        if self.polynomials is not None:
+            count, at = len(self.unknowns), Fraction(value)
+            return [at_value(q, count, at) for q in self.polynomials]
+        found = [{e: c(value) for e, c in q} for q in self._coefficients]
+        return [{e: c for e, c in q.items() if c} for q in found]
+
+    @cached_property
+    def _formula(self) -> Any:
+        left = self.elimination
+        p = real(self.field.parameter)
+        states = left.state({}, self.field.model.states)
+        return sp.lambdify((p, *left.unknowns), [sp.N(s, 17) for s in states], "math")
+
+    @cached_property
+    def _quotients(self) -> list[list[WholeTerms]] | None:
+        """Every state as a quotient of polynomials, if its denominator does not vanish."""
+        if self.general is None:
+            return None
+        return [quotient.at(self._values) for quotient in self.general.solved]
+
+    def _whole(self, value: float, *unknowns: float) -> list[Array]:
+        """The full state at values of the unknowns; none outside the domain of the formulas."""
+        try:
+            if self._quotients is None:
+                return [np.array(self._formula(value, *unknowns), dtype=float)]
+            place = [*map(Fraction, unknowns), Fraction(value)]
+            values = (values_at(quotient, place) for quotient in self._quotients)
+            return [np.array([above / below for above, below in values])]
+        except (ArithmeticError, ValueError, TypeError):
+            return []
+
+    @property
+    def impossible(self) -> bool:
+        """Whether an equation without states can never hold, as where a rate is a constant."""
+        if self.polynomials is not None:
+            return any(len(q) == 1 and not any(next(iter(q))) for q in self.polynomials)
+        return any(e.is_number and e.is_nonzero for e in self.elimination.remaining)
+
+    @cached_property
+    def _undetermined(self) -> bool:
+        """Whether equations without unknowns remain and nothing else: a continuum or nothing."""
+        if not self.unknowns:
+            return False
+        if self.polynomials is not None:
+            return all(not any(e[:-1]) for q in self.polynomials for e in q)
+        return all(not e.has(*self.unknowns) for e in self.elimination.remaining)
+
+    def solutions(
+        self, value: float, bounds: Mapping[str, float] | None = None
+    ) -> tuple[list[Array], bool]:
+        """Isolated equilibria of the region's rates at a value, and whether these are all.
+
+        Admissible or not; those in which the modulus of no state exceeds its bound.
+        """
+        if not self.factors:
+            found, complete = self._known(value, bounds or {})
+        else:
+            found, complete = [], True
+            for equations in self.factors:
+                states, sure = equations._known(value, bounds or {})
+                found += [s for s in states if not any(self.same(s, o, value) for o in found)]
+                complete &= sure
+            found = [found[k] for k in in_order(found, self.unit(value))]
+        return (found, True) if complete else (self._searched(value, found), False)
+
+    def _known(self, value: float, bounds: Mapping[str, float]) -> tuple[list[Array], bool]:
+        """What is found without a search, and whether these are all."""
+        if not self.unknowns:
+            states = self._whole(value) if self._conditions_hold(value) else []
+            return self._polished(value, states), True
+        if self._undetermined or self.impossible:
+            return [], True
+        return self._isolated(value, bounds) if self.isolated else ([], False)
+
+    def _isolated(self, value: float, bounds: Mapping[str, float]) -> tuple[list[Array], bool]:
+        """All solutions of the system, and whether none is missing or undecided."""
+        names = [str(x) for x in self.unknowns]
+        try:
+            terms = self._terms_at(value)
+        except (ArithmeticError, ValueError, TypeError):
+            return [], False
+        solved = solve_polynomials(
+            terms,
+            bounds={m: bounds[name] for m, name in enumerate(names) if name in bounds},
+        )
+        states: list[Array] = []
+        complete = solved.complete
+        middles = solved.clusters.mean(axis=1)
+        if len(terms) == 1:
+            middles = np.array([[multiple_root(terms[0], *m)] for m in middles]).reshape(-1, 1)
+        for sure, roots in ((True, solved.simple), (False, middles)):
+            for root in roots:
+                whole = self._whole(value, *root)
+                corrected = (self.corrected(w, value, proved=sure) for w in whole)
+                fresh = [s for s in corrected if s is not None]
+                # what is no equilibrium here is a zero of a denominator, or a two-fold
+                complete &= bool(fresh) or (sure and not self._regular(value, whole))
+                states += [s for s in fresh if not any(self.same(s, o, value) for o in states)]
+        return states, complete
+
+    def _regular(self, value: float, states: Sequence[Array]) -> bool:
+        """Whether the rates are finite at states and an equilibrium should be there.
+
+        A zero of the numerators on a pole is none of the rates: rounding of the state makes them.
+        """
+        natural = self._natural(value)
+        slopes = [self.field.curve(self.region, np.append(s, value))[1] for s in states]
+        with np.errstate(all="ignore"):
+            terms = [np.abs(a[:, :-1]) @ np.abs(s) for a, s in zip(slopes, states, strict=True)]
+        eps = np.finfo(float).eps
+        return any(np.isfinite(t).all() and (eps * t <= POLE * natural).all() for t in terms)
+
+    def continuum(self, value: float) -> bool:
+        """Whether the region's equilibria at this value form a continuum."""
+        return self._undetermined and not self.impossible and self._conditions_hold(value)
+
+    def _conditions_hold(self, value: float) -> bool:
+        """Whether equations in the parameter alone hold, up to rounding in their terms.
+
+        The terms are those at the parameter's natural unit where its value is below that.
+        """
+        p = real(self.field.parameter)
+        largest = max(abs(value), self._parameter_unit(0.0))
+        if self.polynomials is not None:
+            for q in self.polynomials:
+                over: WholeTerms = {e[-1:]: c for e, c in q.items()}
+                moduli: WholeTerms = {e: abs(c) for e, c in over.items()}
+                (total,) = values_at([over], [at := Fraction(value)])
+                (size,) = values_at([moduli], [far := Fraction(largest)])
+                # both are whole, in units of a power of a denominator
+                most = max((k for (k,) in over), default=0)
+                exact = Fraction(abs(total), at.denominator**most)
+                if exact > Fraction(VANISHING) * Fraction(size, far.denominator**most):
+                    return False
+            return True
+        for e in self.elimination.remaining:
+            parts = sp.Add.make_args(sp.expand(e))
+            terms = sum(abs(float(part.subs(p, largest))) for part in parts)
+            if abs(float(e.subs(p, value))) > VANISHING * terms:
+                return False
+        return True
+
+    def continua(self) -> list[float]:
+        """Parameter values at which the equilibria of the region form a continuum."""
+        if self.polynomials is None or not (self._undetermined or self.univariate):
+            return []
+        forms = list(self.polynomials)
+        if not self._undetermined:
+            (polynomial,) = forms
+            degrees = {e[0] for e in polynomial}
+            forms = [{(k,): c for (i, k), c in polynomial.items() if i == j} for j in degrees]
+        if any(len(form) == 1 and not next(iter(form))[-1] for form in forms):
+            # a number, which vanishes nowhere
+            return []
+        common = _RING.zero
+        for form in forms:
+            over = {(e[-1],): ZZ(c) for e, c in form.items()}
+            common = common.gcd(_RING.from_dict(over))
+        highest = common.degree() if common else -1
+        return real_roots(ratios([int(common.get((k,), 0)) for k in range(highest, -1, -1)]))
+
+    def edges(self, value: float) -> list[Array]:
+        """Where a one-parameter continuum of equilibria meets an interface, or its middle."""
+        if len(self.unknowns) != 1:
+            return self._whole(value, *([0.0] * len(self.unknowns)))
+        ends = []
+        for line in self._lines(value):
+            degree = max((e for (e,) in line), default=0)
+            if degree > 0:
+                roots = real_roots(ratios([line.get((k,), 0) for k in range(degree, -1, -1)]))
+                ends += [s for root in roots for s in self._whole(value, root)]
+        return ends or self._whole(value, 0.0)
+
+    def _lines(self, value: float) -> Iterator[Terms]:
+        """The `bounds` along equilibria at a value as polynomials in the unknown, if they are."""
+        if self.edge_polynomials is not None:
+            yield from (at_value(q, 1, Fraction(value)) for q in self.edge_polynomials)
+            return
+        p = real(self.field.parameter)
+        solved = {real(n): e for n, e in self.elimination.solved.items()}
+        for bound in self.bounds:
+            line = numerator(bound.subs(solved).subs(p, value))
+            yield from terms_of([line], list(self.unknowns)) or []
+
+    def _polished(self, value: float, states: Sequence[Array]) -> list[Array]:
+        """Newton's last digits at fixed parameter; what does not converge was no root."""
+        kept: list[Array] = []
+        for state in states:
+            solved = self.corrected(state, value)
+            solved = None if solved is None else self.field.wrapped(solved)
+            if solved is not None and not any(self.same(solved, o, value) for o in kept):
+                kept.append(solved)
+        return kept
+
+    def same(self, one: Array, other: Array, value: float) -> bool:
+        """Whether two states are equal, but for what a double root may be off."""
+        return same(one, other, self.unit(value), self.field.periods)
+
+    def _searched(self, value: float, known: Sequence[Array] = ()) -> list[Array]:
+        """Newton's method from many states, until no more equilibria are found or it takes long.
+
+        A fixed sequence, spread over several scales in natural units, then in units of what was
+        found. As long as that finds more, half of the next starts have each component from
+        another equilibrium: many equilibria are often nearly products of few values.
+        """
+        field, n, unit = self.field, self.field.n, self.unit(value)
+        count = starts_tried(n)
+        generator = np.random.default_rng(20231)
+        distinct = np.reshape([np.asarray(k) for k in known], (-1, n))
+        quiet = 0
+        for batch in range(max(2, min(BATCHES, int(COST / n**3) // count))):
+            before = len(distinct)
+            spread = 10.0 ** generator.uniform(-2, 1.5, (count, 1))
+            # the size of each state by itself, too
+            spread = np.where(
+                np.arange(count)[:, None] % 2,
+                spread,
+                10.0 ** generator.uniform(-3, 3, (count, n)),
+            )
+            starts = np.vstack([np.zeros(n), unit * generator.standard_normal((count, n)) * spread])
+            if batch > 1:
+                rows = generator.integers(0, before, (count // 2, n))
+                nearby = 1.0 + 0.1 * generator.standard_normal(rows.shape)
+                starts[1::2] = nearby * distinct[rows, np.arange(n)]
+            converged = np.empty(len(starts), dtype=np.bool_)
+            space = newton_space(n, field.compiled.size)
+            for s in blocks(len(starts), 100 * (16 * field.compiled.size + n**3)):
+                loop("newton_from")(
+                    Curve(field.compiled.address, self.region, field.values), starts[s],
+                    converged[s], value, unit, 100, space,
+                )  # fmt: skip
+            for state in field.wrapped(starts[converged]):
+                if np.all(np.abs(state) <= FARTHEST * unit) and not among(
+                    state, distinct, unit, field.periods, 1e-5
+                ):
+                    polished = self.corrected(state, value)
+                    polished = None if polished is None else field.wrapped(polished)
+                    if polished is not None and not among(
+                        polished, distinct, self.unit(value), field.periods
+                    ):
+                        distinct = np.vstack([distinct, polished])
+            quiet = quiet + 1 if batch and len(distinct) == before else 0
+            if quiet > len(distinct) / FEW or len(distinct) > MANY:
+                break
+            # once more in units of what was found
+            sizes = np.abs(distinct).max(axis=0, initial=0.0)
+            unit = np.where(sizes > 0, sizes, unit)
+        return [distinct[k] for k in in_order(distinct, unit)]
+
+
+def starts_tried(states: int) -> int:
+    """How many starts of Newton's method are tried, fewer where each of them takes long.
+
+    Examples
+    --------
+    >>> starts_tried(60), starts_tried(200), starts_tried(1000)
+    (200, 20, 10)
+    """
+    return min(STARTS, max(FEWEST, int(COST / states**3)))
+
+
+@dataclass(frozen=True, eq=False)
+class FactorEquations(RegionEquations):
+    """The equations of a region for one factor of each rate.
+
+    Parameters
+    ----------
+    chosen : tuple of Expr
+        The factor of the rate of each state.
+    lowered : tuple of Expr
+        Equations of lower degree that imply them.
+    """
+
+    chosen: tuple[sp.Expr, ...]
+    lowered: tuple[sp.Expr, ...]
+
+    @cached_property
+    def equations(self) -> dict[str, sp.Expr]:
+        return dict(zip(self.field.model.states, self.lowered, strict=True))
+
+    @cached_property
+    def general(self) -> None:
+        return None
+
+    @cached_property
+    def factors(self) -> tuple[FactorEquations, ...]:
+        return ()
+
+
+def _finite(equations: RegionEquations) -> bool:
+    """Whether finitely many solutions can be isolated."""
+    return equations.impossible or not equations.unknowns or equations.isolated
+
+
+def state_factors(rate: sp.Expr, states: Sequence[sp.Symbol]) -> list[sp.Expr]:
+    """States that are factors of a rate, and the factor without them.
+
+    Examples
+    --------
+    >>> x, y = sp.symbols("x y")
+    >>> state_factors(x * (1 - x) - 2 * x * y, (x, y))
+    [x, -x - 2*y + 1]
+    """
+    bases = [f.as_base_exp() for f in sp.Mul.make_args(sp.factor_terms(rate))]
+    found = [b for b, e in bases if b in states and e.is_positive]
+    rest = sp.Mul(*(b**e for b, e in bases if b not in found))
+    return [*found, rest] if rest.has(*states) or not found else found
+
+
+@dataclass(frozen=True, eq=False)
+class SlidingEquations(RegionEquations):
+    """The equations of pseudo-equilibria, those of the sliding field on its interface.
+
+    Without division they are (1 − α) f₁ + α f₂ = 0 and h = 0 with one more unknown
+    α, or, where that leaves more than one polynomial, b f₁ − a f₂ = 0 and h = 0, of
+    which one equation depends on the others (a, b are the drifts of h).
+    """
+
+    def _eliminated(self) -> Elimination:
+        whole = self._with_share
+        if len(whole.unknowns) <= 1 and whole.is_polynomial:
+            return whole
+        crossed = self._without_share
+        return crossed if crossed is not None and crossed.is_univariate else whole
+
+    @cached_property
+    def equations(self) -> dict[str, sp.Expr]:
+        states, alpha = self.field.model.states, real(SHARE)
+        rates = [f + alpha * (g - f) for f, g in self._fields]
+        return {**dict(zip(states, rates, strict=True)), SHARE: self._height}
+
+    @property
+    def _sides(self) -> Sides:
+        sides = self.field.modes[self.region].sides
+        assert sides is not None
+        return sides
+
+    @property
+    def _height(self) -> sp.Expr:
+        """The function h of the interface that is slid along."""
+        return self._number(self.field.modes[self.region].rows[self._sides.interface])
+
+    @property
+    def _drifts(self) -> tuple[sp.Expr, sp.Expr]:
+        """The drifts a and b of h on both sides."""
+        a, b = self._sides.drifts
+        return self._number(a), self._number(b)
+
+    @property
+    def _fields(self) -> list[tuple[sp.Expr, sp.Expr]]:
+        """The rates on both sides, state by state."""
+        modes, sides = self.field.modes, self._sides
+        both = zip(modes[sides.above].rates, modes[sides.below].rates, strict=True)
+        return [(self._number(f), self._number(g)) for f, g in both]
+
+    @cached_property
+    def _with_share(self) -> Elimination:
+        return eliminate(self.equations, tuple(self.equations), nonzero=self.decisions)
+
+    @cached_property
+    def _without_share(self) -> Elimination | None:
+        states, h = self.field.model.states, self._height
+        a, b = self._drifts
+        crossed = [b * f - a * g for f, g in self._fields]
+        for k, name in enumerate(states):
+            # sum of ∂h/∂x times these vanishes: one with ∂h/∂x ≠ 0 may be left out
+            slope = h.diff(real(name))
+            if slope.is_nonzero if self.decisions is None else self.decisions(slope):
+                crossed[k] = h
+                rates = dict(zip(states, crossed, strict=True))
+                return eliminate(rates, states, nonzero=self.decisions)
+        return None
+
+    @cached_property
+    def factors(self) -> tuple[FactorEquations, ...]:
+        return ()
+
+    @property
+    def bounds(self) -> list[sp.Expr]:
+        functions = super().bounds
+        del functions[self._sides.interface]
+        return [*functions, *self._drifts]
+
+
+def _near(
+    one: Array, others: Array, unit: Array, within: float, periods: ArrayLike
+) -> NDArray[np.bool_]:
+    """Whether states, shape (..., n), agree with one modulo periods.
+
+    Relative to each component of the one, or to its unit.
+    """
+    gap = np.abs(apart(one, others, periods))
+    return np.asarray(np.all(gap <= within * np.maximum(unit, np.abs(one)), axis=-1))
+
+
+def among(
+    state: Array,
+    known: Array,
+    unit: ArrayLike = 1.0,
+    periods: ArrayLike = 0.0,
+    within: float = SAME,
+) -> bool:
+    """Whether a state is one of some known ones, shape (m, n), to a part of its size."""
+    return bool(_near(state, known, np.asarray(unit), within, periods).any())
+
+
+def same(one: Array, other: Array, unit: ArrayLike = 1.0, periods: ArrayLike = 0.0) -> bool:
+    """Whether two states are equal modulo periods, but for what a double root may be off."""
+    return bool(_near(one, other, np.asarray(unit), SAME, periods))
+
+
+@lru_cache(maxsize=64)
+def region_equations(field: FrozenField) -> tuple[RegionEquations, ...]:
+    """The eliminated equations of every region, kept while the field is in use."""
+    found: list[RegionEquations] = []
+    for number, mode in enumerate(field.modes):
+        if mode.sides is None:
+            found.append(RegionEquations(field, number))
+        elif mode.sides.escaping:
+            # the same equations as for sliding, which stands before
+            found.append(found[-1])
+        else:
+            found.append(SlidingEquations(field, number))
+    return tuple(found)

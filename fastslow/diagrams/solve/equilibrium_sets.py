@@ -1,0 +1,787 @@
+"""Sets of equilibria within discontinuities: where 0 is in the convex hull of the fields.
+
+On the interfaces that a sliding motion slides along, its rates and the weights s of the
+fields are functions of the states. Where the rates vanish all along, as v = 0 keeps a block
+with x' = v still, |s_i| ≤ 1 bounds a set of equilibria: an interval, or a polytope
+where everything is affine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
+from itertools import pairwise, product
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.continuation.ordering import in_order
+from fastslow.diagrams.field import IDLE, FrozenField
+from fastslow.diagrams.solve.equations import region_equations
+from fastslow.diagrams.solve.exact_polynomials import real_roots
+from fastslow.model.functions import numpy_function
+from fastslow.model.motions import Motion, motions_of
+from fastslow.model.rational import exact
+from fastslow.model.structure import real
+from fastslow.results.angles import apart, nearest_copy, principal
+from fastslow.results.branch.equilibrium_sets import EquilibriumBand, EquilibriumSet
+from fastslow.results.branch.windows import StateWindow
+from fastslow.symbolic.closed_forms.equilibrium_sets import solved_along
+
+Array = NDArray[np.float64]
+
+#: A set followed over values of the parameter.
+Run = list[tuple[float, EquilibriumSet]]
+
+#: The sets at a value of the parameter.
+SetsAt = Callable[[float], list[EquilibriumSet]]
+
+#: Values of the parameter at which a band is computed, besides its ends.
+ROWS = 129
+
+#: The same for sets of more dimensions than one, each of whose ranges is a linear programme.
+FEWER = 33
+
+#: Where ends are searched for in the free state if no polynomial gives them: from minus to
+#: plus this, in the natural unit of the state.
+REACH = 10.0
+
+#: An unbounded interval is judged at a place this many natural units from its end.
+FAR = 1e3
+
+#: Error of an end that is searched for, as a part of the range that is searched.
+XTOL = 1e-15
+
+#: Places in between at which functions that are no polynomials are looked at.
+PLACES = 1001
+
+#: Rows of a band between its end and the next of the other rows.
+ROUND = 8
+
+#: How far a weight may exceed 1 on an edge that was solved for.
+EDGE = 1e-6
+
+#: What counts as zero, relative to the size of the terms.
+SMALL = 1e-9
+
+#: Places along each free state, by their number, of the grid on which a set is filled; odd,
+#: so that the first place is one of them.
+FILLED = {2: 81, 3: 31}
+
+#: Half the width of the first of these grids, in units of the states; doubled up to `REACH`.
+FIRST = 1e-3
+
+#: Copies of a set, shifted by whole periods, differ by less than this part of the period.
+COPY = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """The equilibria of one sliding motion as functions of free coordinates and the parameter.
+
+    Parameters
+    ----------
+    field : FrozenField
+    motion : Motion
+    free : tuple of Symbol
+        States that stay free, d of them.
+    solved : tuple of sympy.Expr
+        Every state as a function of these and the parameter.
+    bounds : tuple of sympy.Expr
+        Functions that are not negative in the set: 1 ∓ sᵢ for every weight, and those of the
+        other interfaces with their signs.
+    turned : sympy.Expr
+        Negative where the sliding motion attracts: b of a single interface, else −1.
+    """
+
+    field: FrozenField
+    motion: Motion
+    free: tuple[sp.Symbol, ...]
+    solved: tuple[sp.Expr, ...]
+    bounds: tuple[sp.Expr, ...]
+    turned: sp.Expr
+
+    @property
+    def dimension(self) -> int:
+        return len(self.free)
+
+    @cached_property
+    def _symbols(self) -> tuple[sp.Symbol, ...]:
+        return (real(self.field.parameter), *self.free)
+
+    @cached_property
+    def _states(self) -> Callable[..., Any]:
+        return numpy_function(self._symbols, list(self.solved))
+
+    @cached_property
+    def _bounds(self) -> Callable[..., Any]:
+        return numpy_function(self._symbols, list(self.bounds))
+
+    @cached_property
+    def _turned(self) -> Callable[..., Any]:
+        return sp.lambdify(self._symbols, self.turned, "math")
+
+    @cached_property
+    def affine(self) -> bool:
+        """Whether states and bounds are affine in the free coordinates."""
+        free = set(self.free)
+        return all(
+            not (e.diff(c).free_symbols & free)
+            for e in (*self.solved, *self.bounds)
+            for c in self.free
+        )
+
+    @cached_property
+    def _polynomials(self) -> tuple[Callable[..., Any], ...] | None:
+        """Coefficients of the bounds' numerators in the only free state, of polynomials."""
+        forms = [sp.together(e).as_numer_denom()[0] for e in self.bounds]
+        if self.dimension != 1 or not all(e.is_polynomial(*self.free) for e in forms):
+            return None
+        p = real(self.field.parameter)
+        return tuple(
+            sp.lambdify(p, [sp.N(c, 17) for c in sp.Poly(e, *self.free).all_coeffs()], "math")
+            for e in forms
+        )
+
+    @property
+    def exact(self) -> bool:
+        """Whether the set at a value is sure to be found whole."""
+        return self.affine or self._polynomials is not None
+
+    def state(self, value: float, *free: float) -> Array:
+        return np.array([float(s) for s in self._states(value, *free)])
+
+    def values(self, value: float, *free: Any) -> Array:
+        """The bounds at one place or, of the only free state, at several, shape (bounds, …)."""
+        with np.errstate(all="ignore"):
+            found = self._bounds(value, *free)
+        return np.array(np.broadcast_arrays(*found, *free)[: len(found)], dtype=float)
+
+    def _bound(self, value: float, number: int, free: float) -> float:
+        """One of the bounds at a value of the only free state."""
+        return float(self.values(value, free)[number])
+
+    def _units(self, value: float) -> Array:
+        """Natural unit of each free state, shape (d,)."""
+        names = self.field.model.states
+        return self.field.units_at(abs(value))[[names.index(c.name) for c in self.free]]
+
+    def sets(self, value: float) -> list[EquilibriumSet]:
+        """The sets at a value of the parameter, those of dimension 1 from below to above.
+
+        Of copies that are whole periods apart one, with its middle in the principal range.
+        """
+        periods = self.field.periods
+        found = self._sets(value)
+        if not periods.any():
+            return found
+        kept: list[EquilibriumSet] = []
+        for one in found:
+            moved = _aligned(one, principal(_middle(one), periods), periods)
+            if not any(_copies(moved, other, periods) for other in kept):
+                kept.append(moved)
+        return kept
+
+    def _sets(self, value: float) -> list[EquilibriumSet]:
+        """The sets at a value of the parameter, with copies."""
+        if self.dimension == 0:
+            if not (self.values(value) >= -SMALL).all():
+                return []
+            state = self.state(value)
+            return [self._made(value, (), state, state, state[None])]
+        if self.affine:
+            found = self._polytope(value)
+            return [] if found is None else [found]
+        if self.dimension == 1:
+            return [self._interval(value, *piece) for piece in self._pieces(value)]
+        return self._searched(value) if self.dimension == len(self.motion.slides) else []
+
+    def _interval(self, value: float, low: float, high: float) -> EquilibriumSet:
+        """A set of dimension 1 between two values of the free state."""
+        inside = np.linspace(low, high, 65) if np.isfinite(high - low) else np.array([low, high])
+        with np.errstate(all="ignore"):
+            table = np.array(np.broadcast_arrays(*self._states(value, inside), inside)[:-1]).T
+        known = [(c,) for c in (low, high) if np.isfinite(c)]
+        middle = (float(np.mean(known)),) if known else (0.0,)
+        corners = [self.state(value, *free) for free in known or [middle]]
+        return self._made(value, middle, table.min(axis=0), table.max(axis=0), np.array(corners))
+
+    def _made(
+        self, value: float, middle: tuple[float, ...], lower: Array, upper: Array, corners: Array
+    ) -> EquilibriumSet:
+        model, name = self.field.model, self.field.parameter
+        attracting = bool(self._turned(value, *middle) < 0)
+        finite = self._finite(np.append(self.state(value, *middle), value))
+        across = np.full(len(self.motion.slides), -np.inf if attracting else np.inf, dtype=complex)
+        names = tuple(model.interfaces)
+        return EquilibriumSet(
+            model.states,
+            self.motion.name,
+            tuple(names[j] for j in self.motion.slides),
+            self.dimension,
+            {**model.parameters, **({} if name == IDLE else {name: value})},
+            lower,
+            upper,
+            corners,
+            np.concatenate([finite, across]),
+            attracting,
+            attracting and self._decays(finite),
+            self.exact,
+        )
+
+    def _decays(self, finite: NDArray[np.complex128]) -> bool:
+        """Whether all eigenvalues but those along the set have a negative real part."""
+        real_parts = finite.real[np.argsort(np.abs(finite))][self.dimension :]
+        least = SMALL * np.abs(finite).max(initial=0.0)
+        return bool((real_parts < -least).all())
+
+    def _finite(self, u: Array) -> NDArray[np.complex128]:
+        """Eigenvalues of the sliding motion along its interfaces at (states, parameter)."""
+        matrix, gradients = (np.array(m, dtype=float) for m in self._slopes(*u))
+        if not (np.isfinite(matrix).all() and np.isfinite(gradients).all()):
+            return np.full(len(u) - 1 - len(gradients), np.nan, dtype=complex)
+        along = np.linalg.qr(gradients.T, mode="complete")[0][:, len(gradients) :]
+        return np.linalg.eigvals(along.T @ matrix @ along).astype(complex)
+
+    @cached_property
+    def _slopes(self) -> Callable[..., Any]:
+        names = [real(n) for n in self.field.model.states]
+        numbers = _numbers(self.field)
+        rates = sp.Matrix([exact(r).subs(numbers) for r in self.motion.rates])
+        heights = sp.Matrix([exact(h).subs(numbers) for h in _heights(self.field, self.motion)])
+        both = [rates.jacobian(names).tolist(), heights.jacobian(names).tolist()]
+        return numpy_function([*names, real(self.field.parameter)], both)
+
+    def _polytope(self, value: float) -> EquilibriumSet | None:
+        """Ranges of the states by linear programming, corners by solving for the weights."""
+        from scipy.optimize import linprog
+
+        d = self.dimension
+        origin, base = self.values(value, *[0.0] * d), self.state(value, *[0.0] * d)
+        # one step is the natural unit of a free state
+        units = self._units(value)
+        rows = np.array([self.values(value, *step) - origin for step in np.diag(units)]).T
+        moves = np.array([self.state(value, *step) - base for step in np.diag(units)]).T
+        if d == 1:
+            ends = _interval(origin, rows[:, 0])
+            if ends is None:
+                return None
+            return self._interval(value, ends[0] * units[0], ends[1] * units[0])
+
+        size = np.maximum(np.abs(rows).max(axis=1), np.finfo(float).tiny)
+        system, right = -rows / size[:, None], origin / size
+        lower, upper = base.copy(), base.copy()
+        for k, move in enumerate(moves):
+            if not move.any():
+                continue
+            for sign, into in ((1.0, lower), (-1.0, upper)):
+                found = linprog(
+                    sign * move, A_ub=system, b_ub=right, bounds=[(None, None)] * d, method="highs"
+                )
+                if found.status == 2:
+                    return None
+                into[k] = -sign * np.inf if found.status == 3 else base[k] + move @ found.x
+        corners = [tuple((units * c).tolist()) for c in self._corners(rows, origin)]
+        states = [self.state(value, *free) for free in corners]
+        middle = tuple(np.mean(corners, axis=0)) if corners else (0.0,) * d
+        return self._made(value, middle, lower, upper, np.array(states or [base]))
+
+    def _corners(self, rows: Array, origin: Array) -> list[tuple[float, ...]]:
+        """Where every weight is ±1, if there are as many as free coordinates."""
+        m, found = len(self.motion.slides), []
+        if m != self.dimension or np.linalg.matrix_rank(rows[: 2 * m : 2]) < m:
+            return []
+        # the bounds come in pairs 1 - s, 1 + s
+        for side in product((0, 1), repeat=m):
+            chosen = [2 * i + k for i, k in enumerate(side)]
+            free = np.linalg.solve(rows[chosen], -origin[chosen])
+            if (rows @ free + origin >= -SMALL * (1.0 + np.abs(origin))).all():
+                found.append(tuple(free.tolist()))
+        return found
+
+    def _pieces(self, value: float) -> list[tuple[float, float]]:
+        """Intervals of the free coordinate in which no bound is negative."""
+        from scipy.optimize import brentq
+
+        ends: list[float] = []
+        if self._polynomials is not None:
+            for coefficients in self._polynomials:
+                ends += real_roots(np.atleast_1d(np.array(coefficients(value), dtype=float)))
+            ends = [-np.inf, *sorted(set(ends)), np.inf]
+        else:
+            from scipy.optimize import brentq
+
+            # a set with its middle in the principal range ends within a period of zero
+            period = self.field.periods[self.field.model.states.index(self.free[0].name)]
+            reach = float(period or REACH * self._units(value)[0])
+            grid = np.linspace(-reach, reach, PLACES)
+            table = self.values(value, grid)
+            if (table >= 0).all():
+                return [(-np.inf, np.inf)]
+            for number, row in enumerate(table):
+                for i in np.flatnonzero(row[1:] * row[:-1] < 0):
+                    bound = partial(self._bound, value, number)
+                    fine = XTOL * reach
+                    ends.append(float(brentq(bound, grid[i], grid[i + 1], xtol=fine)))
+            ends = sorted(set(ends))
+        inside = []
+        far = FAR * float(self._units(value)[0])
+        for low, high in pairwise(ends):
+            place = 0.5 * (max(low, min(high, 0.0) - far) + min(high, max(low, 0.0) + far))
+            if (self.values(value, place) >= 0).all():
+                inside.append((low, high))
+        joined: list[tuple[float, float]] = []
+        for low, high in inside:
+            if joined and joined[-1][1] == low:
+                joined[-1] = joined[-1][0], high
+            else:
+                joined.append((low, high))
+        return joined
+
+    @cached_property
+    def _weights(self) -> Callable[..., Any]:
+        """The weights and their derivatives by the free states, at places along a last axis."""
+        weights = sp.Matrix([1 - e for e in self.bounds[: 2 * len(self.motion.slides) : 2]])
+        both = [list(weights), list(weights.jacobian(self.free))]
+        return numpy_function(self._symbols, both)
+
+    def _newton(
+        self, value: float, places: Array, targets: Array
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Places at which the weights have target values, both of shape (N, d), and whether."""
+        d = self.dimension
+        with np.errstate(all="ignore"):
+            for _ in range(12):
+                given, slopes = self._weights(value, *places.T)
+                left = np.stack(np.broadcast_arrays(*given, places[:, 0])[:-1], axis=-1) - targets
+                table = np.stack(np.broadcast_arrays(*slopes, places[:, 0])[:-1], axis=-1)
+                matrices = table.reshape(-1, d, d)
+                finite = np.isfinite(matrices).all(axis=(1, 2))
+                sizes = np.abs(np.linalg.det(np.where(finite[:, None, None], matrices, 0.0)))
+                sound = np.logical_and(finite, sizes > 0)
+                matrices = np.where(sound[:, None, None], matrices, np.eye(d))
+                places = places - np.linalg.solve(matrices, left[..., None])[..., 0]
+        near = np.abs(left).max(axis=1) < SMALL
+        return places, np.logical_and(near, np.isfinite(places).all(axis=1))
+
+    def _searched(self, value: float) -> list[EquilibriumSet]:
+        """Sets of several dimensions: from where all weights vanish to the faces of the cube.
+
+        The ranges are those of the places reached on a grid on the faces. Where the states
+        are no functions of the weights all the way, the set is filled on a grid instead.
+        """
+        d = self.dimension
+        units = self._units(value)
+        line = np.linspace(-1.0, 1.0, 9)
+        grid = np.array(list(product(line, repeat=d))) * REACH * units
+        middles, found = self._newton(value, grid, np.zeros_like(grid))
+        inside = np.logical_and(found, (np.abs(middles) <= REACH * units).all(axis=1))
+        distinct: list[Array] = []
+        for middle in middles[inside]:
+            if not any((np.abs(middle - o) <= 1e-6 * units).all() for o in distinct):
+                distinct.append(middle)
+        cube = np.array(list(product(np.linspace(-1.0, 1.0, 9 if d == 2 else 5), repeat=d)))
+        cube = cube[np.abs(cube).max(axis=1) == 1.0]
+        sets: list[EquilibriumSet] = []
+        filled: list[_Filled] = []
+        for middle in (distinct[k] for k in in_order(np.reshape(distinct, (-1, d)), units)):
+            if any(one.holds(middle) for one in filled):
+                continue
+            if not (self.values(value, *middle) >= 0).all():
+                continue
+            places, alive = np.tile(middle, (len(cube), 1)), np.ones(len(cube), dtype=bool)
+            reached = [places]
+            for part in np.linspace(0.0, 1.0, 11)[1:]:
+                further, near = self._newton(value, places, part * cube)
+                alive &= near
+                places = np.where(alive[:, None], further, places)
+                reached.append(places)
+            if not alive.all() and d in FILLED:
+                filled.append(self._filled(value, middle, units))
+                sets.append(self._polished(value, filled[-1]))
+                continue
+            states = np.array([self.state(value, *free) for free in np.concatenate(reached)])
+            corner = alive & np.asarray(np.abs(cube).min(axis=1) == 1.0)
+            corners = np.array([self.state(value, *free) for free in places[corner]])
+            sets.append(
+                self._made(
+                    value,
+                    tuple(middle.tolist()),
+                    states.min(axis=0),
+                    states.max(axis=0),
+                    corners if len(corners) else self.state(value, *middle)[None],
+                )
+            )
+        return sets
+
+    def _filled(self, value: float, middle: Array, units: Array) -> _Filled:
+        """The places of a grid around a place that are connected to it within the bounds."""
+        from scipy.ndimage import label
+
+        count = FILLED[self.dimension]
+        half, most = FIRST * units, REACH * units
+        while True:
+            axes = [np.linspace(m - h, m + h, count) for m, h in zip(middle, half, strict=True)]
+            places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+            flat = places.reshape(-1, self.dimension)
+            inside = (self.values(value, *flat.T) >= 0).all(axis=0).reshape(places.shape[:-1])
+            parts = label(inside)[0]
+            own = parts == parts[(count // 2,) * self.dimension]
+            ends = [bool(own.take([0, -1], axis=k).any()) for k in range(self.dimension)]
+            touched = np.array(ends, dtype=bool)
+            if not (touched & (half < most)).any():
+                return _Filled(places, own, touched)
+            half = np.where(touched, np.minimum(2.0 * half, most), half)
+
+    def _polished(self, value: float, filled: _Filled) -> EquilibriumSet:
+        """The set whose places of a grid are given, its ranges and corners solved for."""
+        inside, cell = filled.places[filled.own], filled.cell
+        given = self._states(value, *inside.T)
+        states = np.stack(np.broadcast_arrays(*given, inside[:, 0])[:-1], axis=-1)
+        lower, upper = states.min(axis=0), states.max(axis=0)
+        free = [c.name for c in self.free]
+        for k, name in enumerate(self.field.model.states):
+            if name in free and filled.touched[free.index(name)]:
+                lower[k], upper[k] = -np.inf, np.inf
+                continue
+            lower[k] = self._least(value, k, 1.0, inside[np.argmin(states[:, k])], cell)
+            upper[k] = self._least(value, k, -1.0, inside[np.argmax(states[:, k])], cell)
+        weights = np.stack(np.broadcast_arrays(*self._weights(value, *inside.T)[0]), axis=-1)
+        targets = np.array(list(product((-1.0, 1.0), repeat=self.dimension)))
+        starts = np.array([inside[np.argmin(np.abs(weights - t).max(axis=1))] for t in targets])
+        corners, near = self._newton(value, starts, targets)
+        near = np.logical_and(near, (np.abs(corners - starts) <= 4.0 * cell).all(axis=1))
+        middle = inside[len(inside) // 2]
+        chosen = corners[near] if near.any() else middle[None]
+        return self._made(
+            value,
+            tuple(middle.tolist()),
+            lower,
+            upper,
+            np.array([self.state(value, *place) for place in chosen]),
+        )
+
+    def _least(self, value: float, k: int, sign: float, start: Array, cell: Array) -> float:
+        """The end of the range of a state in a set, from the place of a grid next to it."""
+        from scipy.optimize import minimize
+
+        def height(steps: Array) -> float:
+            return sign * float(self.state(value, *(start + steps * cell))[k])
+
+        def bounds(steps: Array) -> Array:
+            return self.values(value, *(start + steps * cell))
+
+        with np.errstate(all="ignore"):
+            found = minimize(
+                height,
+                np.zeros(len(start)),
+                method="SLSQP",
+                constraints={"type": "ineq", "fun": bounds},
+                options={"ftol": 1e-14},
+            )
+            near = np.abs(found.x).max() <= 4.0 and (bounds(found.x) >= -SMALL).all()
+        still = height(np.zeros(len(start)))
+        return sign * (min(height(found.x), still) if near else still)
+
+    def contains(self, u: Array, unit: Array | float) -> bool:
+        """Whether a point (states, parameter) is in the set, its edges included.
+
+        ``unit`` is the size of every state, by which rounding is judged.
+        """
+        value = float(u[-1])
+        names = self.field.model.states
+        free = [float(u[names.index(c.name)]) for c in self.free]
+        state = self.state(value, *free)
+        near = SMALL * np.maximum(unit, np.abs(u[:-1]))
+        if not np.all(np.abs(state - u[:-1]) <= 10 * near):
+            return False
+        return bool((self.values(value, *free) >= -EDGE).all())
+
+
+@dataclass(frozen=True, eq=False)
+class _Filled:
+    """Places of a grid, shape (N, …, d), which of them are in a set, and where it goes on."""
+
+    places: Array
+    own: NDArray[np.bool_]
+    touched: NDArray[np.bool_]
+
+    @property
+    def cell(self) -> Array:
+        """Distance between neighbouring places, shape (d,)."""
+        flat = self.places.reshape(-1, self.places.shape[-1])
+        return np.asarray(np.ptp(flat, axis=0) / (self.own.shape[0] - 1))
+
+    def holds(self, place: Array) -> bool:
+        """Whether a place is nearest to one of the set."""
+        first = self.places[(0,) * self.own.ndim]
+        part = np.rint((place - first) / self.cell)
+        if not ((part >= 0) & (part < self.own.shape[0])).all():
+            return False
+        return bool(self.own[tuple(part.astype(int))])
+
+
+def _middle(one: EquilibriumSet) -> Array:
+    """The middle of the ranges, zero of those without both ends."""
+    ends = np.isfinite(one.lower) & np.isfinite(one.upper)
+    return np.where(ends, 0.5 * np.where(ends, one.lower, 0.0), 0.0) + np.where(
+        ends, 0.5 * np.where(ends, one.upper, 0.0), 0.0
+    )
+
+
+def _aligned(one: EquilibriumSet, target: Array, periods: Array) -> EquilibriumSet:
+    """The copy of a set whose middle is nearest to a place; ranges without ends stay."""
+    middle = _middle(one)
+    by = nearest_copy(middle, target, periods) - middle
+    if not by.any():
+        return one
+    return replace(one, lower=one.lower + by, upper=one.upper + by, corners=one.corners + by)
+
+
+def _copies(one: EquilibriumSet, other: EquilibriumSet, periods: Array) -> bool:
+    """Whether two sets are whole periods apart, or none."""
+    if not np.array_equal(np.isfinite(one.lower), np.isfinite(other.lower)):
+        return False
+    away = apart(_middle(one), _middle(other), periods)
+    size = np.where(periods > 0, periods, np.abs(_middle(one)) + np.abs(_middle(other)))
+    return bool((np.abs(away) <= COPY * size).all())
+
+
+def _interval(origin: Array, slope: Array) -> tuple[float, float] | None:
+    """Where origin + slope c >= 0."""
+    size = np.maximum(np.abs(origin), np.abs(slope))
+    still = np.abs(slope) <= 1e-14 * size
+    if (origin[still] < 0).any():
+        return None
+    ends = -origin[~still] / slope[~still]
+    low = float(ends[slope[~still] > 0].max(initial=-np.inf))
+    high = float(ends[slope[~still] < 0].min(initial=np.inf))
+    return (low, high) if low < high else None
+
+
+def _numbers(field: FrozenField) -> dict[sp.Symbol, sp.Rational]:
+    values = field.model.parameters
+    return {real(n): sp.Rational(v) for n, v in values.items() if n != field.parameter}
+
+
+def _heights(field: FrozenField, motion: Motion) -> list[sp.Expr]:
+    functions = [i.function for i in field.model.interfaces.values()]
+    return [functions[j] for j in motion.slides]
+
+
+@lru_cache(maxsize=64)
+def families_of(field: FrozenField) -> tuple[Family, ...]:
+    """The families of equilibria of a field's sliding motions that are no isolated points.
+
+    With sliding along several interfaces isolated equilibria too, which no branch
+    runs through.
+    """
+    found = (_family(field, motion) for motion in motions_of(field.model).sliding)
+    return tuple(family for family in found if family is not None)
+
+
+def _family(field: FrozenField, motion: Motion) -> Family | None:
+    numbers = _numbers(field)
+    names = field.model.states
+    functions = [exact(i.function).subs(numbers) for i in field.model.interfaces.values()]
+    rates = [exact(r).subs(numbers) for r in motion.rates]
+    parts = solved_along([functions[j] for j in motion.slides], rates, names)
+    if parts is None or parts[1] is None or (not parts[1] and len(motion.slides) == 1):
+        return None
+    solved, free = parts[0], parts[1]
+    weights = [sp.cancel(exact(s).subs(numbers).subs(solved)) for s in motion.weights]
+    others = [
+        sp.expand(sign * functions[j].subs(solved)) for j, sign in enumerate(motion.signs) if sign
+    ]
+    if any(h == 0 for h in others):
+        # the edge of a set within one more interface
+        return None
+    turned = sp.Integer(-1)
+    if len(motion.slides) == 1:
+        a, b = (exact(e).subs(numbers).subs(solved) for e in motion.bounds)
+        turned = sp.expand(a - b)
+    bounds = [e for s in weights for e in (1 - s, 1 + s)]
+    symbols = {real(n): real(n) for n in names} | solved
+    return Family(
+        field,
+        motion,
+        free,
+        tuple(sp.expand(symbols[real(n)]) for n in names),
+        (*bounds, *others),
+        turned,
+    )
+
+
+def sets_of(field: FrozenField, value: float) -> list[EquilibriumSet]:
+    """All sets of equilibria at a value of the field's parameter."""
+    return [one for family in families_of(field) for one in family.sets(value)]
+
+
+def all_known(field: FrozenField) -> bool:
+    """Whether no equilibria along several interfaces at once are left out.
+
+    Those of equations that stay implicit, sets with no way to their ranges, and those where
+    no sliding motion is derived are not looked for; sets that are not exact may not be all.
+    """
+    return not _left_out(field) and all(f.exact for f in families_of(field))
+
+
+@lru_cache(maxsize=64)
+def _left_out(field: FrozenField) -> bool:
+    """Whether motions along several interfaces stay implicit, or are not derived."""
+    numbers = _numbers(field)
+    motions = motions_of(field.model)
+    if motions.undecided:
+        return True
+    for motion in motions.sliding:
+        if len(motion.slides) > 1:
+            heights = [exact(h).subs(numbers) for h in _heights(field, motion)]
+            rates = [exact(r).subs(numbers) for r in motion.rates]
+            parts = solved_along(heights, rates, field.model.states)
+            if parts is not None and parts[1] is None:
+                return True
+    return False
+
+
+def covered(field: FrozenField, lower: float, upper: float) -> set[int]:
+    """Numbers of the modes of a field whose equilibria are all in exact sets.
+
+    Those of a region if it has one, in closed form, that is an edge of a set throughout.
+    """
+    names = {family.motion.name for family in families_of(field) if family.exact}
+    if not names:
+        return set()
+    found = set()
+    for equations in region_equations(field):
+        mode = field.modes[equations.region]
+        if mode.sides is not None:
+            if mode.name in names:
+                found |= {equations.region, equations.region + 1}
+        elif not equations.unknowns:
+            values = np.linspace(lower, upper, 7)
+            points = [(s, v) for v in values for s in equations.solutions(v)[0][:1]]
+            inside = [in_a_set(field, np.append(s, v), np.abs(s).max()) for s, v in points]
+            if all(inside) and len(points) == len(values):
+                found.add(equations.region)
+    return found
+
+
+def in_a_set(field: FrozenField, u: Array, unit: Array | float) -> bool:
+    """Whether a point (states, parameter) is in one of the sets of equilibria.
+
+    ``unit`` is the size of every state, by which rounding is judged.
+    """
+    return any(family.contains(u, unit) for family in families_of(field))
+
+
+def bands_of(
+    field: FrozenField, lower: float, upper: float, window: StateWindow
+) -> tuple[EquilibriumBand, ...]:
+    """The bands that the sets of equilibria make over a range of the parameter.
+
+    A band ends where its set leaves the window. Sets of several dimensions that are
+    searched for are too slow to follow: none of those.
+    """
+    followed = (f for f in families_of(field) if f.exact or f.dimension < 2)
+    return tuple(b for family in followed for b in _bands(family, lower, upper, window))
+
+
+def _bands(
+    family: Family, lower: float, upper: float, window: StateWindow
+) -> list[EquilibriumBand]:
+    def sets_at(value: float) -> list[EquilibriumSet]:
+        return [one for one in family.sets(value) if window.meets(one.lower, one.upper)]
+
+    def after(run: Run, one: EquilibriumSet) -> EquilibriumSet | None:
+        """The copy of a set that goes on with a run, None where it does not."""
+        last = run[-1][1]
+        copy = _aligned(one, _middle(last), family.field.periods)
+        return copy if _meet(last, copy) else None
+
+    count = ROWS if family.dimension < 2 else FEWER
+    grid = [float(value) for value in np.linspace(lower, upper, count)]
+    rows = [(value, sets_at(value)) for value in grid]
+    table = rows[:1]
+    for last, now in pairwise(rows):
+        if len(last[1]) != len(now[1]):
+            table += _change(sets_at, last, now)
+        table.append(now)
+    done: list[Run] = []
+    growing: list[Run] = []
+    for value, sets in table:
+        following: list[Run] = []
+        for one in sets:
+            met = [(run, copy) for run in growing if (copy := after(run, one)) is not None]
+            if len(met) == 1 and sum(after(met[0][0], s) is not None for s in sets) == 1:
+                following.append([*met[0][0], (value, met[0][1])])
+            else:
+                following.append([(value, one)])
+        kept = {id(run[-2][1]) for run in following if len(run) > 1}
+        done += [run for run in growing if id(run[-1][1]) not in kept]
+        growing = following
+    return [_band(family, run) for run in (*done, *growing) if len(run) > 1]
+
+
+def _meet(one: EquilibriumSet, other: EquilibriumSet) -> bool:
+    """Whether the ranges of two sets at neighbouring values overlap, and their corners match."""
+    near = SMALL * np.nan_to_num(np.abs(one.lower) + np.abs(one.upper), posinf=0.0)
+    over = (one.lower <= other.upper + near) & (other.lower <= one.upper + near)
+    if one.dimension == 0:
+        over[:] = True
+    return bool(over.all()) and len(one.corners) == len(other.corners)
+
+
+def _change(
+    sets_at: SetsAt,
+    before: tuple[float, list[EquilibriumSet]],
+    after: tuple[float, list[EquilibriumSet]],
+) -> list[tuple[float, list[EquilibriumSet]]]:
+    """Values to rounding between which the number of sets changes, and some beside them."""
+    first, last = before[0], after[0]
+    for _ in range(60):
+        middle = 0.5 * (before[0] + after[0])
+        if not before[0] < middle < after[0]:
+            break
+        now = middle, sets_at(middle)
+        if len(now[1]) == len(before[1]):
+            before = now
+        else:
+            after = now
+    # closer and closer to the change, where an edge may turn round
+    parts = [(k / ROUND) ** 2 for k in range(ROUND - 1, 0, -1)]
+    left = [before[0] - part * (before[0] - first) for part in parts]
+    right = [after[0] + part * (last - after[0]) for part in reversed(parts)]
+    rows = [(value, sets_at(value)) for value in (*left, *right)]
+    count = len(left)
+    return [*rows[:count], before, after, *rows[count:]]
+
+
+def _band(family: Family, run: Run) -> EquilibriumBand:
+    def solver(value: float, near: Array) -> EquilibriumSet | None:
+        found = [_aligned(one, near, family.field.periods) for one in family.sets(value)]
+        if not found:
+            return None
+        middles = [np.nan_to_num(0.5 * (s.lower + s.upper)) for s in found]
+        return found[int(np.argmin([np.abs(m - near).sum() for m in middles]))]
+
+    first = run[0][1]
+    return EquilibriumBand(
+        first.states,
+        family.field.parameter,
+        first.region,
+        first.interfaces,
+        first.dimension,
+        dict(family.field.model.parameters),
+        np.array([v for v, _ in run]),
+        np.array([one.lower for _, one in run]),
+        np.array([one.upper for _, one in run]),
+        np.array([one.corners for _, one in run]),
+        np.array([one.eigenvalues for _, one in run]),
+        first.attracting,
+        np.array([one.stable for _, one in run]),
+        first.exact,
+        solver,
+    )

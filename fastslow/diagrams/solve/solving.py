@@ -1,0 +1,179 @@
+"""All equilibria of a frozen model at one parameter value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import flag, instance, mapping, takes
+from fastslow.diagrams.field import IDLE, FrozenField, require_frozen
+from fastslow.diagrams.points.correcting import point_at
+from fastslow.diagrams.solve.equations import among, region_equations
+from fastslow.diagrams.solve.equilibrium_sets import all_known, in_a_set, sets_of
+from fastslow.diagrams.trace.windows import within
+from fastslow.errors import ModelError
+from fastslow.model.model import Model
+from fastslow.results.branch.windows import state_window
+from fastslow.results.points import Equilibria, Equilibrium
+from fastslow.symbolic.closed_forms.conserved import conserved_quantities
+from fastslow.symbolic.closed_forms.symmetries import free_directions
+
+Array = NDArray[np.float64]
+
+#: Equilibria set the size of a state up to this multiple of its natural unit.
+FAR = 1e3
+
+
+@takes(model=instance(Model), values=mapping, virtual=flag, window=mapping)
+def equilibria(
+    model: Model,
+    values: Mapping[Any, float] | None = None,
+    /,
+    *,
+    virtual: bool = False,
+    window: Mapping[Any, tuple[float | None, float | None]] | None = None,
+    **named: float,
+) -> Equilibria:
+    """All equilibria of a frozen model at given values of its slow quantities.
+
+    Where a region's equations reduce to one polynomial all its roots are
+    found, and the list's ``coverage`` is ``"complete"``; elsewhere Newton's
+    method from many starts, and it is ``"found"``. A continuum (the gap of a
+    backlash at zero load) is given by its ends, with ``continuum=True``.
+
+    Where the rates jump across an interface, the pseudo-equilibria of the sliding
+    field along it are listed too, with the region ``"S1|S2"`` (Filippov 1988). A set of
+    them, such as the states at which dry friction holds a block, is in the
+    attribute ``sets``; in the list are its two ends or corners, with ``continuum=True``.
+
+    Parameters
+    ----------
+    model : Model
+        A frozen model.
+    values : mapping, optional
+        Slow quantity or parameter (symbol or name) to its value.
+    virtual : bool
+        Whether to add the virtual ones, which lie outside their region.
+    window : mapping, optional
+        State to its range (low, high), in its own units; None in place of an end
+        is no bound. Equilibria outside are left out, as negative concentrations.
+    **named : float
+        The same by name.
+
+    Returns
+    -------
+    Equilibria
+        A tuple of Equilibrium, region by region.
+
+    Raises
+    ------
+    UnknownNameError
+        For a name that is no parameter, or in the window no state.
+    ModelError
+        For a slow quantity without value, or where a shift of the states leaves every
+        rate as it is or a combination of them never changes, so that no equilibrium is
+        isolated.
+    ArgumentError
+        For a range in the window that is none.
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> x, w, t = sp.symbols("x w t")
+    >>> model = Model({x: w - sp.Abs(x)}, forcing={w: sp.sin(t)}).frozen()
+    >>> [e.state.tolist() for e in equilibria(model, w=2)]
+    [[2.0], [-2.0]]
+    >>> equilibria(Model({x: w - x - sp.sign(x)}, parameters={w: 0.5}))
+    (Equilibrium(x = 0; in S1|S2; stable pseudo-node),)
+    >>> v = sp.Symbol("v")
+    >>> equilibria(Model({x: v, v: 1 - x - sp.sign(v) / 2})).sets
+    (EquilibriumSet(0.5 ≤ x ≤ 1.5, v = 0; S1|S2 (sticking) on v = 0, dimension 1),)
+    """
+    require_frozen(model, "solve for the equilibria of")
+    given = model.with_parameters(values, **named)
+    if free := (*free_directions(model), *conserved_quantities(model)):
+        raise ModelError(f"the equilibria are not isolated; {free[0]}")
+    name = next(iter(given.parameters), IDLE)
+    value = given.parameters[name] if given.parameters else 0.0
+    asked = state_window(model.states, window, model.periodic)
+    field = FrozenField(given, name)
+    # sets may exist at this value of every parameter alone
+    found = solve_at(field, value, virtual, FrozenField(given, IDLE))
+    inside = [one for one in found.sets if asked.meets(one.lower, one.upper)]
+    return Equilibria(within(field, asked, found), found.coverage, inside)
+
+
+def solve_at(
+    field: FrozenField,
+    value: float,
+    virtual: bool = False,
+    still: FrozenField | None = None,
+    *,
+    with_sets: bool = True,
+    bounds: Mapping[str, float] | None = None,
+) -> Equilibria:
+    """Equilibria of every region at a value of the field's parameter, and pseudo-equilibria.
+
+    A virtual pseudo-equilibrium, where the flow crosses, is listed with the sliding motion.
+    Sets of equilibria are those of the field over its parameter, or of ``still``, in which
+    nothing varies; without ``with_sets`` what is in them is left out, and they are not listed.
+    With bounds on the modulus of states the list need not have what exceeds them.
+    """
+    along = field if still is None else still
+    complete = True
+    solved: list[tuple[int, bool, list[Array]]] = []
+    for number, equations in enumerate(region_equations(field)):
+        whole = equations.continuum(value)
+        states, sure = (
+            (equations.edges(value), True) if whole else equations.solutions(value, bounds)
+        )
+        complete &= sure
+        solved.append((number, whole, states))
+    known = [(number, np.append(s, value)) for number, _, states in solved for s in states]
+    # one equilibrium next to a pole, far from all others, would make any point admissible
+    natural = field.units_at(abs(value))[: field.n]
+    unit = np.append(np.minimum(field.sizes(known), FAR * natural), abs(value))
+    found: list[Equilibrium] = []
+    for number, whole, states in solved:
+        sides = field.modes[number].sides
+        for state in states:
+            u = np.append(state, value)
+            admissible = field.admissible(number, u, unit)
+            if admissible:
+                wanted = not in_a_set(along, u, unit[:-1])
+            elif sides is None:
+                wanted = virtual
+            else:
+                wanted = virtual and not sides.escaping and field.virtual(number, u, unit)
+            if wanted:
+                found.append(point_at(field, number, u, admissible, continuum=whole))
+    sets = sets_of(along, value) if with_sets else []
+    corners = [corner for one in sets for corner in one.equilibria]
+    found += [replace(corner, state=field.wrapped(corner.state)) for corner in corners]
+    complete &= all(one.exact for one in sets) and all_known(along)
+    distinct = _distinct(found, unit[:-1], field.periods)
+    return Equilibria(distinct, "complete" if complete else "found", sets)
+
+
+def _distinct(points: list[Equilibrium], unit: Array, periods: Array) -> list[Equilibrium]:
+    """Each admissible state once: on an interface two regions share it; a continuum wins.
+
+    Ends of a continuum of pseudo-equilibria that is no `EquilibriumSet` stand beside the
+    equilibria of the regions at the same states.
+    """
+    kept: list[Equilibrium] = []
+    shared, count = np.empty((len(points), len(unit))), 0
+    for point in sorted(points, key=lambda p: not p.continuum):
+        if point.admissible:
+            if among(point.state, shared[:count], unit, periods):
+                continue
+            if not (point.continuum and point.pseudo):
+                shared[count] = point.state
+                count += 1
+        kept.append(point)
+    order = {id(p): k for k, p in enumerate(points)}
+    return sorted(kept, key=lambda p: order[id(p)])

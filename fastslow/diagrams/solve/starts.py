@@ -1,0 +1,250 @@
+"""Equilibria from which the branches of a diagram are traced."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property, lru_cache
+from itertools import pairwise, product
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.solve.critical import critical_values
+from fastslow.diagrams.solve.equations import region_equations
+from fastslow.diagrams.solve.equilibrium_sets import all_known, covered
+from fastslow.diagrams.solve.solving import solve_at
+from fastslow.diagrams.trace.windows import Sides, edges_left, known, size_of, within
+from fastslow.model.structure import real
+from fastslow.results.branch.branch import Branch
+from fastslow.results.branch.windows import ON_EDGE, ROUNDING, StateWindow, state_window, typical
+from fastslow.results.points import Equilibrium
+
+Array = NDArray[np.float64]
+
+
+#: Critical values nearer to each other than this part of the range are one, up to rounding.
+SAME = 1e-10
+
+#: Where a state is typically below this part of its largest size, it is zero but at a few
+#: equilibria, and these set its unit.
+FAINT = 1e-14
+
+#: Between critical values nearer than this equilibria may be far away, next to a pole. They
+#: do not count for the units and the window.
+NARROW = 1e-3
+
+
+class Starts:
+    """Equilibria from which branches are traced, solved for once at each value."""
+
+    def __init__(
+        self, field: FrozenField, lower: float, upper: float, inside: int, window: StateWindow
+    ) -> None:
+        self._field = field
+        self._over = (lower, upper)
+        self._asked = window
+        # the golden ratio keeps the values clear of each other and of round numbers
+        parts = [(0.5 + k * 0.6180339887498949) % 1.0 for k in range(inside)]
+        spread = [lower + p * (upper - lower) for p in parts]
+        # what is in exact sets of equilibria is found with them
+        sets = covered(field, lower, upper)
+        equations = self._equations = tuple(
+            e for e in dict.fromkeys(region_equations(field)) if e.region not in sets
+        )
+        self._edges = edges_of(window, window.given)
+        between = [critical_values(e, lower, upper, self._edges) for e in equations]
+        self.complete = all(b is not None for b in between) and all_known(field)
+        self._continua = [
+            (field.regions[equation.region], value)
+            for equation in equations
+            for value in equation.continua()
+            if lower <= value <= upper
+        ]
+        levels = sorted({lower, upper, *(v for b in between for v in b or ())})
+        least = SAME * (upper - lower)
+        middles = [0.5 * (a + b) for a, b in pairwise(levels) if b - a > least]
+        self._first = [lower, upper, *(middles if self.complete else [*middles, *spread])]
+        wide = NARROW * (upper - lower)
+        self._typical = [
+            lower,
+            upper,
+            *(0.5 * (a + b) for a, b in pairwise(levels) if b - a > wide),
+        ]
+        if not self.complete:
+            self._typical += spread
+        self._found: dict[float, list[Equilibrium]] = {}
+        self._sure: dict[float, bool] = {}
+
+    def at(self, value: float, admissible: bool) -> list[Equilibrium]:
+        """Equilibria in the window."""
+        unit = self.scale[:-1]
+        if self._bounds and not self._sure.get(value, False):
+            # what runs to infinity beside a pole need not be decided
+            self._solve(value, self._bounds)
+        points = self._asked_at(value, admissible)
+        return [e for e in points if self.window.contains(self.window.shifted(e.state), unit)]
+
+    def _asked_at(self, value: float, admissible: bool) -> list[Equilibrium]:
+        """Equilibria within the bounds that were asked for."""
+        if value not in self._found:
+            self._solve(value, None)
+        return [e for e in self._found[value] if e.admissible == admissible]
+
+    def _solve(self, value: float, bounds: Mapping[str, float] | None) -> None:
+        """Solve for the equilibria at a value, all or those within bounds."""
+        solved = solve_at(self._field, value, virtual=True, with_sets=False, bounds=bounds)
+        sure = solved.coverage == "complete"
+        if bounds is None or sure:
+            self._sure[value] = sure
+            # no branch runs through what is in a set of equilibria
+            single = [e for e in solved if not e.continuum and e.region in self._field.regions]
+            self._found[value] = within(self._field, self._asked, single)
+
+    @cached_property
+    def _bounds(self) -> dict[str, float]:
+        """The largest modulus in the window of every state that has one."""
+        window = self.window
+        ends = {n: max(abs(low), abs(high)) for n in window.states for low, high in [window[n]]}
+        return {n: (1.0 + ON_EDGE) * end for n, end in ends.items() if 0 < end < np.inf}
+
+    @cached_property
+    def outside(self) -> tuple[StateWindow, list[tuple[Equilibrium, float]]]:
+        """Admissible equilibria that the window asked for excludes, and a window about them.
+
+        Their branches may enter it between the values at which equilibria are looked
+        for. Where critical values are known there is a start in every such interval, and
+        nothing is listed.
+        """
+        if self.complete or not self._asked.chosen:
+            return self._asked, []
+        found = [(e, v) for v in self._first for e in solve_at(self._field, v) if not e.continuum]
+        points = [e for e, _ in found]
+        open_window = state_window(self._asked.states, None, self._field.model.periodic)
+        states = np.reshape([e.state for e in points], (-1, self._field.n))
+        kept = {id(e) for e in within(self._field, self._asked, points)}
+        wide = open_window.around(states, known(self._field, points))
+        return wide, [(e, v) for e, v in found if id(e) not in kept]
+
+    @cached_property
+    def window(self) -> StateWindow:
+        """The window asked for, with defaults about the equilibria at the first values."""
+        for values, admissible in product((self._typical, self._first), (True, False)):
+            points = [e for v in values for e in self._asked_at(v, admissible)]
+            if points:
+                break
+        states = np.reshape([e.state for e in points], (-1, self._field.n))
+        return self._asked.around(states, known(self._field, points))
+
+    def values(self, branches: Sequence[Branch]) -> Iterable[float]:
+        """The first values, then those between edges left and special points found so far."""
+        yield from self._first
+        done: set[float] = set()
+        left = self._asked.given
+        while True:
+            if (now := edges_left(self.window, branches)) != left:
+                left = now
+                yield from self._beside_edges(left)[1]
+            special = {p[b.parameter_name] for b in branches for p in b.special}
+            levels = sorted({*self._over, *special})
+            gap = 1e-6 * (self._over[1] - self._over[0])
+            middles = {0.5 * (a + b) for a, b in pairwise(levels) if b - a > gap}
+            fresh = sorted(middles - done)
+            if not fresh or len(done) > 200:
+                return
+            done |= set(fresh)
+            yield from fresh
+
+    def prove(self, branches: Sequence[Branch]) -> bool:
+        """Whether these branches are sure to be all in the window."""
+        provable, middles = self._beside_edges(edges_left(self.window, branches))
+        return (
+            self.complete and provable and all(self._sure.get(v) for v in (*self._first, *middles))
+        )
+
+    def _beside_edges(self, left: Sides) -> tuple[bool, list[float]]:
+        """Values between those at which an equilibrium is on an edge that a branch has left by.
+
+        A branch that leaves may come back between two values at which equilibria
+        are looked for. With them, whether there can be no others.
+        """
+        edges = tuple(e for e in edges_of(self.window, left) if e not in self._edges)
+        if not edges:
+            return True, []
+        between = [critical_values(e, *self._over, edges) for e in self._equations]
+        levels = sorted({*self._over, *(v for b in between for v in b or ())})
+        middles = [0.5 * (a + b) for a, b in pairwise(levels)]
+        return all(b is not None for b in between), middles
+
+    def missed(self, branches: Sequence[Branch]) -> list[tuple[str, float]]:
+        """Regions and values at which a continuum of equilibria is part of no branch."""
+        near = 1e-9 * (self._over[1] - self._over[0])
+        # most are seen at once to be part of a branch
+        return [
+            (region, value)
+            for region, value in self._continua
+            if not any(_upright(b, value, near, self.scale) for b in branches)
+            and self._lies_within(region, value)
+        ]
+
+    def _lies_within(self, region: str, value: float) -> bool:
+        """Whether a continuum lies in its region, at least in part."""
+        return not self._field.interfaces or any(
+            e.continuum and e.admissible and e.region == region
+            for e in solve_at(self._field, value, virtual=True)
+        )
+
+    @cached_property
+    def scale(self) -> Array:
+        """Unit of each state, the size of its equilibria, and the length of the range."""
+        n = self._field.n
+        both = [e for v in self._typical for k in (True, False) for e in self._asked_at(v, k)]
+        table = np.reshape([e.state for e in both], (-1, n))
+        inside = self.window.contains(self.window.shifted(table))
+        states = table[inside]
+        largest = size = size_of(self._field, [both[k] for k in np.flatnonzero(inside)])
+        # a few equilibria near a pole are far away and must not set the unit
+        wide = typical(states, ROUNDING * size)
+        middle = np.median(states, axis=0) if len(states) else np.zeros(n)
+        spread = np.minimum(np.ptp(states, axis=0) if len(states) else np.zeros(n), wide)
+        size = np.minimum(size, np.abs(middle) + wide)
+        # far from zero it is the differences that count
+        moved = np.where(spread > ROUNDING * size, np.maximum(spread, 1e-3 * size), size)
+        size = np.where(size > FAINT * largest, moved, largest)
+        # an angle is measured in radians
+        periods = self._field.periods
+        size = np.where(periods > 0, periods / (2.0 * np.pi), size)
+        return np.append(size, self._over[1] - self._over[0])
+
+
+def _upright(branch: Branch, value: float, near: float, scale: Array) -> bool:
+    """Whether a branch has a vertical piece at a parameter value."""
+    step = np.abs(np.diff(branch.state, axis=0) / scale[:-1]).max(axis=1)
+    there = np.abs(branch.parameter - value) < near
+    return bool(np.any(there[1:] & there[:-1] & (step > 1e-6)))
+
+
+@lru_cache(maxsize=64)
+def starts_of(
+    field: FrozenField, lower: float, upper: float, inside: int, window: StateWindow
+) -> Starts:
+    """Where tracing starts, searched for once."""
+    return Starts(field, lower, upper, inside, window)
+
+
+def edges_of(window: StateWindow, sides: Sides) -> tuple[sp.Expr, ...]:
+    """Functions that vanish on the finite edges among some bounds of a window.
+
+    Examples
+    --------
+    >>> from fastslow.results.branch.windows import state_window
+    >>> edges_of(state_window(("x", "y"), {"y": (0, 0.5)}), ((True, True), (False, True)))
+    (y - 1/2,)
+    """
+    found = []
+    for k, name in enumerate(window.states):
+        for bound, meant in zip((window.lower[k], window.upper[k]), sides[k], strict=True):
+            if meant and np.isfinite(bound):
+                found.append(real(name) - sp.Rational(bound))
+    return tuple(found)

@@ -1,0 +1,543 @@
+"""One curve of equilibria followed from region to region."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation import loops, spaces
+from fastslow.continuation.location import Located
+from fastslow.continuation.settings import Continuation
+from fastslow.diagrams.curves.two_folds import cut_at_two_fold, two_fold_ahead
+from fastslow.diagrams.field import FrozenField
+from fastslow.results.angles import apart, nearest_copy
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.branch.windows import ON_EDGE, StateWindow, left_window
+
+Array = NDArray[np.float64]
+
+#: How far inside the range, in parts of it, an end is looked for where there is none at its edge.
+SHORT_OF_RANGE = (0.0, 1e-9, 1e-6, 1e-3)
+
+#: A last step that ends nowhere is taken again in steps so many times shorter, so often in turn,
+#: with so many rows before the usual steps are taken again.
+FINER, FINEST, CHUNK = 16.0, 3, 64
+
+#: Pieces (regions in order) that one branch may have.
+PIECES = 1000
+
+
+@dataclass(frozen=True)
+class Window:
+    """Where branches are traced, and in which units.
+
+    Parameters
+    ----------
+    lower, upper : float
+        Range of the parameter.
+    scale : ndarray, shape (n + 1,)
+        Unit of each state and of the parameter.
+    states : StateWindow
+        Range of every state.
+    """
+
+    lower: float
+    upper: float
+    scale: Array
+    states: StateWindow
+
+    @property
+    def weight(self) -> Array:
+        return self.scale**-2.0
+
+    def contains(self, u: Array) -> bool:
+        """Whether the states of a point u are in their window."""
+        return bool(self.states.contains(u[:-1], self.scale[:-1]))
+
+    def leads_out(self, u: Array, tangent: Array) -> bool:
+        """Whether a direction from a point on an edge of the window leaves it."""
+        low, high = np.array(self.states.lower), np.array(self.states.upper)
+        slack = ON_EDGE * self.scale[:-1]
+        out = (u[:-1] <= low + slack) & (tangent[:-1] < 0)
+        return bool(np.any(out | (u[:-1] >= high - slack) & (tangent[:-1] > 0)))
+
+    def size(self, u: Array) -> Array:
+        """Size of each component of a point: its modulus, or its unit where that is larger."""
+        return np.maximum(np.abs(u), self.scale)
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A part of a branch in one region: points u and unit tangents, shape (N, n + 1)."""
+
+    region: int
+    u: Array
+    tangents: Array
+
+    def chords(self, scale: Array) -> Array:
+        """Lengths of the steps in units of the scale."""
+        # NumPy reduces a short last axis slowly
+        columns = np.ascontiguousarray(self.u.T)
+        steps = np.diff(columns) / scale[:, None]
+        return np.asarray(np.sqrt((steps * steps).sum(axis=0)))
+
+    def reversed(self) -> Piece:
+        return Piece(self.region, self.u[::-1].copy(), -self.tangents[::-1])
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """Pieces in order, the interface between each two, and why the walk ended.
+
+    ``last`` is the interface on which the walk stopped for good, if it did.
+    """
+
+    pieces: tuple[Piece, ...]
+    joins: tuple[int, ...]
+    outcome: Outcome
+    last: int | None = None
+    closed: bool = False
+
+
+def walk(
+    field: FrozenField,
+    region: int,
+    start: Array,
+    tangent: Array,
+    window: Window,
+    continuation: Continuation,
+    *,
+    bounded: bool = True,
+) -> Walk:
+    """Follow a curve of equilibria in one direction, through every interface on its way.
+
+    Parameters
+    ----------
+    region : int
+        Region whose rates vanish at the start.
+    start, tangent : ndarray, shape (n + 1,)
+        A point of the branch and the direction to go.
+    bounded : bool
+        Whether interfaces bound the regions; False follows virtual equilibria.
+    """
+    pieces: list[Piece] = []
+    joins: list[int] = []
+    first = Piece(region, start[None], tangent[None])
+    periods = field.periods
+    step = continuation.step
+    while len(pieces) < PIECES:
+        signs = field.signs[region] if bounded else np.zeros(field.compiled.m)
+        u, tangents, status, step, again = _traced(
+            field, region, start, tangent, signs, window, continuation, step, closing=not joins
+        )
+        joined = bool(joins) or again
+        back = _returned(region, u, tangents, first, window, periods) if joined else None
+        if back is not None:
+            pieces.append(back)
+            return Walk(tuple(pieces), tuple(joins), _closed(), closed=True)
+        met = None
+        if status in (spaces.INTERFACE, spaces.SMALL_STEP):
+            end = two_fold_ahead(field, region, u, window.scale)
+            inside = end is not None and window.lower <= end[-1] <= window.upper
+            if end is not None and inside and window.contains(end):
+                pieces.append(Piece(region, *cut_at_two_fold(u, tangents, end, window.scale)))
+                return Walk(tuple(pieces), tuple(joins), _two_fold(field, region, end))
+        if status == spaces.INTERFACE:
+            met = _first_interface(field, region, u, tangents, window)
+            if met is None:
+                status = spaces.SMALL_STEP
+                u, tangents = u[:-1], tangents[:-1]
+            elif not window.contains(met[1]):
+                status = spaces.WINDOW
+            elif not window.lower <= met[1][-1] <= window.upper:
+                status = spaces.RANGE
+        if status in (spaces.RANGE, spaces.WINDOW):
+            u, tangents, status = _cut(field, region, u, tangents, window, status)
+        if status != spaces.INTERFACE or met is None:
+            pieces.append(Piece(region, u, tangents))
+            closed = status == spaces.CLOSED
+            if closed:
+                u[-1] = nearest_copy(first.u[0], u[-1], np.append(periods, 0.0))
+                tangents[-1] = first.tangents[0]
+            outcome = _outcome(status, field, u[-1], window, continuation)
+            return Walk(tuple(pieces), tuple(joins), outcome, closed=closed)
+        row, corner = met
+        interface = _interface_of(field, region, row)
+        end = _oriented(field.tangent(region, corner, window.weight)[0], tangents[-1], window)
+        u[-1], tangents[-1] = corner, end
+        pieces.append(Piece(region, u, tangents))
+        beyond, outcome = _enter(field, region, row, corner, window)
+        if beyond is None:
+            # at a two-fold the branch of pseudo-equilibria itself ends, at no boundary
+            inner = outcome.code == "two-fold" and field.modes[region].sides is not None
+            last = None if inner else interface
+            return Walk(tuple(pieces), tuple(joins), outcome, last=last)
+        if window.leads_out(corner, beyond[1]):
+            return Walk(tuple(pieces), tuple(joins), _left(field, corner, window), last=interface)
+        joins.append(interface)
+        region, tangent = beyond
+        start = corner
+        moved = apart(start, first.u[0], np.append(periods, 0.0))
+        away = np.abs(moved / window.scale).max()
+        home = region == first.region and away < 1e-9
+        if home:
+            return Walk(tuple(pieces), tuple(joins), _closed(), closed=True)
+    return Walk(tuple(pieces), tuple(joins), _full(field, start, continuation))
+
+
+def _traced(
+    field: FrozenField,
+    region: int,
+    start: Array,
+    tangent: Array,
+    signs: Array,
+    window: Window,
+    continuation: Continuation,
+    step: float,
+    *,
+    closing: bool,
+) -> tuple[Array, Array, int, float, bool]:
+    """Rows in one region, their tangents, what ended them, the step, and whether it was divided.
+
+    Where the last step left the range, and no equilibrium is found at the end of the range, the
+    step may have missed a turn of the branch: it is taken again in shorter ones.
+    """
+    low, high = np.array(window.states.lower), np.array(window.states.upper)
+    rows: list[Array] = []
+    tangents: list[Array] = []
+    finer = 0
+    while True:
+        largest = continuation.largest_step / FINER**finer
+        left = continuation.points - sum(map(len, rows))
+        count = min(left, CHUNK) if finer else left
+        u, along = np.empty((count, len(start))), np.empty((count, len(start)))
+        u[0], along[0] = start, tangent
+        in_use = np.array([max(step, 10 * continuation.smallest_step)])
+        progress = np.array([1, 0])
+        status = spaces.PAUSED
+        space = spaces.trace_space(len(start) - 1, len(signs))
+        curve = spaces.Curve(field.compiled.address, region, field.values)
+        limits = spaces.Region(
+            signs, window.weight, window.lower, window.upper, low, high,
+            window.states.middle(), field.periods,
+        )  # fmt: skip
+        stepping = spaces.Stepping(
+            continuation.smallest_step, largest, continuation.largest_turn,
+            continuation.tolerance, continuation.iterations, closing and not rows,
+        )  # fmt: skip
+        traced = spaces.Traced(u, along, in_use, progress)
+        while status == spaces.PAUSED:
+            progress[1] = max(1, loops.WORK // (8 * len(start) ** 3 + 16 * field.compiled.size))
+            status = loops.loop("trace")(curve, limits, stepping, traced, space)
+        u, along, step = u[: progress[0]], along[: progress[0]], float(in_use[0])
+        missed = False
+        if status == spaces.RANGE:
+            end, _, ended = _cut(field, region, u.copy(), along.copy(), window, status)
+            missed = ended == spaces.RANGE and not _at_end(end[-1], window)
+        if missed and finer < FINEST and len(u) > 1:
+            finer += 1
+            step = continuation.largest_step / FINER**finer
+            kept = len(u) - 2
+        elif status == spaces.FULL and finer and len(u) < left:
+            finer, kept = 0, len(u) - 1
+        else:
+            break
+        rows.append(u[:kept])
+        tangents.append(along[:kept])
+        start, tangent = u[kept], along[kept]
+    whole = np.concatenate([*rows, u]), np.concatenate([*tangents, along])
+    return *whole, status, step, bool(rows)
+
+
+def _at_end(u: Array, window: Window) -> bool:
+    """Whether a row is an end of the range, to which its parameter was set."""
+    return bool(u[-1] in (window.lower, window.upper))
+
+
+def _returned(
+    region: int, u: Array, tangents: Array, first: Piece, window: Window, periods: Array
+) -> Piece | None:
+    """The rows before a curve that left the first region passes its start again."""
+    if region != first.region:
+        return None
+    start, direction = first.u[0], first.tangents[0]
+    chords = np.linalg.norm(np.diff(u, axis=0) / window.scale, axis=1)
+    gaps = apart(start, u[:-1], np.append(periods, 0.0)) / window.scale
+    along = tangents[:-1] / window.scale
+    ahead = (gaps * along).sum(axis=1)
+    aside = np.linalg.norm(gaps - ahead[:, None] * along, axis=1)
+    alike = along @ (direction / window.scale) > 0.9
+    passed = np.flatnonzero((ahead > 0) & (ahead <= chords) & (aside < 0.2 * chords) & alike)
+    if not passed.size:
+        return None
+    stop = int(passed[0]) + 1
+    start = nearest_copy(start, u[stop - 1], np.append(periods, 0.0))
+    return Piece(region, np.vstack([u[:stop], start]), np.vstack([tangents[:stop], direction]))
+
+
+def _first_interface(
+    field: FrozenField, region: int, u: Array, tangents: Array, window: Window
+) -> tuple[int, Array] | None:
+    """The switching function met first on the last step, with the point where it vanishes."""
+    before, after = u[-2], u[-1]
+    signs = field.signs[region]
+    _, _, h0, _ = field.at(region, before)
+    _, _, h1, _ = field.at(region, after)
+    length = float(np.linalg.norm((after - before) / window.scale))
+    best: tuple[float, int, Array] | None = None
+    for k in np.flatnonzero(signs * h1 < 0):
+        part = float(np.clip(h0[k] / (h0[k] - h1[k]), 0.0, 1.0)) if h0[k] != h1[k] else 0.5
+        found = on_interface(field, region, int(k), before + part * (after - before), window)
+        ahead = float(((found.u - before) * window.weight) @ tangents[-2])
+        if found.converged and -1e-6 <= ahead <= 1.5 * length and (best is None or ahead < best[0]):
+            best = (ahead, int(k), found.u)
+    return None if best is None else (best[1], best[2])
+
+
+def on_interface(
+    field: FrozenField, region: int, interface: int, guess: Array, window: Window
+) -> Located:
+    """The boundary equilibrium F = 0, h = 0 near a guess."""
+    return field.refined(region, guess, window.scale, row=interface)
+
+
+def beside(
+    field: FrozenField, region: int, point: Array, normal: Array, guess: Array, window: Window
+) -> Located:
+    """Where the curve meets the plane through a point with a given normal."""
+    return field.refined(region, guess, window.scale, normal=normal, point=point)
+
+
+def _interface_of(field: FrozenField, region: int, row: int) -> int:
+    """The interface that a switching function is about: of a drift, the one slid along."""
+    sides = field.modes[region].sides
+    return row if sides is None or row < len(field.interfaces) else sides.interface
+
+
+def _enter(
+    field: FrozenField, region: int, row: int, corner: Array, window: Window
+) -> tuple[tuple[int, Array] | None, Outcome]:
+    """The region (or sliding motion) beyond a switching function, and the tangent into it."""
+    sides = field.modes[region].sides
+    if sides is None or row < len(field.interfaces):
+        return _cross(field, region, row, corner, window)
+    _, _, h, slopes = field.at(region, corner)
+    size = np.abs(slopes) @ window.size(corner)
+    if np.all(np.abs(h[-2:]) <= 1e-9 * size[-2:]):
+        return None, _two_fold(field, region, corner)
+    # the first drift belongs to the region above, whose equilibrium this is
+    beyond = sides.above if row == len(h) - 2 else sides.below
+    return _led_into(field, beyond, sides.interface, sides.interface, corner, window)
+
+
+def _cross(
+    field: FrozenField, region: int, interface: int, corner: Array, window: Window
+) -> tuple[tuple[int, Array] | None, Outcome]:
+    """The same beyond an interface; where the rates jump there, sliding along it."""
+    name, where = field.interfaces[interface], _where(field, corner)
+    _, _, h, gradients = field.at(region, corner)
+    size = np.abs(gradients * window.scale).max(axis=1)
+    near = (np.abs(h) <= 1e-9 * size) & (field.signs[region] != 0)
+    met = {interface, *np.flatnonzero(near[: len(field.interfaces)]).tolist()}
+    if not met <= set(field.coinciding[interface]):
+        meeting = [field.interfaces[k] for k in sorted(met)]
+        return None, Outcome(
+            "interfaces meet",
+            f"the interfaces {' and '.join(meeting)} meet at the equilibrium {where}; where the "
+            "branch goes on is not unique.",
+            False,
+        )
+    beyond = field.neighbour(region, interface)
+    if beyond is None:
+        return None, Outcome(
+            "no region beyond", f"no region lies beyond {name} = 0 at {where}.", False
+        )
+    rates, slopes = field.curve(beyond, corner)
+    bound = 1e-8 * (np.abs(slopes) @ window.size(corner))
+    if np.all(np.abs(rates) <= bound):
+        return _led_into(field, beyond, interface, interface, corner, window)
+    if field.modes[region].sides is not None:
+        return None, Outcome(
+            "discontinuous interface",
+            f"the sliding field jumps across {name} = 0 at {where}, where two discontinuities "
+            "meet; the motion along both at once is not unique.",
+            False,
+        )
+    along = field.slides_into(region, beyond, corner, window.scale)
+    if along is None:
+        return None, Outcome(
+            "two-fold",
+            f"both fields are tangent to {name} = 0 at the boundary equilibrium {where}; there is "
+            "no sliding motion beside it.",
+            True,
+        )
+    # the drift of this region's field, which vanishes here, is the bound to leave
+    sides = field.modes[along].sides
+    drift = -2 if sides is not None and sides.above == region else -1
+    return _led_into(field, along, len(h) + drift, interface, corner, window)
+
+
+def _led_into(
+    field: FrozenField, beyond: int, row: int, interface: int, corner: Array, window: Window
+) -> tuple[tuple[int, Array] | None, Outcome]:
+    """A region and the tangent along which one of the functions that bound it grows."""
+    tangent, single = field.tangent(beyond, corner, window.weight)
+    _, _, _, gradients = field.at(beyond, corner)
+    size = float(np.abs(gradients[row] * window.scale).max())
+    ahead = field.signs[beyond, row] * float(gradients[row] @ tangent)
+    if not single or abs(ahead) < 1e-9 * size:
+        return None, Outcome(
+            "singular at interface",
+            f"the equilibria of region {field.regions[beyond]} are singular or tangent to "
+            f"{field.interfaces[interface]} = 0 at {_where(field, corner)}; a small change of "
+            "another parameter makes them regular.",
+            False,
+        )
+    return (beyond, tangent if ahead > 0 else -tangent), _closed()
+
+
+def _cut(
+    field: FrozenField, region: int, u: Array, tangents: Array, window: Window, status: int
+) -> tuple[Array, Array, int]:
+    """Replace the last row, beyond the range or the window, by the first point on an edge."""
+    if not window.contains(u[-1]):
+        edge = _on_window(field, region, u, tangents, window)
+        if edge is None and status == spaces.WINDOW:
+            return u[:-1], tangents[:-1], spaces.WINDOW
+        if edge is not None and window.lower <= edge[-1] <= window.upper:
+            if np.abs((edge - u[-2]) / window.scale).max() < 1e-13:
+                return u[:-1], tangents[:-1], spaces.WINDOW
+            tangent = field.tangent(region, edge, window.weight)[0]
+            u[-1], tangents[-1] = edge, _oriented(tangent, tangents[-1], window)
+            return u, tangents, spaces.WINDOW
+    u, tangents = _cut_at_range(field, region, u, tangents, window)
+    return u, tangents, spaces.RANGE
+
+
+def _on_window(
+    field: FrozenField, region: int, u: Array, tangents: Array, window: Window
+) -> Array | None:
+    """Where the last step leaves the window of the states: at the first of the edges passed."""
+    before, after = u[-2], u[-1]
+    length = float(np.linalg.norm((after - before) / window.scale))
+    best: tuple[float, Array] | None = None
+    for k in range(field.n):
+        for bound, side in ((window.states.lower[k], -1.0), (window.states.upper[k], 1.0)):
+            if not side * (after[k] - bound) > 0:
+                continue
+            part = float(np.clip((bound - before[k]) / (after[k] - before[k]), 0.0, 1.0))
+            normal = np.zeros(len(after))
+            normal[k] = 1.0
+            guess = before + part * (after - before)
+            found = field.refined(region, guess, window.scale, normal=normal, point=bound * normal)
+            ahead = float(((found.u - before) * window.weight) @ tangents[-2])
+            if found.converged and -1e-6 <= ahead <= 1.5 * length:
+                found.u[k] = bound
+                if window.contains(found.u) and (best is None or ahead < best[0]):
+                    best = ahead, found.u
+    return None if best is None else best[1]
+
+
+def _cut_at_range(
+    field: FrozenField, region: int, u: Array, tangents: Array, window: Window
+) -> tuple[Array, Array]:
+    """Replace the last row, beyond the range, by the point exactly at its end.
+
+    Where the rates are not defined there, by the nearest that is found inside.
+    """
+    beyond, before = u[-1], u[-2]
+    below = beyond[-1] < window.lower
+    bound = window.lower if below else window.upper
+    along = np.zeros(u.shape[1])
+    along[-1] = 1.0
+    for short in SHORT_OF_RANGE:
+        target = bound + (short if below else -short) * (window.upper - window.lower)
+        if not min(before[-1], beyond[-1]) <= target <= max(before[-1], beyond[-1]):
+            break
+        part = (target - before[-1]) / (beyond[-1] - before[-1]) if beyond[-1] != before[-1] else 0
+        guess = before + part * (beyond - before)
+        found = field.refined(region, guess, window.scale, normal=along, point=target * along)
+        if found.converged and np.all(np.isfinite(found.u)):
+            end = found.u
+            end[-1] = target
+            if np.abs((end - before) / window.scale).max() < 1e-13:
+                u[-2, -1] = target
+                break
+            tangent = field.tangent(region, end, window.weight)[0]
+            u[-1], tangents[-1] = end, _oriented(tangent, tangents[-1], window)
+            return u, tangents
+    return u[:-1], tangents[:-1]
+
+
+def _oriented(tangent: Array, along: Array, window: Window) -> Array:
+    return tangent if (tangent * window.weight) @ along >= 0 else -tangent
+
+
+def _where(field: FrozenField, u: Array) -> str:
+    names = (*field.model.states, field.parameter)
+    return "(" + ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, u, strict=True)) + ")"
+
+
+def _two_fold(field: FrozenField, region: int, u: Array) -> Outcome:
+    sides = field.modes[region].sides
+    name = field.interfaces[sides.interface] if sides is not None else ""
+    return Outcome(
+        "two-fold",
+        f"both fields are tangent to {name} = 0 at {_where(field, u)}; at this two-fold the "
+        f"pseudo-equilibria of {field.regions[region]} end.",
+        True,
+    )
+
+
+def _closed() -> Outcome:
+    return Outcome("closed loop", "the branch returned to its start: a closed loop.", True)
+
+
+def _full(field: FrozenField, u: Array, continuation: Continuation) -> Outcome:
+    return Outcome(
+        "too many points",
+        f"the branch has {continuation.points} rows and goes on at {_where(field, u)}; "
+        "raise Continuation(points=…) or largest_step.",
+        False,
+    )
+
+
+def _left(field: FrozenField, u: Array, window: Window) -> Outcome:
+    """What is said of a branch that ends on an edge of the window of the states."""
+    where = f"{field.parameter} = {u[-1]:.6g}"
+    return left_window(window.states, u[:-1], window.scale[:-1], where)
+
+
+def _outcome(
+    status: int,
+    field: FrozenField,
+    u: Array,
+    window: Window,
+    continuation: Continuation,
+) -> Outcome:
+    where = _where(field, u)
+    if status == spaces.RANGE and not _at_end(u, window):
+        return Outcome(
+            "edge of domain",
+            f"followed to {where}; no equilibrium was found at the end of the range itself, where "
+            "the rates may not be defined.",
+            False,
+        )
+    if status == spaces.RANGE:
+        return Outcome(
+            "end of range", f"reached {field.parameter} = {u[-1]:g}, the end of the range.", True
+        )
+    if status == spaces.CLOSED:
+        return _closed()
+    if status == spaces.WINDOW:
+        return _left(field, u, window)
+    if status == spaces.FULL:
+        return _full(field, u, continuation)
+    return Outcome(
+        "step too small",
+        f"no next point was found from {where} with steps down to {continuation.smallest_step:g}: "
+        "the curve is singular here, or the rates are not defined beyond.",
+        False,
+    )

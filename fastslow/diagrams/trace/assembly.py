@@ -1,0 +1,324 @@
+"""From the pieces of a walk to a Branch with its special points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation.location import crossing_tangents
+from fastslow.diagrams.curves.two_folds import two_fold_residual
+from fastslow.diagrams.field import FrozenField, Source
+from fastslow.diagrams.points.detection import Detected, special_points
+from fastslow.diagrams.trace.across_regions import Piece, Walk, Window
+from fastslow.results.angles import principal
+from fastslow.results.base.immutable import read_only
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.branch.branch import Branch
+from fastslow.results.points import NEUTRAL, ClarkePath, SpecialPoint, SpecialPoints
+from fastslow.results.stored.model import StoredModel
+
+Array = NDArray[np.float64]
+
+#: A determinant below this times the product of its row norms counts as zero.
+SINGULAR = 1e-10
+
+#: Kind of a boundary equilibrium by the product of the signs of both determinants.
+KINDS = {1: "persistence", 0: "degenerate", -1: "non-smooth fold"}
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Both directions of a branch joined: pieces, the interfaces between, and both ends."""
+
+    pieces: tuple[Piece, ...]
+    joins: tuple[int, ...]
+    outcomes: tuple[Outcome, Outcome]
+    ends: tuple[int | None, int | None]
+    closed: bool
+
+
+def joined(backward: Walk | None, forward: Walk) -> Curve:
+    """One curve from the walks in both directions from a start."""
+    if backward is None:
+        return Curve(
+            forward.pieces, forward.joins, (forward.outcome, forward.outcome), (None, None), True
+        )
+    left = [p.reversed() for p in reversed(backward.pieces)]
+    first, second = left[-1], forward.pieces[0]
+    middle = Piece(
+        second.region,
+        np.concatenate([first.u, second.u[1:]]),
+        np.concatenate([first.tangents[:-1], second.tangents]),
+    )
+    return Curve(
+        (*left[:-1], middle, *forward.pieces[1:]),
+        (*reversed(backward.joins), *forward.joins),
+        (backward.outcome, forward.outcome),
+        (backward.last, forward.last),
+        False,
+    )
+
+
+def rising(curve: Curve) -> Curve:
+    """The curve in the direction in which the parameter at its ends does not fall."""
+    if curve.closed or curve.pieces[0].u[0, -1] <= curve.pieces[-1].u[-1, -1]:
+        return curve
+    return Curve(
+        tuple(p.reversed() for p in reversed(curve.pieces)),
+        tuple(reversed(curve.joins)),
+        (curve.outcomes[1], curve.outcomes[0]),
+        (curve.ends[1], curve.ends[0]),
+        False,
+    )
+
+
+def branch_of(
+    field: FrozenField, curve: Curve, window: Window, marks: Sequence[float], admissible: bool
+) -> Branch:
+    """The table of a curve, with its special points solved for and put among its rows."""
+    special: list[SpecialPoint] = []
+    at_row: list[int] = []
+    tables: list[tuple[Array, Array, NDArray[np.complex128], int]] = []
+    rows = 0
+    for number, walked in enumerate(curve.pieces):
+        found, piece, finite = special_points(field, walked, window, marks)
+        u, tangents = piece.u, piece.tangents
+        eigenvalues = field.with_infinite(piece.region, finite)
+        if found:
+            largest = np.abs(finite).max(axis=-1, initial=0.0)
+            points = [_point(field, piece, d, window, float(largest[d.row])) for d in found]
+            places = [d.row + 1 for d in found]
+            u = np.insert(u, places, [d.located.u for d in found], axis=0)
+            tangents = np.insert(tangents, places, [p.tangent for p in points], axis=0)
+            eigenvalues = np.insert(eigenvalues, places, [p.eigenvalues for p in points], axis=0)
+            special += points
+            at_row += [rows + place + k for k, place in enumerate(places)]
+        tables.append((u, tangents, eigenvalues, piece.region))
+        rows += len(u)
+        if number < len(curve.joins):
+            special.append(_corner(field, curve, number))
+            at_row.append(rows - 1)
+    u = _centred(field, np.concatenate([t[0] for t in tables]), window)
+    # nobody else has these: a read-only array is kept as it is
+    tangents = read_only(np.concatenate([t[1] for t in tables]))
+    eigenvalues = read_only(np.concatenate([t[2] for t in tables]))
+    names = np.array(field.regions)[[t[3] for t in tables]]
+    region = np.repeat(names, [len(t[0]) for t in tables])
+    if not curve.closed:
+        special, at_row = _with_ends(field, curve, special, at_row, rows)
+    size = _sizes(u[:, :-1], window.scale[:-1])
+    # curves of points take equations
+    stored = isinstance(field.model, StoredModel)
+    source = None if stored else Source(field.model, size, window.states)
+    return Branch(
+        field.model.states,
+        field.parameter,
+        u[:, :-1],
+        u[:, -1],
+        tangents,
+        eigenvalues,
+        region,
+        SpecialPoints(replace(p, source=source, admissible=admissible) for p in special),
+        tuple(at_row),
+        curve.outcomes,
+        curve.closed,
+        admissible,
+        dict(field.model.parameters),
+        periods=dict(field.model.periodic),
+    )
+
+
+def _sizes(states: Array, scale: Array) -> Array:
+    """Typical size of every state on a branch; its unit where it is zero on most of it."""
+    typical = np.median(np.abs(states), axis=0)
+    return np.where(typical > 1e-12 * scale, typical, scale)
+
+
+def _centred(field: FrozenField, u: Array, window: Window) -> Array:
+    """Rows shifted by whole periods, so that angles without a window are about zero."""
+    if not field.periods.any():
+        return u
+    low, high = u[:, :-1].min(axis=0), u[:, :-1].max(axis=0)
+    middle = window.states.shifted(principal(0.5 * (low + high), field.periods))
+    turns = field.periods > 0
+    u[:, :-1][:, turns] += (middle - 0.5 * (low + high))[turns]
+    return u
+
+
+def _special(
+    field: FrozenField, code: str, region: int, u: Array, tangent: Array, **more: object
+) -> SpecialPoint:
+    rates, _ = field.curve(region, u)
+    entries: dict[str, object] = {
+        "label": code,
+        "regions": (field.regions[region],),
+        "residual": float(np.abs(rates).max()),
+        "converged": True,
+        "eigenvalues": field.eigenvalues(region, u),
+        **more,
+    }
+    return SpecialPoint(
+        code=code,
+        states=field.model.states,
+        state=field.wrapped(u[:-1]),
+        parameters={**field.model.parameters, field.parameter: float(u[-1])},
+        tangent=tangent.copy(),
+        **entries,  # type: ignore[arg-type]
+    )
+
+
+def _point(
+    field: FrozenField, piece: Piece, detected: Detected, window: Window, beside: float
+) -> SpecialPoint:
+    """A special point; ``beside`` is the largest eigenvalue at the row before."""
+    located = detected.located
+    tangent, single = field.tangent(piece.region, located.u, window.weight)
+    before = piece.tangents[detected.row]
+    if not single:
+        tangent = before
+    elif (tangent * window.weight) @ before < 0:
+        tangent = -tangent
+    eigenvalues = field.eigenvalues(piece.region, located.u)
+    finite = np.isfinite(eigenvalues)
+    if np.all(np.abs(eigenvalues[finite]) <= NEUTRAL * beside):
+        # all rounding, as the only one at a fold: no unit is left by which to tell its sign
+        eigenvalues = np.where(finite, 0.0, eigenvalues)
+    return _special(
+        field,
+        detected.code,
+        piece.region,
+        located.u,
+        tangent,
+        eigenvalues=eigenvalues,
+        residual=located.residual,
+        converged=located.converged,
+        coefficient=detected.coefficient,
+        frequency=detected.frequency,
+        lyapunov=detected.lyapunov,
+        accuracy=located.correction,
+        switch=_switch(field, piece, detected, window),
+    )
+
+
+def _switch(field: FrozenField, piece: Piece, detected: Detected, window: Window) -> Array | None:
+    """At a branch point the tangent of the branch that crosses this one."""
+    if detected.code != "BP":
+        return None
+    both = crossing_tangents(
+        lambda u: field.curve(piece.region, u), detected.located.u, window.scale
+    )
+    if both is None:
+        return None
+    here = piece.tangents[detected.row]
+    return np.asarray(both[np.argmin(np.abs(both @ (here * window.weight)))])
+
+
+def _corner(field: FrozenField, curve: Curve, number: int) -> SpecialPoint:
+    """The boundary equilibrium between two pieces."""
+    # a closed branch may have its start on an interface
+    before, after = curve.pieces[number], curve.pieces[(number + 1) % len(curve.pieces)]
+    u, interface = before.u[-1], curve.joins[number]
+    names = (field.regions[before.region], field.regions[after.region])
+    sliding = [field.modes[p.region].sides is not None for p in (before, after)]
+    clarke = None
+    if sliding[0] != sliding[1]:
+        active = after.region if sliding[0] else before.region
+        subtype = _filippov(field, active, interface, u)
+    else:
+        active = before.region
+        jacobians = np.array([field.curve(p.region, u)[1][:, : field.n] for p in (before, after)])
+        first, second = (_determinant_sign(j) for j in jacobians)
+        subtype = KINDS[first * second]
+        clarke = None if sliding[0] else ClarkePath(names, jacobians)
+    rates, _, h, _ = field.at(active, u)
+    return _special(
+        field,
+        "BE",
+        before.region,
+        u,
+        before.tangents[-1],
+        regions=names,
+        residual=float(max(np.abs(rates).max(), abs(h[interface]))),
+        interface=field.interfaces[interface],
+        subtype=subtype,
+        clarke=clarke,
+    )
+
+
+def _determinant_sign(matrix: Array) -> int:
+    """Sign of a determinant, 0 where it vanishes to rounding."""
+    size = float(np.prod(np.maximum(np.linalg.norm(matrix, axis=1), 1e-300)))
+    value = float(np.linalg.det(matrix))
+    return 0 if abs(value) <= SINGULAR * size else int(np.sign(value))
+
+
+def _filippov(field: FrozenField, region: int, interface: int, u: Array) -> str | None:
+    """Persistence or non-smooth fold of a boundary equilibrium where the rates jump.
+
+    With N the Jacobian of the region whose equilibrium it is, E the jump of
+    the rates and C the gradient of h towards that region: C·N⁻¹E < 0 is
+    persistence, > 0 a non-smooth fold (di Bernardo et al. 2008, chapter 5).
+    None for a sliding motion, whose branch ends there.
+    """
+    if field.modes[region].sides is not None:
+        return None
+    beyond = field.neighbour(region, interface)
+    if beyond is None:
+        return "degenerate"
+    active, slopes, _, gradients = field.at(region, u)
+    other, _ = field.curve(beyond, u)
+    matrix = slopes[:, : field.n]
+    if _determinant_sign(matrix) == 0:
+        return "degenerate"
+    toward = field.signs[region, interface] * gradients[interface, : field.n]
+    moved = np.linalg.solve(matrix, other - active)
+    value = float(toward @ moved)
+    if abs(value) <= SINGULAR * float(np.abs(toward) @ np.abs(moved)):
+        return "degenerate"
+    return "persistence" if value < 0 else "non-smooth fold"
+
+
+def _with_ends(
+    field: FrozenField, curve: Curve, special: list[SpecialPoint], at_row: list[int], rows: int
+) -> tuple[list[SpecialPoint], list[int]]:
+    """End points first and last, a boundary equilibrium where an interface was the end."""
+    ends = []
+    for side, piece in ((0, curve.pieces[0]), (-1, curve.pieces[-1])):
+        u, tangent, interface = piece.u[side], piece.tangents[side], curve.ends[side]
+        note = curve.outcomes[side].message
+        if interface is None:
+            outcome = curve.outcomes[side]
+            reason = None if outcome.success else outcome.code
+            point = _special(field, "EP", piece.region, u, tangent, note=note, subtype=reason)
+            sides = field.modes[piece.region].sides
+            if curve.outcomes[side].code == "two-fold" and sides is not None:
+                point = replace(point, residual=two_fold_residual(field, piece.region, u))
+                name = field.interfaces[sides.interface]
+                ends.append([replace(point, code="TF", label="TF", interface=name), point])
+            else:
+                ends.append([point])
+            continue
+        beyond = field.neighbour(piece.region, interface)
+        names: tuple[str, ...] = (field.regions[piece.region],)
+        if beyond is not None:
+            names = (*names, field.regions[beyond])
+        point = _special(
+            field,
+            "BE",
+            piece.region,
+            u,
+            tangent,
+            regions=names,
+            interface=field.interfaces[interface],
+            subtype=_filippov(field, piece.region, interface, u),
+            note=note,
+        )
+        ends.append([point, _special(field, "EP", piece.region, u, tangent, note=note)])
+    first, last = ends[0][::-1], ends[1]
+    return (
+        [*first, *special, *last],
+        [*([0] * len(first)), *at_row, *([rows - 1] * len(last))],
+    )

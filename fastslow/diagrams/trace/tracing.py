@@ -1,0 +1,558 @@
+"""All branches of equilibria of a frozen model over one parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import (
+    finite,
+    flag,
+    formula,
+    instance,
+    interval,
+    items,
+    mapping,
+    takes,
+)
+from fastslow.continuation.loops import loop, writeable
+from fastslow.continuation.settings import Continuation
+from fastslow.diagrams.field import FrozenField, StoredFrozen, require_frozen
+from fastslow.diagrams.points.correcting import corrections, point_at
+from fastslow.diagrams.solve.seeds import Seeds
+from fastslow.diagrams.trace.across_regions import Piece, Window, beside, on_interface, walk
+from fastslow.diagrams.trace.assembly import Curve, branch_of, joined, rising
+from fastslow.errors import ArgumentError, ModelError
+from fastslow.results.angles import apart, copies, periods_of
+from fastslow.results.base.outcome import Outcome, with_ends
+from fastslow.results.branch.branch import Branch
+from fastslow.results.branch.diagram import SEARCHED, Diagram
+from fastslow.results.branch.equilibrium_sets import EquilibriumBand
+from fastslow.results.branch.windows import LEFT, StateWindow, state_window
+from fastslow.results.points import Equilibrium, SpecialPoint, SpecialPoints
+from fastslow.results.stored.model import StoredModel
+from fastslow.simulation.arguments import simulated
+
+if TYPE_CHECKING:
+    from fastslow.diagrams.solve.starts import Starts
+    from fastslow.model.model import Model
+
+Array = NDArray[np.float64]
+
+#: Largest distance from an interface, in units of the window, of what lies in it.
+INSIDE = 1e-9
+
+#: Rows of a branch outside the window along which is looked for where it enters.
+COARSE = 2000
+
+#: A state counts in units of this part of itself where that is more than its unit.
+FAR = 0.5
+
+#: First step along the branch that crosses at a branch point, in units of the window.
+SWITCH = 1e-3
+
+ADMISSIBLE = Outcome(
+    "becomes admissible", "the virtual branch meets the interface and is admissible beyond.", True
+)
+
+
+@takes(
+    model=simulated,
+    parameter=formula,
+    over=interval,
+    continuation=instance(Continuation),
+    marks=items(finite),
+    virtual=flag,
+    window=mapping,
+    from_points=items(),
+)
+def continue_equilibria(
+    model: Model | StoredModel,
+    parameter: Any,
+    over: tuple[float, float],
+    *,
+    continuation: Continuation | None = None,
+    marks: Sequence[float] = (),
+    virtual: bool = False,
+    window: Mapping[Any, tuple[float | None, float | None]] | None = None,
+    from_points: Sequence[Any] | None = None,
+) -> Diagram:
+    """Trace every branch of equilibria of a frozen model over a parameter range.
+
+    Pseudo-arclength continuation (Keller 1977) inside each region; at an
+    interface the boundary equilibrium is solved for exactly and the branch
+    goes on in the region beyond, turning back in the parameter where it must.
+    Where the rates jump it goes on as a pseudo-equilibrium of the sliding field,
+    and ends at a two-fold. Sets of equilibria, such as the states at which dry friction
+    holds a block, are the ``bands`` of the diagram.
+
+    Parameters
+    ----------
+    model : Model or StoredModel
+        A frozen model; every parameter but ``parameter`` has a value. That of a diagram from a
+        file is a stored one: its branches are traced ``from_points``, without SymPy.
+    parameter : str or Symbol
+        What varies.
+    over : (float, float)
+        Its range, in its own units.
+    continuation : Continuation, optional
+    marks : sequence of float
+        Parameter values at which a point UZ is wanted exactly.
+    virtual : bool
+        Whether to trace the virtual branches too.
+    window : mapping, optional
+        State to its range (low, high), in its own units: what lies outside is
+        neither looked for nor traced, and a branch that leaves ends exactly on
+        the edge. None in place of an end leaves the default there, an infinite
+        end is no bound. The default is 10⁴ times the size of the equilibria from
+        which branches are traced, and ``diagram.window`` records it.
+    from_points : sequence, optional
+        Trace only the branches through these points, and look for no others: each an
+        Equilibrium, a SpecialPoint (of a branch point both branches), or a mapping
+        of every state and the parameter to a value near an equilibrium.
+
+    Returns
+    -------
+    Diagram
+
+    Raises
+    ------
+    UnknownNameError
+        If the parameter is not one of the model's, or a name in the window no state.
+    ModelError
+        If the model is not frozen, or a slow quantity has no value.
+    ArgumentError
+        If a range is empty, reversed or not finite, a mark lies outside, or a given
+        point is no equilibrium or lies outside the range or the window.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, w, t = sp.symbols("x w t")
+    >>> model = fs.Model({x: w + x - x**3}, forcing={w: sp.sin(t)}).frozen()
+    >>> diagram = continue_equilibria(model, "w", (-1, 1))
+    >>> [round(p["w"], 12) for p in diagram.folds]
+    [0.38490017946, -0.38490017946]
+    """
+    name = str(parameter)
+    lower, upper = over
+    for mark in marks:
+        if not lower <= mark <= upper:
+            raise ArgumentError(
+                f"mark {name} = {mark:g} is outside the range [{lower:g}, {upper:g}]"
+            )
+    require_frozen(model, "trace the branches of")
+    field = _field(model, name)
+    continuation = continuation or Continuation()
+    asked = state_window(model.states, window, model.periodic)
+    starts: Starts | Seeds
+    if from_points is None:
+        if isinstance(model, StoredModel):
+            raise ModelError(
+                "this is a stored model, which has no equations in which to look for equilibria: "
+                "give from_points=, points of the branches that are to be traced"
+            )
+        from fastslow.diagrams.solve.starts import starts_of
+        from fastslow.symbolic.closed_forms.conserved import conserved_quantities
+        from fastslow.symbolic.closed_forms.symmetries import free_directions
+
+        if free := free_directions(model):
+            why = Outcome("free direction", f"no branch of equilibria is traced; {free[0]}.", False)
+            return _without_branches(field, name, (lower, upper), continuation, why)
+        if same := conserved_quantities(model):
+            why = Outcome(
+                "conserved quantity", f"no branch of equilibria is traced; {same[0]}.", False
+            )
+            return _without_branches(field, name, (lower, upper), continuation, why)
+        starts = starts_of(field, lower, upper, continuation.starts, asked)
+    else:
+        starts = Seeds(field, (lower, upper), from_points, asked, virtual)
+    within = Window(lower, upper, starts.scale, starts.window)
+    branches: list[Branch] = []
+    for admissible in (True, False) if virtual else (True,):
+        for value in starts.values(branches):
+            if len(branches) >= continuation.branches:
+                break
+            for start in starts.at(value, admissible)[: continuation.branches - len(branches)]:
+                if not any(_passes(field, b, start, value, within) for b in branches):
+                    curve = _traced(field, start, value, within, continuation, admissible)
+                    branches += _branches(field, curve, within, marks, admissible)
+        for start, value in _entering(field, starts, within) if admissible else ():
+            if len(branches) >= continuation.branches:
+                break
+            if not any(_passes(field, b, start, value, within) for b in branches):
+                curve = _traced(field, start, value, within, continuation, admissible)
+                branches += _branches(field, curve, within, marks, admissible)
+        if from_points is None:
+            branches += _switched(field, branches, within, continuation, marks, admissible)
+    full = len(branches) >= continuation.branches
+    missed = starts.missed(branches)
+    sound = all(o.success or o.code == LEFT for branch in branches for o in branch.outcomes)
+    corrector = _Corrector(field)
+    labelled = _labelled(branches, name, within, corrector)
+    unexplained = sum(len(branch.unexplained) for branch in labelled)
+    traced = sound and not full and not missed and not unexplained
+    return Diagram(
+        model.states,
+        name,
+        (lower, upper),
+        dict(field.model.parameters),
+        labelled,
+        "complete" if traced and starts.prove(branches) else "found",
+        field.interfaces,
+        field.regions,
+        field.source.levels(),
+        _text(model),
+        corrector,
+        with_ends(
+            _ending(name, full, missed, continuation, from_points),
+            [branch.outcomes for branch in branches],
+            unexplained,
+        ),
+        field.source.path(),
+        asdict(continuation),
+        starts.window,
+        _bands(field, lower, upper, asked) if from_points is None else (),
+        dict(model.periodic),
+        field.model,
+    )
+
+
+def _bands(
+    field: FrozenField, lower: float, upper: float, asked: StateWindow
+) -> tuple[EquilibriumBand, ...]:
+    from fastslow.diagrams.solve.equilibrium_sets import bands_of
+
+    return bands_of(field, lower, upper, asked)
+
+
+def _ending(
+    name: str,
+    full: bool,
+    missed: Sequence[tuple[str, float]],
+    continuation: Continuation,
+    from_points: Sequence[Any] | None,
+) -> Outcome:
+    """How the search for branches ended."""
+    if full:
+        return _too_many(continuation)
+    if missed:
+        return _continuum(name, missed)
+    if from_points is None:
+        return SEARCHED
+    count = len(from_points)
+    return Outcome(
+        "from points",
+        f"only branches through the {count} given point{'s' if count > 1 else ''} were traced; "
+        "no others were looked for.",
+        True,
+    )
+
+
+def _without_branches(
+    field: FrozenField,
+    name: str,
+    over: tuple[float, float],
+    continuation: Continuation,
+    outcome: Outcome,
+) -> Diagram:
+    """The diagram of a model in which no equilibrium is isolated, and its outcome."""
+    corrector = _Corrector(field)
+    return Diagram(
+        field.model.states,
+        name,
+        over,
+        dict(field.model.parameters),
+        (),
+        "found",
+        field.interfaces,
+        field.regions,
+        field.source.levels(),
+        _text(field.model),
+        corrector,
+        outcome,
+        field.source.path(),
+        asdict(continuation),
+        model=field.model,
+    )
+
+
+def _continuum(name: str, missed: Sequence[tuple[str, float]]) -> Outcome:
+    places = "; ".join(f"{name} = {value:.6g} in {region}" for region, value in missed)
+    return Outcome(
+        "continuum",
+        f"the equilibria form a continuum that no branch runs through: {places}.",
+        False,
+    )
+
+
+def _too_many(continuation: Continuation) -> Outcome:
+    return Outcome(
+        "too many branches",
+        f"{continuation.branches} branches were traced and there may be more; raise "
+        "Continuation(branches=…) to look for them.",
+        False,
+    )
+
+
+@lru_cache(maxsize=64)
+def _field(model: Model | StoredModel, name: str) -> FrozenField:
+    """The field of a model, made once."""
+    return FrozenField(model.freed(name), name)
+
+
+@lru_cache(maxsize=64)
+def _text(model: Model | StoredModel) -> str:
+    """The equations as they were written, printed once."""
+    return model.equations
+
+
+def _traced(
+    field: FrozenField,
+    start: Equilibrium,
+    value: float,
+    window: Window,
+    continuation: Continuation,
+    bounded: bool,
+) -> Curve:
+    """The whole branch through a start."""
+    region = field.regions.index(start.region)
+    u = np.append(window.states.shifted(start.state), value)
+    tangent, _ = field.tangent(region, u, window.weight)
+    if bounded and _along_interface(field, region, np.array([u]), window).any():
+        # rounding would end it everywhere: no side of the interface is left or entered
+        curve = _traced(field, start, value, window, continuation, False)
+        rows = np.concatenate([piece.u for piece in curve.pieces])
+        if _along_interface(field, region, rows, window).any():
+            return curve
+    forward = walk(field, region, u, tangent, window, continuation, bounded=bounded)
+    if forward.closed:
+        return joined(None, forward)
+    backward = walk(field, region, u, -tangent, window, continuation, bounded=bounded)
+    return rising(joined(backward, forward))
+
+
+def _entering(
+    field: FrozenField, starts: Starts | Seeds, window: Window
+) -> Iterator[tuple[Equilibrium, float]]:
+    """Points in the window on branches that a start outside of it is on."""
+    wide, outside = starts.outside
+    around = replace(window, states=wide)
+    coarse = Continuation(points=COARSE)
+    for start, value in outside:
+        region = field.regions.index(start.region)
+        u = np.append(start.state, value)
+        tangent, _ = field.tangent(region, u, window.weight)
+        for side in (1, -1):
+            for piece in walk(field, region, u, side * tangent, around, coarse).pieces:
+                states = window.states.shifted(piece.u[:, :-1])
+                inside = window.states.contains(states, window.scale[:-1])
+                # the middle of every part inside
+                edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
+                for first, last in zip(edges[::2], edges[1::2], strict=True):
+                    row = piece.u[(first + last - 1) // 2]
+                    yield point_at(field, piece.region, row), float(row[-1])
+
+
+def _along_interface(field: FrozenField, region: int, rows: Array, window: Window) -> Array:
+    """Which of the interfaces that bound a region hold all of the points."""
+    _, _, values, slopes = field.at(region, rows)
+    near = np.abs(values) < INSIDE * np.abs(slopes * window.scale).max(axis=-1)
+    return near.all(axis=0) & (field.signs[region] != 0)
+
+
+def _switched(
+    field: FrozenField,
+    branches: Sequence[Branch],
+    window: Window,
+    continuation: Continuation,
+    marks: Sequence[float],
+    admissible: bool,
+) -> list[Branch]:
+    """Branches that cross another at a branch point and that no start has led to."""
+    found: list[Branch] = []
+    waiting = [p for b in branches if b.admissible == admissible for p in b.special("BP")]
+    while waiting:
+        point = waiting.pop(0)
+        if point.switch is None or len(branches) + len(found) >= continuation.branches:
+            continue
+        region = field.regions.index(point.regions[0])
+        u = np.append(point.state, point.parameters[field.parameter])
+        for step in (SWITCH, -SWITCH):
+            guess = u + step * point.switch
+            near = beside(field, region, guess, point.switch * window.weight, guess, window)
+            value = float(near.u[-1])
+            if not near.converged or not window.lower <= value <= window.upper:
+                continue
+            if not window.contains(near.u):
+                continue
+            if field.admissible(region, near.u, window.scale) != admissible:
+                continue
+            start = point_at(field, region, near.u, admissible)
+            if any(_passes(field, b, start, value, window) for b in (*branches, *found)):
+                continue
+            curve = _traced(field, start, value, window, continuation, admissible)
+            fresh = _branches(field, curve, window, marks, admissible)
+            found += fresh
+            waiting += [p for b in fresh for p in b.special("BP")]
+    return found
+
+
+def _branches(
+    field: FrozenField, curve: Curve, window: Window, marks: Sequence[float], admissible: bool
+) -> list[Branch]:
+    """The branch of a curve; of a virtual one, its parts outside the region."""
+    if admissible:
+        return [branch_of(field, curve, window, marks, True)]
+    found = []
+    (piece,) = curve.pieces
+    inside = np.array([not field.virtual(piece.region, u, window.scale) for u in piece.u])
+    edges = np.flatnonzero(np.diff(inside)) + 1
+    for rows in np.split(np.arange(len(inside)), edges):
+        if inside[rows[0]] or len(rows) < 2:
+            continue
+        part = Piece(piece.region, piece.u[rows], piece.tangents[rows])
+        first, last = curve.outcomes
+        if rows[0] > 0:
+            part = _led_to_interface(field, part, piece.u[rows[0] - 1], 0, window)
+            first = ADMISSIBLE
+        if rows[-1] < len(inside) - 1:
+            part = _led_to_interface(field, part, piece.u[rows[-1] + 1], -1, window)
+            last = ADMISSIBLE
+        cut = Curve((part,), (), (first, last), (None, None), curve.closed and not len(edges))
+        found.append(branch_of(field, cut, window, marks, False))
+    return found
+
+
+def _led_to_interface(
+    field: FrozenField, part: Piece, inside: Array, end: int, window: Window
+) -> Piece:
+    """A virtual piece with the boundary equilibrium added at which it ends."""
+    outside = part.u[end]
+    _, _, h0, _ = field.at(part.region, outside)
+    _, _, h1, _ = field.at(part.region, inside)
+    bounding = field.signs[part.region] != 0
+    for interface in np.flatnonzero((h0 * h1 < 0) & bounding):
+        share = h0[interface] / (h0[interface] - h1[interface])
+        guess = outside + share * (inside - outside)
+        corner = on_interface(field, part.region, int(interface), guess, window)
+        if corner.converged:
+            place = 0 if end == 0 else len(part.u)
+            u = np.insert(part.u, place, corner.u, axis=0)
+            tangents = np.insert(part.tangents, place, part.tangents[end], axis=0)
+            return Piece(part.region, u, tangents)
+    return part
+
+
+def _passes(
+    field: FrozenField, branch: Branch, start: Equilibrium, value: float, window: Window
+) -> bool:
+    """Whether a branch goes through an equilibrium."""
+    if branch.admissible != start.admissible:
+        return False
+    rows = np.column_stack([branch.state, branch.parameter])
+    if not field.periods.any():
+        return _holds(field, branch, rows, np.append(start.state, value), window)
+    low, high = branch.state.min(axis=0), branch.state.max(axis=0)
+    ways = [copies(*entry) for entry in zip(start.state, low, high, field.periods, strict=True)]
+    return any(_holds(field, branch, rows, np.array([*s, value]), window) for s in product(*ways))
+
+
+def _holds(field: FrozenField, branch: Branch, rows: Array, u: Array, window: Window) -> bool:
+    """Whether a branch goes through a point."""
+    if len(rows) < 2:
+        # where the equations are singular all along a line, one point of it is enough
+        apart = np.abs((rows[0] - u) / window.scale)
+        return bool(apart[:-1].max() < 1e-6)
+    # far away the rows of a branch are as far apart as they are away
+    scale = window.scale.copy()
+    scale[:-1] = np.maximum(scale[:-1], FAR * np.abs(u[:-1]))
+    chords, apart = np.empty(len(rows) - 1, dtype=np.int64), np.empty(len(rows) - 1)
+    for k in chords[: loop("passing")(writeable(rows), scale, u, 1e-2, chords, apart)]:
+        chord = (rows[k + 1] - rows[k]) / scale
+        length = max(float(chord @ chord), 1e-300)
+        part = float(np.clip(((u - rows[k]) / scale) @ chord / length, 0.0, 1.0))
+        near = rows[k] + part * (rows[k + 1] - rows[k])
+        normal = chord / np.sqrt(length) / scale
+        region = field.regions.index(str(branch.region[k]))
+        # in units of the point, in which Newton's last corrections far away are rounding
+        found = field.refined(region, near, scale, normal=normal, point=u)
+        if found.converged and np.abs((found.u - u) / scale).max() < 1e-6:
+            return True
+    return False
+
+
+def _labelled(
+    branches: list[Branch], name: str, window: Window, corrector: _Corrector
+) -> tuple[Branch, ...]:
+    """The branches with their corrector and the labels of special points.
+
+    Labels LP1, LP2, … in order along the branches; a shared branch point has one label.
+    """
+
+    def near(one: SpecialPoint, other: SpecialPoint) -> bool:
+        here, there = (np.append(p.state, p.parameters[name]) for p in (one, other))
+        periods = np.append(periods_of(one.states, branches[0].periods), 0.0)
+        away = np.abs(apart(here, there, periods))
+        return bool(np.all(away <= 1e-7 * np.maximum(window.scale, np.abs(here))))
+
+    counts: dict[str, int] = {}
+    shared: list[SpecialPoint] = []
+    done = []
+    for branch in branches:
+        points = []
+        for point in branch.special:
+            known = next((s for s in shared if point.code == "BP" and near(s, point)), None)
+            if known is None:
+                counts[point.code] = counts.get(point.code, 0) + 1
+            label = known.label if known else f"{point.code}{counts[point.code]}"
+            points.append(replace(point, label=label))
+            if point.code == "BP":
+                shared.append(points[-1])
+        done.append(replace(branch, special=SpecialPoints(points), corrector=corrector))
+    return tuple(done)
+
+
+@dataclass(frozen=True, eq=False)
+class _Corrector:
+    """A `Corrector` by the equations of a field."""
+
+    field: FrozenField
+
+    @property
+    def stored(self) -> StoredModel:
+        """The model as it is kept with a diagram: with what its branches are traced by."""
+        source, model = self.field.source, self.field.model
+        if isinstance(source, StoredFrozen):
+            return source.model
+        stored: StoredModel = model.stored
+        return replace(stored, field=source.stored())
+
+    def __call__(self, region: str, state: Array, value: float, /) -> Equilibrium | None:
+        field = self.field
+        number = field.regions.index(region)
+        solved = corrections(field)[number].corrected(state, value)
+        if solved is None:
+            return None
+        u = np.append(solved, value)
+        return point_at(field, number, u, field.admissible(number, u))
+
+    def many(
+        self, region: str, states: Array, values: Array, /
+    ) -> tuple[Array, NDArray[np.complex128]]:
+        field = self.field
+        number = field.regions.index(region)
+        solved = corrections(field)[number].corrected_many(states, values)
+        found = np.full(solved.shape, np.nan, dtype=complex)
+        known = ~np.isnan(solved).any(axis=1)
+        if known.any():
+            found[known] = field.eigenvalues(
+                number, np.column_stack([solved[known], values[known]])
+            )
+        return field.wrapped(solved), found

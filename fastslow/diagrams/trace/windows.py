@@ -1,0 +1,64 @@
+"""Equilibria in a window of the states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.diagrams.field import FrozenField
+from fastslow.results.branch.branch import Branch
+from fastslow.results.branch.windows import LEFT, StateWindow
+from fastslow.results.points import Equilibrium
+
+Array = NDArray[np.float64]
+
+#: For each state, whether its lower and its upper bound are meant.
+Sides = tuple[tuple[bool, bool], ...]
+
+
+def known(field: FrozenField, points: Sequence[Equilibrium]) -> np.ndarray:
+    """Which components of equilibria are more than rounding, shape (m, n)."""
+    found = np.reshape([np.abs(e.state) > 0 for e in points], (-1, field.n)).astype(bool)
+    # sliding along several interfaces is no mode of the field
+    rows = [k for k, e in enumerate(points) if e.region in field.regions]
+    found[rows] = field.certain([_place(field, points[k]) for k in rows])
+    return found
+
+
+def _place(field: FrozenField, point: Equilibrium) -> tuple[int, Array]:
+    """Number of the region, and the point u."""
+    value = point.parameters.get(field.parameter, 0.0)
+    return field.regions.index(point.region), np.append(point.state, value)
+
+
+def size_of(field: FrozenField, points: Sequence[Equilibrium]) -> Array:
+    """Unit of each state by some equilibria, shape (n,)."""
+    return field.sizes([_place(field, e) for e in points])
+
+
+def within(
+    field: FrozenField, window: StateWindow, points: Sequence[Equilibrium]
+) -> list[Equilibrium]:
+    """Those equilibria that lie in a window.
+
+    What is off an edge by rounding lies on it; it is judged by the size of the
+    state among these equilibria, by its natural unit where all are zero.
+    """
+    if not window.chosen:
+        return list(points)
+    states = np.reshape([e.state for e in points], (-1, field.n))
+    inside = window.contains(window.shifted(states), size_of(field, points))
+    return [e for e, kept in zip(points, inside, strict=True) if kept]
+
+
+def edges_left(window: StateWindow, branches: Sequence[Branch]) -> Sides:
+    """The bounds at which branches have left a window."""
+    bounds = np.array([window.lower, window.upper]).T
+    met = np.zeros(bounds.shape, dtype=bool)
+    for branch in branches:
+        for outcome, row in zip(branch.outcomes, (0, -1), strict=True):
+            if outcome.code == LEFT:
+                met |= branch.state[row][:, None] == bounds
+    return tuple((bool(low), bool(high)) for low, high in met)

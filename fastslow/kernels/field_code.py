@@ -1,0 +1,99 @@
+"""Rates, Jacobian and interface functions as compiled code, from operations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from fastslow.errors import ModelError
+from fastslow.kernels.model_code import load_function
+from fastslow.results.stored.fields import FieldOperations
+
+#: Output entries from which zeros are written by a loop: every assignment is compiled by itself.
+FILLED = 200
+
+
+class HasParameters(Protocol):
+    """A model, by what its compiled code needs of it."""
+
+    @property
+    def parameters(self) -> Mapping[str, float]: ...
+
+
+@dataclass(frozen=True)
+class CompiledField:
+    """Address of a generated function and how its arrays are laid out.
+
+    The function fills, for u = (states, varying parameters) of length n + k: F (n),
+    the Jacobian (n, n + k) row by row, h (m) and the gradients of h (m, n + k).
+
+    Parameters
+    ----------
+    address : int
+        Of ``void(int64 region, double* u, double* parameters, double* out)``.
+    parameters : tuple of str
+        Order of the parameter array.
+    n, m, k : int
+        Numbers of states, interfaces and varying parameters.
+    """
+
+    address: int
+    parameters: tuple[str, ...]
+    n: int
+    m: int
+    k: int = 1
+
+    @property
+    def size(self) -> int:
+        """Length of the output array."""
+        return (self.n + self.m) * (self.n + self.k + 1)
+
+
+def load_field(bodies: Sequence[FieldOperations], unknowns: int, parameters: int) -> int:
+    """Address of the function that does these operations, one list of them for each region."""
+    return load_function(_source([_lines(body) for body in bodies], unknowns, parameters), "field")
+
+
+def _lines(body: FieldOperations) -> list[str]:
+    """Assignments that fill the output array for one region."""
+    lines = [f"s{k} = {code}" for k, code in enumerate(body.shared)]
+    if body.size >= FILLED:
+        lines += [f"for k in range({body.size}):", "    out[k] = 0.0"]
+    return [*lines, *(f"out[{k}] = {code}" for k, code in body.outputs)]
+
+
+def _source(bodies: Sequence[list[str]], unknowns: int, parameters: int) -> str:
+    lines = [
+        "def field(region, u, p, out):",
+        *(f"    u{k} = u[{k}]" for k in range(unknowns)),
+        *(f"    p{k} = p[{k}]" for k in range(parameters)),
+    ]
+    # sliding and escaping motion have the same equations
+    alike: dict[tuple[str, ...], list[int]] = {}
+    for number, body in enumerate(bodies):
+        alike.setdefault(tuple(body), []).append(number)
+    for lines_of, numbers in alike.items():
+        test = " or ".join(f"region == {number}" for number in numbers)
+        lines.append(f"    {'if' if numbers[0] == 0 else 'elif'} {test}:")
+        lines += [f"        {line}" for line in lines_of]
+    return "\n".join(lines) + "\n"
+
+
+def parameter_array(model: HasParameters, compiled: CompiledField) -> np.ndarray:
+    """Parameter values in the order of the compiled function.
+
+    Raises
+    ------
+    ModelError
+        If a slow quantity has been given no value.
+    """
+    for name in compiled.parameters:
+        if name not in model.parameters:
+            raise ModelError(
+                f"the frozen slow quantity '{name}' has no value; "
+                f"give one with with_parameters({name}=…)"
+            )
+    return np.array([model.parameters[n] for n in compiled.parameters], dtype=float)

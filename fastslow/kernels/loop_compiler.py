@@ -1,0 +1,135 @@
+"""Numba's part in machine code: a loop, with all that it calls, as one object."""
+
+from __future__ import annotations
+
+import linecache
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from types import ModuleType
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba import njit, types
+from numba.core import event
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import cpu_target
+
+from fastslow.kernels.decorators import OPTIONS
+from fastslow.kernels.loop_target import ENTRY, processor, target_machine
+from fastslow.kernels.signals import between_passes
+
+#: What Numba announces before and after each pass of its compiler.
+_PASS = "numba:run_pass"
+
+
+class _Passes(event.Listener):
+    """Handles signals between Numba's passes."""
+
+    def on_start(self, _: Any) -> None:
+        between_passes()
+
+    def on_end(self, _: Any) -> None:
+        pass
+
+
+def watched_passes() -> AbstractContextManager[None]:
+    """Let what Numba compiles meanwhile be interrupted between its passes."""
+    return event.install_listener(_PASS, _Passes())
+
+
+class _Library(JITCodeLibrary):
+    """A function that is only ever part of others: it is neither optimised nor loaded."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_specific(self) -> None:
+        pass
+
+    def get_pointer_to_function(self, name: str) -> int:
+        self._ensure_finalized()
+        return 0
+
+
+class _Codegen(JITCPUCodegen):
+    """Numba's instructions for the processor that loops are made for."""
+
+    _library_class = _Library
+
+    def _customize_tm_options(self, options: dict[str, Any]) -> None:
+        super()._customize_tm_options(options)
+        options["cpu"], options["features"] = processor(), ""
+
+    def _add_module(self, module: Any) -> None:
+        pass
+
+    def set_env(self, env_name: str, env: Any) -> None:
+        pass
+
+
+_codegen: _Codegen | None = None
+
+#: Every function that was begun. Numba forgets one in a finaliser, which loses an interrupt that
+#: comes while garbage is collected; so those whose compilation was interrupted are kept as well.
+_begun: list[Any] = []
+
+
+@contextmanager
+def _in_place() -> Iterator[None]:
+    """Let Numba's one context for processors make what is compiled meanwhile by `_Codegen`."""
+    global _codegen
+    with global_compiler_lock:
+        context = cpu_target.target_context
+        if _codegen is None:
+            _codegen = _Codegen("fastslow")
+        usual, context._internal_codegen = context._internal_codegen, _codegen
+        try:
+            yield
+        finally:
+            context._internal_codegen = usual
+
+
+def compiled_object(source: str, function: str) -> bytes:
+    """Machine code of a function of slots (see `fastslow.kernels.slots`).
+
+    Parameters
+    ----------
+    source : str
+        Source of a module.
+    function : str
+        Name of the function in it.
+    """
+    name = f"<{function}>"
+    module = ModuleType(f"fastslow_{function}")
+    linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
+    exec(compile(source, name, "exec"), module.__dict__)
+    with _in_place(), watched_passes():
+        entry: Any = njit(**OPTIONS)(getattr(module, function))
+        _begun.append(entry)
+        entry.compile((types.CPointer(types.int64),))
+        (made,) = entry.overloads.values()
+        whole = made.library._final_module.clone()
+    return _object(whole, made.fndesc.llvm_func_name)
+
+
+def _object(module: Any, entry: str) -> bytes:
+    """An optimised object of a module, in which nothing but its entry can be seen."""
+    machine = target_machine()
+    for function in module.functions:
+        if function.name == entry:
+            function.name = ENTRY
+            function.linkage = "external"
+        elif not function.is_declaration:
+            function.linkage = "internal"
+    for variable in module.global_variables:
+        if not variable.is_declaration:
+            variable.linkage = "internal"
+    module.verify()
+    between_passes()
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    options.slp_vectorization = False
+    builder = llvm.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
+    between_passes()
+    return bytes(machine.emit_object(module))

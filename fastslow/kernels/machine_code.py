@@ -1,0 +1,115 @@
+"""LLVM's instructions to machine code, loaded in a millisecond."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from itertools import count
+from typing import Any
+
+import llvmlite
+import llvmlite.binding as llvm
+import numpy as np
+from llvmlite import ir
+
+from fastslow.kernels.signals import between_passes
+
+#: How far LLVM optimises: the next level takes longer and gains nothing.
+_LEVEL = 2
+
+
+@dataclass(frozen=True)
+class _Machine:
+    """What code is made for, and where it is loaded."""
+
+    triple: str
+    target: Any
+    linker: Any
+
+
+@cache
+def _machine() -> _Machine:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    triple = llvm.get_process_triple()
+    linker = llvm.create_lljit_compiler(_target(triple), suppress_errors=True)
+    return _Machine(triple, _target(triple), linker)
+
+
+def _target(triple: str) -> Any:
+    return llvm.Target.from_triple(triple).create_target_machine(
+        cpu=llvm.get_host_cpu_name(),
+        features=llvm.get_host_cpu_features().flatten(),
+        opt=_LEVEL,
+        reloc="static" if triple.startswith("x86") else "default",
+        codemodel="jitdefault",
+        jit=True,
+    )
+
+
+@cache
+def platform_key() -> str:
+    """What machine code depends on beside the sources that it is made of."""
+    cpu, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    version = ".".join(map(str, llvm.llvm_version_info))
+    # numbers that NumPy computes are part of functions of lanes
+    versions = (llvmlite.__version__, version, np.__version__)
+    return "|".join((*versions, llvm.get_process_triple(), cpu, features))
+
+
+def object_code(build: Callable[[ir.Module], None]) -> bytes:
+    """Machine code of a module, for the processor that this runs on.
+
+    Parameters
+    ----------
+    build : callable
+        Fills the empty module that it is given.
+    """
+    machine = _machine()
+    module = ir.Module("generated")
+    module.triple, module.data_layout = machine.triple, str(machine.target.target_data)
+    build(module)
+    between_passes()
+    parsed = llvm.parse_assembly(str(module))
+    parsed.verify()
+    between_passes()
+    options = llvm.create_pipeline_tuning_options(speed_level=_LEVEL)
+    options.loop_vectorization = options.slp_vectorization = False
+    # the loops of series are short: unrolled they are no faster, and take three times as long here
+    options.loop_unrolling = False
+    builder = llvm.create_pass_builder(machine.target, options)
+    builder.getModulePassManager().run(parsed, builder)
+    between_passes()
+    return bytes(machine.target.emit_object(parsed))
+
+
+_numbers = count()
+
+#: Code is there for as long as what it was loaded with.
+_loaded: list[Any] = []
+
+
+def load_object(code: bytes, name: str, symbols: Mapping[str, int]) -> int:
+    """Load machine code, and the address of one of its functions.
+
+    Parameters
+    ----------
+    code : bytes
+    name : str
+        The function.
+    symbols : mapping
+        Addresses of other functions that it calls; those of the C library are known.
+
+    Raises
+    ------
+    RuntimeError
+        If the code calls a function that is not known.
+    """
+    library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
+    for symbol, address in symbols.items():
+        library.import_symbol(symbol, address)
+    library.export_symbol(name)
+    loaded = library.link(_machine().linker, f"generated_{next(_numbers)}")
+    _loaded.append(loaded)
+    return int(loaded[name])

@@ -1,0 +1,101 @@
+"""Machine code of models, from generated source to an address, without Numba.
+
+Every function has the arguments that `fastslow.kernels.pointers` describes. Code is kept on
+disk under a name that says all that it depends on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections.abc import Callable, Mapping
+from functools import cache
+
+from llvmlite import ir
+
+from fastslow.kernels.cache import store
+from fastslow.kernels.cache.digest import digest_of_imports
+from fastslow.kernels.machine_code import load_object, object_code, platform_key
+from fastslow.kernels.native import translate
+from fastslow.kernels.signals import between_passes, deferring_signals
+
+#: Where everything is that code is made by.
+_MAKERS = "from fastslow.kernels import lane_steps, model_code, special"
+
+_addresses: dict[str, int] = {}
+_lock = threading.RLock()
+
+
+def load_function(source: str, function: str) -> int:
+    """Address of the function of a generated source.
+
+    Parameters
+    ----------
+    source : str
+        One function, of the Python that `fastslow.kernels.native` translates.
+    function : str
+        Its name.
+    """
+    if "special." not in source:
+        return load_built(source, function, lambda module: translate(source, module))
+    # SciPy's functions are imported where they are used alone
+    from fastslow.kernels import special
+
+    def build(module: ir.Module) -> None:
+        translate(source, module, special.names())
+
+    return load_built(source, function, build, special.addresses)
+
+
+def load_built(
+    text: str,
+    function: str,
+    build: Callable[[ir.Module], None],
+    symbols: Callable[[], Mapping[str, int]] = dict,
+) -> int:
+    """Address of a function, built if its code is not kept.
+
+    Parameters
+    ----------
+    text : str
+        All that decides on what is built, beside the sources of this package.
+    function : str
+        Its name.
+    build : callable
+        Fills a module.
+    symbols : callable, optional
+        Gives the addresses of what the function calls.
+    """
+    key = f"{platform_key()}\n{_digest_of_makers()}\n{text}"
+    name = f"fastslow_{function}_{hashlib.sha256(key.encode()).hexdigest()[:24]}"
+    with _lock:
+        if name not in _addresses:
+            # what a handler of a signal raises in a finaliser would be lost
+            _addresses[name] = deferring_signals(_load, name, function, build, symbols)
+        return _addresses[name]
+
+
+def _load(
+    name: str,
+    function: str,
+    build: Callable[[ir.Module], None],
+    symbols: Callable[[], Mapping[str, int]],
+) -> int:
+    return load_object(_code(name, build), function, symbols())
+
+
+def _code(name: str, build: Callable[[ir.Module], None]) -> bytes:
+    code = store.read(name)
+    if code is None:
+        with store.alone(name, between_passes):
+            # by now another process may have compiled it
+            code = store.read(name)
+            if code is None:
+                code = object_code(build)
+                store.write(name, code)
+    return code
+
+
+@cache
+def _digest_of_makers() -> str:
+    return digest_of_imports(_MAKERS)

@@ -1,0 +1,261 @@
+"""A model's Taylor series as one compiled function.
+
+The function has a mode for every region, for every sliding motion between two
+regions, and for the gradient of every interface. Its source depends on the
+equations alone: parameter values arrive as an array.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.kernels.model_code import load_function
+from fastslow.kernels.taylor.modes import (
+    COLLOCATION,
+    DIRECTIONAL,
+    RATES,
+    SHORT,
+    SHORTENED,
+)
+from fastslow.kernels.taylor.recurrences import Recurrences
+from fastslow.results.stored.operations import Operations, SeriesOperations, ValueOperations
+
+_HEADER = '''"""{what} for {modes} modes of {states} states."""
+
+
+def series(mode, inputs, parameters, W):
+    n = {order}
+    clock = 1.0
+    if mode >= {number}:
+        if mode >= {directional}:
+            mode -= {directional}
+            n = {second}
+            clock = 0.0
+        elif mode >= {rates}:
+            mode -= {rates}
+            n = 1
+        else:
+            mode -= {number}
+            n = {short}
+'''
+
+
+#: Operations whose compiled series is kept in memory.
+KEPT = 256
+
+
+class HasOperations(Protocol):
+    """A model, or one that was stored."""
+
+    @property
+    def operations(self) -> Operations: ...
+
+    @property
+    def parameters(self) -> Mapping[str, float]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledSeries:
+    """The compiled series of a model and how its arrays are laid out.
+
+    Called with a mode, ``inputs = (t, states, slow states)`` and the parameter
+    array, the function fills rows of ``order + 1`` coefficients: states and
+    slow states, slow quantities, interface functions, two bounds for each interface
+    that is slid along (see `Motion`), then work space. In a gradient mode ``inputs``
+    goes on with the slow quantities, and the output is h, the sum of the
+    moduli of its terms, and its gradient by states and slow states. Beyond all
+    these the modes follow again with only `SHORT` coefficients; then with one, the
+    rates; and then for a direction u: the first coefficients of the states are u when
+    it is called, time stands still, and the second ones become J u / 2, with the
+    Jacobian J of the rates, exact as the derivatives of a series are.
+
+    Parameters
+    ----------
+    address : int
+        Of the compiled function.
+    order : int
+        Highest Taylor coefficient.
+    parameters : tuple of str
+        Order of the parameter array.
+    n_states, n_forcing, n_interfaces, n_rows : int
+        Numbers of rows: states with slow states, slow quantities, interfaces, and all.
+    signs : ndarray of int64, shape (n_modes, n_interfaces)
+        Side of each interface in every mode, 0 on interfaces that are slid along.
+    modes : tuple of str
+        Region names; sliding between A and B is named ``"A|B"``.
+    continuous : ndarray of bool, shape (n_interfaces,)
+        Whether the rates are continuous across each interface.
+    values_only : tuple of str
+        Functions without a Taylor recurrence. Where there are any, the compiled function
+        fills the values of all rows and the rates of states and interface functions alone,
+        and its last coefficient is NaN.
+    undecided : tuple of (str, str)
+        Intersections of discontinuities along which no sliding is derived, and why.
+    """
+
+    address: int
+    order: int
+    parameters: tuple[str, ...]
+    n_states: int
+    n_forcing: int
+    n_interfaces: int
+    n_rows: int
+    signs: NDArray[np.int64]
+    modes: tuple[str, ...]
+    continuous: NDArray[np.bool_]
+    values_only: tuple[str, ...] = ()
+    undecided: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def method(self) -> str:
+        """How this model is stepped, in words."""
+        if self.values_only:
+            names = ", ".join(self.values_only)
+            return f"collocation of order {self.order} (no Taylor recurrence for {names})"
+        return f"Taylor series of order {self.order}"
+
+    def parameter_array(self, model: HasOperations) -> NDArray[np.float64]:
+        """Parameter values in the order that the compiled function expects, never empty."""
+        return np.array([model.parameters[name] for name in self.parameters] or [0.0])
+
+
+def compile_series(model: HasOperations, order: int) -> CompiledSeries:
+    """Compile the Taylor series of a model, or find it compiled already.
+
+    A model with a function that has no recurrence is compiled to values and rates.
+
+    Parameters
+    ----------
+    model : Model or StoredModel
+    order : int
+        Highest coefficient, lowered to `COLLOCATION` where no Taylor series exists.
+
+    Raises
+    ------
+    ModelError
+        If a function in the equations cannot be compiled.
+    """
+    operations = model.operations
+    return _compiled(operations, min(order, COLLOCATION) if operations.values_only else order)
+
+
+@lru_cache(maxsize=KEPT)
+def _compiled(operations: Operations, order: int) -> CompiledSeries:
+    source, n_rows = _source(operations, order)
+    m, q, p = operations.sizes
+    signs = np.array([motion.signs for motion in operations.motions], dtype=np.int64)
+    return CompiledSeries(
+        load_function(source, "series"),
+        order,
+        operations.parameters,
+        m,
+        q,
+        p,
+        n_rows,
+        signs.reshape(len(operations.motions), p),
+        tuple(motion.name for motion in operations.motions),
+        np.array(operations.continuous, dtype=bool),
+        operations.values_only,
+        operations.undecided,
+    )
+
+
+def _source(operations: Operations, order: int) -> tuple[str, int]:
+    """Source of the generated module, and the number of rows it fills."""
+    lines = [f"    p{i} = parameters[{i}]" for i in range(len(operations.parameters))]
+    n_rows = 0
+    bodies: list[list[str]] = []
+    for motion in operations.motions:
+        if isinstance(motion, SeriesOperations):
+            body, rows = motion_source(operations, motion, order, clock="clock")
+        else:
+            body, rows = _values_source(operations, motion, order)
+        bodies.append(body)
+        n_rows = max(n_rows, rows)
+    bodies += [_gradient_source(operations, number) for number in range(operations.sizes[2])]
+    for number, body in enumerate(bodies):
+        lines.append(f"    {'if' if number == 0 else 'elif'} mode == {number}:")
+        lines += [f"        {line}" for line in body]
+    text = "\n".join(lines) + "\n"
+    alone = operations.values_only
+    what = "Values and rates" if alone else f"Taylor coefficients of order {order}"
+    header = _HEADER.format(
+        what=what,
+        order=order,
+        modes=len(operations.motions),
+        states=operations.sizes[0],
+        short=min(SHORT, order),
+        second=min(2, order),
+        number=SHORTENED * len(bodies),
+        rates=RATES * len(bodies),
+        directional=DIRECTIONAL * len(bodies),
+    )
+    return header + text, n_rows
+
+
+def motion_source(
+    operations: Operations, motion: SeriesOperations, order: int, *, clock: str = "1.0"
+) -> tuple[list[str], int]:
+    """Source lines that fill the series of one motion, and the number of its rows.
+
+    Where ``clock`` is the name of the rate of time, the first coefficients of the
+    states are kept as they are while it is 0.
+    """
+    m = operations.sizes[0]
+    work = Recurrences(motion.nodes, order, clock)
+    copies = {row: held for row, held in enumerate(motion.outputs, start=m) if row != held}
+    body = ["t = inputs[0]"]
+    body += [f"{work.at(i, '0')} = inputs[{i + 1}]" for i in range(m)]
+    body += [f"c{k} = {code}" for k, code in enumerate(motion.scalars)]
+    body += work.values()
+    first = [f"{work.at(i, '1')} = {work.at(r, '0')}" for i, r in enumerate(motion.rates)]
+    body += first if clock == "1.0" else [f"if {clock} != 0.0:", *(f"    {s}" for s in first)]
+    body += ["for k in range(1, n):", "    q = 1.0 / k"]
+    body += ["    " + line for line in work.general()]
+    body += ["    r = 1.0 / (k + 1)"]
+    body += [f"    {work.at(i, 'k + 1')} = {work.at(r)} * r" for i, r in enumerate(motion.rates)]
+    last = work.general(motion.outputs)
+    body += ["k = n", "q = 1.0 / k", *last] if last else []
+    if copies:
+        body += ["for k in range(n + 1):"]
+        body += [f"    {work.at(row)} = {work.at(held)}" for row, held in copies.items()]
+    rows = (node[1] + 1 for node in motion.nodes)
+    return body, max(operations.first_free, *rows, 0)
+
+
+def _values_source(
+    operations: Operations, motion: ValueOperations, order: int
+) -> tuple[list[str], int]:
+    """What a motion fills without recurrences: values, and rates of states and interfaces."""
+    columns, (m, q, p) = order + 1, operations.sizes
+    body = ["t = inputs[0]"]
+    for i in range(m):
+        body += [f"y{i} = inputs[{i + 1}]", f"W[{i * columns}] = y{i}"]
+    for k, law in enumerate(motion.laws):
+        body += [f"w{k} = {law}", f"W[{(m + k) * columns}] = w{k}"]
+    body += [f"s{k} = {code}" for k, code in enumerate(motion.shared)]
+    body += [f"W[{i * columns + 1}] = {rate}" for i, rate in enumerate(motion.rates)]
+    for row, (height, rate) in enumerate(motion.heights, start=m + q):
+        body += [f"W[{row * columns}] = {height}", f"W[{row * columns + 1}] = {rate}"]
+    first = m + q + p
+    body += [f"W[{k * columns}] = {bound}" for k, bound in enumerate(motion.bounds, start=first)]
+    # what no recurrence gives
+    return [*body, f"W[{order}] = math.nan"], operations.first_free
+
+
+def _gradient_source(operations: Operations, number: int) -> list[str]:
+    terms, slopes = operations.gradients[number]
+    m, q, _ = operations.sizes
+    symbols = ("t", *(f"y{i}" for i in range(m)), *(f"w{k}" for k in range(q)))
+    used = set(re.findall(r"\b[tyw]\d*\b", " ".join(terms)))
+    body = [f"{s} = inputs[{i}]" for i, s in enumerate(symbols) if s in used]
+    body.append("W[0] = " + " + ".join(f"({term})" for term in terms))
+    body.append("W[1] = " + " + ".join(f"abs({term})" for term in terms))
+    return body + [f"W[{2 + i}] = {slope}" for i, slope in enumerate(slopes)]

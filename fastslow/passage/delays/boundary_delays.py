@@ -1,0 +1,492 @@
+"""The lag of persistence, the delay of a non-smooth fold, and the crossing of a gap."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.diagrams.points.normal_forms import null_vectors
+from fastslow.errors import ArgumentError
+from fastslow.model.model import Model
+from fastslow.passage.delays.linear_flow import LinearFlow
+from fastslow.passage.delays.local_field import (
+    TURN,
+    Site,
+    drift_of,
+    level_of,
+    named_level,
+    require_code,
+    site_of,
+    wrong_way,
+)
+from fastslow.passage.delays.local_passages import (
+    REGIONS,
+    Event,
+    Place,
+    bound_of,
+    follow,
+    quasi_static,
+    reached_delay,
+    rounding,
+)
+from fastslow.results.overlay.delays import BoundaryDelay, GapTransit
+from fastslow.results.overlay.drifts import Drift
+from fastslow.results.points import SpecialPoint
+
+Array = NDArray[np.float64]
+
+#: A product of null vectors, or of one with a gradient, below this part of their lengths is zero.
+ZERO = 1e-9
+
+#: Relative error of a passage in closed form, after root finding.
+EXACT = 1e-9
+
+#: Why a passage behind an interface does not end.
+NOT_REACHED = "the motion behind the interface does not reach the level"
+RETURNED = "the motion returns across the interface before it reaches the level"
+
+#: Relaxation times before the point at which a passage is integrated from, where it may be.
+FORGOTTEN = (36.0, 24.0, 12.0, 6.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Approach:
+    """The stable sheet followed up to an interface.
+
+    Parameters
+    ----------
+    before, behind : int
+        The regions.
+    interface : int
+    inward : ndarray, shape (n + 3,)
+        Positive, applied to z = (y, μ, t, 1), behind the interface.
+    stable : float
+        Largest real part of the eigenvalues before it.
+    first : ndarray, shape (n,)
+        dX/dμ of its slow manifold.
+    z : ndarray, shape (n + 3,)
+        Where the quasi-static motion crosses, t = 0 when the parameter is at the point.
+    """
+
+    before: int
+    behind: int
+    interface: int
+    inward: Array
+    stable: float
+    first: Array
+    z: Array
+
+    @property
+    def mu(self) -> float:
+        return float(self.z[-3])
+
+    @property
+    def time(self) -> float:
+        return float(self.z[-2])
+
+
+def boundary_delay(
+    point: SpecialPoint,
+    rate: float | Drift,
+    *,
+    level: Mapping[Any, float] | str | None = None,
+    parameter: object = None,
+    model: Model | None = None,
+) -> BoundaryDelay:
+    """How late a drifting parameter finds the trajectory at a boundary equilibrium.
+
+    Before the interface the rates are linearised, y' = J₁ y + b₁ μ with μ' linear as well: the
+    motion on the slow manifold, y = −J₁⁻¹ b₁ μ − J₁⁻² b₁ rate at a constant drift, crosses
+    with a lag of the order of the rate. With persistence that is all. At a non-smooth
+    fold the motion behind the interface, y' = J₂ y + b₂ μ + …, grows along the unstable
+    direction of J₂ until the level is reached, at
+
+        delay = (rate/λ₂) ln(1/rate) + O(rate)
+
+    with a part of order rate that depends on the level: no power of the rate. It is
+    solved in closed form where the rates and the drift are linear, region by region, and
+    else integrated from the crossing. For x' = p + |x|, p = εt, it gives
+    p = ε (1 + ln((x + p + ε)/(2ε))).
+
+    Parameters
+    ----------
+    point : SpecialPoint
+        A boundary equilibrium of a continuous field, code BE, of subtype
+        ``"persistence"`` or ``"non-smooth fold"``.
+    rate : float or Drift
+        Of the parameter, with its sign.
+    level : mapping or "turn"
+        One state and its value, e.g. ``{"x": 1.0}``, or that the parameter turns round; a
+        non-smooth fold needs it.
+    parameter : str or Symbol, optional
+        What drifts, by default the parameter of the point's diagram.
+    model : Model, optional
+        For a point that was read from a file: its model.
+
+    Returns
+    -------
+    BoundaryDelay
+        Exact where the rates and the drift are linear. ``delay`` is the lag
+        for persistence, and nan where the level is never reached.
+
+    Raises
+    ------
+    ArgumentError
+        For a point of another code or subtype, a rate of zero or towards the
+        stable sheet, or a missing level.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, p = sp.symbols("x p")
+    >>> corner = fs.Model({x: p + sp.Abs(x)}, parameters={p: -1})
+    >>> diagram = fs.continue_equilibria(corner, "p", over=(-1, 1))
+    >>> law = boundary_delay(diagram.boundary_equilibria[0], 0.01, level={"x": 1})
+    >>> round(law.delay, 10)
+    0.0497000894
+    """
+    require_code(point, "BE", "the delay of a boundary equilibrium")
+    if point.clarke is None or point.subtype not in ("persistence", "non-smooth fold"):
+        kind = "a degenerate one" if point.subtype == "degenerate" else "one of a Filippov field"
+        hint = "; see gap_transit" if point.subtype == "degenerate" else ""
+        raise ArgumentError(
+            f"expected a boundary equilibrium of a continuous field with persistence or a "
+            f"non-smooth fold, received {point.label}, {kind}{hint}"
+        )
+    site = site_of(point, parameter, model)
+    drift = drift_of(site, rate)
+    height = level_of(site, level, drift)
+    way = approach_of(site, drift)
+    jacobian, _ = site.slopes(way.behind)
+    unstable = float(np.linalg.eigvals(jacobian).real.max())
+    stop = Event(interface=way.interface)
+    sense, delay, time, words, error = drift.way, drift.way * way.mu, way.time, "", math.nan
+    if point.subtype == "persistence":
+        words, error = _judged(site, drift, way, stop, delay, linear=site.affine(way.before))
+        words = f"no delay but a lag, {words}"
+        if unstable >= 0:
+            words += "; the sheet behind the interface is not stable"
+    elif height is None:
+        raise ArgumentError(
+            "the delay of a non-smooth fold is that of reaching a level; give level={state: value}"
+        )
+    else:
+        stop = Event(height)
+        place, reason, linear = _behind(site, drift, way, stop, 40.0 / max(unstable, -way.stable))
+        delay, time = sense * float(place.z[-1]), place.time
+        if reason:
+            delay = time = math.nan
+            words = f"none: {reason}"
+        else:
+            linear &= site.affine(way.before)
+            words, error = _judged(site, drift, way, stop, delay, linear=linear)
+    return BoundaryDelay(
+        point=point,
+        parameter=site.field.parameter,
+        rate=drift.rate,
+        delay=delay,
+        validity=words,
+        error=error,
+        drift=None if drift.constant else drift,
+        time=time,
+        lag=sense * way.mu,
+        stable=way.stable,
+        unstable=unstable,
+        level=named_level(site, height),
+    )
+
+
+def _judged(
+    site: Site, drift: Drift, way: Approach, stop: Event, delay: float, *, linear: bool
+) -> tuple[str, float]:
+    """How good a passage is, in words and by its error."""
+    if linear and not drift.law:
+        if not drift.complete:
+            return "exact at a drift of this form, whose other terms are not known", math.nan
+        return "exact: the rates and the drift are linear", EXACT * abs(delay) + rounding(site)
+    words = "from the rates linearised before the interface"
+    words += "" if stop.level is None else ", integrated behind it"
+    passed = math.nan
+    for count in FORGOTTEN:
+        mu = -count * drift.rate / -way.stable
+        start = quasi_static(site, drift, way.before, mu, way.first * mu)
+        if start is not None:
+            span = 4.0 * (count / -way.stable + abs(delay / drift.rate))
+            place = Place(way.before, start, 0.0)
+            passed, _ = reached_delay(site, drift, place, stop, span)
+        if math.isfinite(passed):
+            break
+    error, more = bound_of(site, delay, passed, drift)
+    return words + more, error
+
+
+def _behind(
+    site: Site, drift: Drift, way: Approach, stop: Event, slowest: float
+) -> tuple[Place, str, bool]:
+    """Where the passage behind an interface ends, why it does not, and whether it is linear."""
+    span = 40.0 * slowest
+    if site.affine(way.behind) and not drift.law:
+        place, reason, linear = _linear_legs(site, drift, way, stop)
+        if linear:
+            return place, reason, True
+        span += 4.0 * (abs(place.time) if not reason else 0.0)
+    start = Place(way.behind, way.z[: site.n + 1], way.time)
+    place, reason = follow(site, drift, start, stop, span=span)
+    return place, reason and NOT_REACHED, False
+
+
+def _linear_legs(site: Site, drift: Drift, way: Approach, stop: Event) -> tuple[Place, str, bool]:
+    """The passage behind an interface in closed form; False where it is not linear."""
+    field, n, count = site.field, site.n, len(site.field.interfaces)
+    region, z, linear = way.behind, way.z, True
+    for _ in range(REGIONS):
+        linear &= site.affine(region)
+        flow = _flow(site, drift, region)
+        rows = np.zeros((count + 1, n + 3))
+        _, _, heights, gradients = field.at(region, site.u)
+        rows[:count, : n + 1] = field.signs[region, :count, None] * gradients[:count]
+        rows[:count, -1] = field.signs[region, :count] * heights[:count]
+        if stop.level == TURN:
+            rows[count] = drift.way * flow.drift
+        elif isinstance(stop.level, tuple):
+            rows[count, stop.level[0]], rows[count, -1] = 1.0, -stop.level[1]
+            size = float(np.abs(rows[count]) @ np.abs(z))
+            if abs(float(rows[count] @ z)) <= 1e-12 * size:
+                return Place(region, z[: n + 1], float(z[-2])), "", linear
+            rows[count] *= math.copysign(1.0, float(rows[count] @ z))
+        else:
+            rows[count, -1] = 1.0
+        time, met = flow.reaches(z, rows)
+        if math.isnan(time):
+            return Place(region, z[: n + 1], math.nan), NOT_REACHED, linear
+        z = flow.at(z, time)
+        place = Place(region, z[: n + 1], float(z[-2]))
+        if met in (count, stop.interface):
+            return place, "", linear
+        across = field.neighbour(region, met)
+        if across == way.before:
+            return place, RETURNED, linear
+        if across is None or field.modes[across].sides is not None:
+            return place, NOT_REACHED, linear
+        region = across
+    return place, NOT_REACHED, linear
+
+
+def _flow(site: Site, drift: Drift, region: int) -> LinearFlow:
+    """The rates of a region linearised at the point, with a drift."""
+    rates, slopes, _, _ = site.field.at(region, site.u)
+    by_state = np.array([drift.by_state.get(name, 0.0) for name in site.field.model.states])
+    # at an equilibrium of the region rounding is all there is
+    rounding = 1e-12 * (np.abs(slopes) @ np.abs(site.u))
+    offset = np.where(np.abs(rates) > rounding, rates, 0.0)
+    return LinearFlow(
+        slopes[:, : site.n],
+        slopes[:, site.n],
+        drift.rate,
+        drift.change,
+        drift.by_value,
+        by_state,
+        offset,
+    )
+
+
+def gap_transit(
+    point: SpecialPoint,
+    rate: float | Drift,
+    *,
+    parameter: object = None,
+    model: Model | None = None,
+) -> GapTransit:
+    """How long a drifting parameter needs to carry the trajectory across a gap.
+
+    In a region whose equilibria form a continuum at one value of the parameter
+    (no stiffness between two contacts) the motion y' = J y + b μ with J q = 0,
+    ψ J = 0, ψ·q = 1 is pushed along q by ξ' = β μ, β = ψ·b; the other motions
+    follow with the time τ. From contact to contact over the length ℓ, for slow drift,
+
+        delay = √(2ℓ |rate/β|) + τ |rate|.
+
+    For x'' + c x' = w between x = ±D with s = |rate| that is Δw = 2√(c D s) + s/c, in
+    Δt = √(4 c D/s) + 1/c: the slow limit, `GapTransit.asymptotic`. The prediction itself is
+    solved for the linear motion in the gap (integrated, where the rates or the drift are not
+    linear), from the quasi-static state in which it is entered; the two agree as the drift
+    becomes slow.
+
+    Parameters
+    ----------
+    point : SpecialPoint
+        The end of the continuum at which it is entered: a degenerate boundary
+        equilibrium, code BE.
+    rate : float or Drift
+        Of the parameter, with its sign.
+    parameter : str or Symbol, optional
+        What drifts, by default the parameter of the point's diagram.
+    model : Model, optional
+        For a point that was read from a file: its model.
+
+    Returns
+    -------
+    GapTransit
+
+    Raises
+    ------
+    ArgumentError
+        For a point of another code or subtype, or without a continuum behind it
+        that ends at another interface; for a rate of zero or towards the contact.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> fast = fs.systems.harmonic_gear(D=0.25).frozen()
+    >>> diagram = fs.continue_equilibria(fast, "w", over=(-1, 1))
+    >>> upper = [p for p in diagram.boundary_equilibria if p["x"] > 0][0]
+    >>> law = gap_transit(upper, -0.001)
+    >>> round(law.asymptotic - 2 * (0.25 * 0.001) ** 0.5, 12), round(law.transit_time, 2)
+    (0.001, 32.58)
+    """
+    require_code(point, "BE", "the crossing of a gap")
+    if point.clarke is None or point.subtype != "degenerate":
+        kind = point.subtype or "one of a Filippov field"
+        raise ArgumentError(
+            f"expected a degenerate boundary equilibrium of a continuous field, the end of a "
+            f"continuum; received {point.label}, {kind}"
+        )
+    site = site_of(point, parameter, model)
+    drift = drift_of(site, rate)
+    way = approach_of(site, drift)
+    jacobian, slope = site.slopes(way.behind)
+    p, q = null_vectors(jacobian, site.unit)
+    p, q = _normalised(site, p, q, way)
+    drifts = float(p @ slope)
+    far, length, outward = _far_side(site, way, q)
+    # the inverse of J on its range: the other motions lag behind by it
+    bordered = np.block([[jacobian, q[:, None]], [p[None, :], np.zeros((1, 1))]])
+    lean = np.linalg.solve(bordered, np.append(slope - drifts * q, 0.0))[:-1]
+    n = site.n
+    relaxation = float(outward[:n] @ lean / (outward[:n] @ q)) / drifts
+    relaxation -= float(outward[n] / (outward[:n] @ q)) / drifts
+    stop = Event(interface=far)
+    slowest = math.sqrt(2.0 * length / abs(drifts * drift.rate)) + abs(relaxation)
+    place, reason, linear = _behind(site, drift, way, stop, slowest)
+    delay, time, error = drift.way * float(place.z[-1]), place.time, math.nan
+    if reason:
+        delay = time = math.nan
+        back = "the motion returns to the contact that it left"
+        words = f"none: {back if reason == RETURNED else 'the far interface is not reached'}"
+    else:
+        linear &= site.affine(way.before)
+        words, error = _judged(site, drift, way, stop, delay, linear=linear)
+        values = np.linalg.eigvals(jacobian)
+        others = np.delete(values, np.argmin(np.abs(values))).real
+        fastest = float(others.max(initial=-math.inf)) * (time - way.time)
+        words += f"; of the slow limit a part {math.exp(min(fastest, 700.0)):.1g} has not died out"
+    return GapTransit(
+        point=point,
+        parameter=site.field.parameter,
+        rate=drift.rate,
+        delay=delay,
+        validity=words,
+        error=error,
+        drift=None if drift.constant else drift,
+        time=time,
+        lag=drift.way * way.mu,
+        length=length,
+        slope=drifts,
+        relaxation=relaxation,
+        interfaces=(site.field.interfaces[way.interface], site.field.interfaces[far]),
+        lag_time=way.time,
+    )
+
+
+def approach_of(site: Site, drift: Drift) -> Approach:
+    """Which region's stable sheet the drift runs off, and the quasi-static crossing.
+
+    Raises
+    ------
+    ArgumentError
+        If the drift goes the other way or is not slow, or the sheet before the interface is
+        unstable.
+    """
+    field, n = site.field, site.n
+    k = field.interfaces.index(str(site.point.interface))
+    regions = [site.region(name) for name in site.point.regions]
+    unstable, moved = -math.inf, False
+    for before, behind in (regions, regions[::-1]):
+        jacobian, slope = site.slopes(before)
+        values = np.linalg.eigvals(jacobian).real
+        if np.abs(values).min() <= 1e-10 * np.abs(values).max(initial=0.0):
+            continue
+        first = np.linalg.solve(-jacobian, slope)
+        _, _, _, gradients = field.at(behind, site.u)
+        inward = np.zeros(n + 3)
+        inward[: n + 1] = field.signs[behind, k] * gradients[k]
+        speed = float(inward[:n] @ first + inward[n]) * drift.rate
+        if abs(speed) <= 1e-12 * abs(drift.rate) * float(np.abs(inward[:n]) @ np.abs(first)):
+            continue
+        moved = True
+        if speed < 0:
+            continue
+        if values.max() >= 0:
+            unstable = max(unstable, float(values.max()))
+            continue
+        flow = _flow(site, drift, before)
+        manifold = flow.slow_manifold()
+        time = math.nan if manifold is None else flow.slow_crossing(manifold, inward)
+        if manifold is None or math.isnan(time):
+            raise ArgumentError(
+                f"the drift of {field.parameter} is not slow beside the sheet before "
+                f"{site.point.label}, whose slowest eigenvalue is {values.max():.3g}"
+            )
+        z = flow.slow_motion(manifold, time)
+        return Approach(before, behind, k, inward, float(values.max()), manifold[0], z)
+    if unstable >= 0:
+        raise ArgumentError(
+            f"no stable sheet ends at {site.point.label}: before the interface an eigenvalue has "
+            f"real part {unstable:.3g}"
+        )
+    if not moved:
+        raise ArgumentError(
+            f"a drift of {field.parameter} leaves the equilibrium at {site.point.label} on the "
+            "interface"
+        )
+    raise wrong_way(site, drift.rate)
+
+
+def _normalised(site: Site, p: Array, q: Array, way: Approach) -> tuple[Array, Array]:
+    """Null vectors with ψ·q = 1, q into the gap."""
+    across, unit = way.inward[: site.n], site.unit
+    overlap, inward, length = float(p @ q), float(across @ q), np.linalg.norm(q / unit)
+    if (
+        abs(overlap) <= ZERO * np.linalg.norm(p * unit) * length
+        or abs(inward) <= ZERO * np.linalg.norm(across * unit) * length
+    ):
+        raise ArgumentError(
+            f"behind {site.point.label} no continuum of equilibria with damped motion along it "
+            "leads away from the interface"
+        )
+    q = math.copysign(1.0, inward) * q
+    return p / float(p @ q), q
+
+
+def _far_side(site: Site, way: Approach, q: Array) -> tuple[int, float, Array]:
+    """The next interface along the continuum, how far it is, and its function, positive inside."""
+    field, n = site.field, site.n
+    _, _, heights, gradients = field.at(way.behind, site.u)
+    found: list[tuple[float, int]] = []
+    for j in range(len(field.interfaces)):
+        along = float(gradients[j, :n] @ q)
+        if j != way.interface and along != 0.0 and -heights[j] / along > 0.0:
+            found.append((float(-heights[j] / along), j))
+    if not found:
+        raise ArgumentError(
+            f"the continuum behind {site.point.label} ends at no other interface; a gap lies "
+            "between two"
+        )
+    length, j = min(found)
+    sign = field.signs[way.behind, j]
+    return j, length, sign * np.append(gradients[j], heights[j])

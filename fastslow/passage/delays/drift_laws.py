@@ -1,0 +1,125 @@
+"""The law of a drift in numbers: its values, and what compiled code takes in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.kernels.fields import compile_function
+from fastslow.model.functions import numpy_function
+from fastslow.model.structure import TIME, read_expression, real
+
+Array = NDArray[np.float64]
+
+#: Nodes on every part of a table, parts of the first one, and most of them.
+NODES, PARTS, MOST = 16, 4, 4096
+
+#: The last two coefficients of a part are below this times the largest of the table.
+ACCURATE = 1e-14
+
+_ANGLES = np.pi * (np.arange(NODES) + 0.5) / NODES
+
+#: Places of the nodes, between -1 and 1, and from values there to Chebyshev's coefficients.
+_PLACES = np.cos(_ANGLES)
+_TO_COEFFICIENTS = np.cos(np.arange(NODES)[:, None] * _ANGLES) * 2.0 / NODES
+_TO_COEFFICIENTS[0] *= 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class DriftLaw:
+    """w' as a formula in fast states, the slow quantity and the time, in numbers.
+
+    Parameters
+    ----------
+    text : str
+    names : tuple of str
+        Of the states and of the slow quantity.
+    """
+
+    text: str
+    names: tuple[str, ...]
+
+    @cached_property
+    def expression(self) -> sp.Expr:
+        return read_expression("law of the drift", self.text, [*self.names, "t"])
+
+    @cached_property
+    def in_time(self) -> bool:
+        """Whether it depends on the time alone."""
+        return bool(self.expression.free_symbols <= {TIME})
+
+    @cached_property
+    def _function(self) -> Callable[..., Any]:
+        symbols = [*map(real, self.names), TIME]
+        function: Callable[..., Any] = numpy_function(symbols, self.expression)
+        return function
+
+    def at(self, u: Array, time: float) -> float:
+        """Its value at one point u (n + 1,) and a time."""
+        return float(self._function(*u, time))
+
+    def along(self, points: Array, times: Array) -> Array:
+        """Its values at points (N, n + 1) and times (N,)."""
+        values = np.asarray(self._function(*points.T, times), dtype=float)
+        return np.broadcast_to(values, len(times)).copy()
+
+    def table(self, start: float, stop: float) -> tuple[Array, Array]:
+        """A law in time as sums of Chebyshev polynomials.
+
+        Parameters
+        ----------
+        start, stop : float
+
+        Returns
+        -------
+        breaks : ndarray, shape (K + 1,)
+        coefficients : ndarray, shape (K, NODES)
+
+        Examples
+        --------
+        >>> breaks, sums = DriftLaw("cos(t)", ("x", "w")).table(0.0, 10.0)
+        >>> s = 2.0 * (9.0 - breaks[-2]) / (breaks[-1] - breaks[-2]) - 1.0
+        >>> bool(abs(np.polynomial.chebyshev.chebval(s, sums[-1]) - np.cos(9.0)) < 1e-14)
+        True
+        """
+        none = np.zeros(len(self.names))
+        edges = np.linspace(start, stop, PARTS + 1)
+        low, high = edges[:-1], edges[1:]
+        done: list[tuple[Array, Array]] = []
+        largest, count = 0.0, 0
+        while len(low):
+            half = 0.5 * (high - low)
+            times = (0.5 * (low + high))[:, None] + half[:, None] * _PLACES
+            values = self._function(*none, times.ravel())
+            table = np.broadcast_to(np.asarray(values, dtype=float), times.size)
+            found = table.reshape(times.shape) @ _TO_COEFFICIENTS.T
+            largest = max(largest, float(np.abs(found).max()))
+            fine = np.abs(found[:, -2:]).max(axis=1) <= ACCURATE * largest
+            fine |= half <= 1e-13 * (stop - start)
+            count += len(low)
+            if count > MOST:
+                fine[:] = True
+            done.append((low[fine], found[fine]))
+            middle = (0.5 * (low + high))[~fine]
+            low, high = np.append(low[~fine], middle), np.append(middle, high[~fine])
+        starts = np.concatenate([part[0] for part in done])
+        order = np.argsort(starts)
+        sums = np.concatenate([part[1] for part in done])[order]
+        return np.append(starts[order], stop), np.ascontiguousarray(sums)
+
+    @cached_property
+    def compiled(self) -> tuple[int, Array]:
+        """Address of its compiled function of (states, w, t), with slopes, and its parameters."""
+        return compile_function(self.expression, [*map(real, self.names), TIME])
+
+
+@lru_cache(maxsize=256)
+def drift_law(text: str, names: tuple[str, ...]) -> DriftLaw:
+    """A law by its text; its functions are made once."""
+    return DriftLaw(text, names)

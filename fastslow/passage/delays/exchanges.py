@@ -1,0 +1,141 @@
+"""The algebraic passage of a transcritical point, where the drift pushes off the branch left."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.passage.delays.critical_modes import CriticalMode
+from fastslow.passage.delays.local_field import Site
+
+Array = NDArray[np.float64]
+
+#: Step of differences, in units of the states and by the parameter's range.
+STEP = 1e-4
+
+#: The passage begins so many widths √(rate/β) before the point: e^(−72) of its start is left.
+BEGIN = 12.0
+
+#: It ends so many widths behind it: a jump comes before.
+END = 12.0
+
+#: A quadratic term below this part of the others vanishes, as at a pitchfork.
+VANISHES = 1e-6
+
+#: Error control.
+RTOL, ATOL = 1e-11, 1e-13
+
+#: A solution of the scaled normal form beyond this many times its own size runs to infinity.
+INFINITE = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """y' = a y² + b y μ + c μ² on the centre manifold, with y along the critical vector.
+
+    Parameters
+    ----------
+    a, b, c : float
+    """
+
+    a: float
+    b: float
+    c: float
+
+    def slopes(self) -> tuple[float, float]:
+        """Of the two branches y = m μ."""
+        root = math.sqrt(self.b**2 - 4.0 * self.a * self.c)
+        return (-self.b - root) / (2.0 * self.a), (-self.b + root) / (2.0 * self.a)
+
+    def growth(self, slope: float) -> float:
+        """d/dμ of the eigenvalue along a branch."""
+        return 2.0 * self.a * slope + self.b
+
+
+def passage_in_words(mode: CriticalMode, site: Site, rate: float) -> str:
+    """What the drift does to a trajectory at a branch point whose branches both move.
+
+    With y = √ε Y and μ = √ε τ the rate drops out of the normal form. The solution of
+    Y' = a Y² + b Y τ + c τ² that comes along the attracting branch is at τ = 0 on the side of
+    the branch that attracts from there on, or on the other side, from which it goes
+    to infinity (Krupa and Szmolyan 2001, Nonlinearity 14, 1473-1491).
+    """
+    form = _form(mode, site)
+    if form is None:
+        return "the passage is algebraic in the rate; at a pitchfork no law for it is known here"
+    tau = blow_up(form, mode.behind.way)
+    if math.isnan(tau):
+        return (
+            "it is carried over to the other branch without a delay, at a distance of the order "
+            "of the square root of the rate"
+        )
+    delay = math.sqrt(abs(rate)) * tau
+    return (
+        "it leaves both branches by a jump, with a delay of the order of the square root of the "
+        f"rate ({delay:.3g} in the normal form, without an error)"
+    )
+
+
+def _form(mode: CriticalMode, site: Site) -> Form | None:
+    """The quadratic normal form at the point; None at a pitchfork or in a sliding motion."""
+    region = site.region(str(mode.before.branch.region[mode.before.rows[-1]]))
+    if site.field.modes[region].sides is not None:
+        return None
+    n, unit, u = site.n, mode.unit, site.u
+    scale = float(np.ptp(mode.before.diagram.over))
+
+    def slopes(y: Array, mu: float) -> tuple[Array, Array]:
+        _, table, _, _ = site.field.at(region, u + np.append(y * unit, mu))
+        return table[:, :n] * unit / unit[:, None], table[:, n] / unit
+
+    jacobian, by_parameter = slopes(np.zeros(n), 0.0)
+    values, vectors = np.linalg.eig(jacobian)
+    k = int(np.argmin(np.abs(values)))
+    right = vectors[:, k].real / np.linalg.norm(vectors[:, k].real)
+    values, vectors = np.linalg.eig(jacobian.T)
+    left = vectors[:, int(np.argmin(np.abs(values)))].real
+    left = left / (left @ right)
+    # the part of the motion with the parameter that is not along the critical vector
+    bordered = np.block([[jacobian, right[:, None]], [left[None, :], np.zeros((1, 1))]])
+    along = np.linalg.solve(bordered, np.append(-by_parameter, 0.0))[:n]
+
+    def derivative(y: Array, mu: float) -> tuple[Array, Array]:
+        up, down = slopes(STEP * y, STEP * mu), slopes(-STEP * y, -STEP * mu)
+        return (up[0] - down[0]) / (2 * STEP), (up[1] - down[1]) / (2 * STEP)
+
+    by_right, _ = derivative(right, 0.0)
+    by_mu, forced = derivative(along * scale, scale)
+    a = 0.5 * float(left @ by_right @ right)
+    b = float(left @ by_mu @ right) / scale
+    c = 0.5 * float(left @ (by_mu @ along + forced)) / scale
+    size = np.abs(left) @ np.abs(by_right) @ np.abs(right) + abs(b) * scale
+    if abs(a) <= VANISHES * size or b * b - 4.0 * a * c <= 0.0:
+        return None
+    return Form(a, b, c)
+
+
+def blow_up(form: Form, way: int) -> float:
+    """τ at which the scaled motion goes to infinity; nan where it comes to the other branch."""
+    from scipy.integrate import solve_ivp
+
+    # with μ = way |μ| the drift is upwards
+    form = Form(form.a, form.b * way, form.c)
+    old, new = sorted(form.slopes(), key=form.growth, reverse=True)
+    width = 1.0 / math.sqrt(abs(form.growth(old)))
+
+    def flow(tau: float, y: Array) -> list[float]:
+        return [form.a * y[0] ** 2 + form.b * y[0] * tau + form.c * tau**2]
+
+    def runs_away(tau: float, y: Array) -> float:
+        return float(INFINITE * (1.0 + abs(old) + abs(new)) * width - abs(y[0]))
+
+    runs_away.terminal = True  # type: ignore[attr-defined]
+    begin = -BEGIN * width
+    start = [old * begin + old / (form.growth(old) * begin)]
+    found = solve_ivp(
+        flow, (begin, END * width), start, method="LSODA", rtol=RTOL, atol=ATOL, events=runs_away
+    )
+    return float(found.t_events[0][0]) if len(found.t_events[0]) else math.nan

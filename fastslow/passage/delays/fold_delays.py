@@ -1,0 +1,486 @@
+"""The delay of the jump at a smooth fold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.diagrams.points.normal_forms import cusp_form, forms_at, null_vectors
+from fastslow.errors import ArgumentError, ModelError
+from fastslow.model.model import Model
+from fastslow.passage.delays.local_field import (
+    TURN,
+    Level,
+    Site,
+    drift_of,
+    level_of,
+    named_level,
+    require_code,
+    site_of,
+    wrong_way,
+)
+from fastslow.passage.delays.local_passages import (
+    Event,
+    LocalDrift,
+    Place,
+    bound_of,
+    quasi_static,
+    reached_delay,
+)
+from fastslow.passage.roots import sign_change
+from fastslow.results.overlay.delays import FoldDelay
+from fastslow.results.overlay.drifts import Drift
+from fastslow.results.points import SpecialPoint
+from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.simulation.one import simulate
+from fastslow.simulation.settings import Integration
+
+Array = NDArray[np.float64]
+
+#: First zero of Ai(−s), DLMF 9.9.
+OMEGA_0 = 2.338107410459767
+
+#: ∫₋∞^(Ω₀−z) −A'³/A ds / A'(Ω₀)² = ln(1/z) + MATCHING as z → 0, with A(s) = Ai(−s). By parts it
+#: is −½ ln A'(Ω₀)² − ½ + ∫₋∞^Ω₀ A² ln A ds / A'(Ω₀)².
+MATCHING = -1.0085182549893932
+
+#: Jumps are timed from this part of the way on which the normal form holds, and from half of the
+#: last one as often as this: rounding grows as 1/Y³.
+NEAR, HALVINGS = 0.4, 6
+
+#: Extrapolations that differ by no more than this, in units of the time of a jump, are the limit.
+SETTLED = 1e-8
+
+#: A level nearer than this (in units of δ) is reached while the drift still carries the passage.
+SLOW_PART = 2.0
+
+#: Places before the fold, in units of δ, up to which its branch is followed for the passage to be
+#: integrated from there: the quasi-static state is forgotten as exp(−4/3 s^(3/2)), from the
+#: last by exp(−40).
+BEFORE = (1.0, 1.5, 2.0, 3.0, 4.0, 5.5, 7.5, 9.65)
+
+#: A jump is simulated for 1/Y and this part of it more, and then for longer where it is not done:
+#: what the frozen model does behind it, as to oscillate, is not asked for.
+LONGER = (0.25, 1.0, 9.0)
+
+#: A turn of the drift is looked for at so many places in every step of a run.
+PARTS = 4
+
+#: Nodes on a step of a run, whose series has order 16.
+NODES = 10
+
+#: A coefficient below this times its terms counts as zero.
+ZERO = 1e-9
+
+
+@dataclass(frozen=True)
+class FoldForm:
+    """y' = a y² + b μ + c y³ + g μ y on the centre manifold, and how it lies in the states.
+
+    Parameters
+    ----------
+    a, b, c, g : float
+    along, bend, lean : ndarray, shape (n,)
+        The state is x* + y·along + ½ y²·bend + μ·lean.
+    slowest : float
+        Smallest |Re λ| of the other eigenvalues, infinite for one state.
+    """
+
+    a: float
+    b: float
+    c: float
+    g: float
+    along: Array
+    bend: Array
+    lean: Array
+    slowest: float
+
+
+def fold_delay(
+    point: SpecialPoint,
+    rate: float | Drift,
+    *,
+    level: Mapping[Any, float] | str | None = None,
+    parameter: object = None,
+    model: Model | None = None,
+) -> FoldDelay:
+    """How far past a fold a drifting parameter is when the trajectory jumps.
+
+    On the centre manifold of the fold y' = a y² + b μ + c y³ + g μ y with μ' = rate + k y + ….
+    In units of δ = (|ab rate|)^(1/3), with μ as the independent variable, its leading part is
+    a Riccati equation whose solution −A'/A, A(s) = Ai(−s), ends at the first zero
+    Ω₀ = 2.33810741 of the Airy function; the feedback κ = k/(a rate) acts like a part of the
+    cubic term:
+
+        delay = Ω₀ |ab|^(−1/3) |rate|^(2/3) + ((c/a² − κ)/3) |rate| ln |rate| + O(rate).
+
+    With a level, of a state whose value tells when the jump is done, or the turn of
+    the slow quantity, the term of order rate is known too, by matching to the jump of the frozen
+    model, which is simulated, the drift integrated along it. A rate that changes
+    by the time (c₁) or by the parameter (c₂) adds (2/5) Ω₀² (c₁/rate + c₂) |rate|/δ². The
+    terms left out are O(rate^(4/3)); ``error`` bounds them, from the same passage integrated
+    numerically.
+
+    Parameters
+    ----------
+    point : SpecialPoint
+        A fold, code LP.
+    rate : float or Drift
+        Of the parameter, with its sign.
+    level : mapping or "turn", optional
+        One state and its value, e.g. ``{"x": 1.0}``, or that the parameter turns round.
+    parameter : str or Symbol, optional
+        What drifts, by default the parameter of the point's diagram.
+    model : Model, optional
+        For a point that was read from a file: its model.
+
+    Returns
+    -------
+    FoldDelay
+
+    Raises
+    ------
+    ArgumentError
+        For a point of another code, a rate of zero or towards the stable sheet, a
+        degenerate fold (a = 0, as at a cusp; b = 0, where the parameter does not
+        unfold it; a double zero eigenvalue), or a fold whose sheets are unstable.
+
+    References
+    ----------
+    E. F. Mishchenko and N. Kh. Rozov, Differential Equations with Small Parameters
+    and Relaxation Oscillations, Plenum 1980. R. Haberman, SIAM J. Appl. Math. 37,
+    69-106, 1979. M. Krupa and P. Szmolyan, SIAM J. Math. Anal. 33, 286-314, 2001.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> fast = fs.systems.cusp().frozen()
+    >>> fold = fs.continue_equilibria(fast, "p", over=(-1, 1)).folds[0]
+    >>> law = fold_delay(fold, 1e-6, level={"x": 0.5})
+    >>> round(law.coefficients[0], 8), round(law.coefficients[1], 8), f"{law.delay:.4e}"
+    (1.94690271, -0.11111111, '1.9582e-04')
+    """
+    require_code(point, "LP", "the delay of a fold")
+    site = site_of(point, parameter, model)
+    drift = drift_of(site, rate)
+    height = level_of(site, level, drift)
+    form = fold_form_of(site)
+    if form.a * form.b * drift.rate < 0:
+        raise wrong_way(site, drift.rate)
+    speed, product = abs(drift.rate), abs(form.a * form.b)
+    feedback, change = _moved(site, form, drift)
+    # with μ as the independent variable feedback is a part of the cubic and the mixed term
+    kappa = feedback / (form.a * drift.rate)
+    d, g = form.c / form.a**2 - kappa, form.g / (form.a * form.b) - kappa
+    scale = (product * speed) ** (1.0 / 3.0)
+    first = OMEGA_0 * product ** (-1.0 / 3.0)
+    changed = 0.4 * OMEGA_0**2 * change * speed / scale**2
+    delay, third = first * speed ** (2.0 / 3.0) + changed, math.nan
+    words = "leading order, the order of the rate depends on the level of the jump"
+    if height is not None:
+        eta = _end(form, height, kappa) / scale
+        slow = height != TURN and eta <= SLOW_PART
+        jump = math.nan if slow else jump_time(site, form, drift, kappa, height)
+        if slow:
+            words = "to first order: the level lies within the slow part of the passage"
+            terms = (d * scale, g * scale, change / scale)
+            delay = slow_part(eta, terms) * speed / scale
+        elif math.isnan(jump):
+            goal = "a turn" if isinstance(height, str) else _words(site, height)
+            words = f"leading order: no jump of the frozen model to {goal} was found"
+        else:
+            # the inner solution to first order, matched to the jump
+            third = d * (math.log(product) / 3.0 - MATCHING) + jump - g / 2.0
+            delay += speed * (d / 3.0 * math.log(speed) + third)
+            if height != TURN:
+                # what the level sees of the end of the inner solution
+                delay += (airy_passage(eta) + 1.0 / eta - OMEGA_0) * speed / scale
+            words = "to the order of the rate"
+    passed, time = math.nan, math.nan
+    if height is not None:
+        passed, time = _passed(site, form, drift, height, scale)
+    error, more = bound_of(site, delay, passed, drift)
+    return FoldDelay(
+        point=point,
+        parameter=site.field.parameter,
+        rate=drift.rate,
+        delay=delay,
+        validity=words + more,
+        error=error,
+        drift=None if drift.constant else drift,
+        time=time if not drift.constant else math.nan,
+        quadratic=form.a,
+        slope=form.b,
+        cubic=form.c,
+        mixed=form.g,
+        feedback=feedback,
+        coefficients=(first, d / 3.0, third),
+        level=named_level(site, height),
+    )
+
+
+def _moved(site: Site, form: FoldForm, drift: Drift) -> tuple[float, float]:
+    """Slope k in μ' = rate + k y + …, and the relative change of the rate in time and by μ."""
+    by_state = np.array([drift.by_state.get(n, 0.0) for n in site.field.model.states])
+    change = drift.change / drift.rate + drift.by_value + float(by_state @ form.lean)
+    return float(by_state @ form.along), change
+
+
+def _end(form: FoldForm, level: Level, kappa: float) -> float:
+    """a·y where the jump is done, on the centre manifold."""
+    if isinstance(level, str):
+        return -1.0 / kappa if kappa < 0.0 else math.inf
+    return _along(form, *level)
+
+
+def _passed(
+    site: Site, form: FoldForm, drift: Drift, level: Level, scale: float
+) -> tuple[float, float]:
+    """The delay and the time of the passage as integrated; nan where that fails."""
+    region, start = site.region(site.point.regions[0]), None
+    for before in BEFORE:
+        mu = -before * drift.rate / scale
+        if start is None:
+            y = -math.copysign(math.sqrt(-form.b * mu / form.a), form.a)
+            guess = y * form.along + 0.5 * y**2 * form.bend + mu * form.lean
+        else:
+            guess = start[:-1]
+        found = quasi_static(site, drift, region, mu, guess)
+        if found is None:
+            break
+        start = found
+    place = None if start is None else Place(region, start, 0.0)
+    return reached_delay(site, drift, place, Event(level), 200.0 / scale)
+
+
+def jump_time(site: Site, form: FoldForm, drift: Drift, kappa: float, level: Level) -> float:
+    """Finite part of the time of the jump in the frozen model, from the fold to a level.
+
+    Time counts by w'/rate, so that it is the change of the slow quantity along the jump. From
+    Y = a y on the unstable side the frozen model needs a time T(Y) that grows as
+    1/Y + d ln Y towards the fold, d = c/a² − κ; with those terms taken off, and with the
+    exact time of the cubic normal form in their place, what is left is a series in Y. It is
+    simulated from ever smaller Y and extrapolated to 0 by Romberg's scheme. nan where the level
+    is not reached.
+    """
+    cubic = form.c / form.a**2
+    end = _end(form, level, kappa)
+    bends = _turning(form, site.unit)
+    usual = max(abs(cubic), abs(kappa), 1.0 / form.slowest, bends, 1.0 / end)
+    y = NEAR / usual
+    while not _inside(site, _past(site, form, y)):
+        y *= 0.5
+    best, change = math.nan, math.inf
+    row: list[float] = []
+    for _ in range(HALVINGS + 1):
+        gone = _gone(site, drift, _past(site, form, y), 1.0 / y, level)
+        following = [gone - 1.0 / y - (cubic - kappa) * math.log(y / (1.0 + cubic * y))]
+        for k, last in enumerate(row):
+            following.append(following[k] + (following[k] - last) / (2.0 ** (k + 1) - 1.0))
+        apart = abs(following[-1] - row[-1]) if row else math.inf
+        if math.isnan(gone) or (len(row) > 2 and not apart < change):
+            break
+        best, change = following[-1], apart
+        if change <= SETTLED * max(usual, abs(best)):
+            break
+        row, y = following, 0.5 * y
+    return best
+
+
+def _past(site: Site, form: FoldForm, y: float) -> Array:
+    """The state on the centre manifold at Y past a fold, to second order."""
+    past = y / form.a
+    return np.asarray(site.u[:-1] + past * form.along + 0.5 * past**2 * form.bend)
+
+
+def _inside(site: Site, state: Array) -> bool:
+    """Whether a state at the fold's parameter is in the region of the fold."""
+    region, count = site.region(site.point.regions[0]), len(site.field.interfaces)
+    _, _, heights, _ = site.field.at(region, np.append(state, site.u[-1]))
+    return bool((site.field.signs[region, :count] * heights[:count] >= 0.0).all())
+
+
+def _gone(site: Site, drift: Drift, state: Array, slow: float, level: Level) -> float:
+    """∫ w' dt/rate along the jump of the frozen model from a state; nan if it is not done.
+
+    Parameters
+    ----------
+    site : Site
+    drift : Drift
+    state : ndarray, shape (n,)
+    slow : float
+        Time that it takes to leading order.
+    level : (int, float) or "turn"
+    """
+    model = site.field.model.ramped(site.field.parameter, 0.0, float(site.u[-1]))
+    speed = LocalDrift(site, drift)
+    for longer in LONGER:
+        span = (0.0, (1.0 + longer) * slow)
+        try:
+            run = simulate(model, state, t=span, integration=Integration(rtol=1e-15))
+        except ModelError:
+            return math.nan
+        done = _done(run, site, speed, level)
+        if not (math.isnan(done) and run.outcome):
+            break
+    return done if drift.constant or math.isnan(done) else _integral(run, speed, done)
+
+
+def _done(run: Trajectory, site: Site, speed: LocalDrift, level: Level) -> float:
+    """When a jump of the frozen model reaches a level; nan if it does not."""
+    if isinstance(level, str):
+        return _turned(run, speed)
+    name, height = site.field.model.states[level[0]], float(site.u[level[0]])
+    hits = run.section(name, level=height + level[1])
+    return float(hits.times[0]) if len(hits) else math.nan
+
+
+def _turned(run: Trajectory, speed: LocalDrift) -> float:
+    """When w' of a drift first vanishes along a jump of the frozen model; nan if never."""
+
+    def relative(time: float) -> float:
+        return float(speed.on_a_path(run(np.array([time])).T)[0] / speed.drift.rate)
+
+    parts = np.arange(PARTS) / PARTS
+    times = np.append((run.steps[:, :1] + run.steps[:, 1:2] * parts).ravel(), run.span[1])
+    back = np.flatnonzero(speed.on_a_path(run(times).T) / speed.drift.rate <= 0.0)
+    if not len(back) or back[0] == 0:
+        return math.nan
+    before, after = times[back[0] - 1 : back[0] + 1].tolist()
+    return sign_change(relative, before, after, 1e-15 * run.span[1])
+
+
+def _integral(run: Trajectory, speed: LocalDrift, until: float) -> float:
+    """∫ w' dt/rate along a jump of the frozen model, by Gauss' rule on every step."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    edges = np.append(run.step_starts[run.step_starts < until], until)
+    half = 0.5 * np.diff(edges)
+    times = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half[:, None] * nodes
+    rate = speed.on_a_path(run(times.ravel()).T).reshape(times.shape) / speed.drift.rate
+    return float(((rate @ weights) * half).sum())
+
+
+def _turning(form: FoldForm, unit: Array) -> float:
+    """How soon the centre manifold bends, by Y, with each state in its unit."""
+    bend, along = (np.abs(v / unit).max() for v in (form.bend, form.along))
+    return float(bend / (abs(form.a) * along))
+
+
+def _words(site: Site, level: tuple[int, float]) -> str:
+    number, height = level
+    return f"{site.field.model.states[number]} = {float(site.u[number]) + height:g}"
+
+
+def fold_form_of(site: Site) -> FoldForm:
+    """The normal form on the centre manifold of a fold, by projection (Kuznetsov 2004, 5.4)."""
+    region = site.region(site.point.regions[0])
+    jacobian, slope = site.slopes(region)
+    p, q = null_vectors(jacobian, site.unit)
+    label = site.point.label
+    overlap = float(p @ q)
+    if abs(overlap) <= ZERO * np.linalg.norm(p * site.unit) * np.linalg.norm(q / site.unit):
+        raise ArgumentError(
+            f"{label} has a double zero eigenvalue (Bogdanov-Takens), where this law does not hold"
+        )
+    p = p / overlap
+    forms = forms_at(site.field, region, site.u)
+    bent = forms.form(q, q).real
+    a, b = float(0.5 * (p @ bent)), float(p @ slope)
+    if abs(a) <= ZERO * max(float(np.abs(p) @ np.abs(forms.form(abs(q), abs(q)))), 1e-300):
+        raise ArgumentError(
+            f"{label} is degenerate: its quadratic coefficient vanishes (a cusp); "
+            "the delay there is not of the order rate^(2/3)"
+        )
+    if abs(b) <= ZERO * float(np.abs(p) @ np.abs(slope)) or b == 0.0:
+        raise ArgumentError(
+            f"{label} is not unfolded by {site.field.parameter}: the derivative of the rates by it "
+            "has no part along the fold (the branch is vertical or crossed there)"
+        )
+    others = np.delete(*_without_zero(jacobian))
+    if np.any(others.real >= 0):
+        raise ArgumentError(
+            f"no stable sheet ends at {label}: another eigenvalue has real part "
+            f"{others.real.max():.3g}"
+        )
+    bordered = np.block([[jacobian, q[:, None]], [p[None, :], np.zeros((1, 1))]])
+    bend = np.linalg.solve(bordered, np.append(-bent + (p @ bent) * q, 0.0))[:-1]
+    lean = np.linalg.solve(bordered, np.append(-slope + b * q, 0.0))[:-1]
+    mixed = float(p @ (site.mixed(region) @ q + forms.form(q, lean).real))
+    slowest = float(np.abs(others.real).min(initial=math.inf))
+    return FoldForm(a, b, cusp_form(forms, jacobian, site.unit), mixed, q, bend, lean, slowest)
+
+
+def _without_zero(jacobian: Array) -> tuple[NDArray[np.complex128], int]:
+    values = np.linalg.eigvals(jacobian).astype(complex)
+    return values, int(np.argmin(np.abs(values)))
+
+
+def _along(form: FoldForm, state: int, height: float) -> float:
+    """a·y where the centre manifold reaches a level, the nearest way past the fold."""
+    roots = np.roots([0.5 * form.bend[state], form.along[state], -height])
+    found = form.a * roots[np.abs(roots.imag) <= 1e-12 * np.abs(roots)].real
+    past = found[found > 0]
+    if past.size:
+        return float(past.min())
+    return float(found.max()) if found.size else math.inf
+
+
+def slow_part(eta: float, terms: tuple[float, float, float]) -> float:
+    """The m at which η' = η² + m + c₁ η³ + c₂ m η − c₃ (m η² + m²) reaches η, to first order in c.
+
+    With η₀ = −A'/A and the integrating factor A², A(s) = Ai(−s), the solution is
+    η₀ + A⁻² ∫ A² f dm, so that a value is reached earlier by what this adds, over η₀'.
+
+    Examples
+    --------
+    >>> slow_part(0.5, (0.0, 0.0, 0.0)) == airy_passage(0.5)
+    True
+    """
+    from scipy.integrate import quad
+    from scipy.special import airy
+
+    at = airy_passage(eta)
+    if not any(terms) or at <= -BEFORE[-1]:
+        return at
+
+    def added(m: float) -> float:
+        value, minus_slope, _, _ = airy(-m)
+        slope = -minus_slope
+        cubic, mixed = -(slope**3) / value, -m * value * slope
+        return float(terms[0] * cubic + terms[1] * mixed - terms[2] * m * (slope**2 + m * value**2))
+
+    whole, _ = quad(added, -BEFORE[-1], at, epsabs=1e-14, epsrel=1e-9, limit=200)
+    value = float(airy(-at)[0])
+    return float(at - whole / (value**2 * (eta**2 + at)))
+
+
+def airy_passage(eta: float) -> float:
+    """The s at which η' = η² + s, from the stable sheet, reaches η: −A'(s)/A(s) = η, A(s) = Ai(−s).
+
+    Examples
+    --------
+    >>> round(airy_passage(0.0), 8), round(airy_passage(1e8), 7)
+    (1.01879297, 2.3381074)
+    """
+    from scipy.special import airy, airye
+
+    if math.isinf(eta):
+        return OMEGA_0
+    if eta < -500.0:
+        # the quasi-static sheet, η = −√z − 1/(4 z) with z = −s, where the Airy functions overflow
+        return -((eta + 0.25 / eta**2) ** 2)
+
+    def left(s: float) -> float:
+        # scaled alike, their ratio counts
+        value, slope, _, _ = airye(-s) if s < 0.0 else airy(-s)
+        return float(slope - eta * value)
+
+    low = 1.0
+    while left(low) > 0.0:
+        low -= 1.0 + abs(low)
+    return sign_change(left, low, OMEGA_0, 4e-16 * max(1.0, abs(low)))

@@ -1,0 +1,273 @@
+"""A special point with the rates around it, as the laws of slow passage need them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.arguments import either, finite, instance, refusal
+from fastslow.diagrams.field import FrozenField
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.model import Model
+from fastslow.model.structure import real
+from fastslow.results.overlay.drifts import Drift
+from fastslow.results.point_types import point_name
+from fastslow.results.points import SpecialPoint
+
+Array = NDArray[np.float64]
+
+
+#: Special points of one diagram that differ by this part of their size are the same.
+SAME = 1e-9
+
+
+#: A level that is no state's: where the slow quantity itself turns round.
+TURN = "turn"
+
+#: Where a jump counts as done: one state by its number and its height above the point, or a turn.
+Level = tuple[int, float] | str
+
+
+class WrongWay(ArgumentError):
+    """The parameter drifts towards the stable sheet and not off its end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """A special point on the field of its frozen model.
+
+    Parameters
+    ----------
+    point : SpecialPoint
+    field : FrozenField
+        Over the parameter that drifts.
+    u : ndarray, shape (n + 1,)
+        State and parameter.
+    """
+
+    point: SpecialPoint
+    field: FrozenField
+    u: Array
+
+    @property
+    def n(self) -> int:
+        return self.field.n
+
+    @property
+    def unit(self) -> Array:
+        """Size of each state on the point's branch, or its natural unit, shape (n,)."""
+        if self.point.source is not None:
+            return np.asarray(self.point.source.unit)
+        return self.field.units_at(abs(float(self.u[-1])))[: self.n]
+
+    def region(self, name: str) -> int:
+        return self.field.regions.index(name)
+
+    def slopes(self, region: int) -> tuple[Array, Array]:
+        """Jacobian (n, n) and derivative by the parameter (n,) of a region's rates."""
+        _, slopes, _, _ = self.field.at(region, self.u)
+        return slopes[:, : self.n], slopes[:, self.n]
+
+    def mixed(self, region: int) -> Array:
+        """∂²F/∂x∂p of a region's rates, shape (n, n)."""
+        p = real(self.field.parameter)
+        rates = self.field.rates(region)
+        names = map(real, self.field.model.states)
+        table = sp.Matrix([rate.diff(p) for rate in rates]).jacobian(list(names))
+        return np.array(table.subs(self._numbers), dtype=float)
+
+    def affine(self, region: int) -> bool:
+        """Whether a region's rates and all interfaces are affine in states and parameter."""
+        return _affine(self.field, region)
+
+    @property
+    def _numbers(self) -> dict[sp.Symbol, float]:
+        names = (*self.field.model.states, self.field.parameter)
+        values = self.field.model.values
+        return {**values, **{real(n): float(v) for n, v in zip(names, self.u, strict=True)}}
+
+
+@lru_cache(maxsize=256)
+def _affine(field: FrozenField, region: int) -> bool:
+    moving = [real(n) for n in (*field.model.states, field.parameter)]
+    functions = [*field.rates(region), *field.modes[region].rows]
+    return all(
+        sp.expand(f.diff(a)).free_symbols.isdisjoint(moving)
+        for f in functions
+        for a in moving
+        if a in f.free_symbols
+    )
+
+
+def site_of(point: SpecialPoint, parameter: object, model: Model | None) -> Site:
+    """Put a special point on the field of its model.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no model, or it is not clear which parameter drifts.
+    UnknownNameError
+        For a name that is no parameter.
+    """
+    if model is None:
+        if point.source is None:
+            raise ArgumentError(
+                f"the point {point.label} carries no model (it was read from a file or another "
+                "process); give model="
+            )
+        model = point.source.model
+    elif model.forcing or model.slow_states:
+        model = _frozen(model)
+    known = (*model.parameters, *model.free)
+    if parameter is None:
+        left = [n for n in model.free if n not in model.parameters]
+        if len(left) != 1:
+            raise ArgumentError(
+                "which parameter drifts? give parameter=, one of " + ", ".join(sorted(set(known)))
+            )
+        name = left[0]
+    else:
+        name = str(parameter)
+        if name not in known:
+            raise unknown_name("parameter", name, known)
+    if name not in point.parameters:
+        raise unknown_name("parameter of the point", name, point.parameters)
+    values = {n: point.parameters[n] for n in known if n in point.parameters}
+    field = _field(model, name, tuple(sorted(values.items())))
+    return Site(point, field, np.append(point.state, point.parameters[name]))
+
+
+@lru_cache(maxsize=32)
+def _frozen(model: Model) -> Model:
+    return model.frozen()
+
+
+@lru_cache(maxsize=64)
+def _field(model: Model, name: str, values: tuple[tuple[str, float], ...]) -> FrozenField:
+    return FrozenField(model.with_parameters(dict(values)).freed(name), name)
+
+
+def frozen_field(model: Model, parameter: str, values: Mapping[str, float]) -> FrozenField:
+    """The fast subsystem of a model over one of its slow quantities, at values of the others."""
+    fast = _frozen(model) if model.forcing or model.slow_states else model
+    known = {n: values[n] for n in (*fast.parameters, *fast.free) if n in values}
+    return _field(fast, parameter, tuple(sorted(known.items())))
+
+
+def require_code(point: SpecialPoint, code: str, law: str) -> None:
+    """Raise unless a special point is of a code."""
+    if point.code != code:
+        received = f"{point.label}, a {point_name(point.code)}"
+        raise ArgumentError(
+            f"{law} holds at a point {code} ({point_name(code)}); received {received}"
+        )
+
+
+def drift(rate: Any) -> float:
+    """A rate of drift that is finite and not zero."""
+    return Drift(rate).rate
+
+
+def drift_of(site: Site, rate: float | Drift) -> Drift:
+    """A rate or a drift as a drift, of the states of a site.
+
+    Raises
+    ------
+    ArgumentError
+        For a rate that is zero or not finite.
+    UnknownNameError
+        For a state that the model has not.
+    """
+    drift = rate if isinstance(rate, Drift) else Drift(rate)
+    states = site.field.model.states
+    for name in drift.by_state:
+        if name not in states:
+            raise unknown_name("state of the drift", name, states)
+    return drift
+
+
+def level_argument(name: str, value: Any) -> Any:
+    """A level as an argument: a mapping of one state, or ``"turn"``."""
+    if not (isinstance(value, Mapping) or (isinstance(value, str) and value == TURN)):
+        raise refusal(name, value, "a mapping of one state to its value, or 'turn'")
+    return value
+
+
+#: A rate of drift as an argument.
+rate_argument = either(instance(Drift), finite)
+
+
+def level_of(site: Site, level: Any, drift: Drift) -> Level | None:
+    """The state of a level, by its number, and how far it is from the special point; or a turn."""
+    if level is None:
+        return None
+    if level == TURN:
+        if drift.constant:
+            raise ArgumentError(
+                "level = 'turn': a constant drift does not turn; give rate=fs.Drift(...), with its "
+                "feedback from the states or its change in time"
+            )
+        return TURN
+    if not isinstance(level, Mapping) or len(level) != 1:
+        raise ArgumentError(
+            f"level = {level!r}; expected one state and its value, as in {{'x': 1}}, or 'turn'"
+        )
+    ((name, value),) = level.items()
+    states = site.field.model.states
+    if str(name) not in states:
+        raise unknown_name("state of the level", name, states)
+    value = finite(f"level of {name}", value)
+    number = states.index(str(name))
+    return number, value - float(site.u[number])
+
+
+def named_level(site: Site, level: Level | None) -> dict[str, float] | str | None:
+    """A level as it was given."""
+    if level is None or isinstance(level, str):
+        return level
+    number, height = level
+    return {site.field.model.states[number]: float(site.u[number]) + height}
+
+
+def wrong_way(site: Site, rate: float) -> WrongWay:
+    """The error for a drift towards a stable sheet."""
+    name, way = site.field.parameter, "rising" if rate > 0 else "falling"
+    other = "rate < 0" if rate > 0 else "rate > 0"
+    return WrongWay(
+        f"rate = {rate:g}: with {name} {way} no stable sheet ends at {site.point.label}; "
+        f"expected {other}"
+    )
+
+
+def same_point(
+    one: SpecialPoint, other: SpecialPoint, parameter: str, length: float, within: float = SAME
+) -> bool:
+    """Whether two special points are one, up to rounding, in any units.
+
+    Parameters
+    ----------
+    one, other : SpecialPoint
+    parameter : str
+        The one that varies.
+    length : float
+        Of the range over which it does.
+    within : float
+        How much they may differ, relative to the size of a state and to the length.
+    """
+    if (one.code, one.states) != (other.code, other.states):
+        return False
+    unit = np.maximum(np.abs(one.state), np.abs(other.state))
+    for point in (one, other):
+        if point.source is not None:
+            unit = np.maximum(unit, point.source.unit)
+    apart = abs(one[parameter] - other[parameter])
+    return bool(
+        np.all(np.abs(one.state - other.state) <= within * unit)
+        and apart <= within * max(abs(one[parameter]), length)
+    )

@@ -1,0 +1,262 @@
+"""The passage of a special point integrated numerically, with the rates of its model."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.kernels.loops import load_loop
+from fastslow.passage.delays.drift_laws import DriftLaw, drift_law
+from fastslow.passage.delays.local_field import TURN, Site
+from fastslow.passage.delays.radau_passages import End, Law, Motion, space_for
+from fastslow.passage.loops import PASS_THROUGH
+from fastslow.results.overlay.drifts import Drift
+
+Array = NDArray[np.float64]
+
+#: Error of the integrated passage, relative: ten thousand times what it is found to be.
+NUMERICAL = 1e-7
+
+#: A law is off by no more than this many times what separates it from the integrated passage.
+SAFETY = 1.25
+
+#: Regions that are gone through at most on the way to a level.
+REGIONS = 12
+
+#: Why a passage does not end, as its integration tells.
+TOO_LONG, FAILED = "it takes longer than expected", "the integration failed"
+
+
+@dataclass(frozen=True, eq=False)
+class LocalDrift:
+    """w' as a function of states, parameter and time about a special point.
+
+    Parameters
+    ----------
+    site : Site
+    drift : Drift
+    """
+
+    site: Site
+    drift: Drift
+
+    @cached_property
+    def gradient(self) -> Array:
+        """By the states and by w, shape (n + 1,)."""
+        names = self.site.field.model.states
+        return np.array([*(self.drift.by_state.get(n, 0.0) for n in names), self.drift.by_value])
+
+    @cached_property
+    def _law(self) -> DriftLaw | None:
+        names = (*self.site.field.model.states, self.site.field.parameter)
+        return drift_law(self.drift.law, names) if self.drift.law else None
+
+    def __call__(self, z: Array, time: float) -> float:
+        """Rate w' at z = (x − x*, w − w*)."""
+        if self._law is not None:
+            return self._law.at(self.site.u + z, time)
+        return float(self.drift.rate + self.drift.change * time + self.gradient @ z)
+
+    def on_a_path(self, states: Array) -> Array:
+        """Rate w' at states (N, n) with w = w* and t = 0, shape (N,)."""
+        if self._law is not None:
+            here = np.full(len(states), float(self.site.u[-1]))
+            return self._law.along(np.column_stack([states, here]), np.zeros(len(states)))
+        rate = self.drift.rate + (states - self.site.u[:-1]) @ self.gradient[:-1]
+        return np.asarray(rate, dtype=float)
+
+    def numbers(self, start: float, stop: float) -> Law:
+        """For compiled code, from one time to another."""
+        law, none = self._law, np.zeros(len(self.gradient))
+        if law is None:
+            return Law(self.drift.rate, self.drift.change, self.gradient)
+        if law.in_time:
+            return Law(0.0, 0.0, none, *law.table(start, stop))
+        address, numbers = law.compiled
+        return Law(0.0, 0.0, none, address=address, numbers=numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """What ends a passage: a state at a height above the point, an interface, or a turn of w.
+
+    Parameters
+    ----------
+    level : (int, float), "turn" or None
+    interface : int, optional
+    """
+
+    level: tuple[int, float] | str | None = None
+    interface: int = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a passage is: the region, (x − x*, w − w*), and the time since w passed the point."""
+
+    region: int
+    z: Array
+    time: float
+
+
+def quasi_static(site: Site, drift: Drift, region: int, mu: float, guess: Array) -> Array | None:
+    """(x − x*, μ) near a guess on the slow manifold of a region's stable branch, to first order.
+
+    None where Newton's method finds no stable equilibrium.
+    """
+    y, n = guess.copy(), site.n
+    jacobian = np.empty((n, n))
+    for _ in range(60):
+        rates, slopes, _, _ = site.field.at(region, site.u + np.append(y, mu))
+        jacobian = slopes[:, :n]
+        try:
+            step = np.linalg.solve(jacobian, -rates)
+        except np.linalg.LinAlgError:
+            return None
+        y = y + step
+        if not np.isfinite(y).all():
+            return None
+        if (np.abs(step) <= 1e-14 * (np.abs(y) + site.unit)).all():
+            break
+    _, slopes, heights, _ = site.field.at(region, site.u + np.append(y, mu))
+    count = len(site.field.interfaces)
+    if (site.field.signs[region, :count] * heights[:count] < 0).any():
+        return None
+    jacobian = slopes[:, :n]
+    if not np.linalg.eigvals(jacobian).real.max() < 0:
+        return None
+    rate = LocalDrift(site, drift)(np.append(y, mu), _time_before(drift, mu))
+    lag = np.linalg.solve(jacobian, np.linalg.solve(jacobian, slopes[:, n])) * rate
+    return np.append(y - lag, mu)
+
+
+def follow(
+    site: Site, drift: Drift, start: Place, stop: Event, *, span: float
+) -> tuple[Place, str]:
+    """Integrate x' = F(x, w), w' of a drift, from a place to what ends the passage.
+
+    A run that starts before the point is first integrated to where w passes it, from
+    where time counts; what ends the passage counts only from there.
+
+    Parameters
+    ----------
+    site : Site
+    drift : Drift
+    start : Place
+    stop : Event
+    span : float
+        Time that it may take.
+
+    Returns
+    -------
+    place : Place
+        The last one.
+    reason : str
+        Empty where the end was reached, else why it was not.
+    """
+    place, reason = start, ""
+    way, speed = drift.way, LocalDrift(site, drift)
+    if start.z[-1] * way < 0.0:
+        begin = start.time if start.time < 0.0 else _time_before(drift, float(start.z[-1]))
+        early = Place(start.region, start.z, begin)
+        place, reason = _legs(site, speed, early, None, way, span)
+        if reason:
+            return place, reason
+        # the drift before the point may take another time than it was given
+        place = Place(place.region, place.z, 0.0)
+    return _legs(site, speed, place, stop, way, span)
+
+
+def _time_before(drift: Drift, mu: float) -> float:
+    """When w was at w* + μ, from the rate of the drift and its change."""
+    time = mu / drift.rate
+    square = 1.0 + 2.0 * drift.change * mu / drift.rate**2
+    return 2.0 * time / (1.0 + math.sqrt(square)) if square > 0.0 else time
+
+
+def _legs(
+    site: Site, speed: LocalDrift, start: Place, stop: Event | None, way: float, span: float
+) -> tuple[Place, str]:
+    """Integrate from region to region until an event (or, without one, until w passes w*)."""
+    place, final = start, start.time + span
+    for _ in range(REGIONS):
+        place, met, reason = _leg(site, speed, place, stop, way, final)
+        if reason or met < 0 or (stop is not None and met == stop.interface):
+            return place, reason
+        across = site.field.neighbour(place.region, met)
+        if across is None or site.field.modes[across].sides is not None:
+            return place, "it leaves the regions of the model"
+        place = Place(across, place.z, place.time)
+    return place, "it goes through too many regions"
+
+
+def _leg(
+    site: Site, speed: LocalDrift, start: Place, stop: Event | None, way: float, final: float
+) -> tuple[Place, int, str]:
+    """Integrate within one region: where it ends, by which interface (−1: the event), why not."""
+    field, n = site.field, site.n
+    count = len(field.interfaces)
+    reach = abs(float(start.z[n])) or abs(speed.drift.rate * final)
+    motion = Motion(
+        field.compiled.address,
+        start.region,
+        field.values,
+        field.compiled.size,
+        site.u,
+        np.ascontiguousarray(field.signs[start.region, :count]),
+    )
+    z, times = np.array(start.z, dtype=float), np.array([start.time, final], dtype=float)
+    met, status = load_loop(PASS_THROUGH)(
+        motion,
+        speed.numbers(start.time, final),
+        _end(stop, way),
+        z,
+        times,
+        np.append(site.unit, reach),
+        space_for(n, count, field.compiled.size),
+    )
+    return Place(start.region, z, float(times[0])), met, ("", TOO_LONG, FAILED)[status]
+
+
+def _end(stop: Event | None, way: float) -> End:
+    """What ends a passage, in numbers."""
+    if stop is None:
+        return End(1, 0, 0.0, way)
+    if stop.level == TURN:
+        return End(2, 0, 0.0, way)
+    if isinstance(stop.level, tuple):
+        return End(3, stop.level[0], float(stop.level[1]), way)
+    return End(0, 0, 0.0, way)
+
+
+def reached_delay(
+    site: Site, drift: Drift, start: Place | None, stop: Event, span: float
+) -> tuple[float, float]:
+    """How far past the point, along the drift, and when a passage ends; (nan, nan) if never."""
+    if start is None:
+        return math.nan, math.nan
+    place, reason = follow(site, drift, start, stop, span=span)
+    if reason:
+        return math.nan, math.nan
+    return drift.way * float(place.z[-1]), place.time
+
+
+def rounding(site: Site) -> float:
+    """What the parameter is rounded by at a special point: no delay is known better."""
+    return 4.0 * float(np.spacing(abs(site.u[-1])))
+
+
+def bound_of(site: Site, delay: float, passed: float, drift: Drift) -> tuple[float, str]:
+    """Bound on the error of a law, from the passage as integrated, and what to say of it."""
+    if math.isnan(delay):
+        return math.nan, ""
+    if not drift.complete:
+        return math.nan, "; no error is stated, as the drift is not known in full"
+    if math.isnan(passed):
+        return math.nan, "; no error is stated"
+    error = SAFETY * abs(delay - passed) + NUMERICAL * abs(passed) + rounding(site)
+    return error, f"; within {error:.2g}, by the passage integrated with this drift"

@@ -1,0 +1,405 @@
+"""Entry and exit along the slow path of a run: the growth integrated over time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.model.functions import numpy_function
+from fastslow.model.structure import TIME, real
+from fastslow.passage.delays.critical_modes import CriticalMode
+from fastslow.passage.delays.entry_exits import NUMERICAL, SAFETY
+from fastslow.passage.overlay.slow_quantities import SlowQuantity
+from fastslow.passage.roots import sign_change
+
+Array = NDArray[np.float64]
+
+#: Gauss points within one interval of time.
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
+
+#: Intervals of time that the path is divided into, beside the steps of the run.
+INTERVALS = 400
+
+#: Intervals over which growth on the slow path of a feedback is compared with that of the branch.
+FEEDBACK = 48
+
+#: Bisections within an interval.
+BISECTIONS = 60
+
+#: Amplitudes are compared with their growth over these exponents next to the entry and the exit.
+COMPARED = (1.5, 3.0)
+
+#: An amplitude below this part of the lag behind the branch is not told from the terms of
+#: second order of the slow manifold.
+UNREADABLE = 1e-3
+
+#: The path is continued for so many times its length beyond the run.
+BEYOND = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class SlowPath:
+    """The slow quantity of a run from its entry on, and beyond what the run gives.
+
+    Parameters
+    ----------
+    slow : SlowQuantity
+    start : float
+        Time of the entry.
+    known : float
+        Time up to which the run itself gives the path.
+    beyond : callable or None
+        Values at later times; None where nothing is known of them.
+    source : str
+        Of the values beyond, in words.
+    """
+
+    slow: SlowQuantity
+    start: float
+    known: float
+    beyond: Callable[[Array], Array] | None
+    source: str
+
+    def at(self, times: Array) -> Array:
+        """Values at times, nan where they are not known."""
+        inside = times <= self.known
+        found = np.full(len(times), np.nan)
+        if inside.any():
+            found[inside] = self.slow.at(times[inside])[0]
+        if self.beyond is not None and not inside.all():
+            found[~inside] = self.beyond(times[~inside])
+        return found
+
+    def rate(self, time: float) -> float:
+        """dw/dt at a time of the run."""
+        begin, end = float(self.slow.run.t[0]), float(self.slow.run.t[-1])
+        step = 1e-5 * (end - begin)
+        pair = np.clip([time - step, time + step], begin, end)
+        one, other = self.slow.at(pair)[0]
+        return float((other - one) / (pair[1] - pair[0]))
+
+    def edges(self, stop: float) -> Array:
+        """Ends of intervals in each of which the path is smooth, from the entry to a time."""
+        run = self.slow.run
+        even = np.linspace(self.start, stop, INTERVALS + 1)
+        steps = np.asarray(run.step_starts) if self.slow.dense else np.empty(0)
+        inside = steps[(steps > self.start) & (steps < min(stop, self.known))]
+        every = np.unique(np.concatenate([even, inside, [min(self.known, stop)]]))
+        # intervals that are shorter than rounding hold nothing
+        apart = np.diff(every) > 1e-13 * np.abs(every[1:])
+        return np.asarray(every[np.r_[True, apart]])
+
+
+def path_of(mode: CriticalMode, slow: SlowQuantity, start: float, left: float) -> SlowPath:
+    """The path of a run that comes to a branch at a time and leaves it at another.
+
+    A forcing goes on, whatever the state does. The rate of a slow state is that of the
+    branch after the run has left it, if it depends on nothing else that moves.
+    """
+    run, model, name = slow.run, slow.run.symbolic_model, slow.name
+    end = float(run.t[-1])
+    if slow.laws or name in run.forcing:
+        beyond = None
+        if model is not None and not slow.laws:
+            law = _numbers(model, model.forcing[name])
+            beyond = _vectorised(numpy_function(TIME, law))
+        return SlowPath(slow, start, end, beyond, "the forcing")
+    law = None if model is None else _numbers(model, model.rates[name])
+    names = [real(n) for n in (*slow.states, name)]
+    if law is None or not law.free_symbols <= {*names, TIME}:
+        return SlowPath(slow, start, left, None, "")
+    rate = numpy_function([*names, TIME], law)
+    return SlowPath(slow, start, left, _along_the_branch(mode, slow, rate, left), "the branch")
+
+
+def _numbers(model: Any, law: sp.Expr) -> sp.Expr:
+    return law.xreplace({n: sp.Float(value, 17) for n, value in model.values.items()})
+
+
+def _vectorised(function: Callable[..., Any]) -> Callable[[Array], Array]:
+    def values(times: Array) -> Array:
+        return np.array(np.broadcast_to(function(times), times.shape), dtype=float)
+
+    return values
+
+
+def _along_the_branch(
+    mode: CriticalMode, slow: SlowQuantity, rate: Callable[..., Any], left: float
+) -> Callable[[Array], Array]:
+    """The solution of w' = g(X(w), w, t) from where the run leaves, nan beyond the branch."""
+    from scipy.integrate import solve_ivp
+
+    low, high = sorted((mode.before.end, mode.behind.end))
+
+    def flow(time: float, w: Array) -> list[float]:
+        value = float(w[0])
+        if not low <= value <= high:
+            return [0.0]
+        return [float(rate(*mode.side(value).place(value)[1], value, time))]
+
+    def values(times: Array) -> Array:
+        start = float(slow.at(np.array([left]))[0][0])
+        span = (left, float(times.max()))
+        solved = solve_ivp(flow, span, [start], rtol=1e-9, atol=1e-12, dense_output=True)
+        found = np.asarray(solved.sol(times))[0]
+        return np.where((found > low) & (found < high), found, np.nan)
+
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class Growth:
+    """The exponent ∫ Re λ(w(t)) dt from the entry on, at the edges of intervals of time.
+
+    Parameters
+    ----------
+    mode : CriticalMode
+    path : SlowPath
+    edges, exponent : ndarray
+        The exponent is nan from where the path leaves the branch.
+    """
+
+    mode: CriticalMode
+    path: SlowPath
+    edges: Array
+    exponent: Array
+
+    def rate(self, times: Array) -> Array:
+        w = self.path.at(times)
+        return self._of_values(w)
+
+    def _of_values(self, w: Array) -> Array:
+        behind = self.mode.behind
+        ahead = behind.way * (w - behind.here) >= 0.0
+        return np.where(ahead, behind.rate(w), self.mode.before.rate(w))
+
+    def at(self, time: float) -> float:
+        """The exponent at a time."""
+        k = min(max(int(np.searchsorted(self.edges, time)) - 1, 0), len(self.edges) - 2)
+        half = 0.5 * (time - self.edges[k])
+        inner = self.rate(self.edges[k] + half * (1.0 + NODES)) @ WEIGHTS * half
+        return float(self.exponent[k] + inner)
+
+    def first(self, level: float, since: float) -> float:
+        """The first time after another at which the exponent is at a level, nan if none."""
+        late = np.flatnonzero((self.edges > since) & (self.exponent >= level))
+        if not len(late):
+            return math.nan
+        k = int(late[0])
+        low, high = max(float(self.edges[k - 1]), since), float(self.edges[k])
+        if self.at(low) >= level:
+            return low
+        fine = 4e-16 * max(abs(low), abs(high))
+        return sign_change(lambda time: self.at(time) - level, low, high, fine)
+
+    def last(self, level: float, until: float) -> float:
+        """The last time of an edge before another at which the exponent is below a level."""
+        early = np.flatnonzero((self.edges < until) & (self.exponent <= level))
+        return float(self.edges[early[-1]]) if len(early) else math.nan
+
+
+def growth_along(mode: CriticalMode, path: SlowPath, stop: float) -> Growth:
+    """Integrate the growth of a mode along a path up to a time."""
+    edges = path.edges(stop)
+    half = 0.5 * np.diff(edges)
+    times = edges[:-1, None] + half[:, None] * (1.0 + NODES)
+    growth = Growth(mode, path, edges, np.zeros(len(edges)))
+    rates = growth.rate(times.ravel()).reshape(times.shape)
+    exponent = np.r_[0.0, np.cumsum(rates @ WEIGHTS * half)]
+    return Growth(mode, path, edges, exponent)
+
+
+@dataclass(frozen=True, eq=False)
+class PathExit:
+    """Where growth along a path has made up for the decay.
+
+    Parameters
+    ----------
+    entry, exit : float
+        Values of the slow quantity; the exit is nan where there is none.
+    passed, time : float
+        Times at which the branch loses stability for the last time, and of the exit.
+    decay, gain : float
+        As those of `HopfExit`.
+    amplitude : float
+        At the entry, the states in their units; nan where it cannot be read.
+    error : float
+        Bound on the exit's error, nan where none is stated.
+    words : str
+        What the path and the amplitudes are known from.
+    """
+
+    entry: float
+    exit: float
+    passed: float
+    time: float
+    decay: float
+    gain: float
+    amplitude: float
+    error: float
+    words: str
+
+
+def path_exit(
+    mode: CriticalMode, slow: SlowQuantity, start: float, small: float, left: float
+) -> PathExit | None:
+    """Where a run should leave a branch that it came to at one time and left at another.
+
+    The amplitudes of the critical mode at both times are read off the run, about the
+    slow manifold to first order.
+
+    Parameters
+    ----------
+    mode : CriticalMode
+    slow : SlowQuantity
+    start, small, left : float
+        Times of the entry, where the run is last near the branch, and where it counts as left.
+
+    Returns
+    -------
+    PathExit or None
+        None where the run is on neither side of the point in between.
+    """
+    path = path_of(mode, slow, start, left)
+    growth = growth_along(mode, path, max(left, path.known))
+    inside = growth.edges <= left
+    if not np.isfinite(growth.exponent[inside]).all() or inside.sum() < 2:
+        return None
+    lowest = int(np.argmin(growth.exponent[inside]))
+    passed, decay = _stability_lost(growth, lowest), -float(growth.exponent[lowest])
+    first, last = _amplitude(growth, start), _amplitude(growth, left)
+    gain, words = last / first, "the amplitudes at the entry and where the run leaves"
+    if not math.isfinite(gain) or gain <= 0.0:
+        gain, words = (
+            1.0,
+            "the exit at the amplitude of the entry, which cannot be read off the run",
+        )
+    level = math.log(gain)
+    at = growth.first(level, passed)
+    if math.isnan(at) and path.beyond is not None:
+        growth = growth_along(mode, path, path.known + BEYOND * (path.known - start))
+        at = growth.first(level, passed)
+        if math.isfinite(at):
+            words += f"; beyond t = {path.known:.6g} along {path.source}"
+    entry = float(path.at(np.array([start]))[0])
+    if math.isnan(at):
+        why = "the branch or the path ends before growth has made up for the decay"
+        if path.beyond is None and not slow.laws and slow.name not in slow.run.forcing:
+            why += "; how the slow quantity would go on after the run leaves is not known"
+        nan = math.nan
+        return PathExit(entry, nan, passed, nan, decay, gain, first, nan, f"none: {why}")
+    value = float(path.at(np.array([at]))[0])
+    error = math.nan
+    if math.isfinite(first) and math.isfinite(last):
+        if path.beyond is not None and growth.edges[-1] <= path.known:
+            # the error reaches farther than the exit
+            growth = growth_along(mode, path, path.known + BEYOND * (path.known - start))
+        error = _error(growth, entry, value, passed, at, level, (small, left))
+    return PathExit(entry, value, passed, at, decay, gain, first, error, words)
+
+
+def _stability_lost(growth: Growth, lowest: int) -> float:
+    """When the path passes the point about the edge at which the exponent is lowest."""
+    behind, edges = growth.mode.behind, growth.edges
+    low, high = (float(edges[min(max(lowest + k, 0), len(edges) - 1)]) for k in (-1, 1))
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        ahead = behind.way * (growth.path.at(np.array([middle]))[0] - behind.here) >= 0.0
+        low, high = (low, middle) if ahead else (middle, high)
+    return high
+
+
+def _amplitude(growth: Growth, time: float) -> float:
+    """Of the critical mode at a time of the run; nan where the lag is not told from it."""
+    value, state = growth.path.slow.at(np.array([time]))
+    rate = growth.path.rate(time)
+    mode = growth.mode.at(float(value[0]))
+    if mode is None:
+        return math.nan
+    found = growth.mode.amplitude(state[0], float(value[0]), rate)
+    lag = abs(mode.left @ mode.lag) * abs(rate)
+    return found if found > UNREADABLE * lag else math.nan
+
+
+def _error(
+    growth: Growth,
+    entry: float,
+    value: float,
+    passed: float,
+    at: float,
+    level: float,
+    leaving: tuple[float, float],
+) -> float:
+    """From terms of first order, the feedback of a slow state, and amplitudes not small."""
+    mode, path = growth.mode, growth.path
+    speed = path.rate(min(passed, path.known))
+    off = mode.exponent_error(entry, value, speed) + abs(_feedback(growth, at))
+    off += _nonlinear(growth, *leaving)
+    around = []
+    for side in (-1.0, 1.0):
+        time = growth.first(level + side * off, passed)
+        if math.isnan(time):
+            if side > 0.0:
+                return math.nan
+            time = passed
+        around.append(float(path.at(np.array([time]))[0]))
+    return SAFETY * max(abs(value - other) for other in around) + NUMERICAL * abs(value - entry)
+
+
+def _nonlinear(growth: Growth, small: float, left: float) -> float:
+    """What amplitudes of the run differ from their growth, next to the entry and to the exit."""
+    start = growth.path.start
+    total = 0.0
+    reached = growth.at(small)
+    falls = np.flatnonzero((growth.exponent <= -COMPARED[0]) & (growth.edges > start))
+    inner = float(growth.edges[falls[0]]) if len(falls) else math.nan
+    outer = growth.last(reached - COMPARED[1], small)
+    for one, other in ((start, inner), (outer, left)):
+        if math.isnan(one) or math.isnan(other) or not other > one:
+            continue
+        sizes = _amplitude(growth, one), _amplitude(growth, other)
+        if all(math.isfinite(s) and s > 0.0 for s in sizes):
+            grown = growth.at(other) - growth.at(one)
+            total += abs(math.log(sizes[1] / sizes[0]) - grown)
+    return total
+
+
+def _feedback(growth: Growth, at: float) -> float:
+    """What the feedback of a slow state adds to the exponent, by λ of all states together."""
+    slow = growth.path.slow
+    model, name = slow.run.symbolic_model, slow.name
+    if model is None or slow.laws or name in slow.run.forcing:
+        return 0.0
+    law = _numbers(model, model.rates[name])
+    names = [real(n) for n in (*slow.states, name)]
+    others = [n for n in slow.run.columns if n not in (*slow.states, name)]
+    symbols = [*names, *map(real, others), TIME]
+    slopes = numpy_function(symbols, [law.diff(n) for n in names])
+    edges = np.linspace(growth.path.start, at, FEEDBACK + 1)
+    times = 0.5 * (edges[1:] + edges[:-1])
+    total = 0.0
+    values = growth.path.at(times)
+    for time, value, mode in zip(times, values, growth.mode.modes(values), strict=True):
+        if mode is None:
+            continue
+        inside = min(float(time), growth.path.known)
+        extra: list[float] = []
+        if others and slow.dense:
+            columns = slow.run.dense_columns(np.array([inside]))[:, 0]
+            extra = [float(columns[slow.run.columns.index(n)]) for n in others]
+        unit = growth.mode.unit
+        gradient = np.array(slopes(*(mode.state * unit), value, *extra, time), dtype=float)
+        n = len(unit)
+        full = np.zeros((n + 1, n + 1))
+        full[:n, :n], full[:n, n] = mode.jacobian, mode.by_parameter
+        full[n, :n], full[n, n] = gradient[:n] * unit, gradient[n]
+        found = np.linalg.eigvals(full)
+        near = complex(found[np.argmin(np.abs(found - mode.value))])
+        total += (near.real - mode.value.real) * (edges[1] - edges[0])
+    return total

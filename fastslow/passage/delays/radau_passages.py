@@ -1,0 +1,503 @@
+"""A passage of a special point by Radau IIA steps, compiled.
+
+The motion is that of one region, z = (x - x*, w - w*) with x' = F(x, w) by the
+compiled function of a frozen model, and w' by a drift. The steps are those of
+`fastslow.simulation.stepper.radau` (Hairer and Wanner 1996, section IV.8), which hold on to a
+slow manifold however stiff the motion towards it is. What ends a passage is where a step
+of another length ends, so that it is as accurate as the steps are.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from fastslow.kernels.decorators import part
+from fastslow.kernels.pointers import call_address
+from fastslow.kernels.records import (
+    ComplexMatrix,
+    ComplexTensor,
+    ComplexVector,
+    Matrix,
+    Vector,
+    zeros,
+)
+from fastslow.simulation.stepper.matrices import factorise_in_place, solve_in_place
+from fastslow.simulation.stepper.polynomials import EPSILON
+from fastslow.simulation.stepper.radau import (
+    BETWEEN,
+    INTO,
+    OUT_OF,
+    POWERS,
+    STAGES,
+    VALUES,
+    WITHIN,
+    C,
+)
+
+#: Error allowed within a step, where it is of order STAGES + 1. At its end it is of order
+#: 2 STAGES: over a whole passage some 1e-11 (Hairer and Wanner 1996, section IV.8).
+TOLERANCE = 5e-10
+
+#: A deviation below this part of a state's unit need not be known as well.
+SMALL = 1e-3
+
+#: Newton's method goes on until a state changes by less than this part of its scale.
+SOLVED = 1e-13
+
+#: What is left when it stands still is rounding, below this part of the scale.
+ROUNDING = 1e-8
+
+#: Iterations of Newton's method, and steps in all.
+ITERATIONS, STEPS = 16, 200_000
+
+#: Between two steps the length grows by no more than this factor.
+GROWTH = 4.0
+
+#: What ends a passage, beside an interface: nothing, that w passes w*, its turn, a level.
+INTERFACES, PASSING, TURNING, LEVEL = range(4)
+
+#: How it went.
+ENDED, TOO_LONG, FAILED = range(3)
+
+
+class Motion(NamedTuple):
+    """The motion within a region, for compiled code.
+
+    Parameters
+    ----------
+    address, region : int
+        Of the frozen model's compiled function.
+    parameters : ndarray
+    width : int
+        Of the function's output.
+    point : ndarray, shape (n + 1,)
+        The special point (x*, w*).
+    signs : ndarray
+        Of the interface functions within the region.
+    """
+
+    address: int
+    region: int
+    parameters: Vector
+    width: int
+    point: Vector
+    signs: Vector
+
+
+class Law(NamedTuple):
+    """w' of a drift, for compiled code: the sum of what is given.
+
+    Parameters
+    ----------
+    rate, change : float
+    gradient : ndarray, shape (n + 1,)
+    breaks, coefficients : ndarray
+        A table over time, empty for none.
+    address : int
+        Of a compiled function, 0 for none.
+    numbers : ndarray
+        Its parameters.
+    """
+
+    rate: float
+    change: float
+    gradient: Vector
+    breaks: Vector = np.empty(0)
+    coefficients: Matrix = np.empty((0, 0))
+    address: int = 0
+    numbers: Vector = np.empty(0)
+
+
+class Space(NamedTuple):
+    """Work space of compiled code.
+
+    Parameters
+    ----------
+    out, inputs, slopes
+        Of the compiled functions.
+    jacobian, factors, given, moved
+        Of the equations of a step.
+    stages, increments, kept : ndarray, shape (STAGES, n + 1)
+        Rates and increments at the stages of a step, and increments of the last one.
+    start, place, rates, scale, speeds : ndarray, shape (n + 1,)
+    heights : ndarray, shape (STAGES, count + 1)
+    here, floor, beyond : ndarray, shape (count + 1,)
+        Of the interfaces and of what ends the passage.
+    """
+
+    out: Vector
+    inputs: Vector
+    slopes: Vector
+    jacobian: Matrix
+    factors: ComplexTensor
+    given: ComplexVector
+    moved: ComplexMatrix
+    stages: Matrix
+    increments: Matrix
+    kept: Matrix
+    start: Vector
+    place: Vector
+    rates: Vector
+    scale: Vector
+    speeds: Vector
+    heights: Matrix
+    here: Vector
+    floor: Vector
+    beyond: Vector
+
+
+class End(NamedTuple):
+    """What ends a passage, for compiled code.
+
+    Parameters
+    ----------
+    kind : int
+        0 an interface only, 1 that w passes w*, 2 a turn of w, 3 a level.
+    number : int
+        Of the state that reaches a level.
+    height : float
+        Of the level above the point.
+    way : float
+        Direction of the drift.
+    """
+
+    kind: int
+    number: int
+    height: float
+    way: float
+
+
+def space_for(n: int, count: int, width: int) -> Space:
+    """Work space for n states and so many interfaces."""
+    size, pairs = n + 1, len(VALUES)
+    shapes = (width, size + 1, size + 2, (size, size), (pairs, size, size + 1), size, (pairs, size))
+    stages, ends = [(STAGES, size)] * 3, [count + 1] * 3
+    return zeros(Space, *shapes, *stages, *[size] * 5, (STAGES, count + 1), *ends)
+
+
+@part
+def pass_through(motion, law, end, z, times, unit, space):
+    """Integrate within one region until something ends the passage.
+
+    Parameters
+    ----------
+    motion : Motion
+    law : Law
+    end : End
+    z : ndarray, shape (n + 1,)
+        (x - x*, w - w*) at the start; the last one is put in its place.
+    times : ndarray, shape (2,)
+        At the start, in whose place the last one is put, and the latest one.
+    unit : ndarray, shape (n + 1,)
+        Of z.
+    space : Space
+
+    Returns
+    -------
+    met : int
+        Number of the interface that ended it, -1 where it was not an interface.
+    status : int
+        ENDED, TOO_LONG or FAILED.
+    """
+    size, count = z.shape[0], motion.signs.shape[0]
+    scale, rates, Z, kept = space.scale, space.speeds, space.increments, space.kept
+    heights, here, floor = space.heights, space.here, space.floor
+    for j in range(STAGES):
+        for i in range(size):
+            Z[j, i] = kept[j, i] = 0.0
+    t, final = times[0], times[1]
+    rates_at(motion, law, t, z, space, rates)
+    heights_of(motion, end, z, rates, space, 1.0, here)
+    out = space.out
+    first = out.shape[0] - (out.shape[0] // (size + 1) - size + 1) * size
+    for k in range(count):
+        noise = 0.0
+        for i in range(size):
+            noise += abs(out[first + k * size + i] * (motion.point[i] + z[i]))
+        # the interface that was just crossed is met to rounding
+        floor[k] = min(here[k], 0.0) - 4.0 * EPSILON * noise
+    floor[count] = 0.0
+    sense = math.copysign(1.0, here[count])
+    here[count] *= sense
+    h = final - t
+    for i in range(size):
+        if rates[i] != 0.0:
+            h = min(h, 0.01 * (abs(z[i]) + SMALL * unit[i]) / abs(rates[i]))
+    last, beyond = 0.0, space.beyond
+    # between low and high, lengths of steps that end before and behind what ends the passage, by
+    # the values left and right of the height that is met
+    low = high = left = right = 0.0
+    met, side = -1, 0
+    for _ in range(STEPS):
+        if met < 0:
+            if not t < final:
+                return -1, TOO_LONG
+            h = min(h, final - t)
+            if not t + 1e-3 * h > t:
+                return -1, FAILED
+            for i in range(size):
+                noise = 64.0 * EPSILON * abs(motion.point[i]) / TOLERANCE
+                scale[i] = max(abs(z[i]) + SMALL * unit[i], noise)
+            continued(kept, last, h, Z)
+        else:
+            fine = EPSILON * max(abs(t), abs(t + high))
+            if not high - low > 2.0 * fine:
+                other = another(beyond, floor, met)
+                if other < 0:
+                    for i in range(size):
+                        z[i] += kept[STAGES - 1, i]
+                    times[0] = t + high
+                    return met if met < count else -1, ENDED
+                met, side, low = other, 0, 0.0
+                left, right = here[met] - floor[met], beyond[met] - floor[met]
+                continue
+            # one that rounds to an end is put beside it, so that the other end comes there
+            h = min(max(between(low, high, left, right), low + fine), high - fine)
+            for j in range(STAGES):
+                for i in range(size):
+                    Z[j, i] = kept[j, i] * h / high
+        error = step(motion, law, end, t, z, h, scale, sense, space, Z, heights)
+        if met >= 0:
+            if not error < np.inf:
+                return -1, FAILED
+            # regula falsi, the value at the end that stays halved (Illinois)
+            value = heights[STAGES - 1, met] - floor[met]
+            if value <= 0.0:
+                left = 0.5 * left if side > 0 else left
+                high, right, side = h, value, 1
+                low = low if value < 0.0 else h
+                copied(Z, kept)
+                for k in range(count + 1):
+                    beyond[k] = heights[STAGES - 1, k]
+            else:
+                right = 0.5 * right if side < 0 else right
+                low, left, side = h, value, -1
+            continue
+        if not error <= 1.0:
+            known = error < np.inf
+            h *= max(0.1, 0.9 * error ** (-1.0 / (STAGES + 1))) if known else 0.25
+            last = last if known else 0.0
+            continue
+        stage = first_below(heights, floor)
+        if stage < STAGES - 1:
+            # a step that ends there comes first
+            h *= C[stage]
+            continue
+        copied(Z, kept)
+        if stage < STAGES:
+            for k in range(count + 1):
+                beyond[k] = heights[stage, k]
+            met = another(beyond, floor, -1)
+            low, high, side = 0.0, h, 0
+            left, right = here[met] - floor[met], beyond[met] - floor[met]
+            continue
+        for i in range(size):
+            z[i] += Z[STAGES - 1, i]
+            if not abs(z[i]) < np.inf:
+                return -1, FAILED
+        for k in range(count + 1):
+            here[k] = heights[STAGES - 1, k]
+        t = t + h
+        times[0] = t
+        last = h
+        h *= min(GROWTH, 0.9 * error ** (-1.0 / (STAGES + 1))) if error > 0.0 else GROWTH
+    return -1, FAILED
+
+
+@part
+def copied(values, into):
+    """Copy the values of all stages."""
+    for j in range(values.shape[0]):
+        for i in range(values.shape[1]):
+            into[j, i] = values[j, i]
+
+
+@part
+def first_below(heights, floor):
+    """The first stage at which any is, STAGES if none."""
+    for j in range(STAGES):
+        if another(heights[j], floor, -1) >= 0:
+            return j
+    return STAGES
+
+
+@part
+def another(heights, floor, met):
+    """A height below its floor beside one of them, -1 if none."""
+    found = -1
+    for k in range(floor.shape[0]):
+        if k != met and heights[k] < floor[k]:
+            found = k
+    return found
+
+
+@part
+def between(low, high, left, right):
+    """Where the straight line through two values vanishes, or the middle."""
+    found = (low * right - high * left) / (right - left) if right < left else low
+    return found if low < found < high else 0.5 * (low + high)
+
+
+@part
+def continued(kept, last, h, Z):
+    """The increments of the last step, continued, as a first guess of those of the next."""
+    # far beyond the last step its polynomial is no guide
+    known = last > 0.0 and h <= 2.5 * last
+    for i in range(Z.shape[1]):
+        for j in range(STAGES):
+            Z[j, i] = 0.0
+        if not known:
+            continue
+        for k in range(STAGES - 1, -1, -1):
+            coefficient = 0.0
+            for m in range(STAGES):
+                coefficient += POWERS[k, m] * kept[m, i]
+            for j in range(STAGES):
+                s = 1.0 + C[j] * h / last
+                Z[j, i] += coefficient * (s ** (k + 1) - 1.0)
+
+
+@part
+def rates_at(motion, law, t, z, space, rates):
+    """The rates at a place, and all that the compiled function gives there."""
+    out, inputs, slopes = space.out, space.inputs, space.slopes
+    size = z.shape[0]
+    for i in range(size):
+        inputs[i] = motion.point[i] + z[i]
+    call_address(motion.address, motion.region, inputs, motion.parameters, out)
+    for i in range(size - 1):
+        rates[i] = out[i]
+    speed = law.rate + law.change * t
+    for i in range(size):
+        speed += law.gradient[i] * z[i]
+    if law.breaks.shape[0] > 1:
+        speed += by_table(law.breaks, law.coefficients, t)
+    if law.address != 0:
+        inputs[size] = t
+        call_address(law.address, 0, inputs, law.numbers, slopes)
+        speed += slopes[0]
+    rates[size - 1] = speed
+
+
+@part
+def by_table(breaks, coefficients, t):
+    """A sum of Chebyshev polynomials, other ones between every two breaks (Clenshaw)."""
+    low, high = 0, breaks.shape[0] - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if breaks[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    s = (2.0 * t - breaks[low] - breaks[low + 1]) / (breaks[low + 1] - breaks[low])
+    one = other = 0.0
+    for k in range(coefficients.shape[1] - 1, 0, -1):
+        one, other = 2.0 * s * one - other + coefficients[low, k], one
+    return s * one - other + coefficients[low, 0]
+
+
+@part
+def heights_of(motion, end, z, rates, space, sense, heights):
+    """Interface functions, not negative within the region, and what the event is told by."""
+    out, size, count = space.out, z.shape[0], motion.signs.shape[0]
+    first = (size - 1) * (size + 1)
+    for k in range(count):
+        heights[k] = motion.signs[k] * out[first + k]
+    value = 1.0
+    if end.kind == PASSING:
+        value = end.way * z[size - 1]
+    elif end.kind == TURNING:
+        value = end.way * rates[size - 1]
+    elif end.kind == LEVEL:
+        value = z[end.number] - end.height
+    heights[count] = sense * value if end.kind != INTERFACES else 1.0
+
+
+@part
+def step(motion, law, end, t, z, h, scale, sense, space, Z, heights):
+    """One step: increments at its stages from a guess of them, and the heights there.
+
+    Returns
+    -------
+    float
+        Its error in units of what is allowed, infinite where the equations are not solved.
+    """
+    out, slopes, jacobian, factors = space.out, space.slopes, space.jacobian, space.factors
+    given, moved, F = space.given, space.moved, space.stages
+    start, place, rates = space.start, space.place, space.rates
+    size, half = z.shape[0], VALUES.shape[0]
+    rates_at(motion, law, t, z, space, start)
+    n = size - 1
+    for i in range(n):
+        for k in range(size):
+            jacobian[i, k] = out[n + i * size + k]
+    for k in range(size):
+        jacobian[n, k] = law.gradient[k] + (slopes[1 + k] if law.address != 0 else 0.0)
+    for m in range(half):
+        for i in range(size):
+            for k in range(size):
+                factors[m, i, k] = -jacobian[i, k]
+            factors[m, i, i] += VALUES[m] / h
+        if not factorise_in_place(factors[m], size):
+            return np.inf
+    before, done = np.inf, False
+    for turn in range(ITERATIONS):
+        for j in range(STAGES):
+            for i in range(size):
+                place[i] = z[i] + Z[j, i]
+            rates_at(motion, law, t + C[j] * h, place, space, F[j])
+            if done:
+                heights_of(motion, end, place, F[j], space, sense, heights[j])
+        if done:
+            break
+        for m in range(half):
+            for i in range(size):
+                value = 0.0j
+                for j in range(STAGES):
+                    value += INTO[m, j] * (F[j, i] - VALUES[m] / h * Z[j, i])
+                given[i] = value
+            solve_in_place(factors[m], given, moved[m], size)
+        largest = 0.0
+        for i in range(size):
+            for j in range(STAGES):
+                change = 0.0
+                for m in range(half):
+                    change += (OUT_OF[j, m] * moved[m, i]).real
+                # the rates may not be defined there
+                if not abs(change) < np.inf:
+                    return np.inf
+                Z[j, i] += change
+                largest = max(largest, abs(change) / scale[i])
+        done = largest <= SOLVED or (largest <= ROUNDING and largest > 0.3 * before)
+        if not done and turn > 1 and not largest <= 0.9 * before:
+            return np.inf
+        before = largest
+    if not done:
+        return np.inf
+    # the defects of the rates where they are largest, filtered by the method
+    error = 0.0
+    for which in range(2):
+        s = BETWEEN if which == 1 else 0.0
+        for i in range(size):
+            value = slope = 0.0
+            for k in range(STAGES - 1, -1, -1):
+                coefficient = 0.0
+                for j in range(STAGES):
+                    coefficient += POWERS[k, j] * Z[j, i]
+                value = (value + coefficient) * s
+                slope = slope * s + (k + 1) * coefficient
+            place[i], given[i] = z[i] + value, -slope / h
+        if which == 1:
+            rates_at(motion, law, t + s * h, place, space, rates)
+        for i in range(size):
+            given[i] += rates[i] if which == 1 else start[i]
+        solve_in_place(factors[0], given, moved[0], size)
+        for i in range(size):
+            share = abs(moved[0, i].real) * (1.0 if which == 1 else WITHIN)
+            if not share < np.inf:
+                return np.inf
+            error = max(error, share / (TOLERANCE * max(scale[i], abs(z[i] + Z[STAGES - 1, i]))))
+    return error

@@ -1,0 +1,158 @@
+"""The entry-exit laws of a run: where it should leave a branch past a Hopf or branch point."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import sympy as sp
+
+from fastslow.errors import ArgumentError
+from fastslow.model.structure import TIME
+from fastslow.passage.delays.branch_exits import UNDERFLOW, invariant_mode
+from fastslow.passage.delays.critical_modes import CriticalMode
+from fastslow.passage.delays.entry_exits import MEMORY, bound_in_words
+from fastslow.passage.delays.hopf_delays import hopf_mode, with_buffer
+from fastslow.passage.delays.path_exits import PathExit, path_exit
+from fastslow.passage.overlay.transitions import Passage
+from fastslow.results.overlay.delays import BranchPointExit, Delay, HopfExit
+from fastslow.results.overlay.transitions import StableSheet, Transition
+from fastslow.results.points import SpecialPoint
+
+#: What a run forgets by its own tolerance is told within this factor of an amplitude.
+NOISY = 10.0
+
+
+#: A mode that loses stability, why its branch is invariant, and the decay that is remembered.
+Known = tuple[CriticalMode, str, float]
+
+
+def exit_law(
+    p: Passage,
+    t: Transition,
+    point: SpecialPoint,
+    known: dict[tuple[str, int], Known | None],
+) -> Delay | None:
+    """What entry-exit along its own path predicts for a transition; None where it does not hold.
+
+    The growth rate is integrated over time along the slow quantity of the run, from where
+    the motion came to the branch, however the load moved in between; amplitudes at both
+    ends are read off the run. ``known`` keeps the modes of points that are passed again.
+    """
+    if t.land is t.leave:
+        # it never left
+        return None
+    left = next(sheet for sheet in p.sheets if sheet.label == t.from_sheet)
+    way = int(p.outward(left, point))
+    key = (point.label, way)
+    if key not in known:
+        try:
+            known[key] = _mode(p, point, way)
+        except ArgumentError:
+            known[key] = None
+    kept = known[key]
+    if kept is None:
+        return None
+    mode, remembered, memory = kept
+    if mode.before.first_growth() > 0:
+        return None
+    found = path_exit(mode, p.slow, _entry(p, t, left), t.leave.time, t.time)
+    return None if found is None else _law(p, mode, found, remembered, memory)
+
+
+def _mode(p: Passage, point: SpecialPoint, way: int) -> Known:
+    if point.code == "HB":
+        return hopf_mode(p.diagram, point, way), "", MEMORY
+    return invariant_mode(p.diagram, point, way, alone=not _others(p))
+
+
+def _others(p: Passage) -> bool:
+    """Whether quantities other than the one of the diagram move in the fast rates."""
+    run = p.slow.run
+    moving = {n for n in run.columns if n != p.slow.name and n not in p.slow.states}
+    if run.symbolic_model is None or p.slow.laws:
+        return bool(moving) and not p.slow.laws
+    return any(
+        symbol.name in moving
+        for name in p.slow.states
+        for symbol in run.symbolic_model.rates[name].free_symbols
+    )
+
+
+def _entry(p: Passage, t: Transition, left: StableSheet) -> float:
+    """When the motion came to the course of the sheet that it leaves."""
+    number = p.sheets.index(left)
+    course = next(c for c in p.m.courses if number in c.sheets)
+    on = np.isin(p.followed, course.sheets)
+    away = np.flatnonzero(~on[: np.searchsorted(p.m.time, t.leave.time)])
+    if not len(away):
+        return float(p.m.time[0])
+    first = min(int(away[-1]) + 1, len(p.m.time) - 1)
+    return float(p.m.time[first])
+
+
+def _law(
+    p: Passage, mode: CriticalMode, found: PathExit, remembered: str, memory: float
+) -> HopfExit | BranchPointExit:
+    name = p.diagram.parameter
+    words, error = found.words, found.error
+    floor = _floor(p, found, memory)
+    forgotten = bool(floor)
+    if math.isfinite(found.exit):
+        words = f"along the path of the run, by {words}{remembered}"
+        if forgotten:
+            error = math.nan
+            words = (
+                f"{floor} decides: the amplitude falls by exp(−{found.decay:.0f}), below it, and "
+                "the exit comes at another place than this"
+            )
+        else:
+            words += bound_in_words(error, " at these amplitudes")
+    kind = HopfExit if mode.point.code == "HB" else BranchPointExit
+    law = kind(
+        point=mode.point,
+        parameter=name,
+        rate=_rate(p, found.passed),
+        delay=abs(found.exit - mode.point[name]),
+        validity=words,
+        error=error,
+        time=found.time - found.passed,
+        entry=found.entry,
+        decay=found.decay,
+        gain=found.gain,
+        forgotten=forgotten,
+    )
+    if not isinstance(law, HopfExit) or forgotten or math.isnan(law.delay):
+        return law
+    if _constant(p):
+        return with_buffer(mode, law)
+    return replace(law, validity=f"{law.validity}; the buffer point is not computed on this path")
+
+
+def _constant(p: Passage) -> bool:
+    """Whether the slow quantity is a forcing of constant rate."""
+    model, name = p.slow.run.symbolic_model, p.slow.name
+    if model is None or p.slow.laws or name not in p.slow.run.forcing:
+        return False
+    return bool(sp.expand(model.forcing[name].diff(TIME).diff(TIME)) == 0) and not _others(p)
+
+
+def _rate(p: Passage, time: float) -> float:
+    begin, end = float(p.m.time[0]), float(p.m.time[-1])
+    step = 1e-5 * (end - begin)
+    pair = np.clip([time - step, time + step], begin, end)
+    first, second = p.slow.at(pair)[0]
+    return float((second - first) / (pair[1] - pair[0]))
+
+
+def _floor(p: Passage, found: PathExit, memory: float) -> str:
+    """What the entry is forgotten in, empty where it is remembered."""
+    if memory == UNDERFLOW:
+        return "the smallest number, 1e-300," if found.decay > memory else ""
+    rtol = float(p.slow.run.settings.get("rtol", 0.0))
+    known = math.isfinite(found.amplitude) and found.amplitude > 0.0
+    start = math.log(found.amplitude) if known else 0.0
+    if rtol > 0.0 and start - found.decay < math.log(NOISY * rtol):
+        return f"the tolerance (rtol = {rtol:g})"
+    return "rounding" if found.decay > memory else ""

@@ -1,0 +1,112 @@
+"""Whether a diagram and a run are of one model."""
+
+from __future__ import annotations
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError
+from fastslow.formulas.columns import evaluated
+from fastslow.model.functions import numpy_function
+from fastslow.model.model import Model
+from fastslow.model.structure import real
+from fastslow.results.branch.branch import Branch
+from fastslow.results.branch.diagram import Diagram
+from fastslow.results.trajectory.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+#: Rows of each branch at which rates that are written differently are compared.
+ROWS = 5
+
+#: A rate vanishes where what is left is this part of its change over the states of the branch;
+#: files of AUTO have few digits.
+SAME = 1e-4
+
+#: Eigenvalues that differ by this part of the largest are different: of a double one only half the
+#: digits are known.
+NEAR = 1e-2
+
+
+def require_one_model(diagram: Diagram, run: Trajectory) -> bool:
+    """Raise if the rates of a diagram's states are not those of the run.
+
+    They are the same when they are written alike. Otherwise equilibria of the diagram, with
+    their eigenvalues, must be those of the run's model.
+
+    Returns
+    -------
+    bool
+        False where nothing could be compared: along a path, for a run that was read from a file.
+
+    Raises
+    ------
+    ArgumentError
+        If they differ.
+    """
+    ours, theirs = _rates(diagram.equations), _rates(run.equations)
+    different = [n for n in diagram.states if ours.get(n) != theirs.get(n)]
+    if not different:
+        return True
+    if run.symbolic_model is not None:
+        agrees = [
+            a
+            for b in diagram.branches
+            if (a := _agrees(run.symbolic_model, b, diagram)) is not None
+        ]
+        if agrees and all(agrees):
+            return True
+        if not agrees:
+            return False
+    elif diagram.path or not ours or not theirs:
+        return False
+    name = different[0]
+    has = "other equilibria or eigenvalues" if not ours else f"{name}' = {ours.get(name)}"
+    raise ArgumentError(
+        f"the diagram is of another model: it has {has}, the run {name}' = {theirs.get(name)}; "
+        "continue the equilibria of the frozen model of this run"
+    )
+
+
+def _rates(equations: str) -> dict[str, str]:
+    """The right-hand sides of a model's text."""
+    lines = (line.strip().partition("' = ") for line in equations.splitlines())
+    return {name: rate for name, equals, rate in lines if equals}
+
+
+def _agrees(model: Model, branch: Branch, diagram: Diagram) -> bool | None:
+    """Whether equilibria of a branch, with their eigenvalues, are those of a model.
+
+    None for a branch of virtual or pseudo-equilibria, which are zeros of no rate as written.
+    """
+    regular = [k for k, name in enumerate(branch.region) if name in diagram.regions]
+    if not branch.admissible or not regular:
+        return None
+    rows = np.array(regular)[np.linspace(0, len(regular) - 1, ROWS).astype(int)]
+    value = branch.parameter[rows]
+    known = {**model.parameters, **diagram.parameters, diagram.parameter: value}
+    along = {name: evaluated(law, known) for name, law in diagram.path.items()}
+    known = {**known, **along, **{n: branch.state[rows, k] for k, n in enumerate(branch.states)}}
+    states = [real(name) for name in branch.states]
+    rates = [model.rates[name] for name in branch.states]
+    slopes = sp.Matrix(rates).jacobian(states)
+    symbols = sorted(set().union(*(rate.free_symbols for rate in rates)), key=lambda s: s.name)
+    if any(symbol.name not in known for symbol in symbols):
+        return False
+    columns = [np.broadcast_to(known[symbol.name], len(rows)) for symbol in symbols]
+    both = numpy_function(symbols, [*rates, *slopes], cse=True)
+    with np.errstate(all="ignore"):
+        found = [[float(v) for v in both(*numbers)] for numbers in zip(*columns, strict=True)]
+    n = len(states)
+    reach = np.abs(branch.state).max(axis=0)
+    for number, row in zip(rows, np.array(found), strict=True):
+        rest, jacobian = row[:n], row[n:].reshape(n, n)
+        if not (np.abs(rest) <= SAME * (np.abs(jacobian) @ reach)).all():
+            return False
+        here = np.sort_complex(branch.eigenvalues[number])
+        if np.isfinite(here).all() and np.isfinite(jacobian).all():
+            there = np.sort_complex(np.linalg.eigvals(jacobian))
+            if not np.abs(here - there).max() <= NEAR * max(np.abs(there).max(), 1e-300):
+                return False
+    return True

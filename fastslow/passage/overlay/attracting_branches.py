@@ -1,0 +1,214 @@
+"""Stable sheets of a diagram, and the courses that they lie on, over the slow quantity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.results.branch.branch import Branch, Sheet
+from fastslow.results.branch.diagram import Diagram
+from fastslow.results.branch.interpolation import Cubics, cubics
+from fastslow.results.overlay.transitions import StableSheet
+from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.points import SpecialPoint
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A run of a branch over which the parameter is monotone, across interfaces too.
+
+    Parameters
+    ----------
+    branch : Branch
+    pieces : tuple of Sheet
+        One for each region, in order along the branch, the joints at boundary equilibria.
+    sheets : tuple of int
+        The stable sheets on it, as indices into those of the diagram.
+    ranges : ndarray, shape (len(sheets), 2)
+        The parameter's range on each of them.
+    """
+
+    branch: Branch
+    pieces: tuple[Sheet, ...]
+    sheets: tuple[int, ...]
+    ranges: Array
+
+    @cached_property
+    def _rows(self) -> NDArray[np.intp]:
+        """Rows in ascending order of the parameter; a joint stands twice."""
+        rows = np.concatenate([np.arange(p.start, p.stop) for p in self.pieces])
+        values = self.branch.parameter
+        return rows if values[rows[-1]] >= values[rows[0]] else rows[::-1]
+
+    @cached_property
+    def _ordered(self) -> Array:
+        return self.branch.parameter[self._rows]
+
+    @cached_property
+    def _leading(self) -> Array:
+        eigenvalues = self.branch.eigenvalues[self._rows]
+        real = np.where(np.isinf(eigenvalues.real), -np.inf, eigenvalues.real)
+        return np.maximum(real.max(axis=1), -1e300)
+
+    @cached_property
+    def _softest(self) -> Array:
+        size = np.abs(self.branch.eigenvalues[self._rows])
+        return np.where(np.isfinite(size), size, np.inf).min(axis=1)
+
+    @cached_property
+    def range(self) -> tuple[float, float]:
+        return float(self._ordered[0]), float(self._ordered[-1])
+
+    def present(self, slow: Array) -> NDArray[np.bool_]:
+        """Whether a stable sheet of the course exists at values of the parameter."""
+        found = np.zeros(len(slow), dtype=bool)
+        for low, high in self.ranges.tolist():
+            found |= (slow >= low) & (slow <= high)
+        return found
+
+    def sheet(self, slow: Array) -> NDArray[np.intp]:
+        """Number of the stable sheet at (or nearest to) values of the parameter."""
+        low, high = self.ranges.T
+        away = np.maximum(low - slow[:, None], slow[:, None] - high)
+        return np.asarray(self.sheets, dtype=np.intp)[np.argmin(np.maximum(away, 0.0), axis=1)]
+
+    def fastest(self) -> float:
+        """Typical modulus of its largest finite eigenvalue."""
+        size = np.abs(self.branch.eigenvalues[self._rows])
+        return float(np.median(np.where(np.isfinite(size), size, 0.0).max(axis=1)))
+
+    def curve(self) -> Array:
+        """States and parameter of all its rows, shape (rows, n + 1)."""
+        return np.column_stack([self.branch.state[self._rows], self._ordered])
+
+    def state(self, slow: Array) -> Array:
+        """Equilibria at values of the parameter, shape (N, n); at its end beyond the range."""
+        low, high = self.range
+        slow = np.minimum(np.maximum(slow, low), high)
+        return self._cubics.at(self._step(slow), slow)
+
+    @cached_property
+    def _cubics(self) -> Cubics:
+        return cubics(self.branch, np.minimum(self._rows[:-1], self._rows[1:]))
+
+    def slope(self, slow: Array) -> Array:
+        """dX/dw at parameter values, shape (N, n); infinite at a fold, 0 beyond the range."""
+        low, high = self.range
+        inside = np.minimum(np.maximum(slow, low), high)
+        step, (begin, width, lower, upper) = self._step(inside), self._tangents
+        part = (inside - begin[step]) / width[step]
+        mean = (1 - part) * lower.take(step, axis=1) + part * upper.take(step, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = mean[:-1] / mean[-1]
+        slope[:, (slow < low) | (slow > high)] = 0.0
+        return slope.T
+
+    @cached_property
+    def _tangents(self) -> tuple[Array, Array, Array, Array]:
+        """Where each step begins, its width, and tangents at its lower and its upper row.
+
+        Those of one step, in columns, point the same way.
+        """
+        values, tangent = self._ordered, self.branch.tangent[self._rows]
+        one, other = tangent[:-1], tangent[1:]
+        other = np.where(np.sum(one * other, axis=1, keepdims=True) < 0, -other, other)
+        lower, upper = (np.ascontiguousarray(t.T) for t in (one, other))
+        return values[:-1], np.diff(values), lower, upper
+
+    def relaxation(self, slow: Array) -> Array:
+        """Largest real part of the eigenvalues at values of the parameter, shape (N,)."""
+        return np.interp(slow, self._ordered, self._leading)
+
+    def stiffness(self, slow: Array) -> Array:
+        """Least modulus of the eigenvalues at values of the parameter, shape (N,)."""
+        return np.interp(slow, self._ordered, self._softest)
+
+    def _step(self, slow: Array) -> NDArray[np.intp]:
+        """The step in which each of some values inside the range is."""
+        return self._step_after[np.searchsorted(self._ordered, slow, side="right")]
+
+    @cached_property
+    def _step_after(self) -> NDArray[np.intp]:
+        """The step of a value that is not below so many rows."""
+        place = np.clip(np.arange(len(self._ordered) + 1) - 1, 0, len(self._ordered) - 2)
+        # not between the two rows of a joint
+        return np.where(self._ordered[place] == self._ordered[place + 1], place - 1, place)
+
+
+def courses_of(diagram: Diagram) -> tuple[tuple[StableSheet, ...], tuple[Course, ...]]:
+    """Stable sheets of every admissible branch, and the courses that they lie on."""
+    found: list[tuple[int, int, int, str]] = []
+    members: list[tuple[Branch, list[Sheet], list[int]]] = []
+    for number, branch in enumerate(diagram.branches):
+        if not branch.admissible:
+            continue
+        stable = branch.stable
+        for pieces in _monotone(branch):
+            inside = []
+            for piece in pieces:
+                rows = np.arange(piece.start, piece.stop)
+                for part in np.split(rows, np.flatnonzero(np.diff(stable[rows].astype(int))) + 1):
+                    if stable[part[0]]:
+                        start = max(piece.start, int(part[0]) - 1)
+                        stop = min(piece.stop, int(part[-1]) + 2)
+                        inside.append(len(found))
+                        found.append((number, start, stop, piece.region))
+            if inside:
+                members.append((branch, pieces, inside))
+    counts = {f[3]: sum(g[3] == f[3] for g in found) for f in found}
+    seen: dict[str, int] = {}
+    sheets = []
+    for number, start, stop, region in found:
+        seen[region] = seen.get(region, 0) + 1
+        label = region if counts[region] == 1 else f"{region}.{seen[region]}"
+        sheets.append(StableSheet(label, number, start, stop, region))
+    courses = []
+    for branch, pieces, inside in members:
+        ends = [sorted(branch.parameter[[sheets[k].start, sheets[k].stop - 1]]) for k in inside]
+        courses.append(Course(branch, tuple(pieces), tuple(inside), np.array(ends)))
+    return tuple(sheets), tuple(courses)
+
+
+def _monotone(branch: Branch) -> list[list[Sheet]]:
+    """Sheets of a branch, those joined that follow each other with the parameter in one sense."""
+    joined: list[list[Sheet]] = []
+    sense = 0.0
+    for sheet in branch.sheets():
+        values = branch.parameter[[sheet.start, sheet.stop - 1]]
+        now = float(np.sign(values[1] - values[0]))
+        touching = joined and joined[-1][-1].stop == sheet.start
+        if touching and now == sense and branch.parameter[sheet.start - 1] == values[0]:
+            joined[-1].append(sheet)
+        else:
+            joined.append([sheet])
+        sense = now
+    return joined
+
+
+def ends_of(diagram: Diagram, sheet: StableSheet) -> list[SpecialPoint]:
+    """The special points at which a sheet ends."""
+    branch = diagram.branches[sheet.branch]
+    low, high = sorted(branch.parameter[[sheet.start, sheet.stop - 1]])
+    near = 1e-9 * max(abs(low), abs(high), high - low)
+    return [
+        point
+        for point, row in zip(branch.special, branch.special_rows, strict=True)
+        if POINT_TYPES[point.code].changes_stability
+        and sheet.start - 1 <= row <= sheet.stop
+        and min(abs(point[diagram.parameter] - low), abs(point[diagram.parameter] - high)) <= near
+    ]
+
+
+def over_a_gap(diagram: Diagram, one: StableSheet, other: StableSheet) -> bool:
+    """Whether two sheets are joined by a continuum: rows of one branch at one parameter value."""
+    if one.branch != other.branch:
+        return False
+    first, second = sorted((one, other), key=lambda s: s.start)
+    values = diagram.branches[one.branch].parameter[first.stop - 1 : second.start + 1]
+    size = max(float(np.abs(diagram.over).max()), np.finfo(float).tiny)
+    return len(values) > 2 and bool(np.ptp(values) <= 1e-9 * size)

@@ -1,0 +1,158 @@
+"""What the rhythm of a run is called."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fastslow.passage.overlay.cycle_ends import CycleEnd
+from fastslow.results.overlay.transitions import Bursting, Phase, Transition
+from fastslow.results.points import SpecialPoint
+
+#: Kinds of transition that a relaxation oscillation consists of.
+LEAVING = ("jump", "gap crossing", "grazing", "Hopf")
+
+#: A rhythm repeats at least once.
+TWICE = 2
+
+#: Of a start or end that nothing explains.
+UNKNOWN = "unclassified"
+
+
+@dataclass(frozen=True, eq=False)
+class Burst:
+    """A complete oscillating phase, with what starts and what ends it."""
+
+    phase: Phase
+    start: Transition
+    end: CycleEnd | None
+
+
+def bursting_of(bursts: Sequence[Burst], transitions: Sequence[Transition]) -> Bursting | None:
+    """Name a rhythm after the bifurcations that start and end its oscillating phases.
+
+    The start is the special point at which the branch is left, the end is that of the cycle;
+    where one of them is not known the burst is unclassified.
+
+    Bursts on a cycle are named as by E. M. Izhikevich, International Journal of
+    Bifurcation and Chaos 10(6), 1171-1266, 2000: start/end. Where it is
+    the oscillation in which a trajectory settles on the next sheet (point-point
+    bursting there), the names of the two leavings take their place, and without
+    oscillations the rhythm is a relaxation oscillation.
+
+    Parameters
+    ----------
+    bursts : sequence of Burst
+        In order of time.
+    transitions : sequence of Transition
+        All of the run.
+
+    Returns
+    -------
+    Bursting or None
+        None where there is no rhythm: no two oscillating phases on a cycle, each from a stable
+        branch to one, and no two branches that are left in turn.
+    """
+    cycles = [b for b in bursts if b.end is not None]
+    if cycles:
+        return _on_cycles(cycles) if len(cycles) >= TWICE else None
+    between = [t for t in transitions if t.kind in LEAVING]
+    between = [t for t in between if t.from_sheet != t.to_sheet and t.to_sheet]
+    if len({t.from_sheet for t in between}) < 2:
+        return None
+    leavings = list(dict.fromkeys(_start(t) for t in between[-2:]))
+    pair = "/".join(leavings * 2 if len(leavings) == 1 else leavings)
+    counts = [b.phase.oscillations for b in bursts]
+    specials = [t.special for t in between[-2:]]
+    mirrored = _mirrored(specials[0], specials[1])
+    symmetric = "symmetric " if mirrored else ""
+    evidence = [f"{_at(t)}, from {t.from_sheet} to {t.to_sheet}" for t in between[-2:]]
+    gaps = all(t.kind == "gap crossing" for t in between)
+    if mirrored and not gaps:
+        evidence.append("both points have the same eigenvalues and normal form: a symmetric pair")
+    if gaps:
+        evidence.append("the equilibria change steeply at the gap, without a bifurcation")
+        name = "fast-slow oscillation across the gap, without bifurcation"
+        if counts:
+            evidence.append(_settling(counts))
+        return Bursting(name, tuple(evidence))
+    if counts:
+        evidence.append(_settling(counts))
+        return Bursting(f"{symmetric}{pair} bursting (point-point)", tuple(evidence))
+    evidence.append("no oscillation of the fast states between the sheets")
+    return Bursting(f"relaxation oscillation ({symmetric}{pair})", tuple(evidence))
+
+
+def _settling(counts: Sequence[int]) -> str:
+    low, high = min(counts), max(counts)
+    return f"{low if low == high else f'{low} to {high}'} oscillations while settling on a sheet"
+
+
+def _on_cycles(bursts: Sequence[Burst]) -> Bursting:
+    # the first may still bear the marks of the start
+    steady = bursts[1:] if len(bursts) > 1 else bursts
+    names: list[str] = []
+    evidence: list[str] = []
+    for b in steady:
+        assert b.end is not None
+        name = _named(_start(b.start), b.end.name)
+        if name not in names:
+            names.append(name)
+            evidence.append(f"starts: {_at(b.start)}")
+            end = "" if b.end.special is None else f"at {b.end.special.label}, "
+            evidence.append(f"ends: {end}{b.end.evidence}")
+    counts = [b.phase.oscillations for b in steady]
+    low, high = min(counts), max(counts)
+    evidence.append(f"{low if low == high else f'{low} to {high}'} oscillations in a burst")
+    specials = list({id(b.start.special): b.start.special for b in steady}.values())
+    symmetric = len(names) == 1 and len(specials) == 2 and _mirrored(*specials)
+    name = ("symmetric " if symmetric else "") + " + ".join(names)
+    return Bursting(name, tuple(evidence))
+
+
+def _named(start: str, end: str) -> str:
+    """The class of a burst; none where one of the two bifurcations is not known."""
+    if UNKNOWN not in (start, end):
+        return f"{start}/{end} bursting"
+    known = [f"starts: {start}"] * (start != UNKNOWN) + [f"ends: {end}"] * (end != UNKNOWN)
+    return f"unclassified bursting ({', '.join(known) or 'start and end not known'})"
+
+
+def _start(t: Transition) -> str:
+    """What a leaving is called in a name."""
+    point = t.special
+    if t.kind == "gap crossing":
+        return "gap crossing"
+    if point is None:
+        return "grazing" if t.kind == "grazing" else UNKNOWN
+    if point.code == "LP":
+        return "fold"
+    if point.code == "HB":
+        return "subHopf" if point.criticality == "subcritical" else "Hopf"
+    if point.code == "BP":
+        return "branch point"
+    return UNKNOWN if t.kind == UNKNOWN else point.subtype or "boundary equilibrium"
+
+
+def _at(t: Transition) -> str:
+    if t.special is None:
+        return f"{t.kind} at {t.value:.4g}"
+    words = f"leaves at {t.special.label}"
+    return words + (f" with delay {t.delay:.3g}" if np.isfinite(t.delay) else "")
+
+
+def _mirrored(one: SpecialPoint | None, other: SpecialPoint | None) -> bool:
+    """Whether two points have the same eigenvalues and normal form, as under a symmetry."""
+    if one is None or other is None or one.code != other.code or one.label == other.label:
+        return False
+    first, second = np.sort_complex(one.eigenvalues), np.sort_complex(other.eigenvalues)
+    if not (np.isfinite(first).all() and np.isfinite(second).all()):
+        return False
+    numbers = [
+        (abs(q.coefficient or 0.0), q.lyapunov or 0.0, q.frequency or 0.0) for q in (one, other)
+    ]
+    apart = max(np.abs(first - second).max(), *np.abs(np.subtract(numbers[0], numbers[1])))
+    size = max(np.abs(first).max(), *np.abs(numbers[0]))
+    return bool(apart <= 1e-6 * size)

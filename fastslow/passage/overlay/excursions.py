@@ -1,0 +1,160 @@
+"""What a trajectory does between two stays on sheets: jump, oscillate, or settle by oscillating."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.passage.overlay.following import Measured, Stay
+from fastslow.passage.overlay.spikes import PROMINENT, refined, turns_of
+from fastslow.results.overlay.transitions import Phase
+
+Array = NDArray[np.float64]
+
+#: So many oscillations make an oscillating phase.
+LEAST = 2
+
+#: An oscillation decays when its last rise is below this part of its largest.
+DECAYED = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Excursion:
+    """The samples between two stays.
+
+    Parameters
+    ----------
+    old, new : Stay or None
+        The stays before and after; None at the start and at the end of the run.
+    turns : tuple of float
+        Times of the maxima in between.
+    sizes : tuple of float
+        The rise to each of them, in units of the state.
+    cycle : bool
+        Whether it is an oscillating phase that settles on no sheet.
+    """
+
+    old: Stay | None
+    new: Stay | None
+    turns: tuple[float, ...]
+    sizes: tuple[float, ...]
+    cycle: bool
+
+    @property
+    def oscillating(self) -> bool:
+        return len(self.turns) >= LEAST
+
+    def rows(self, m: Measured) -> tuple[int, int]:
+        """First sample of it, and the first after it."""
+        return (
+            0 if self.old is None else self.old.stop,
+            len(m.time) if self.new is None else self.new.start,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Oscillation:
+    """Every maximum of the observed state that is prominent, and every minimum.
+
+    Parameters
+    ----------
+    times, sizes : ndarray, shape (K,)
+        Times of the turns, and how far the state moved to each from the turn before.
+    upper : ndarray of bool, shape (K,)
+        Whether each is a maximum.
+    """
+
+    times: Array
+    sizes: Array
+    upper: NDArray[np.bool_]
+
+
+def oscillation_of(m: Measured, observed: int) -> Oscillation:
+    """Turns of the observed state over the whole run; of an angle those of its sine."""
+    values = m.scaled[:, observed] * m.extent[observed]
+    if m.periods[observed] > 0:
+        values = np.sin(2.0 * np.pi * m.scaled[:, observed] / m.periods[observed])
+    reach = float(np.ptp(values))
+    # what moves by rounding only has no turns
+    least = PROMINENT * reach if reach > 1e-9 * float(np.abs(values).max(initial=0.0)) else 0.0
+    turns = turns_of(values, least)
+    if not len(turns.rows):
+        return Oscillation(np.empty(0), np.empty(0), turns.upper)
+    first = values[: turns.rows[0] + 1]
+    before = first.min() if turns.upper[0] else first.max()
+    sizes = np.abs(np.diff(np.r_[before, values[turns.rows]]))
+    return Oscillation(refined(m.time, values, turns.rows), sizes, turns.upper)
+
+
+def excursions_of(m: Measured, stays: list[Stay], swing: Oscillation) -> list[Excursion]:
+    """What lies between the stays, before the first and after the last."""
+    pairs = zip([None, *stays], [*stays, None], strict=True)
+    found = [_excursion(m, old, new, swing) for old, new in pairs]
+    return [e for e in found if _matters(m, e)]
+
+
+def _matters(m: Measured, e: Excursion) -> bool:
+    """Whether there is anything between the stays, at the start or the end of the run."""
+    start, stop = e.rows(m)
+    return stop > start or (e.old is not None and e.new is not None)
+
+
+def _excursion(m: Measured, old: Stay | None, new: Stay | None, swing: Oscillation) -> Excursion:
+    start = 0 if old is None else old.stop
+    stop = len(m.time) if new is None else new.start
+    since, until = m.time[min(start, len(m.time) - 1)], m.time[min(stop, len(m.time) - 1)]
+    inside = (swing.times >= since) & (swing.times <= until)
+    upper, lower = inside & swing.upper, inside & ~swing.upper
+    if new is not None and upper.sum() + lower.sum() >= 2:
+        rows = slice(start, stop)
+        weight = np.diff(m.time[start : stop + 1])
+        there = float(weight @ m.present[rows, new.course]) > 0.5 * float(weight.sum())
+        sizes = swing.sizes[inside]
+        settling = there and sizes[-1] < DECAYED * sizes.max()
+    else:
+        settling = False
+    # a cycle is counted by its maxima; an oscillation that dies out may begin downwards
+    counted = lower if settling and lower.sum() > upper.sum() else upper
+    oscillating = counted.sum() >= LEAST
+    return Excursion(
+        old,
+        new,
+        tuple(swing.times[counted].tolist()),
+        tuple(swing.sizes[counted].tolist()),
+        bool(oscillating and not settling),
+    )
+
+
+def phase_of(m: Measured, e: Excursion, start: float, end: float, sheet: str, away: str) -> Phase:
+    """The phase between leaving and landing.
+
+    Parameters
+    ----------
+    m : Measured
+    e : Excursion
+    start, end : float
+        Its times.
+    sheet : str
+        Where it lands, "" for nowhere.
+    away : str
+        The kind where it does not oscillate.
+    """
+    first, _ = e.rows(m)
+    if first < len(m.time) and not m.within[first]:
+        return Phase(start, end, "outside")
+    if e.oscillating and (e.cycle or e.old is not None):
+        return Phase(
+            start,
+            end,
+            "oscillating",
+            () if e.cycle else (sheet,),
+            len(e.turns),
+            "cycle" if e.cycle else "equilibrium",
+            tuple(np.diff(e.turns).tolist()),
+            e.sizes,
+        )
+    if e.old is None or e.new is None:
+        return Phase(start, end, "transient", oscillations=len(e.turns))
+    return Phase(start, end, away, (sheet,), len(e.turns))

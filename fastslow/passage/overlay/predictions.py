@@ -1,0 +1,80 @@
+"""The law of delay beside every transition that has one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from fastslow.errors import ArgumentError
+from fastslow.passage.delays.delay_laws import predict_delay
+from fastslow.passage.delays.drifts import drift_at
+from fastslow.passage.delays.local_field import TURN
+from fastslow.passage.delays.run_exits import Known, exit_law
+from fastslow.passage.delays.settling import with_memory
+from fastslow.passage.overlay.transitions import Passage
+from fastslow.results.overlay.delays import Delay
+from fastslow.results.overlay.drifts import Drift
+from fastslow.results.overlay.transitions import OSCILLATING, Transition
+from fastslow.results.points import SpecialPoint
+
+#: Kinds of transition that a law is known for.
+LAWFUL = ("jump", "gap crossing", "crossing", "Hopf")
+
+
+def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
+    """The same transitions, each with what its law predicts for its own rate of drift."""
+    # a periodic run passes the same points at the same rates over and over
+    known: dict[tuple[object, ...], Delay | None] = {}
+    modes: dict[tuple[str, int], Known | None] = {}
+    found = []
+    for t in transitions:
+        point = t.special
+        exits = point is not None and point.code in ("HB", "BP") and t.from_sheet != OSCILLATING
+        if not (t.kind in LAWFUL or exits) or point is None or not t.slope > 0:
+            found.append(t)
+            continue
+        if exits:
+            found.append(replace(t, law=exit_law(p, t, point, modes)))
+            continue
+        passed = p.passing(point, t.time)
+        drift = None if passed is None else drift_at(p.slow, point, passed, told=False)
+        where: str | dict[str, float] | None = None
+        if t.kind == "jump":
+            where = TURN if t.turned else _level(p, t)
+        key = (point.label, t.kind, _rounded(drift), _rounded(where))
+        if key not in known:
+            known[key] = None if passed is None else _law(p, point, passed, where)
+        law = known[key]
+        if law is not None and passed is not None:
+            law = with_memory(p, t, transitions, law, passed)
+        found.append(replace(t, law=law))
+    return found
+
+
+def _law(
+    p: Passage, point: SpecialPoint, passed: float, where: str | dict[str, float] | None
+) -> Delay | None:
+    drift = drift_at(p.slow, point, passed)
+    if drift is None:
+        return None
+    try:
+        return predict_delay(point, drift, level=where)
+    except ArgumentError:
+        # a law that does not hold there, or a diagram without its model
+        return None
+
+
+def _rounded(what: str | Mapping[str, float] | Drift | None) -> str:
+    if isinstance(what, Mapping):
+        return " ".join(f"{name} {value:.6g}" for name, value in what.items())
+    # a law in time differs by the period, its first terms do not
+    return str(replace(what, law="") if isinstance(what, Drift) else what)
+
+
+def _level(p: Passage, t: Transition) -> dict[str, float]:
+    """Where the measured delay is taken, in the state that moves most."""
+    way = (t.state - t.leave.state) / p.m.extent
+    number = int(np.argmax(np.abs(way)))
+    return {p.diagram.states[number]: float(t.state[number])}

@@ -1,0 +1,56 @@
+"""Columns of a run at any times, from the Taylor coefficients of its steps, compiled."""
+
+from __future__ import annotations
+
+from fastslow.kernels.decorators import unfused_part
+
+
+@unfused_part
+def step_of(starts, time):
+    """The last step that begins at a time or before it, 0 where none does."""
+    low, high = 0, starts.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if starts[middle] <= time:
+            low = middle + 1
+        else:
+            high = middle
+    return max(low - 1, 0)
+
+
+@unfused_part
+def values_in_steps(series, starts, begin, end, times, values):
+    """Sum the series of steps at times, to the bit as `fastslow.results.trajectory.dense`.
+
+    Parameters
+    ----------
+    series : ndarray, shape (n_steps, columns, order + 1)
+    starts : ndarray, shape (n_steps,)
+    begin, end : float
+        Of the run.
+    times : ndarray, shape (N,)
+    values : ndarray, shape (columns, N)
+        Filled.
+
+    Returns
+    -------
+    int
+        How many of the times are outside the run.
+    """
+    count, columns, width = series.shape
+    row = outside = 0
+    for i in range(times.shape[0]):
+        time = times[i]
+        if not begin <= time <= end:
+            outside += 1
+        # most often that of the time before
+        after = row + 1
+        if time < starts[row] or (after < count and starts[after] <= time):
+            row = step_of(starts, time)
+        offset = time - starts[row]
+        for j in range(columns):
+            value = series[row, j, width - 1]
+            for k in range(width - 2, -1, -1):
+                value = value * offset + series[row, j, k]
+            values[j, i] = value
+    return outside

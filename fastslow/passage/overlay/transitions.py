@@ -1,0 +1,548 @@
+"""Leavings and landings of a trajectory: where, when, and what is responsible."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.passage.overlay.attracting_branches import Course, ends_of, over_a_gap
+from fastslow.passage.overlay.excursions import Excursion
+from fastslow.passage.overlay.following import WAY, Measured, Stay, way_done
+from fastslow.passage.overlay.slow_quantities import SlowQuantity
+from fastslow.passage.overlay.spikes import refined
+from fastslow.results.branch.diagram import Diagram
+from fastslow.results.overlay.transitions import OSCILLATING, StableSheet, Transition
+from fastslow.results.points import SpecialPoint
+from fastslow.results.trajectory.crossings import Crossing, regions_at
+from fastslow.results.trajectory.state_at import Moment
+
+Array = NDArray[np.float64]
+
+#: A sheet left at no more than this part of the slow range before its end was left because of it.
+BEFORE = 0.05
+
+#: A state goes away from a sheet that comes back between samples by less than this part of the
+#: radius.
+RETURN = 1e-3
+
+#: A turn between samples is bracketed 16 times closer so often before a parabola is put through it.
+CLOSER = 4
+
+#: Rounding of a number of size one.
+EPSILON = float(np.finfo(float).eps)
+
+#: Places between two times, and about where a condition is expected to begin to hold.
+EVEN = np.linspace(0.0, 1.0, 17)
+NEARBY = np.concatenate([-(10.0 ** -np.arange(1, 13)), [0.0], 10.0 ** -np.arange(1, 13)])
+PLACES = np.concatenate([EVEN, NEARBY])
+
+
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """All that transitions are read off.
+
+    Parameters
+    ----------
+    diagram : Diagram
+    slow : SlowQuantity
+    m : Measured
+    sheets : tuple of StableSheet
+    followed : ndarray of int, shape (N,)
+        The sheet of each sample of a stay (past its end still that sheet), −1 elsewhere.
+    drift : ndarray, shape (N,)
+        dw/dt.
+    """
+
+    diagram: Diagram
+    slow: SlowQuantity
+    m: Measured
+    sheets: tuple[StableSheet, ...]
+    followed: NDArray[np.intp]
+    drift: Array
+
+    def moment(self, time: float) -> Moment:
+        """The slow quantity and the state at a time."""
+        value, state = self.slow.at(np.array([time]))
+        run, name = self.slow.run, self.slow.name
+        return Moment(
+            float(time),
+            self.slow.states,
+            state[0].copy(),
+            {name: float(value[0])},
+            str(regions_at(run, np.array([time]))[0]),
+            run.parameters,
+            parameter=name,
+        )
+
+    @cached_property
+    def crossed(self) -> tuple[Array, NDArray[np.str_], NDArray[np.str_]]:
+        """Times of the run's crossings, and the regions that are left and entered."""
+        table, modes = self.slow.run.crossing_table, np.array(self.slow.run.modes, dtype=str)
+        return table[:, 0], modes[table[:, 3].astype(int)], modes[table[:, 4].astype(int)]
+
+    def first(self, start: float, stop: float, over: Callable[[Array, Array], Array]) -> float:
+        """First time of an interval, to rounding, from which on a condition holds.
+
+        Parameters
+        ----------
+        start, stop : float
+            Times; at the second the condition holds.
+        over : callable
+            (slow (N,), state (N, n)) -> (N,), not negative where it holds.
+        """
+        guess = 0.5 * (start + stop)
+        while stop - start > 4.0 * EPSILON * max(abs(start), abs(stop)):
+            times = (stop - start) * PLACES
+            times[: len(EVEN)] += start
+            times[len(EVEN) :] += guess
+            times = np.minimum(np.maximum(times, start), stop)
+            times.sort()
+            value = np.asarray(over(*self.slow.at(times)))
+            holds = (value >= 0.0) & (times > start) | (times >= stop)
+            k = int(np.argmax(holds))
+            if not times[k] - times[k - 1] < stop - start:
+                break
+            start, stop = float(times[k - 1]), float(times[k])
+            rows = slice(max(k - 2, 0), k + 2)
+            guess = zero_between(times[rows], value[rows], start, stop)
+        return stop
+
+    def left(self, stay: Stay, rival: int | None) -> Moment:
+        """Where a stay ends."""
+        time, course = self.m.time, self.m.courses[stay.course]
+        if stay.stop >= len(time):
+            return self.moment(float(time[-1]))
+        other = None if rival is None else self.m.courses[rival]
+
+        def away(slow: Array, state: Array) -> Array:
+            scaled = state / self.m.extent
+            far = -self.m.nearness(stay.course, slow, scaled)
+            there = None if other is None else other.present(slow)
+            if other is not None and there is not None and there.any():
+                old, new = (c.state(slow) / self.m.extent for c in (course, other))
+                way = way_done(scaled, old, new, self.m.periods)
+                far = np.where(there, np.maximum(far, way - WAY), far)
+            return far
+
+        return self.moment(self.first(float(time[stay.stop - 1]), float(time[stay.stop]), away))
+
+    def landed(self, stay: Stay, not_before: float) -> Moment:
+        """Where a stay begins."""
+        time, course = self.m.time, self.m.courses[stay.course]
+
+        def near(slow: Array, state: Array) -> Array:
+            beside = self.m.nearness(stay.course, slow, state / self.m.extent)
+            return np.where(course.present(slow), beside, -1.0)
+
+        since = max(float(time[max(stay.start - 1, 0)]), not_before)
+        if since >= time[stay.start]:
+            return self.moment(since)
+        if (stay, since) not in self._landings:
+            found = self.moment(self.first(since, float(time[stay.start]), near))
+            self._landings[stay, since] = found
+        return self._landings[stay, since]
+
+    @cached_property
+    def _landings(self) -> dict[tuple[Stay, float], Moment]:
+        return {}
+
+    def passing(self, point: SpecialPoint, until: float) -> float | None:
+        """When the slow quantity last passed a special point before the sample after a time."""
+        value, time = point[self.diagram.parameter], self.m.time
+        stop = int(np.searchsorted(time, until, side="right"))
+        passed = np.flatnonzero(np.diff(self.m.slow[:stop] > value))
+        if not len(passed):
+            return None
+        row = int(passed[-1])
+        if (value, row) not in self._passings:
+            way = 1.0 if self.m.slow[row] <= value else -1.0
+            self._passings[value, row] = self.first(
+                float(time[row]), float(time[row + 1]), lambda w, _: way * (w - value)
+            )
+        return self._passings[value, row]
+
+    @cached_property
+    def _passings(self) -> dict[tuple[float, int], float]:
+        return {}
+
+    def two_thirds(self, old: Stay, new: Stay) -> Moment | None:
+        """Where two thirds of the way from one course to another are done."""
+        # near sheets are come to before
+        rows = slice(old.stop, new.stop)
+        over = self.m.present[rows, new.course] & (self.m.way(old.course, new.course)[rows] > WAY)
+        if not over.any():
+            return None
+        row = old.stop + int(np.argmax(over))
+        one, other = self.m.courses[old.course], self.m.courses[new.course]
+
+        def done(slow: Array, state: Array) -> Array:
+            unit = self.m.extent
+            places = one.state(slow) / unit, other.state(slow) / unit
+            way = way_done(state / unit, *places, self.m.periods)
+            return np.where(other.present(slow), way - WAY, -1.0)
+
+        return self.moment(self.first(float(self.m.time[row - 1]), float(self.m.time[row]), done))
+
+    def outward(self, sheet: StableSheet, point: SpecialPoint) -> float:
+        """+1 where a special point is at the upper end of a sheet, −1 at the lower."""
+        branch = self.diagram.branches[sheet.branch]
+        ends = branch.parameter[[sheet.start, sheet.stop - 1]]
+        return 1.0 if point[self.diagram.parameter] >= ends.mean() else -1.0
+
+    def passed(self, sheet: StableSheet, rows: slice) -> SpecialPoint | None:
+        """The end of a sheet that the slow quantity goes past first in some samples."""
+        found: list[tuple[int, SpecialPoint]] = []
+        for point in ends_of(self.diagram, sheet):
+            past = self.m.slow[rows] - point[self.diagram.parameter]
+            beyond = self.outward(sheet, point) * past
+            if (beyond > 0).any():
+                found.append((int(np.argmax(beyond > 0)), point))
+        return min(found, key=lambda f: f[0])[1] if found else None
+
+    def extreme_past(self, sheet: StableSheet, point: SpecialPoint, until: float) -> Moment | None:
+        """Where the slow quantity turns round past the end of a sheet, if before a time."""
+        where, outward = point[self.diagram.parameter], self.outward(sheet, point)
+        stop = int(np.searchsorted(self.m.time, until, side="right"))
+        past = outward * (self.m.slow[:stop] - where)
+        within = np.flatnonzero(past <= 0.0)
+        # the last passage of the end, or one that is undone before landing
+        rows = np.arange(within[-1] + 1 if len(within) else 0, stop)
+        if not len(rows) and len(within):
+            gone = np.flatnonzero(past > 0.0)
+            if not len(gone):
+                return None
+            start = within[within < gone[-1]]
+            rows = np.arange(start[-1] + 1 if len(start) else 0, gone[-1] + 1)
+        if not len(rows):
+            return None
+        row = int(rows[np.argmax(past[rows])])
+        if row in (0, stop - 1):
+            return None
+        time = self._turn(row, outward)
+        return self.moment(time) if time < until else None
+
+    def _turn(self, row: int, outward: float) -> float:
+        """When the slow quantity is farthest out, near a sample at which it is among samples."""
+        times = self.m.time[[row - 1, row, row + 1]]
+        value = self.slow.at(times)[0]
+        for _ in range(CLOSER if self.slow.dense else 0):
+            times = np.linspace(times[0], times[-1], 33)
+            value = self.slow.at(times)[0]
+            best = int(np.clip(np.argmax(outward * value), 1, len(times) - 2))
+            times, value = times[best - 1 : best + 2], value[best - 1 : best + 2]
+        return float(refined(times, value, np.array([1]))[0])
+
+    def delay(self, sheet: StableSheet, point: SpecialPoint | None, value: float) -> float:
+        if point is None:
+            return float("nan")
+        delay = self.outward(sheet, point) * (value - point[self.diagram.parameter])
+        return delay if abs(delay) > 1e-13 * self.m.span else 0.0
+
+    def slope(self, point: SpecialPoint | None, until: float) -> float:
+        """|dw/dt| where the slow quantity last passed a special point before a time, or then."""
+        time = self.m.time
+        passed = None if point is None else self.passing(point, until)
+        until = until if passed is None else passed
+        step = 1e-5 * float(time[-1] - time[0])
+        pair = np.clip([until - step, until + step], time[0], time[-1])
+        first, second = self.slow.at(pair)[0]
+        return float(abs(second - first) / (pair[1] - pair[0])) if pair[1] > pair[0] else 0.0
+
+
+def zero_between(times: Array, values: Array, start: float, stop: float) -> float:
+    """Where values at up to four times vanish, between two of these, by inverse interpolation.
+
+    The middle where the values do not rise.
+
+    Examples
+    --------
+    >>> t = np.array([1.0, 1.1, 1.2, 1.3])
+    >>> round(zero_between(t, (t + 1) ** 3 - 10, 1.1, 1.2), 4)
+    1.1545
+    """
+    for used in (slice(None), (times >= start) & (times <= stop)):
+        t, v = times[used].tolist(), values[used].tolist()
+        if not all(b > a for a, b in pairwise(v)):
+            continue
+        # Neville's scheme for the time as a function of the value
+        for level in range(1, len(t)):
+            for k in range(len(t) - level):
+                a, b = v[k], v[k + level]
+                t[k] = (b * t[k] - a * t[k + 1]) / (b - a)
+        if start < t[0] < stop:
+            return float(t[0])
+    return 0.5 * (start + stop)
+
+
+def passages_within(p: Passage, stay: Stay) -> list[Transition]:
+    """Changes of sheet along one course: passages of boundary equilibria and unstable stretches."""
+    found = []
+    rows = np.arange(stay.start, stay.stop)
+    for row in rows[1:][np.diff(p.followed[rows]) != 0]:
+        left, entered = p.sheets[p.followed[row - 1]], p.sheets[p.followed[row]]
+        course = p.m.courses[stay.course]
+        last = stay.start + int(np.flatnonzero(p.m.present[stay.start : row, stay.course])[-1])
+        special = p.passed(left, slice(last, row + 1))
+        low, high = course.ranges[course.sheets.index(int(p.followed[row]))]
+
+        def entering(slow: Array, state: Array, low: float = low, high: float = high) -> Array:
+            return np.minimum(slow - low, high - slow)
+
+        here = p.moment(p.first(float(p.m.time[row - 1]), float(p.m.time[row]), entering))
+        kind, note = "crossing", ""
+        if special is not None and special.code == "BE":
+            crossing = _crossing(p, special, left, entered, here.time)
+            here = p.moment(crossing) if crossing is not None else here
+        elif special is not None and special.code == "HB":
+            kind, note = "Hopf", "stays near the branch all along its unstable stretch"
+        found.append(
+            Transition(
+                here.time, here.value, here.state, left.label, entered.label, special,
+                p.delay(left, special, here.value), kind, here, here,
+                p.slope(special, float(p.m.time[row])), note=note,
+            )
+        )  # fmt: skip
+    return found
+
+
+def steep_parts(p: Passage, stay: Stay) -> list[Transition]:
+    """Where a sheet goes on, but so steeply that its state at the same value is out of reach.
+
+    Such a part begins and ends where the distance at the same value of the slow quantity
+    passes the radius; one that reaches to the end of the stay belongs to the leaving.
+    """
+    course = p.m.courses[stay.course]
+    rows = slice(stay.start, stay.stop)
+    behind = (p.m.apart(stay.course)[rows] >= p.m.radius) & p.m.present[rows, stay.course]
+    edges = np.flatnonzero(np.diff(behind.astype(int)))
+    if behind[0]:
+        edges = edges[1:]
+    found = []
+    for start, stop in zip(edges[::2], edges[1::2], strict=False):
+        inside = slice(stay.start + int(start), stay.start + int(stop) + 2)
+        steepness = _steepness(p, course, stay, inside)
+        sheets = p.followed[inside]
+        time = p.m.time[inside]
+        worst = inside.start + int(np.argmax(p.m.apart(stay.course)[inside]))
+        lags = steepness >= 0.5 * p.m.radius and _behind(p, stay.course, worst)
+        if not lags or np.ptp(sheets):
+            continue
+        here = p.moment(float(p.m.time[worst]))
+        label = p.sheets[sheets[0]].label
+        found.append(
+            Transition(
+                here.time, here.value, here.state, label, label, None, float("nan"), "steep",
+                p.moment(float(time[0])), p.moment(float(time[-1])), p.slope(None, here.time),
+                steepness,
+            )
+        )  # fmt: skip
+    return found
+
+
+def _behind(p: Passage, number: int, row: int) -> bool:
+    """Whether the deviation of a sample points back along the course that drifts away."""
+    slope = p.m.courses[number].slope(p.m.slow[row : row + 1])[0] / p.m.extent
+    back = -slope * p.drift[row]
+    deviation = p.m.deviation(number, row)
+    sizes = np.linalg.norm(back) * np.linalg.norm(deviation)
+    return bool(back @ deviation > 0.7 * sizes)
+
+
+def _crossing(
+    p: Passage, point: SpecialPoint, left: StableSheet, entered: StableSheet, time: float
+) -> float | None:
+    """The time of the crossing of a boundary equilibrium's interface that is nearest to another."""
+    run, (times, outside, inside) = p.slow.run, p.crossed
+    through = run.crossing_table[:, 1].astype(int)
+    met = (outside == left.region) & (inside == entered.region)
+    met &= np.array(run.interfaces, dtype=str)[through] == point.interface
+    if not met.any():
+        return None
+    nearest = float(times[met][np.argmin(np.abs(times[met] - time))])
+    if not p.m.time[0] <= nearest <= p.m.time[-1]:
+        return None
+    # one that belongs to this passage lies before the slow quantity turns back
+    slow = p.m.slow[slice(*np.searchsorted(p.m.time, sorted((time, nearest))))]
+    turned = len(slow) > 2 and len(np.unique(np.sign(np.diff(slow)))) > 1
+    return None if turned else nearest
+
+
+def leaving(p: Passage, excursion: Excursion) -> Transition:
+    """The transition that begins with leaving a sheet."""
+    old, new = excursion.old, excursion.new
+    assert old is not None
+    course = p.m.courses[old.course]
+    rows = slice(old.start, old.stop)
+    last = old.start + int(np.flatnonzero(p.m.present[rows, old.course])[-1])
+    left = p.sheets[p.followed[old.stop - 1]]
+    leave = p.left(old, None if new is None else new.course)
+    stop = len(p.m.time) if new is None else new.start + 1
+    special = p.passed(left, slice(last, stop)) or _passed_before(p, left, old)
+    land = None if new is None else p.landed(new, leave.time)
+    entered = None if new is None else p.sheets[p.followed[new.start]]
+    here = leave
+    if new is not None and not excursion.cycle and new.course != old.course:
+        here = p.two_thirds(old, new) or leave
+        if land is not None and land.time < here.time:
+            land = here
+    to_sheet = OSCILLATING if excursion.cycle else "" if entered is None else entered.label
+    passed = special is not None
+    if special is None and to_sheet != left.label:
+        special = _just_before(p, left, leave.value)
+    steepness = _steepness(p, course, old, slice(max(old.stop - 2, 0), stop))
+    kind, note = _kind(p, excursion, left, entered, special, steepness)
+    if kind == "gap crossing":
+        leave, land = _across(p, left, entered, here.time) or (leave, land)
+    extreme = None
+    if kind == "jump" and special is not None and passed:
+        extreme = p.extreme_past(left, special, here.time if land is None else land.time)
+        # a load that turned before the jump did not turn because of it
+        if extreme is not None and not p.slow.responds and extreme.time < leave.time:
+            extreme = None
+        here = extreme or here
+    notes = [note]
+    if excursion.turns and not excursion.cycle:
+        count = len(excursion.turns)
+        notes.append(f"{count} oscillation{'s' if count > 1 else ''} on landing")
+    delay = p.delay(left, special, here.value)
+    if special is not None and delay < 0.0:
+        candidate = "" if passed else ", which is not passed: a candidate"
+        notes.insert(0, f"left {-delay:.3g} before {special.label}{candidate}")
+        delay = float("nan")
+    note = "; ".join(filter(None, notes))
+    return Transition(
+        here.time, here.value, here.state, left.label, to_sheet, special,
+        delay, kind, leave, None if excursion.cycle else land,
+        p.slope(special, here.time),
+        steepness, note, turned=extreme is not None,
+    )  # fmt: skip
+
+
+def _passed_before(p: Passage, left: StableSheet, stay: Stay) -> SpecialPoint | None:
+    """The end of a sheet that was passed during a stay, after which the state only went away.
+
+    The slow quantity has turned round and is back over the sheet where that is left.
+    """
+    rows = np.arange(stay.start, stay.stop)
+    past = np.zeros(len(rows), dtype=bool)
+    for point in ends_of(p.diagram, left):
+        beyond = p.outward(left, point) * (p.m.slow[rows] - point[p.diagram.parameter])
+        past |= beyond > 0.0
+    if not past.any():
+        return None
+    since = stay.start + int(np.flatnonzero(past)[-1])
+    away = np.diff(p.m.apart(stay.course)[since : stay.stop])
+    if (away < -RETURN * p.m.radius).any():
+        return None
+    return p.passed(left, slice(since, since + 1))
+
+
+def _just_before(p: Passage, left: StableSheet, value: float) -> SpecialPoint | None:
+    """The end of a sheet that was left a little before it."""
+    reach = BEFORE * float(np.ptp(p.m.slow))
+    near = [
+        point
+        for point in ends_of(p.diagram, left)
+        if abs(point[p.diagram.parameter] - value) <= reach
+    ]
+    return min(near, key=lambda e: abs(e[p.diagram.parameter] - value), default=None)
+
+
+def _steepness(p: Passage, course: Course, stay: Stay, rows: slice) -> float:
+    """Largest predicted lag behind a course where it is stable, in units of the extent."""
+    slow = p.m.slow[rows]
+    # the lag solves J y = dX/dw dw/dt: before a Hopf point Re λ vanishes, and λ does not
+    rate = course.stiffness(slow)
+    usable = p.m.present[rows, stay.course] & (rate > 0)
+    if not usable.any():
+        return float("nan")
+    slope = np.linalg.norm(course.slope(slow[usable]) / p.m.extent, axis=1)
+    lag = slope * np.abs(p.drift[rows][usable]) / rate[usable]
+    lag = lag[np.isfinite(lag)]
+    return float(lag.max()) if len(lag) else float("nan")
+
+
+def _kind(
+    p: Passage,
+    excursion: Excursion,
+    left: StableSheet,
+    entered: StableSheet | None,
+    special: SpecialPoint | None,
+    steepness: float,
+) -> tuple[str, str]:
+    """Kind of a leaving, and what else is to be said."""
+    back = entered is not None and entered.label == left.label and not excursion.cycle
+    if special is not None:
+        if special.code == "LP" or special.subtype == "non-smooth fold":
+            return "jump", ""
+        if special.code in ("HB", "BP"):
+            return ("Hopf" if special.code == "HB" else "branch point"), ""
+        if special.code == "BE" and back:
+            return "excursion", "past the end of the sheet and back"
+        if special.code == "BE" and entered is not None:
+            if over_a_gap(p.diagram, left, entered):
+                return "gap crossing", ""
+            if entered.region in special.regions:
+                return "crossing", ""
+        return "unclassified", ""
+    touch = _touch(p, excursion)
+    if touch is not None:
+        return "grazing", f"touches {touch.interface} at t = {touch.time:.6g}"
+    if back:
+        return ("steep" if steepness >= 0.5 * p.m.radius else "excursion"), ""
+    if _lost(p, excursion):
+        return "rate-induced", _still_stable(p, excursion)
+    return "loss of tracking", ""
+
+
+def _lost(p: Passage, excursion: Excursion) -> bool:
+    """Whether a stable sheet was lost because it drifted away too fast.
+
+    It exists and is stable all the time, the state falls behind it and not ahead, and comes to
+    another sheet or grows without bound.
+    """
+    old, (_, stop) = excursion.old, excursion.rows(p.m)
+    assert old is not None
+    if excursion.cycle or (excursion.new is None and p.slow.run.outcome):
+        return False
+    rows = slice(old.stop - 1, min(stop + 1, len(p.m.time)))
+    return bool(p.m.present[rows, old.course].all()) and _behind(p, old.course, old.stop - 1)
+
+
+def _still_stable(p: Passage, excursion: Excursion) -> str:
+    start, stop = excursion.rows(p.m)
+    rows = slice(max(start - 1, 0), min(stop + 1, len(p.m.time)))
+    low, high = float(p.m.slow[rows].min()), float(p.m.slow[rows].max())
+    return (
+        f"the equilibrium stays stable from {p.diagram.parameter} = {low:.6g} to {high:.6g}, and "
+        "the state falls behind it"
+    )
+
+
+def _touch(p: Passage, excursion: Excursion) -> Crossing | None:
+    """The first touch of an interface around a leaving: from one fast oscillation before it on."""
+    start, stop = excursion.rows(p.m)
+    since = p.m.time[max(start - (stop - start), 0)]
+    until = p.m.time[min(stop, len(p.m.time) - 1)]
+    times, tangential = p.crossed[0], p.slow.run.crossing_table[:, 5] != 0.0
+    found = np.flatnonzero((since <= times) & (times <= until) & tangential)
+    return p.slow.run.crossings[int(found[0])] if len(found) else None
+
+
+def _across(
+    p: Passage, left: StableSheet, entered: StableSheet | None, time: float
+) -> tuple[Moment, Moment] | None:
+    """Where a trajectory leaves the one side of a gap and reaches the other."""
+    if entered is None:
+        return None
+    times, outside, inside = p.crossed
+    out = times[(outside == left.region) & (times <= time)]
+    if not len(out):
+        return None
+    reach = times[(inside == entered.region) & (times > out[-1])]
+    return (p.moment(float(out[-1])), p.moment(float(reach[0]))) if len(reach) else None

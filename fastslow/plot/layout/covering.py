@@ -1,0 +1,202 @@
+"""Where the curves and markers of axes are, in pixels, so that nothing is written over them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
+
+from fastslow.plot.layout.style import root
+
+Points = NDArray[np.float64]
+
+#: A step of the layout, which measures texts with the renderer given.
+Step = Callable[[RendererBase], None]
+
+#: Distance of the points that stand for a curve, in points (1/72 inch).
+STEP = 1.5
+
+#: What it costs to cover a point of a marker, in points of curves.
+MARKER = 10.0
+
+#: Group of artists that may be written over.
+FAINT = "fastslow faint"
+
+
+class Settler(Artist):
+    """Runs a step of the layout as soon as axes are drawn in another way than before.
+
+    Invisible; whatever is to be placed by where other things are (labels, legends, the
+    names of regions) is so placed anew when limits, size or resolution have changed.
+    """
+
+    def __init__(self, step: Step) -> None:
+        super().__init__()
+        self.step = step
+        self.seen: tuple[Any, ...] = ()
+        self.set_in_layout(False)
+        self.set_zorder(-1e9)
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Run the step, unless nothing has changed since the last time."""
+        ax: Any = self.axes
+        frame = ax.get_window_extent().bounds
+        limits = [ax.get_xlim(), ax.get_ylim(), ax.get_xscale(), ax.get_yscale()]
+        if ax.name == "3d":
+            limits += [ax.get_zlim(), ax.elev, ax.azim, ax.roll]
+        now = (*frame, *limits, root(ax).dpi, len(ax.lines), len(ax.collections))
+        if now != self.seen:
+            self.seen = now
+            self.step(renderer)
+
+
+def at_draw(ax: Axes, step: Step) -> None:
+    """Run a step of the layout whenever the axes are drawn in another way than before.
+
+    The step receives the renderer: a text measures itself with the one that drew it last,
+    whose resolution may be another.
+    """
+    ax.add_artist(Settler(step))
+
+
+def settle(ax: Axes) -> None:
+    """Give the axes of a figure, and what stands in them, their places.
+
+    Axes that were given are left to be settled when their figure is drawn.
+    """
+    root(ax).draw_without_rendering()
+
+
+def projected(ax: Any, places: Points) -> Points:
+    """Points in space, shape (N, 3), in the plane of the data that is drawn, shape (N, 2)."""
+    onto = np.column_stack([places, np.ones(len(places))]) @ ax.get_proj().T
+    return np.asarray(onto[:, :2] / onto[:, 3:])
+
+
+def pixels_of(ax: Axes, places: Points) -> Points:
+    """Points of the plane, shape (N, 2), or in space, shape (N, 3), in pixels."""
+    flat = projected(ax, places) if places.shape[1] == 3 else places
+    return np.asarray(ax.transData.transform(flat))
+
+
+def covered(ax: Axes) -> Points:
+    """Points in pixels along all curves and around all markers of the axes, and their weights.
+
+    Returns
+    -------
+    ndarray, shape (N, 3)
+        x, y, and what it costs to cover the point: 1 on a curve, more on a marker.
+    """
+    frame, scale = ax.get_window_extent(), root(ax).dpi / 72.0
+    step = STEP * scale
+    parts = [np.empty((0, 3))]
+    for pixels, drawn, radius in _shapes(ax, scale):
+        if drawn:
+            parts.append(_weighed(_dense(pixels, frame, step), 1.0))
+        if radius:
+            near = np.isfinite(pixels).all(axis=1)
+            parts.append(_weighed(_rounded(pixels[near], radius), MARKER))
+    ink = np.vstack(parts)
+    # of several points in one little square the heaviest counts
+    ink = ink[np.argsort(-ink[:, 2], kind="stable")]
+    cells = np.floor((ink[:, :2] - (frame.x0, frame.y0)) / step)
+    inside = (np.abs(cells) < 100_000).all(axis=1)
+    _, first = np.unique(cells[inside] @ np.array([1.0, 1e6]), return_index=True)
+    return np.asarray(ink[inside][first])
+
+
+def _weighed(points: Points, weight: float) -> Points:
+    return np.column_stack([points, np.full(len(points), weight)])
+
+
+def _shapes(ax: Axes, scale: float) -> Iterator[tuple[Points, bool, float]]:
+    """Curves in pixels, whether a line joins their points, and the radius of the markers."""
+    for line in ax.lines:
+        if not line.get_visible() or line.get_gid() == FAINT:
+            continue
+        joined = line.get_linestyle() not in ("None", "", " ")
+        marked = line.get_marker() not in ("None", "", " ", None)
+        yield _of_line(ax, line), joined, marked * 0.5 * line.get_markersize() * scale
+    for collection in ax.collections:
+        if isinstance(collection, LineCollection):
+            for path in collection.get_paths():
+                yield ax.transData.transform(path.vertices), True, 0.0
+
+
+def _of_line(ax: Axes, line: Line2D) -> Points:
+    if hasattr(line, "get_data_3d"):
+        places = np.column_stack([np.asarray(d, dtype=float) for d in line.get_data_3d()])
+        return pixels_of(ax, places)
+    places = np.asarray(line.get_xydata(), dtype=float)
+    with np.errstate(all="ignore"):  # what a logarithmic axis cannot show
+        return np.asarray(line.get_transform().transform(places))
+
+
+def _dense(pixels: Points, frame: Bbox, step: float) -> Points:
+    """Points along a curve as far as it is within the frame."""
+    start, run = pixels[:-1], np.diff(pixels, axis=0)
+    good = np.isfinite(start).all(axis=1) & np.isfinite(run).all(axis=1)
+    start, run = start[good], run[good]
+    enter, leave = np.zeros(len(start)), np.ones(len(start))
+    for axis, (low, high) in enumerate((frame.intervalx, frame.intervaly)):
+        with np.errstate(all="ignore"):
+            one, other = ((edge - start[:, axis]) / run[:, axis] for edge in (low, high))
+        still = run[:, axis] == 0.0
+        within = (start[:, axis] >= low) & (start[:, axis] <= high)
+        first = np.where(still, np.where(within, -np.inf, np.inf), np.minimum(one, other))
+        last = np.where(still, np.inf, np.maximum(one, other))
+        enter, leave = np.maximum(enter, first), np.minimum(leave, last)
+    kept = enter <= leave
+    start, run, enter, leave = start[kept], run[kept], enter[kept], leave[kept]
+    counts = np.ceil((leave - enter) * np.hypot(*run.T) / step).astype(np.int64) + 1
+    rows = np.repeat(np.arange(len(start)), counts)
+    place = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
+    part = enter[rows] + (leave - enter)[rows] * place / np.maximum(counts[rows] - 1, 1)
+    return np.asarray(start[rows] + part[:, None] * run[rows])
+
+
+def _rounded(pixels: Points, radius: float) -> Points:
+    """Markers as their centres and eight points around each."""
+    turns = np.linspace(0, 2 * np.pi, 8, endpoint=False)
+    around = radius * np.column_stack([np.cos(turns), np.sin(turns)])
+    return (pixels[:, None] + np.vstack([[0.0, 0.0], around])).reshape(-1, 2)
+
+
+def overlaid(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Points:
+    """How much would be covered by boxes, shape (K, 4) as x0, y0, x1, y1.
+
+    Parameters
+    ----------
+    boxes : ndarray, shape (K, 4)
+    ink : ndarray, shape (N, 3)
+        Points with their weights, from `covered`.
+    taken : ndarray, shape (M, 4)
+        Other boxes: a thousand each.
+    frame : Bbox
+        To stand out of it costs ten thousand.
+
+    Returns
+    -------
+    ndarray, shape (K,)
+    """
+    left, low, right, high = (edge[:, None] for edge in boxes.T)
+    x, y, weight = ink.T
+    over = ((x > left) & (x < right) & (y > low) & (y < high)) @ weight
+    x0, y0, x1, y1 = taken.T
+    met = ((x0 < right) & (x1 > left) & (y0 < high) & (y1 > low)).sum(axis=1)
+    inside = (boxes[:, 0] > frame.x0) & (boxes[:, 2] < frame.x1)
+    inside &= (boxes[:, 1] > frame.y0) & (boxes[:, 3] < frame.y1)
+    return np.asarray(over + 1e3 * met + 1e4 * ~inside, dtype=float)
+
+
+def box_of(artist: Artist, renderer: RendererBase, pad: float = 1.0) -> Points:
+    """Extent of an artist in pixels with some air, shape (4,)."""
+    return np.asarray(artist.get_window_extent(renderer).padded(pad).extents)

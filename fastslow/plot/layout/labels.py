@@ -1,0 +1,198 @@
+"""Small texts beside points, put where they cover nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
+from matplotlib.lines import Line2D
+from matplotlib.text import Annotation, Text
+from matplotlib.transforms import Bbox, IdentityTransform
+
+from fastslow.plot.layout.bands import Bands, fit_bands
+from fastslow.plot.layout.covering import (
+    FAINT,
+    Points,
+    at_draw,
+    box_of,
+    covered,
+    overlaid,
+    projected,
+)
+from fastslow.plot.layout.style import BLACK, GREY, SMALL, root
+
+#: Directions of a label from its point, the better ones first, and its distances in points.
+TURNS = np.deg2rad([45, 135, -45, -135, 90, -90, 0, 180, 22, 158, -22, -158])
+REACH = (7.0, 10.0, 14.0, 19.0, 25.0, 33.0, 43.0, 55.0)
+
+#: Labels further away than this are joined to their points by a thin line.
+FAR = 20.0
+
+#: What a text keeps from the edges of the axes, in points.
+AIR = 1.5
+
+#: Where the name of a region may stand: across its band, and along it in parts of the axes.
+DEPTHS = (0.5, 0.25, 0.75)
+SIDES = (0.95, 0.05, 0.9, 0.1, 0.8, 0.2, 0.65, 0.35, 0.5)
+
+#: From here on a place is no place: over another text, or out of the axes.
+TAKEN = 1e3
+
+
+def tag(ax: Axes, text: str, at: Sequence[float]) -> Annotation:
+    """A label for a point of the plane or in space, to be placed by `place`."""
+    label = ax.annotate(
+        text,
+        (float(at[0]), float(at[1])),
+        xytext=(6, 6),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        fontsize=SMALL,
+        color=BLACK,
+        zorder=6,
+    )
+    # it stays within the axes, whose size must not depend on it
+    label.set_in_layout(False)
+    if len(at) == 3:
+        label._point_in_space = np.array(at, dtype=float)  # type: ignore[attr-defined]
+    return label
+
+
+def place(
+    ax: Axes,
+    tags: Sequence[Annotation] = (),
+    taken: Sequence[Artist] = (),
+    bands: Sequence[Bands] = (),
+) -> None:
+    """Keep labels off the curves, off each other, in the axes, and near to their own points.
+
+    They are placed when the axes are drawn, and anew after their limits or their size
+    have changed. A label without any room is left out until there is some.
+
+    Parameters
+    ----------
+    ax : Axes
+    tags : sequence of Annotation
+        From `tag`.
+    taken : sequence of Artist
+        What else must not be covered, e.g. a legend of the figure.
+    bands : sequence of Bands
+        Whose names are moved too, along and within their regions.
+    """
+    if not tags and not any(drawn.fills or drawn.lines for drawn in bands):
+        return
+    leaders = Line2D(
+        [], [], color=GREY, linewidth=0.5, zorder=1.8, transform=IdentityTransform(), gid=FAINT
+    )
+    leaders.set_in_layout(False)
+    if tags:
+        ax.add_artist(leaders)
+    at_draw(ax, lambda renderer: _place(ax, tags, taken, bands, leaders, renderer))
+
+
+def _place(
+    ax: Axes,
+    tags: Sequence[Annotation],
+    taken: Sequence[Artist],
+    bands: Sequence[Bands],
+    leaders: Line2D,
+    renderer: RendererBase,
+) -> None:
+    for drawn in bands:
+        fit_bands(ax, drawn)
+    ink, scale = covered(ax), root(ax).dpi / 72.0
+    whole = ax.get_window_extent()
+    frame = whole.padded(-AIR * scale)
+    own = [*tags, *(name for drawn in bands for name in drawn.names)]
+    boxes = _others(ax, own, taken, renderer)
+    anchors = _anchors(ax, tags)
+    reach = np.repeat(REACH, len(TURNS))
+    turns = np.tile(TURNS, len(REACH))
+    # an ellipse, since a label is wider than high
+    offsets = np.column_stack([1.3 * reach * np.cos(turns), reach * np.sin(turns)])
+    joined: list[Points] = []
+    for label, anchor in zip(tags, anchors, strict=True):
+        shown = bool(whole.padded(1.0).contains(*anchor))
+        label.set_visible(shown)
+        if not shown:
+            continue
+        label.set_position((0.0, 0.0))
+        centred = box_of(label, renderer)
+        places = centred + np.tile(scale * offsets, 2)
+        cost = overlaid(places, ink, boxes, frame) + 0.5 * reach
+        middles = 0.5 * (places[:, :2] + places[:, 2:])
+        gaps = np.hypot(*np.moveaxis(anchors - middles[:, None], 2, 0))
+        away = np.hypot(*(anchor - middles).T)
+        nearer = (gaps < 0.999 * away[:, None]).sum(axis=1)
+        cost += np.where(reach > FAR, 6.0, 20.0 * nearer)
+        best = int(np.argmin(cost))
+        label.set_position((float(offsets[best, 0]), float(offsets[best, 1])))
+        if cost[best] >= TAKEN:
+            label.set_visible(False)
+            continue
+        boxes = np.vstack([boxes, places[best]])
+        if reach[best] > FAR:
+            joined += [anchor, _nearest_in(places[best], anchor), np.full(2, np.nan)]
+    leaders.set_data(*(np.array(joined).T if joined else ([], [])))
+    for drawn in bands:
+        for name, span in zip(drawn.names, drawn.spans, strict=True):
+            if name.get_visible():
+                boxes = _move(ax, name, span, drawn.vertical, frame, ink, boxes, renderer)
+
+
+def _nearest_in(box: Points, point: Points) -> Points:
+    return np.clip(point, box[:2], box[2:])
+
+
+def _others(
+    ax: Axes, own: Sequence[Artist], taken: Sequence[Artist], renderer: RendererBase
+) -> Points:
+    """Boxes of the texts and legends already there, shape (M, 4)."""
+    texts = [t for t in ax.texts if t.get_visible() and t.get_text() and t not in own]
+    legend: Any = ax.get_legend()
+    met = dict.fromkeys([*texts, *([legend] if legend is not None else []), *taken])
+    return np.array([box_of(artist, renderer) for artist in met]).reshape(-1, 4)
+
+
+def _anchors(ax: Axes, tags: Sequence[Annotation]) -> Points:
+    """The points of labels in pixels; those in space are put where they are seen."""
+    for label in tags:
+        spot = getattr(label, "_point_in_space", None)
+        if spot is not None:
+            ((x, y),) = projected(ax, spot[None])
+            label.xy = (float(x), float(y))
+    return np.asarray(ax.transData.transform(np.reshape([label.xy for label in tags], (-1, 2))))
+
+
+def _move(
+    ax: Axes,
+    name: Text,
+    span: tuple[float, float],
+    vertical: bool,
+    frame: Bbox,
+    ink: Points,
+    boxes: Points,
+    renderer: RendererBase,
+) -> Points:
+    """Move the name of a region to a free place in its band, at an edge of the axes if it can."""
+    low, high = sorted(ax.get_xlim() if vertical else ax.get_ylim())
+    start, stop = max(span[0], low), min(span[1], high)
+    axis = (ax.xaxis if vertical else ax.yaxis).get_transform()
+    ends = axis.transform([start, stop])
+    air = AIR * root(ax).dpi / 72.0 * np.array([-1.0, -1.0, 1.0, 1.0])
+    inside = axis.inverted().transform(ends[0] + np.array(DEPTHS) * (ends[1] - ends[0]))
+    across, along = np.repeat(inside, len(SIDES)), np.tile(SIDES, len(DEPTHS))
+    spots = np.column_stack([across, along] if vertical else [along, across])
+    seat = name.get_transform()
+    around = box_of(name, renderer) - np.tile(seat.transform(name.get_position()), 2)
+    places = around + np.tile(seat.transform(spots), 2)
+    costs = overlaid(places + air, ink, boxes, frame)
+    best = int(np.argmin(costs))
+    name.set_position((float(spots[best, 0]), float(spots[best, 1])))
+    name.set_visible(bool(costs[best] < TAKEN))
+    return np.vstack([boxes, places[best]]) if costs[best] < TAKEN else boxes

@@ -1,0 +1,165 @@
+"""Legends, put where they cover nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, get_args
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.legend import Legend
+from matplotlib.transforms import ScaledTranslation
+
+from fastslow.plot.layout.covering import Points, at_draw, covered, overlaid, settle
+from fastslow.plot.layout.style import SMALL, root
+
+Corner = Literal[
+    "upper left", "lower right", "upper right", "lower left", "center left", "center right"
+]
+CORNERS: tuple[Corner, ...] = get_args(Corner)
+
+#: Part of the axes that a legend may take at their top where the curves leave no room for it.
+MOST = 0.5
+
+LOOK: dict[str, Any] = {"fontsize": SMALL, "handlelength": 2.2, "columnspacing": 1.0}
+
+
+def explained(
+    ax: Axes,
+    handles: Sequence[Artist],
+    own: bool,
+    label: bool,
+    legend: bool | None,
+    top: float = 1.0,
+) -> Legend | None:
+    """A legend if one is wanted: below the axes of our own figure, inside axes that were given.
+
+    Parameters
+    ----------
+    ax : Axes
+    handles : sequence of Artist
+    own : bool
+        Whether the figure is our own.
+    label, legend : bool, bool or None
+        As given to the plot function: without a word about the legend labels decide.
+    top : float
+        Up to where a legend inside the axes may stand, in parts of their height.
+    """
+    if not handles or not (label if legend is None else legend):
+        return None
+    return legend_below(ax, handles) if own else legend_inside(ax, handles, top)
+
+
+def legend_below(ax: Axes, handles: Sequence[Artist]) -> Legend:
+    """A legend for the whole figure, below its axes, in as many columns as have room."""
+    figure = root(ax)
+
+    def draw(columns: int) -> Legend:
+        look: dict[str, Any] = {"loc": "outside lower center", "frameon": False, **LOOK}
+        return figure.legend(handles=list(handles), ncols=columns, **look)
+
+    return _fitting(draw, len(handles), 0.98 * figure.bbox.width)
+
+
+def _fitting(draw: Callable[[int], Legend], count: int, width: float) -> Legend:
+    """A legend in as many columns as fit into a width in pixels."""
+    columns = min(count, 6)
+    while True:
+        legend = draw(columns)
+        if columns == 1 or legend.get_window_extent().width <= width:
+            return legend
+        legend.remove()
+        # as many rows, or one more, in columns that are filled
+        rows = -(-count // columns)
+        fewer = -(-count // rows)
+        columns = fewer if fewer < columns else columns - 1
+
+
+def legend_inside(ax: Axes, handles: Sequence[Artist], top: float = 1.0) -> Legend | None:
+    """A legend inside the axes where it covers nothing; if need be room is made above the curves.
+
+    Limits that were set by hand are kept. Where there is no room at all the legend stands
+    below the axes if the figure has a layout that makes room there; otherwise it is left out.
+    """
+    settle(ax)
+    frame = ax.get_window_extent()
+    found: list[tuple[float, int, float]] = []
+    for columns in (1, 2, 3):
+        legend = _inside(ax, handles, columns, top)
+        box = legend.get_window_extent()
+        if columns <= len(handles) and box.width <= 0.96 * frame.width:
+            found.append((float(_costs(ax, legend, top).min()), columns, box.height))
+        legend.remove()
+    free = [one for one in found if one[0] == 0.0]
+    flat = min(found, key=lambda one: one[2], default=None)
+    if free:
+        columns = free[0][1]
+    elif ax.name != "3d" and flat is not None and _made_room(ax, flat[2], top):
+        columns = flat[1]
+    elif root(ax).get_layout_engine() is not None:
+        return _outside(ax, handles)
+    else:
+        return None
+    legend = _inside(ax, handles, columns, top)
+    _choose(ax, legend, top)
+    at_draw(ax, lambda _: _choose(ax, legend, top))
+    return legend
+
+
+def _inside(ax: Axes, handles: Sequence[Artist], columns: int, top: float) -> Legend:
+    look: dict[str, Any] = {"framealpha": 0.85, "loc": CORNERS[0], **LOOK}
+    look |= {"bbox_to_anchor": (0.0, 0.0, 1.0, top), "borderaxespad": 0.5}
+    return ax.legend(handles=list(handles), ncols=columns, **look)
+
+
+def _outside(ax: Axes, handles: Sequence[Artist]) -> Legend:
+    """A legend below the axes, their ticks and their name."""
+    figure = root(ax)
+    frame, all_of_it = ax.get_window_extent(), ax.get_tightbbox()
+    depth = 0.0 if all_of_it is None else (frame.y0 - all_of_it.y0) / figure.dpi
+    below = ax.transAxes + ScaledTranslation(0.0, -depth, figure.dpi_scale_trans)
+    look: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "frameon": False}
+
+    def draw(columns: int) -> Legend:
+        more = {"bbox_transform": below, "ncols": columns, **LOOK}
+        return ax.legend(handles=list(handles), **look, **more)
+
+    return _fitting(draw, len(handles), 1.1 * frame.width)
+
+
+def _pad(ax: Axes) -> float:
+    """Distance of a legend from the edges of the axes, in pixels."""
+    return 0.5 * SMALL * root(ax).dpi / 72.0
+
+
+def _costs(ax: Axes, legend: Legend, top: float) -> Points:
+    """How much the legend would cover at each corner and side, shape (corners,)."""
+    frame, box, pad = ax.get_window_extent(), legend.get_window_extent(), _pad(ax)
+    highest = frame.y0 + top * frame.height
+    places = []
+    for corner in CORNERS:
+        upright, side = corner.split()
+        x0 = frame.x0 + pad if side == "left" else frame.x1 - pad - box.width
+        middle = (frame.y0 + highest - box.height) / 2.0
+        y0 = {"upper": highest - pad - box.height, "lower": frame.y0 + pad}.get(upright, middle)
+        places.append([x0, y0, x0 + box.width, y0 + box.height])
+    return overlaid(np.array(places), covered(ax), np.empty((0, 4)), frame.padded(1.0))
+
+
+def _choose(ax: Axes, legend: Legend, top: float) -> None:
+    """Move a legend to the best corner, unless it was removed or replaced."""
+    if ax.get_legend() is legend:
+        legend.set_loc(CORNERS[int(np.argmin(_costs(ax, legend, top)))])
+
+
+def _made_room(ax: Axes, height: float, top: float) -> bool:
+    """Raise the upper limit by the height of a legend, if that may be and is not too much."""
+    part = (height + 2.0 * _pad(ax)) / ax.get_window_extent().height
+    if part > MOST * top or not ax.get_autoscaley_on():
+        return False
+    scale = ax.yaxis.get_transform()
+    low, high = scale.transform(ax.get_ylim())
+    rise = (high - low) * top / (top - part)
+    ax.set_ylim(ax.get_ylim()[0], float(scale.inverted().transform([low + rise])[0]), auto=None)
+    return True

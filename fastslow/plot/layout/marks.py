@@ -1,0 +1,84 @@
+"""Marks along a trajectory: crossings of interfaces, transitions, turning points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.lines import Line2D
+
+from fastslow.plot.layout.style import MOTION, TRANSITIONS, VERMILION
+from fastslow.plot.layout.typesetting import typeset
+from fastslow.plot.quantities import Array, Quantity, at_times
+from fastslow.results.overlay.overlay import Overlay
+
+
+def draw_dots(ax: Any, places: Sequence[Array]) -> Line2D | None:
+    """Mark crossings of interfaces by small dots."""
+    if not len(places[0]):
+        return None
+    (dots,) = ax.plot(
+        *places,
+        linestyle="none",
+        marker="o",
+        markersize=2.4,
+        markerfacecolor="white",
+        markeredgecolor=VERMILION,
+        markeredgewidth=0.6,
+        zorder=4,
+        label="interface crossing",
+    )
+    return dots
+
+
+def draw_crossings(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> Line2D | None:
+    """Mark the crossings of interfaces by the trajectory of an overlay."""
+    met = lay.run.crossings
+    times, state = np.array([c.time for c in met]), np.array([c.state for c in met])
+    return draw_dots(ax, at_times(lay, times, lay.run.states, state, *shown)) if met else None
+
+
+def at_moments(lay: Overlay, shown: Sequence[Quantity], moments: Any) -> list[Array]:
+    """Quantities at moments, which know their fast states and the slow quantity."""
+    state = np.array([[*m.state, m.value] for m in moments])
+    names = (*lay.diagram.states, lay.parameter)
+    return at_times(lay, np.array([m.time for m in moments]), names, state, *shown)
+
+
+def draw_transitions(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> tuple[Line2D, ...]:
+    """Mark the transitions, every kind by a marker of its own."""
+    drawn: list[Line2D] = []
+    for kind, (marker, colour, text) in TRANSITIONS.items():
+        met = [t for t in lay.transitions if t.kind == kind]
+        if met:
+            filled = marker in "*PX"
+            drawn += ax.plot(
+                *at_moments(lay, shown, met),
+                linestyle="none",
+                marker=marker,
+                markersize=7.0 if marker == "*" else 5.5,
+                markerfacecolor=colour if filled else "none",
+                markeredgecolor="black" if filled else colour,
+                markeredgewidth=0.4 if filled else 1.2,
+                zorder=5.5,
+                label=text,
+            )
+    return tuple(drawn)
+
+
+def draw_turning(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> Line2D | None:
+    """Bars where the slow quantity turns back."""
+    if not lay.turning:
+        return None
+    (line,) = ax.plot(
+        *at_moments(lay, shown, lay.turning),
+        linestyle="none",
+        marker="|",
+        markersize=9.0,
+        markeredgewidth=1.4,
+        color=MOTION,
+        zorder=4.6,
+        label=f"{typeset(lay.parameter)} turns back",
+    )
+    return line

@@ -1,0 +1,328 @@
+"""Colours, line styles and markers of all figures, and the axes they are drawn into."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.backend_bases import get_registered_canvas_class
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from fastslow.arguments import word
+from fastslow.disk import write_file
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.plot.layout.typesetting import plain
+from fastslow.results.point_types import POINT_TYPES
+
+# M. Okabe and K. Ito, Color Universal Design, 2008
+BLACK, ORANGE, GREEN = "#000000", "#E69F00", "#009E73"
+BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
+GREY, DARK = "#8A8A8A", "#5A5A5A"
+
+BRANCH, MOTION = BLACK, BLUE
+
+#: Line style and width of a branch by stability; virtual branches are faint and dotted.
+LINES: dict[str, dict[str, Any]] = {
+    "stable": {"linestyle": "-", "linewidth": 1.5},
+    "unstable": {"linestyle": (0, (3.5, 1.8)), "linewidth": 1.2},
+    "neutral": {"linestyle": (0, (5, 1.5, 1, 1.5)), "linewidth": 0.9},
+    "virtual": {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.45},
+}
+
+#: The palette by the names used in `fastslow.results.point_types`.
+COLOURS = {
+    "black": BLACK,
+    "orange": ORANGE,
+    "green": GREEN,
+    "blue": BLUE,
+    "vermilion": VERMILION,
+    "purple": PURPLE,
+    "grey": GREY,
+}
+
+#: Markers that are strokes, without a face.
+STROKES = "x|"
+
+#: Line of the virtual parts of a curve of special points.
+VIRTUAL_CURVE: dict[str, Any] = {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.6}
+
+#: Line of a curve of Hopf points by their criticality.
+HOPF_CURVES: dict[str, dict[str, Any]] = {
+    "supercritical": {"linestyle": "-"},
+    "subcritical": {"linestyle": (0, (3, 1.5))},
+}
+
+#: Marker, colour and legend text of a transition by kind.
+TRANSITIONS: dict[str, tuple[str, str, str]] = {
+    "jump": ("*", VERMILION, "jump at a fold"),
+    "Hopf": ("P", GREEN, "leaves past Hopf"),
+    "branch point": ("^", GREEN, "leaves past BP"),
+    "crossing": ("D", ORANGE, "passage of BE"),
+    "gap crossing": (">", PURPLE, "gap crossing"),
+    "steep": ("X", BLACK, "steep slope"),
+    "rate-induced": ("o", VERMILION, "rate-induced tipping"),
+    "grazing": ("h", ORANGE, "grazing"),
+    "end of oscillation": ("v", VERMILION, "end of oscillation"),
+    "excursion": ("p", GREY, "excursion"),
+    "loss of tracking": ("s", GREY, "loss of tracking"),
+    "unclassified": ("d", GREY, "unclassified transition"),
+}
+
+#: Look of a phase of the motion by kind.
+PHASES: dict[str, dict[str, Any]] = {
+    "quasi-static": {"facecolor": "#C2DBEB"},
+    "oscillating": {"facecolor": "#EBBC72"},
+    "jump": {"facecolor": VERMILION},
+    "gap crossing": {"facecolor": PURPLE},
+    "excursion": {"facecolor": ORANGE},
+    "transient": {"facecolor": "#EBEBEB"},
+    "sticking": {"facecolor": "#727272"},
+    "outside": {"facecolor": "white", "hatch": "/////", "edgecolor": GREY},
+}
+
+#: Phases whose name is drawn in white.
+WHITE_WORDS = ("sticking",)
+
+#: Light fills of the regions, in turn.
+BANDS = ("#D6E7F4", "#FFFFFF", "#FEF0D8")
+
+#: Dots per inch of a figure on a screen.
+SHOWN = 150
+
+MM = 1 / 25.4
+COLUMN, FULL = 85 * MM, 170 * MM
+TEXT, SMALL = 8.0, 7.0
+
+#: Widths of figures by name, in millimetres.
+WIDTHS = {"column": 85.0, "page": 170.0}
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of a size in inches, outside pyplot."""
+    figure = Figure(figsize=(width, height), dpi=SHOWN, layout="constrained")
+    # keeps one renderer, which measures a text once, where a bare figure makes one for each
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def dressed(ax: Axes) -> Axes:
+    """Axes of our own figures: small text, thin frame."""
+    ax.tick_params(labelsize=SMALL, width=0.6, length=2.5)
+    ax.xaxis.label.set_fontsize(TEXT)
+    ax.yaxis.label.set_fontsize(TEXT)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.get_offset_text().set_fontsize(SMALL)
+    for spine in ax.spines.values():
+        spine.set_linewidth(0.6)
+    return ax
+
+
+def inches(width: str | float) -> float:
+    """The width of a figure in inches.
+
+    Parameters
+    ----------
+    width : str or float
+        ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+
+    Raises
+    ------
+    UnknownNameError
+        For another name.
+    ArgumentError
+        For no width to draw in.
+
+    Examples
+    --------
+    >>> round(inches("page"), 3), inches(127)
+    (6.693, 5.0)
+    """
+    if isinstance(width, str):
+        if width not in WIDTHS:
+            raise unknown_name("width", width, WIDTHS)
+        return WIDTHS[width] * MM
+    if not 30.0 <= width <= 2000.0:
+        raise ArgumentError(
+            f'width = {width!r}; expected "column", "page", or 30 to 2000 (millimetres)'
+        )
+    return float(width) * MM
+
+
+def axes_for(
+    ax: Axes | None, width: str | float = "column", height: float = 64.0, space: bool = False
+) -> Any:
+    """The axes given, or new ones.
+
+    Parameters
+    ----------
+    ax : Axes or None
+    width : str or float
+        Of a new figure, as for `inches`.
+    height : float
+        Of a figure of a column's width, in millimetres; wider ones are somewhat higher.
+    space : bool
+        Whether new axes are in space.
+
+    Returns
+    -------
+    Axes
+        Typed loosely, since Matplotlib does not type axes in space.
+    """
+    if ax is not None:
+        return ax
+    across = inches(width)
+    figure = new_figure(across, height * MM * (across / COLUMN) ** 0.4)
+    if space:
+        return figure.add_subplot(projection="3d")
+    axes = dressed(figure.add_subplot())
+    axes.locator_params(axis="x", nbins=6 if across < 1.5 * COLUMN else 10)
+    return axes
+
+
+def spatial(function: str, ax: Axes | None, z: object) -> bool:
+    """Whether to draw in space.
+
+    Raises
+    ------
+    ArgumentError
+        For a third quantity and axes of the plane.
+    """
+    given = ax is not None and ax.name == "3d"
+    if z is not None and ax is not None and not given:
+        raise ArgumentError(f'{function}: z in space needs axes with projection="3d"')
+    return given or z is not None
+
+
+def point_colour(code: str) -> str:
+    """Colour of the special points of a code and of their curves."""
+    return COLOURS[POINT_TYPES[code].colour]
+
+
+def curve_look(code: str) -> dict[str, Any]:
+    """Properties of the line of a curve of special points."""
+    line = POINT_TYPES[code].line
+    assert line is not None
+    return {"color": point_colour(code), "linestyle": line[0], "linewidth": line[1]}
+
+
+def dot_look(code: str, size: float = 4.5) -> dict[str, Any]:
+    """Properties of the marker of a special point."""
+    marker, colour = POINT_TYPES[code].marker, point_colour(code)
+    stroke = marker in STROKES
+    return {
+        "linestyle": "none",
+        "marker": marker,
+        "markersize": size + (1.0 if marker in "dph" else 0.0),
+        "markerfacecolor": colour,
+        "markeredgecolor": colour if stroke else "white",
+        "markeredgewidth": 0.9 if stroke else 0.5,
+    }
+
+
+def widen(ax: Axes) -> None:
+    """Keep points that agree to rounding from filling the axes with their noise."""
+    box = ax.dataLim
+    limits: list[Any] = [(box.intervalx, ax.set_xlim), (box.intervaly, ax.set_ylim)]
+    sizes = [max(abs(low), abs(high)) for (low, high), _ in limits]
+    if not max(sizes) < float("inf"):
+        return
+    for ((low, high), set_limits), size in zip(limits, sizes, strict=True):
+        if size <= 1e-12 * max(sizes):  # nothing but the rounding of zero
+            size = max(sizes)
+        if size > 0.0 and high - low <= 1e-6 * size:
+            middle = 0.5 * (low + high)
+            set_limits(middle - 0.1 * size, middle + 0.1 * size)
+
+
+def note_early_end(ax: Axes, why: str) -> None:
+    """Write why a run ended early below the upper edge of axes, where there is a reason.
+
+    Examples
+    --------
+    >>> ax = axes_for(None, 85)
+    >>> note_early_end(ax, "too many steps")
+    >>> ax.texts[0].get_text()
+    'run ended early: too many steps'
+    """
+    note(ax, f"run ended early: {why}" if why else "")
+
+
+def note(ax: Axes, words: str) -> None:
+    """Write what a reader of a figure must know below the upper edge of axes, if anything.
+
+    Examples
+    --------
+    >>> ax = axes_for(None, 85)
+    >>> note(ax, "outside the diagram")
+    >>> ax.texts[0].get_text()
+    'outside the diagram'
+    """
+    if words:
+        ax.annotate(
+            plain(words),
+            (0.02, 0.98),
+            xycoords="axes fraction",
+            ha="left",
+            va="top",
+            fontsize="small",
+            color=VERMILION,
+        )
+
+
+def root(ax: Axes) -> Figure:
+    """The outermost figure of axes."""
+    figure = ax.get_figure(root=True)
+    if figure is None:
+        raise ValueError("these axes were removed from their figure")
+    return figure
+
+
+def save(figure: Figure, path: str | Path, dpi: float = 300) -> Path:
+    """Write a figure with fonts that editors and journals can read."""
+    target = Path(path)
+    ending = target.suffix.removeprefix(".").lower()
+    word("figure format", sorted(figure.canvas.get_supported_filetypes()))("path", ending)
+    write_file(target, printed(figure, ending, dpi))
+    return target
+
+
+def printed(figure: Figure, ending: str, dpi: float) -> bytes:
+    """A figure in a format, laid out for it and drawn once."""
+    stream = BytesIO()
+    # Matplotlib 3.11 looks up under "ps" how many characters a font in PDF may hold
+    fonts = rc_context({"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "none"})
+    with fonts, _laid_out(figure, ending, dpi):
+        figure.savefig(stream, format=ending, dpi=dpi)
+    return stream.getvalue()
+
+
+@contextmanager
+def _laid_out(figure: Figure, ending: str, dpi: float) -> Iterator[None]:
+    """Lay a figure out for a format, and keep that from being done anew.
+
+    Matplotlib draws a figure with a layout twice when it saves it, the first time to lay
+    it out alone.
+    """
+    engine, canvas, resolution = figure.get_layout_engine(), figure.canvas, figure.dpi
+    # a canvas on a fine screen has scaled the figure, which another one would do again
+    if engine is None or not figure.axes or canvas.device_pixel_ratio != 1:
+        yield
+        return
+    try:
+        for_it: Any = get_registered_canvas_class(ending)(figure)
+        figure.dpi = for_it.fixed_dpi or dpi
+        engine.execute(figure)
+    finally:
+        figure.dpi = resolution
+        figure.set_canvas(canvas)
+    figure.set_layout_engine(None)
+    try:
+        yield
+    finally:
+        figure.set_layout_engine(engine)

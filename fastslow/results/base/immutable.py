@@ -1,0 +1,182 @@
+"""Results cannot be changed: arrays are read-only, mappings and sequences too.
+
+An array that is put into a result is copied, unless nothing can write to it: what its
+maker does with it later does not reach the result. NumPy lets the owner of an array make
+it writeable again (``array.flags.writeable = True``); who does so means to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from functools import cached_property
+from inspect import isfunction
+from operator import is_
+from typing import Any, Self
+
+import numpy as np
+
+from fastslow.arguments import like
+from fastslow.results.base.equality import content_hash, equal
+from fastslow.results.base.named_mapping import Named
+
+#: What cannot be changed anyway.
+PLAIN = frozenset({float, int, bool, str, type(None)})
+
+#: What is in the annotation of a method that hands out arrays.
+ARRAYS = ("Array", "Floats", "Integers", "Bits", "Any")
+
+
+def fixed(name: str, value: Any) -> Any:
+    """A value of a field as it is kept: read-only, and nobody else's to write to.
+
+    Examples
+    --------
+    >>> given = np.zeros(2)
+    >>> kept = fixed("state", given)
+    >>> given[0] = 1.0
+    >>> kept, kept.flags.writeable
+    (array([0., 0.]), False)
+    >>> fixed("state", kept) is kept
+    True
+    """
+    kind = type(value)
+    if kind in PLAIN:
+        return value
+    if isinstance(value, np.ndarray):
+        return value if _out_of_reach(value) else read_only(np.array(value))
+    if kind is tuple and PLAIN.issuperset(map(type, value)):
+        return value
+    if kind in (list, tuple):
+        items = [item if type(item) in PLAIN else fixed(name, item) for item in value]
+        same = kind is tuple and all(map(is_, items, value))
+        return value if same else tuple(items)
+    if kind is Named:
+        kept = {k: v if type(v) in PLAIN else fixed(k, v) for k, v in value.items()}
+        same = all(kept[key] is item for key, item in value.items())
+        return value if same else Named(value.kind, kept)
+    if isinstance(value, Mapping):
+        kept = {k: v if type(v) in PLAIN else fixed(str(k), v) for k, v in value.items()}
+        return Named(name.replace("_", " ").removesuffix("s"), kept)
+    return value
+
+
+def _out_of_reach(array: np.ndarray[Any, Any]) -> bool:
+    """Whether an array is read-only, and all that it is a view of."""
+    part: Any = array
+    while isinstance(part, np.ndarray):
+        if part.flags.writeable:
+            return False
+        part = part.base
+    return part is None
+
+
+def read_only(value: Any) -> Any:
+    """A value just computed, with its arrays (and those in tuples and mappings) read-only."""
+    if isinstance(value, np.ndarray):
+        value.flags.writeable = False
+    elif isinstance(value, Mapping):
+        for item in value.values():
+            read_only(item)
+    elif type(value) in (list, tuple):
+        for item in value:
+            read_only(item)
+    return value
+
+
+class ReadOnly:
+    """Hands out read-only arrays alone: from every method and property that is annotated so."""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        for name, member in list(vars(cls).items()):
+            if isinstance(member, property) and _hands_out_arrays(member.fget):
+                assert member.fget is not None
+                setattr(cls, name, member.getter(_closed(member.fget)))
+            elif isinstance(member, cached_property) and _hands_out_arrays(member.func):
+                member.func = _closed(member.func)
+            elif isfunction(member) and name != "__init__" and _hands_out_arrays(member):
+                setattr(cls, name, _closed(member))
+
+
+def _hands_out_arrays(function: Callable[..., Any] | None) -> bool:
+    returned = str(getattr(function, "__annotations__", {}).get("return", ""))
+    return any(word in returned for word in ARRAYS)
+
+
+def _closed(function: Callable[..., Any]) -> Callable[..., Any]:
+    close = read_only
+
+    def closed(*args: Any, **kwargs: Any) -> Any:
+        return close(function(*args, **kwargs))
+
+    return like(function, closed)
+
+
+class Immutable(ReadOnly):
+    """A frozen dataclass with read-only content, equal to others with the same.
+
+    What lives only in this process (the model behind a diagram) is not compared, and not
+    pickled. A copy of what cannot be changed is itself.
+    """
+
+    def __post_init__(self) -> None:
+        own = self.__dict__
+        for name, value in own.items():
+            if type(value) not in PLAIN:
+                own[name] = fixed(name, value)
+
+    @classmethod
+    def of_fixed(cls, shared: Mapping[str, Any], **own: Any) -> Self:
+        """One whose fields, all of them given, are `fixed` already: none is looked at again."""
+        made = object.__new__(cls)
+        made.__dict__.update(shared, **own)
+        return made
+
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Self:
+        return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        # neither what was computed from the fields, nor what lives only in this process
+        known = {entry.name: entry for entry in fields(self)}  # type: ignore[arg-type]
+        return {
+            name: None if known[name].metadata.get("live") else value
+            for name, value in self.__dict__.items()
+            if name in known
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update({name: read_only(value) for name, value in state.items()})
+
+    def _content(self) -> tuple[Any, ...]:
+        known = fields(self)  # type: ignore[arg-type]
+        return tuple(getattr(self, e.name) for e in known if not e.metadata.get("live"))
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return self is other or equal(self._content(), other._content())
+
+    def __hash__(self) -> int:
+        return content_hash((type(self).__name__, self._content()))
+
+
+class ImmutableSequence(ReadOnly):
+    """A tuple of results whose attributes are set once, in ``__new__``."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in self.__dict__ or name not in type(self).__annotations__:
+            raise AttributeError(f"cannot set '{name}' of {type(self).__name__}")
+        super().__setattr__(name, value)
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"cannot delete '{name}' of {type(self).__name__}")
+
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Self:
+        return self

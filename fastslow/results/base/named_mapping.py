@@ -1,0 +1,108 @@
+"""A small immutable mapping whose keys are names, and symbols by their names."""
+
+from __future__ import annotations
+
+from collections.abc import ItemsView, Iterable, Iterator, Mapping
+from typing import Any, Generic, TypeVar
+
+from fastslow.errors import unknown_name
+from fastslow.formulas.grammar import normalised
+from fastslow.results.base.equality import content_hash, equal
+
+V = TypeVar("V")
+
+
+class Named(Mapping[str, V], Generic[V]):
+    """An ordered, immutable mapping from names to values.
+
+    A key may be a name or anything that prints as one (a SymPy symbol); identifiers
+    are compared as Python compares them. An unknown key raises an error that suggests
+    the nearest name.
+
+    Parameters
+    ----------
+    kind : str
+        What the entries are, used in error messages.
+    items : mapping or iterable of (name, value)
+        The entries.
+
+    Examples
+    --------
+    >>> values = Named("parameter", {"A": 1.0, "omega": 0.1})
+    >>> values["A"]
+    1.0
+    >>> values["omga"]  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    fastslow.errors.UnknownNameError: unknown parameter 'omga'; did you mean 'omega'? ...
+    """
+
+    __slots__ = ("_items", "kind")
+
+    kind: str
+    _items: dict[str, V]
+
+    def __init__(self, kind: str, items: Mapping[str, V] | Iterable[tuple[str, V]] = ()) -> None:
+        pairs = items.items() if isinstance(items, Mapping) else items
+        _set_kind(self, kind)
+        _set_items(self, {normalised(str(key)): value for key, value in pairs})
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"cannot set '{name}': a mapping of names cannot be changed")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"cannot delete '{name}': a mapping of names cannot be changed")
+
+    def __copy__(self) -> Named[V]:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Named, (self.kind, self._items)
+
+    def __getitem__(self, key: object) -> V:
+        try:
+            return self._items[normalised(str(key))]
+        except KeyError:
+            raise unknown_name(self.kind, key, self._items) from None
+
+    def items(self) -> ItemsView[str, V]:
+        """Names and values in order."""
+        return self._items.items()
+
+    def get(self, key: object, default: V | None = None) -> V | None:  # type: ignore[override]
+        """The value of a name, or the default."""
+        return self._items.get(normalised(str(key)), default)
+
+    def __contains__(self, key: object) -> bool:
+        return normalised(str(key)) in self._items
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __repr__(self) -> str:
+        return "{" + ", ".join(f"{k}: {v}" for k, v in self._items.items()) + "}"
+
+    def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
+        if isinstance(other, Mapping):
+            given = {str(k): v for k, v in other.items()}
+            return self._items.keys() == given.keys() and all(
+                equal(value, given[key]) for key, value in self._items.items()
+            )
+        return NotImplemented
+
+    def __hash__(self) -> int:
+        return content_hash(self._items)
+
+    def index(self, key: object) -> int:
+        """Position of a name among the keys."""
+        self[key]
+        return list(self._items).index(normalised(str(key)))
+
+
+# the slots themselves, past __setattr__
+_set_kind, _set_items = (vars(Named)[name].__set__ for name in ("kind", "_items"))

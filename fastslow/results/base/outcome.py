@@ -1,0 +1,120 @@
+"""How a computation ended, as data that reads as a sentence."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fastslow.results.trajectory.trajectory import Trajectory
+
+#: Codes of ends at which a branch goes on, though its tracing does not.
+CUT_SHORT = ("too many points", "step too small")
+
+#: Codes of ends that the model has, to which every branch there can be followed.
+ENDS_OF_MODEL = ("left the window",)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The way a branch or a trajectory ended.
+
+    Parameters
+    ----------
+    code : str
+        Short stable name that programs can compare, e.g. ``"end of range"``.
+    message : str
+        One sentence: what happened and, where something can be done, what to try.
+    success : bool
+        Whether the computation reached what it was asked for.
+    notes : tuple of str
+        What of the message warns of a doubtful result, such as states whose noise decides.
+
+    Examples
+    --------
+    >>> print(Outcome("end of range", "reached w = 6, the end of the range.", True))
+    reached w = 6, the end of the range.
+    """
+
+    code: str
+    message: str
+    success: bool
+    notes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return self.message
+
+    def __bool__(self) -> bool:
+        return self.success
+
+
+def with_notes(outcome: Outcome, notes: Sequence[str]) -> Outcome:
+    """The outcome with sentences of warning that it does not have yet.
+
+    Examples
+    --------
+    >>> done = Outcome("end of time", "reached t = 1.", True)
+    >>> print(with_notes(done, ["x fell below its atol."]))
+    reached t = 1. x fell below its atol.
+    """
+    new = tuple(note for note in notes if note not in outcome.notes)
+    message = " ".join([outcome.message, *new])
+    return replace(outcome, message=message, notes=(*outcome.notes, *new))
+
+
+def stopped_early(run: Trajectory) -> str:
+    """What a result read off a run adds when the run stopped before its end, else nothing."""
+    return "" if run.outcome.success else f" The run ended early: {run.outcome}"
+
+
+def early_end(run: Trajectory) -> str:
+    """The code of the outcome of a run that ended early, else empty."""
+    return "" if run.outcome.success else run.outcome.code
+
+
+def with_ends(
+    search: Outcome, ends: Sequence[tuple[Outcome, Outcome]], unexplained: int
+) -> Outcome:
+    """How the search for branches ended, and how many of them ended before their time.
+
+    Parameters
+    ----------
+    search : Outcome
+        Of the search itself.
+    ends : sequence of (Outcome, Outcome)
+        Of every branch, at its first and last row.
+    unexplained : int
+        Changes of the number of unstable eigenvalues without a special point.
+
+    Examples
+    --------
+    >>> done, full = Outcome("end of range", "", True), Outcome("too many points", "", False)
+    >>> print(with_ends(Outcome("searched", "All.", True), [(done, full), (done, done)], 0))
+    1 of 2 branches ended unsuccessfully (too many points).
+    """
+    failed = [
+        {o.code for o in pair if not o.success and o.code not in ENDS_OF_MODEL} for pair in ends
+    ]
+    count = sum(map(bool, failed))
+    sentences = []
+    if count:
+        codes = Counter(code for pair in failed for code in pair)
+        words = ", ".join(f"{n} × {code}" if n > 1 else code for code, n in codes.items())
+        sentences.append(
+            f"{count} of {len(ends)} branch{'es' if len(ends) > 1 else ''} ended unsuccessfully "
+            f"({words})."
+        )
+    if unexplained:
+        sentences.append(
+            f"{unexplained} change{'s' if unexplained > 1 else ''} of the number of unstable "
+            "eigenvalues without a special point that explains it: see diagram.unexplained."
+        )
+    if not sentences:
+        return search
+    if not search.success:
+        return replace(search, message=" ".join([search.message, *sentences]))
+    if count:
+        return Outcome("cut short", " ".join(sentences), False)
+    return Outcome("unexplained", " ".join(sentences), False)

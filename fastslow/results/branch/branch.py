@@ -1,0 +1,383 @@
+"""A branch of equilibria as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import flag, formula, position, takes, text
+from fastslow.errors import unknown_name
+from fastslow.formulas.columns import by_value, column
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.base.result import LIVE, Result
+from fastslow.results.base.table import Table, numbered
+from fastslow.results.branch import slicing, stability_intervals
+from fastslow.results.branch.intersections import intersections
+from fastslow.results.branch.lookup import Pieces, asked, chosen, passages, pieces_of, stored
+from fastslow.results.branch.nearest import nearest_of
+from fastslow.results.branch.point_columns import labels_at
+from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
+from fastslow.results.io.html import branch_html
+from fastslow.results.points import Corrector, Equilibrium, SpecialPoints, stability_of
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A run of a branch over which the parameter is strictly monotone and the region one.
+
+    Parameters
+    ----------
+    start, stop : int
+        Rows ``start`` to ``stop - 1`` of the branch.
+    region : str
+        The region of all its rows.
+    """
+
+    start: int
+    stop: int
+    region: str
+
+
+@dataclass(frozen=True, eq=False)
+class Branch(Table, Result):
+    """A curve of equilibria, row by row along its arclength.
+
+    At an interface the boundary equilibrium stands twice, once as the last row
+    of the region left and once as the first row of the region entered, so that
+    every row's eigenvalues belong to its own region.
+
+    ``branch["x"]`` is a column and ``branch["x**2 + v"]`` an expression in states
+    and parameters; ``branch[3]`` and iteration give the equilibria of rows, and
+    ``branch[10:50]`` is the branch of those rows, with its special points.
+
+    Parameters
+    ----------
+    states : tuple of str
+        State names.
+    parameter_name : str
+        The continuation parameter.
+    state : ndarray, shape (N, n)
+        States, row by row.
+    parameter : ndarray, shape (N,)
+        Parameter values.
+    tangent : ndarray, shape (N, n + 1)
+        Unit tangents (states, parameter), in the direction of tracing.
+    eigenvalues : ndarray of complex, shape (N, n)
+        Of the Jacobian in the row's region.
+    region : ndarray of str, shape (N,)
+        The region whose rates vanish.
+    special : SpecialPoints
+        In order along the branch; ``branch.special("LP")`` gives those of one code.
+    special_rows : tuple of int
+        The row of each special point (of a boundary equilibrium, the first of its two).
+    outcomes : tuple of Outcome
+        Why the branch stopped at its first and its last row.
+    closed : bool
+        Whether the last row is the first again (an isolated loop).
+    admissible : bool
+        False for a branch of virtual equilibria.
+    parameters : mapping
+        The values of all other parameters.
+    known_stability : ndarray of str, shape (N,), optional
+        Stability where the eigenvalues are not known, as in files of AUTO-07p.
+    corrector : callable, optional
+        Solves for an equilibrium read between rows; not kept in a file.
+    periods : mapping
+        The period of every state that has one. The columns go on beyond the
+        principal range (−period/2, period/2] without a jump, and the last row of a
+        closed branch may be whole periods from the first; equilibria and special
+        points are given in the principal range.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> gear = fs.systems.harmonic_gear(A=-0.6)
+    >>> (branch,) = fs.continue_equilibria(gear.frozen(), "w", over=(-0.5, 0.5)).branches
+    >>> [point.region for point in branch.at(w=0.05, stable=True)]
+    ['S3', 'S1']
+    >>> branch.stable_intervals().round(6)
+    array([[-0.5    ,  0.08944],
+           [-0.08944,  0.5    ]])
+    """
+
+    states: tuple[str, ...]
+    parameter_name: str
+    state: NDArray[np.float64]
+    parameter: NDArray[np.float64]
+    tangent: NDArray[np.float64]
+    eigenvalues: NDArray[np.complex128]
+    region: NDArray[np.str_]
+    special: SpecialPoints
+    special_rows: tuple[int, ...]
+    outcomes: tuple[Outcome, Outcome]
+    closed: bool = False
+    admissible: bool = True
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    known_stability: NDArray[np.str_] | None = None
+    corrector: Corrector | None = field(default=None, repr=False, metadata=LIVE)
+    periods: Mapping[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def stability(self) -> NDArray[np.str_]:
+        """``"stable"``, ``"unstable"`` or ``"neutral"``, shape (N,)."""
+        if self.known_stability is not None:
+            return self.known_stability
+        return stability_of(self.eigenvalues)
+
+    @cached_property
+    def stable(self) -> NDArray[np.bool_]:
+        """Whether each row is stable, shape (N,)."""
+        return self.stability == "stable"
+
+    @property
+    def outcome(self) -> Outcome:
+        """How the tracing ended: the first unsuccessful end, else the last one."""
+        return next((o for o in self.outcomes if not o.success), self.outcomes[-1])
+
+    @cached_property
+    def unexplained(self) -> tuple[UnexplainedChange, ...]:
+        """Changes of the number of unstable eigenvalues that no special point explains."""
+        return unexplained_changes(self)
+
+    def __len__(self) -> int:
+        return len(self.parameter)
+
+    def __iter__(self) -> Iterator[Equilibrium]:
+        return (stored(self, row, self.parameters) for row in range(len(self)))
+
+    @overload
+    def __getitem__(self, key: slice) -> Branch: ...
+    @overload
+    def __getitem__(self, key: int) -> Equilibrium: ...
+    @overload
+    def __getitem__(self, key: str) -> NDArray[np.float64]: ...
+    def __getitem__(self, key: object) -> Branch | Equilibrium | NDArray[np.float64]:
+        """A column or expression, shape (N,); the equilibrium of a row; the branch of some rows.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no state and no parameter.
+        ArgumentError
+            For text that is no expression, or a slice that holds no row or leaves some out.
+        OutOfRangeError
+            For a row that there is not.
+        """
+        if isinstance(key, slice):
+            return slicing.rows_of(self, key)
+        if isinstance(key, int | np.integer) and not isinstance(key, bool):
+            return stored(self, position(key, len(self), "row"), self.parameters)
+        columns = {n: self._state(k) for k, n in enumerate(self.states)}
+        columns[self.parameter_name] = lambda: self.parameter
+        return column(key, columns, self.parameters, len(self), by_value(self.parameter_name, key))
+
+    def _state(self, k: int) -> Callable[[], NDArray[np.float64]]:
+        return lambda: self.state[:, k]
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """Runs of rows over which the parameter does not turn."""
+        return pieces_of(self.parameter)
+
+    @cached_property
+    def regions(self) -> tuple[str, ...]:
+        """The regions gone through, each once, in order."""
+        starts = np.flatnonzero(np.append(True, self.region[1:] != self.region[:-1]))
+        return tuple(dict.fromkeys(self.region[starts].tolist()))
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest value of the parameter."""
+        return float(self.pieces.low.min()), float(self.pieces.high.max())
+
+    @takes(stable=flag, region=text)
+    def at(
+        self, *, stable: bool | None = None, region: str | None = None, **value: float
+    ) -> list[Equilibrium]:
+        """Equilibria at one value of the parameter, one per passage; see `Diagram.at`.
+
+        Parameters
+        ----------
+        stable : bool, optional
+        region : str, optional
+        **value : float
+            The parameter by name, e.g. ``w=1.0``.
+
+        Returns
+        -------
+        list of Equilibrium
+            In order along the branch.
+
+        Raises
+        ------
+        UnknownNameError
+            If the name is not the branch's parameter, or the region not one of its own.
+        ArgumentError
+            If the branch does not reach the value.
+        """
+        where = asked(self.parameter_name, self.range, "branch", value)
+        found = passages(self, where, self.parameters, self.corrector)
+        return chosen(found, stable, region, self.regions)
+
+    @takes(stable=flag, region=text, code=text)
+    def select(
+        self,
+        *,
+        stable: bool | None = None,
+        region: str | None = None,
+        code: str | None = None,
+        between: tuple[float, float] | None = None,
+    ) -> tuple[Branch, ...]:
+        """The parts of the branch whose rows all fulfil the conditions, in order.
+
+        Parameters
+        ----------
+        stable : bool, optional
+            Rows that are stable (or not).
+        region : str, optional
+            Rows of one region.
+        code : str, optional
+            Parts with a special point of this code.
+        between : (float, float), optional
+            Rows with the parameter in this range, ends included.
+
+        Returns
+        -------
+        tuple of Branch
+
+        Raises
+        ------
+        UnknownNameError
+            For a region or code that there is not.
+        ArgumentError
+            For a range that is none.
+        """
+        if region is not None and region not in self.regions:
+            raise unknown_name("region", region, self.regions)
+        return slicing.parts_of(self, stable, region, code, between)
+
+    def stable_intervals(self) -> NDArray[np.float64]:
+        """Intervals of the parameter over which the branch is stable, shape (k, 2).
+
+        One for each stable stretch along the branch, in order; where a special
+        point ends it, the interval ends exactly there.
+        """
+        return self._stable_intervals
+
+    @cached_property
+    def _stable_intervals(self) -> NDArray[np.float64]:
+        return stability_intervals.stable_intervals(self)
+
+    def nearest(self, **values: float) -> Equilibrium:
+        """The point of the branch nearest to some values of states and the parameter.
+
+        Distances are measured in units of each column's range. Between rows the
+        point is interpolated, and corrected at its parameter value where the
+        model is attached.
+
+        Parameters
+        ----------
+        **values : float
+            At least one, e.g. ``w=0.1, x=0.3``.
+
+        Returns
+        -------
+        Equilibrium
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no state and not the parameter.
+        ArgumentError
+            For a number that is not finite, or none at all.
+        """
+        return nearest_of([self], self.parameters, values, self.corrector)
+
+    @takes(x=formula, y=formula)
+    def intersections(self, other: Branch, x: str, y: str) -> NDArray[np.float64]:
+        """Where two branches meet in the plane of two columns, shape (k, 2).
+
+        Both curves are interpolated by cubics with their tangents. In a plane of
+        two of more columns a meeting need not be a common equilibrium.
+
+        Parameters
+        ----------
+        other : Branch
+            Over the same parameter.
+        x, y : str
+            Two of the states and the parameter.
+
+        Returns
+        -------
+        ndarray
+            Values of x and y, in order along this branch. Curves that run
+            along each other meet nowhere.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no column of both.
+        ArgumentError
+            For a branch with itself.
+        """
+        return intersections(self, other, (str(x), str(y)))
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """States and parameter, shape (N, n + 1)."""
+        return np.column_stack([self.state, self.parameter])
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """The columns of `points`."""
+        return (*self.states, self.parameter_name)
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Parameter, states, region, stability, eigenvalues and labels of special points."""
+        return {
+            self.parameter_name: self.parameter,
+            **{name: self.state[:, k] for k, name in enumerate(self.states)},
+            "region": self.region,
+            "stability": self.stability,
+            **numbered("eigenvalue", self.eigenvalues),
+            "label": labels_at(self.special, self.special_rows, len(self)),
+        }
+
+    def sheets(self) -> Iterator[Sheet]:
+        """Split into runs of one region and strictly monotone parameter.
+
+        Vertical segments, where the parameter does not change, are no sheets.
+        """
+        change = np.diff(self.parameter)
+        step = np.sign(change)
+        span = max(float(np.ptp(self.parameter)), np.finfo(float).tiny)
+        step[np.abs(change) <= 1e-13 * span] = 0
+        step[self.region[1:] != self.region[:-1]] = 0
+        edges = np.flatnonzero(step[1:] != step[:-1]) + 1
+        for start, stop in zip([0, *edges.tolist()], [*edges.tolist(), len(step)], strict=True):
+            if stop > start and step[start] != 0:
+                yield Sheet(start, stop + 1, str(self.region[start]))
+
+    def _repr_html_(self) -> str:
+        return branch_html(self)
+
+    def __repr__(self) -> str:
+        low, high = self.range
+        codes = "".join(f" {p.label}" for p in self.special)
+        failed = [
+            f"{outcome.code} at {self.parameter_name} = {self.parameter[row]:.6g}"
+            for outcome, row in zip(self.outcomes, (0, -1), strict=True)
+            if not outcome.success
+        ]
+        return (
+            f"Branch({len(self)} points, {self.parameter_name} from {low:.6g} to {high:.6g}, "
+            f"regions {' → '.join(self.regions)}"
+            + (f";{codes}" if codes else "")
+            + "".join(f"; {words}" for words in dict.fromkeys(failed))
+            + ")"
+        )

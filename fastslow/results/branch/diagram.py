@@ -1,0 +1,377 @@
+"""All branches of one frozen model over one parameter."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import flag, position, takes, text, whole
+from fastslow.errors import ArgumentError, IncompleteWarning, unknown_name
+from fastslow.formulas.columns import by_value, column
+from fastslow.results.base.outcome import CUT_SHORT, Outcome
+from fastslow.results.base.result import LIVE, STORED, Result
+from fastslow.results.base.table import Table
+from fastslow.results.branch import stability_intervals
+from fastslow.results.branch.branch import Branch
+from fastslow.results.branch.equilibrium_sets import EquilibriumBand
+from fastslow.results.branch.lookup import asked, chosen, passages
+from fastslow.results.branch.nearest import nearest_of
+from fastslow.results.branch.slicing import limits_of
+from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
+from fastslow.results.branch.windows import LEFT, StateWindow
+from fastslow.results.io.html import diagram_html
+from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
+from fastslow.results.stored.model import StoredModel
+
+#: The usual end of the search for branches.
+SEARCHED = Outcome("searched", "every start was followed.", True)
+
+#: Code of a search that ended at the largest number of branches.
+TOO_MANY = "too many branches"
+
+
+@dataclass(frozen=True, eq=False)
+class Diagram(Table, Result):
+    """The branches of equilibria of a frozen model over one parameter.
+
+    ``diagram[0]`` and iteration give branches, ``diagram["x"]`` a column of all
+    of them, row by row.
+
+    Parameters
+    ----------
+    states : tuple of str
+        State names.
+    parameter : str
+        The continuation parameter.
+    over : tuple of float
+        The range asked for, (low, high).
+    parameters : mapping
+        The values of all other parameters.
+    branches : tuple of Branch
+        Every branch found.
+    coverage : str
+        ``"complete"`` when every branch in the range is proved found, else ``"found"``.
+    interfaces, regions : tuple of str
+        Names, in the model's order.
+    interface_values : mapping
+        For every interface that is a plain value of one state, (state, value).
+    equations : str
+        The equations as they were written, as text.
+    corrector : callable, optional
+        Solves for an equilibrium read between rows; not kept in a file.
+    outcome : Outcome
+        How the search for branches ended.
+    path : mapping
+        Of a model frozen along a path, each slow quantity as text in the parameter.
+    settings : mapping
+        How the branches were traced.
+    bands : tuple of EquilibriumBand
+        Sets of equilibria within discontinuities over the parameter, such as the
+        sticking band of dry friction.
+    window : StateWindow, optional
+        The ranges of the states within which they were: what lies beyond was
+        neither looked for nor traced, and "complete" says nothing of it.
+    periods : mapping
+        The period of every state that has one.
+    model : Model or StoredModel, optional
+        The frozen model, in which the parameter has no value; of a diagram from a file a stored
+        model, which can be simulated and needs no SymPy.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> gear = fs.systems.harmonic_gear(A=-0.6)
+    >>> diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-0.5, 0.5))
+    >>> diagram.bistable().round(6)
+    array([[-0.08944,  0.08944]])
+    >>> diagram.nearest(w=0.1, x=0.9).region
+    'S1'
+    """
+
+    states: tuple[str, ...]
+    parameter: str
+    over: tuple[float, float]
+    parameters: Mapping[str, float]
+    branches: tuple[Branch, ...]
+    coverage: str
+    interfaces: tuple[str, ...]
+    regions: tuple[str, ...]
+    interface_values: Mapping[str, tuple[str, float]]
+    equations: str
+    corrector: Corrector | None = field(default=None, repr=False, metadata=LIVE)
+    outcome: Outcome = SEARCHED
+    path: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, float] = field(default_factory=dict)
+    window: StateWindow | None = None
+    bands: tuple[EquilibriumBand, ...] = ()
+    periods: Mapping[str, float] = field(default_factory=dict)
+    model: Any = field(default=None, repr=False, metadata=STORED)
+
+    @property
+    def stored_model(self) -> StoredModel | None:
+        """The model as a file keeps it, with what its branches are traced by."""
+        source = self.model if self.corrector is None else self.corrector
+        return getattr(source, "stored", None)
+
+    def __len__(self) -> int:
+        return len(self.branches)
+
+    def __iter__(self) -> Iterator[Branch]:
+        return iter(self.branches)
+
+    @overload
+    def __getitem__(self, key: int) -> Branch: ...
+    @overload
+    def __getitem__(self, key: str) -> NDArray[np.float64]: ...
+    def __getitem__(self, key: object) -> Branch | NDArray[np.float64]:
+        """A branch by number; a column or expression of all branches, row by row.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no state and no parameter.
+        ArgumentError
+            For text that is no expression.
+        OutOfRangeError
+            For a branch that there is not.
+        """
+        if isinstance(key, int | np.integer) and not isinstance(key, bool):
+            return self.branches[position(key, len(self), "branch")]
+        if isinstance(key, slice):
+            raise ArgumentError(
+                "a diagram has no slices; expected the number of a branch, a name or an "
+                "expression (some of its branches are diagram.branches[0:2])"
+            )
+        names = (*self.states, self.parameter)
+        columns = {name: partial(self._joined, name) for name in names}
+        count = sum(map(len, self.branches))
+        return column(key, columns, self.parameters, count, by_value(self.parameter, key))
+
+    def _joined(self, name: str) -> NDArray[np.float64]:
+        return np.concatenate([np.empty(0), *(branch[name] for branch in self.branches)])
+
+    @property
+    def special(self) -> SpecialPoints:
+        """Every special point, branch by branch; ``diagram.special("BE")`` those of one code.
+
+        A point that several branches share, as a branch point, is listed once.
+        """
+        kept: dict[str, SpecialPoint] = {}
+        for branch in self.branches:
+            for point in branch.special:
+                kept.setdefault(point.label, point)
+        return SpecialPoints(kept.values())
+
+    @cached_property
+    def unexplained(self) -> tuple[UnexplainedChange, ...]:
+        """Changes of the number of unstable eigenvalues that no special point explains.
+
+        Branch by branch, from row to row: at a fold or branch point the number of
+        eigenvalues with positive real part changes by one, at a Hopf point by two,
+        and it may change by any number from one region to another. An entry says
+        that a special point is missing, or that rounding decides a stability.
+        """
+        return tuple(
+            change
+            for number, branch in enumerate(self.branches)
+            for change in unexplained_changes(branch, number)
+        )
+
+    def _warn(self, query: str) -> None:
+        """Warn that a query may lack what a branch that was cut short would have added."""
+        cut = sum(any(o.code in CUT_SHORT for o in b.outcomes) for b in self.branches)
+        reasons = []
+        if cut:
+            reasons.append(f"{cut} of {len(self)} branches were cut short")
+        if self.outcome.code == TOO_MANY:
+            reasons.append("there may be more branches")
+        if self.unexplained:
+            reasons.append("a change of stability is unexplained")
+        if reasons:
+            warnings.warn(
+                f"{query} may lack something: {' and '.join(reasons)}; see diagram.outcome",
+                IncompleteWarning,
+                stacklevel=4,
+            )
+
+    @property
+    def folds(self) -> SpecialPoints:
+        return self.special("LP")
+
+    @property
+    def boundary_equilibria(self) -> SpecialPoints:
+        return self.special("BE")
+
+    @takes(stable=flag, region=text)
+    def at(
+        self, *, stable: bool | None = None, region: str | None = None, **value: float
+    ) -> list[Equilibrium]:
+        """Equilibria at one value of the parameter, one per passage of a branch.
+
+        Where the branch is vertical at that value its two ends are given, with
+        ``continuum=True``. With the model attached each is solved for to
+        rounding; a diagram read from a file interpolates and says so
+        (``interpolated=True``). A set of equilibria (see ``bands``) is given by its ends
+        or corners, with ``continuum=True``.
+
+        Parameters
+        ----------
+        stable : bool, optional
+            Keep only the stable (or only the others).
+        region : str, optional
+            Keep only those of one region.
+        **value : float
+            The parameter by name, e.g. ``w=1.0``.
+
+        Returns
+        -------
+        list of Equilibrium
+
+        Raises
+        ------
+        UnknownNameError
+            If the name is not the diagram's parameter.
+        ArgumentError
+            If the value is outside the range of the diagram.
+        """
+        where = asked(self.parameter, self.over, "diagram", value)
+        self._warn("at()")
+        found = [
+            point
+            for branch in self.branches
+            for point in passages(branch, where, self.parameters, self.corrector)
+        ]
+        sets = (band.set_at(where) for band in self.bands)
+        found += [corner for one in sets if one is not None for corner in one.equilibria]
+        return chosen(found, stable, region, self._known_regions)
+
+    @property
+    def _known_regions(self) -> tuple[str, ...]:
+        # pseudo-equilibria lie in no region of the model
+        sliding = (*(r for b in self.branches for r in b.regions), *(b.region for b in self.bands))
+        return tuple(dict.fromkeys([*self.regions, *sliding]))
+
+    @takes(stable=flag, region=text, code=text)
+    def select(
+        self,
+        *,
+        stable: bool | None = None,
+        region: str | None = None,
+        code: str | None = None,
+        between: tuple[float, float] | None = None,
+    ) -> Diagram:
+        """The diagram of those parts of branches whose rows all fulfil the conditions.
+
+        Parameters
+        ----------
+        stable, region, code, between
+            As for `Branch.select`; ``between`` becomes the range of the diagram.
+
+        Returns
+        -------
+        Diagram
+            Its special points are those on the parts.
+
+        Raises
+        ------
+        UnknownNameError
+            For a region or code that there is not.
+        ArgumentError
+            For a range that is none, or outside that of the diagram.
+        """
+        if region is not None and region not in self._known_regions:
+            raise unknown_name("region", region, self._known_regions)
+        over = self.over
+        if between is not None:
+            low, high = limits_of(between)
+            over = max(low, over[0]), min(high, over[1])
+            if over[0] > over[1]:
+                raise ArgumentError(
+                    f"between=({low:g}, {high:g}) is outside this diagram's range "
+                    f"[{self.over[0]:g}, {self.over[1]:g}]"
+                )
+        branches = tuple(
+            part
+            for branch in self.branches
+            if region is None or region in branch.regions
+            for part in branch.select(stable=stable, region=region, code=code, between=between)
+        )
+        bands = [band for band in self.bands if region in (None, band.region) and code is None]
+        cut = (band.between(*over) for band in bands if stable in (None, band.is_stable))
+        kept = tuple(band for band in cut if band is not None)
+        return replace(self, branches=branches, over=over, bands=kept)
+
+    @takes(at_least=whole(1))
+    def bistable(self, at_least: int = 2) -> NDArray[np.float64]:
+        """Intervals of the parameter with two (or more) stable equilibria, shape (k, 2).
+
+        Where a special point ends an interval, it ends exactly there. Virtual
+        branches do not count.
+
+        Parameters
+        ----------
+        at_least : int
+            How many stable equilibria.
+
+        Raises
+        ------
+        ArgumentError
+            For a number below one.
+        """
+        self._warn("bistable()")
+        if at_least not in self._multistable:
+            self._multistable[at_least] = stability_intervals.multistable(self.branches, at_least)
+        return self._multistable[at_least]
+
+    @cached_property
+    def _multistable(self) -> dict[int, NDArray[np.float64]]:
+        return {}
+
+    def nearest(self, **values: float) -> Equilibrium:
+        """The point of any branch nearest to some values; see `Branch.nearest`."""
+        self._warn("nearest()")
+        return nearest_of(self.branches, self.parameters, values, self.corrector)
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """The columns of `Branch.to_dict`, with the number of the branch, row by row."""
+        tables = [branch.to_dict() for branch in self.branches]
+        numbers = np.repeat(np.arange(len(tables)), [len(branch) for branch in self.branches])
+        columns = {"branch": numbers}
+        for name in tables[0] if tables else ():
+            columns[name] = np.concatenate([one[name] for one in tables])
+        return columns
+
+    def _repr_html_(self) -> str:
+        return diagram_html(self)
+
+    @property
+    def _within(self) -> str:
+        """The window, where it was asked for or has cut a branch off."""
+        cut = any(o.code == LEFT for branch in self.branches for o in branch.outcomes)
+        return f", {self.window}" if self.window and (self.window.chosen or cut) else ""
+
+    def __repr__(self) -> str:
+        low, high = self.over
+        lines = [
+            f"Diagram of {', '.join(self.states)} over {self.parameter} in [{low:g}, {high:g}]"
+            f"{self._within} ({self.coverage})"
+        ]
+        if self.outcome.code != SEARCHED.code:
+            lines.append(f"   {self.outcome}")
+        lines += [f"   {change}" for change in self.unexplained]
+        for number, branch in enumerate(self.branches):
+            last = number == len(self.branches) - 1
+            lines.append(("└─ " if last else "├─ ") + repr(branch))
+            stem = "   " if last else "│  "
+            for point in branch.special:
+                if point.code != "EP":
+                    at = f"{self.parameter} = {point.parameters[self.parameter]:.6g}"
+                    lines.append(f"{stem}   {point.label}: {at}, {point.description}")
+        lines += [f"   {band!r}" for band in self.bands]
+        return "\n".join(lines)

@@ -1,0 +1,64 @@
+"""States between the rows of a branch, from its tangents."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from fastslow.results.branch.branch import Branch
+
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Cubics:
+    """States on the steps of a branch as cubics in the part of the step, by their coefficients.
+
+    Parameters
+    ----------
+    begin, width : ndarray, shape (m,)
+        The parameter at the lower row, and by how much it changes to the next.
+    powers : ndarray, shape (4, n, m)
+        Coefficients of 1, s, s² and s³, those of each state side by side.
+    """
+
+    begin: Floats
+    width: Floats
+    powers: Floats
+
+    def at(self, steps: NDArray[np.intp], values: Floats) -> Floats:
+        """States on some of the steps at parameter values, shape (N, n)."""
+        part = (values - self.begin[steps]) / self.width[steps]
+        zero, one, two, three = self.powers.take(steps, axis=2)
+        return np.asarray(zero + part * one + part**2 * two + part**3 * three).T
+
+
+def cubics(branch: Branch, rows: NDArray[np.intp]) -> Cubics:
+    """The steps between rows ``rows`` and ``rows + 1``.
+
+    Cubic Hermite in the parameter where both end slopes are finite and mild,
+    linear otherwise (beside a fold the slope dx/dp grows without bound).
+    """
+    p0, p1 = branch.parameter[rows], branch.parameter[rows + 1]
+    x0, x1 = branch.state[rows], branch.state[rows + 1]
+    width = p1 - p0
+    chord = x1 - x0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        m0 = branch.tangent[rows, :-1] / branch.tangent[rows, -1:] * width[:, None]
+        m1 = branch.tangent[rows + 1, :-1] / branch.tangent[rows + 1, -1:] * width[:, None]
+        bound = 3.0 * np.abs(chord) + 1e-12 * np.maximum(np.abs(x0), np.abs(x1))
+        mild = (np.abs(m0) <= bound) & (np.abs(m1) <= bound)
+        two = np.where(mild, 3 * chord - 2 * m0 - m1, 0.0)
+        three = np.where(mild, m0 + m1 - 2 * chord, 0.0)
+    powers = np.array([x0, np.where(mild, m0, chord), two, three])
+    return Cubics(p0, width, np.ascontiguousarray(powers.transpose(0, 2, 1)))
+
+
+def hermite(branch: Branch, rows: NDArray[np.intp], values: Floats) -> Floats:
+    """States between rows ``rows`` and ``rows + 1`` at parameter values, shape (m, n); `cubics`."""
+    return cubics(branch, rows).at(np.arange(len(rows)), values)

@@ -1,0 +1,235 @@
+"""Where a branch takes one value of its parameter: a binary search on the pieces that do not turn.
+
+The pieces are found once for a branch; each question then costs a comparison
+per piece and a binary search in those that hold the value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import finite
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.angles import periods_of, principal
+from fastslow.results.base.immutable import Immutable
+from fastslow.results.branch.interpolation import hermite
+from fastslow.results.points import Corrector, Equilibrium
+
+if TYPE_CHECKING:
+    from fastslow.results.branch.branch import Branch
+
+Array = NDArray[np.float64]
+
+
+#: A row is at a value of the parameter if it is off it by this part of the parameter's size.
+AT = 1e-12
+
+#: Rows at one value between which a state moves by this part of its size are a continuum.
+MOVED = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces(Immutable):
+    """Runs of rows over which the parameter does not turn; each begins where the last ends.
+
+    Parameters
+    ----------
+    first, last : ndarray of int, shape (K,)
+        Rows.
+    low, high : ndarray, shape (K,)
+        Smallest and largest parameter value.
+    signed : ndarray, shape (2, N)
+        The parameter and its negative, one of which rises along a piece.
+    """
+
+    first: NDArray[np.intp]
+    last: NDArray[np.intp]
+    low: Array
+    high: Array
+    signed: Array
+
+    def around(self, value: float, near: float) -> tuple[list[tuple[int, int]], list[int]]:
+        """Runs of rows at a value, and rows between which and the next one it is passed."""
+        level: list[tuple[int, int]] = []
+        passed: list[int] = []
+        for k in np.flatnonzero((self.low <= value + near) & (self.high >= value - near)):
+            first, last = int(self.first[k]), int(self.last[k])
+            falling = int(self.signed[0, last] < self.signed[0, first])
+            rising = self.signed[falling, first : last + 1]
+            target = -value if falling else value
+            begin = int(np.searchsorted(rising, target - near, side="left"))
+            end = int(np.searchsorted(rising, target + near, side="right"))
+            if end > begin:
+                begin, end = first + begin, first + end - 1
+                if level and begin <= level[-1][1] + 1:
+                    level[-1] = (level[-1][0], end)
+                else:
+                    level.append((begin, end))
+            elif 0 < begin < len(rising):
+                passed.append(first + begin - 1)
+        return level, passed
+
+
+def pieces_of(parameter: Array) -> Pieces:
+    """Split at the rows where the parameter turns.
+
+    Examples
+    --------
+    >>> pieces = pieces_of(np.array([0.0, 1.0, 1.0, 2.0, 1.0, 0.0]))
+    >>> pieces.first.tolist(), pieces.last.tolist()
+    ([0, 3], [3, 5])
+    >>> pieces.around(0.5, 0.0)
+    ([], [0, 4])
+    """
+    way = np.sign(np.diff(parameter))
+    moving = np.flatnonzero(way)
+    if len(moving):
+        # a row without change goes on in the direction before it
+        source = np.zeros(len(way), dtype=np.intp)
+        source[moving] = moving
+        source = np.maximum.accumulate(source)
+        source[: moving[0]] = moving[0]
+        way = way[source]
+    turns = np.flatnonzero(way[1:] != way[:-1]) + 1
+    first = np.append(0, turns)
+    last = np.append(turns, len(parameter) - 1)
+    ends = parameter[first], parameter[last]
+    return Pieces(
+        first, last, np.minimum(*ends), np.maximum(*ends), np.stack([parameter, -parameter])
+    )
+
+
+def passages(
+    branch: Branch, where: float, constants: Mapping[str, float], corrector: Corrector | None
+) -> list[Equilibrium]:
+    """The equilibria of a branch at a parameter value, in order along it."""
+    near = AT * float(np.abs(branch.parameter).max(initial=0.0))
+    level, passed = branch.pieces.around(where, near)
+    runs = [(begin, begin, end) for begin, end in level]
+    if branch.closed and len(runs) > 1 and runs[0][1] == 0 and runs[-1][2] == len(branch) - 1:
+        # the first row is the last one again: both runs are one
+        last = runs.pop()
+        runs[0] = (0, last[1], runs[0][2])
+    found: list[tuple[int, Equilibrium]] = []
+    for place, begin, end in runs:
+        moved = np.abs(branch.state[end] - branch.state[begin])
+        vertical = bool(np.any(moved > MOVED * _unit(branch)))
+        for row in (begin, end) if vertical else (begin,):
+            found.append((place, stored(branch, row, constants, vertical)))
+    found += [(row, between(branch, row, where, constants, corrector)) for row in passed]
+    return [point for _, point in sorted(found, key=lambda entry: entry[0])]
+
+
+def _unit(branch: Branch) -> Array:
+    """Size of each state on a branch; where it is zero but for rounding, its natural unit."""
+    unit = np.abs(branch.state).max(axis=0, initial=0.0)
+    for point in branch.special[:1]:
+        if point.source is not None:
+            unit = np.maximum(unit, point.source.unit)
+    return unit
+
+
+def wrapped(branch: Branch, state: Array) -> Array:
+    """A state of a branch with angles in their principal range."""
+    return principal(state, periods_of(branch.states, branch.periods))
+
+
+def stored(
+    branch: Branch, row: int, constants: Mapping[str, float], continuum: bool = False
+) -> Equilibrium:
+    """The equilibrium of one row."""
+    return Equilibrium(
+        branch.states,
+        wrapped(branch, branch.state[row]),
+        {**constants, branch.parameter_name: float(branch.parameter[row])},
+        str(branch.region[row]),
+        branch.admissible,
+        branch.eigenvalues[row].copy(),
+        continuum=continuum,
+        known_stability=_known(branch, row),
+    )
+
+
+def _known(branch: Branch, row: int) -> str | None:
+    return None if branch.known_stability is None else str(branch.known_stability[row])
+
+
+def between(
+    branch: Branch,
+    row: int,
+    where: float,
+    constants: Mapping[str, float],
+    corrector: Corrector | None,
+) -> Equilibrium:
+    """The equilibrium between a row and the next one, where the parameter has a value."""
+    state = hermite(branch, np.array([row]), np.array([where]))[0]
+    region = str(branch.region[row])
+    if corrector is not None:
+        solved = corrector(region, state, where)
+        if solved is not None:
+            return solved
+    low, high = branch.parameter[row], branch.parameter[row + 1]
+    part = (where - low) / (high - low)
+    return read_off(branch, row, part, state, {**constants, branch.parameter_name: where})
+
+
+def read_off(
+    branch: Branch, row: int, part: float, state: Array, parameters: Mapping[str, float]
+) -> Equilibrium:
+    """An equilibrium that is interpolated, with its eigenvalues, and says so."""
+    pair = branch.eigenvalues[row : row + 2]
+    # apart, because a complex number times an infinite one (of sliding) is not a number
+    real, imaginary = (np.array([1 - part, part]) @ p for p in (pair.real, pair.imag))
+    return Equilibrium(
+        branch.states,
+        wrapped(branch, state),
+        parameters,
+        str(branch.region[row]),
+        branch.admissible,
+        real + 1j * imaginary,
+        residual=float("nan"),
+        interpolated=True,
+        known_stability=_known(branch, row if part < 0.5 else row + 1),
+    )
+
+
+def asked(
+    parameter: str, over: tuple[float, float], what: str, value: Mapping[str, float]
+) -> float:
+    """The value asked for, of the right parameter and inside the range.
+
+    Raises
+    ------
+    UnknownNameError
+        For another name.
+    ArgumentError
+        For a value outside the range.
+    """
+    if list(value) != [parameter]:
+        wrong = next((name for name in value if name != parameter), "nothing")
+        raise unknown_name(f"{what} parameter", wrong, [parameter])
+    where = finite(parameter, value[parameter])
+    low, high = over
+    if not low <= where <= high:
+        raise ArgumentError(
+            f"{parameter} = {where:g} is outside this {what}'s range [{low:g}, {high:g}]"
+        )
+    return where
+
+
+def chosen(
+    found: list[Equilibrium], stable: bool | None, region: str | None, regions: tuple[str, ...]
+) -> list[Equilibrium]:
+    """Those that are stable (or not), and those of a region."""
+    if region is not None and region not in regions:
+        raise unknown_name("region", region, regions)
+    return [
+        e
+        for e in found
+        if (stable is None or e.stable == stable) and (region is None or e.region == region)
+    ]

@@ -1,0 +1,272 @@
+"""A curve of special points in the plane of two parameters, as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import finite, formula, takes
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.formulas.columns import column
+from fastslow.results.base.immutable import ImmutableSequence
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.base.result import LIVE, Result
+from fastslow.results.base.table import Table, numbered
+from fastslow.results.branch.intersections import intersections
+from fastslow.results.branch.point_columns import labels_at
+from fastslow.results.branch.point_lookup import points_at
+from fastslow.results.io.html import points_html
+from fastslow.results.point_types import POINT_TYPES, point_name
+from fastslow.results.points import SpecialPoint, SpecialPoints
+
+#: Solves for the point of a curve after a part of the step behind a row at which a
+#: parameter has a value: (row, part, name, value) -> SpecialPoint.
+PointCorrector = Callable[[int, float, str, float], SpecialPoint | None]
+
+
+@dataclass(frozen=True, eq=False)
+class PointBranch(Table, Result):
+    """A curve of folds, Hopf points, branch points or boundary equilibria.
+
+    Parameters
+    ----------
+    states : tuple of str
+        State names.
+    parameter_names : tuple of str
+        The two parameters, as they were asked for.
+    code : str
+        What the curve was asked to be made of: LP, HB, BP or BE.
+    codes : ndarray of str, shape (N,)
+        What each row is: a curve of Hopf points goes on as one of neutral
+        saddles (NSD) beyond a Bogdanov-Takens point.
+    state : ndarray, shape (N, n)
+    parameter : ndarray, shape (N, 2)
+    tangent : ndarray, shape (N, n + 2)
+        Unit tangents (states, parameters), in the direction of tracing.
+    eigenvalues : ndarray of complex, shape (N, n)
+        Of the Jacobian in the curve's region.
+    region : str
+        The region whose rates vanish.
+    admissible : ndarray of bool, shape (N,)
+        Whether each row lies in its region; the others are virtual.
+    coefficient : ndarray, shape (N,)
+        Normal-form coefficient: a of folds, l₁ of Hopf points, else NaN.
+    special : SpecialPoints
+        In order along the curve; ``curve.special("CP")`` gives those of one code.
+    special_rows : tuple of int
+        The row of each special point.
+    outcomes : tuple of Outcome
+        Why the curve stopped at its first and its last row.
+    closed : bool
+    parameters : mapping
+        The values of all other parameters.
+    equations : str
+        The model as text.
+    settings : mapping
+        How the curve was traced.
+    corrector : callable, optional
+        Solves for a point read between rows; not kept in a file.
+    """
+
+    states: tuple[str, ...]
+    parameter_names: tuple[str, str]
+    code: str
+    codes: NDArray[np.str_]
+    state: NDArray[np.float64]
+    parameter: NDArray[np.float64]
+    tangent: NDArray[np.float64]
+    eigenvalues: NDArray[np.complex128]
+    region: str
+    admissible: NDArray[np.bool_]
+    coefficient: NDArray[np.float64]
+    special: SpecialPoints
+    special_rows: tuple[int, ...]
+    outcomes: tuple[Outcome, Outcome]
+    closed: bool = False
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    equations: str = ""
+    settings: Mapping[str, float] = field(default_factory=dict)
+    corrector: PointCorrector | None = field(default=None, repr=False, metadata=LIVE)
+
+    @property
+    def outcome(self) -> Outcome:
+        """How the tracing ended: the first unsuccessful end, else the last one."""
+        return next((o for o in self.outcomes if not o.success), self.outcomes[-1])
+
+    #: Numbers are no columns, and rows no points: there is nothing to go through one by one.
+    __iter__: ClassVar[None] = None
+
+    def __len__(self) -> int:
+        return len(self.state)
+
+    def __getitem__(self, name: object) -> NDArray[np.float64]:
+        """A state, a parameter, or an expression in them, shape (N,)."""
+        columns = {key: partial(self._column, k) for k, key in enumerate(self.point_names)}
+        return column(name, columns, self.parameters, len(self))
+
+    def _column(self, k: int) -> NDArray[np.float64]:
+        n = len(self.states)
+        return self.state[:, k] if k < n else self.parameter[:, k - n]
+
+    @property
+    def criticality(self) -> NDArray[np.str_]:
+        """Of Hopf points supercritical, subcritical or degenerate, else empty, shape (N,)."""
+        kinds = np.array(["supercritical", "degenerate", "subcritical"])
+        hopf = (self.codes == "HB") & np.isfinite(self.coefficient)
+        signs = np.sign(np.where(hopf, self.coefficient, 0.0)).astype(int)
+        return np.where(hopf, kinds[signs + 1], "")
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """States and parameters, shape (N, n + 2)."""
+        return np.column_stack([self.state, self.parameter])
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """The columns of `points`."""
+        return (*self.states, *self.parameter_names)
+
+    def at(self, **value: float) -> SpecialPoints:
+        """The points of the curve at one value of one of its parameters.
+
+        Each is solved for to rounding while the model is attached. Of a curve read
+        from a file it is interpolated by cubics, and its note says so.
+
+        Parameters
+        ----------
+        **value : float
+            One of both parameters by name, e.g. ``q=0.5``.
+
+        Returns
+        -------
+        SpecialPoints
+            In order along the curve; none where it does not reach the value.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is neither of both parameters.
+        ArgumentError
+            For a number that is not finite, or not one value.
+
+        Examples
+        --------
+        >>> import fastslow as fs
+        >>> cusp = fs.systems.cusp().frozen()
+        >>> fold = fs.continue_equilibria(cusp, "p", over=(-1, 1)).folds[0]
+        >>> curve = fs.continue_points(fold, ("p", "q"), over={"p": (-1, 1), "q": (-1, 2)})
+        >>> curve.at(q=0.75)["p"].round(12)
+        array([-0.25,  0.25])
+        """
+        if len(value) != 1:
+            raise ArgumentError(
+                f"at: expected one value of {' or '.join(self.parameter_names)}, received "
+                f"{', '.join(value) or 'none'}"
+            )
+        ((name, given),) = value.items()
+        if name not in self.parameter_names:
+            raise unknown_name("parameter of the curve", name, self.parameter_names)
+        return points_at(self, name, finite(name, given))
+
+    @takes(x=formula, y=formula)
+    def intersections(
+        self, other: PointBranch, x: object = None, y: object = None
+    ) -> NDArray[np.float64]:
+        """Where two curves meet in the plane of two columns; see `Branch.intersections`.
+
+        Parameters
+        ----------
+        other : PointBranch
+        x, y : str, optional
+            By default the two parameters.
+
+        Raises
+        ------
+        ArgumentError
+            For the same curve, also where it was traced twice.
+        """
+        first, second = self.parameter_names
+        names = str(first if x is None else x), str(second if y is None else y)
+        return intersections(self, other, names)
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Parameters, states, code, admissibility, coefficient, eigenvalues, labels of points."""
+        return {
+            **{name: self[name] for name in (*self.parameter_names, *self.states)},
+            "code": self.codes,
+            "admissible": self.admissible,
+            "coefficient": self.coefficient,
+            **numbered("eigenvalue", self.eigenvalues),
+            "label": labels_at(self.special, self.special_rows, len(self)),
+        }
+
+    def _repr_html_(self) -> str:
+        return points_html(self.special, repr(self).split("\n")[0], self.parameter_names)
+
+    def __repr__(self) -> str:
+        first, second = self.parameter_names
+        lines = [
+            f"Curve of {self.code} ({POINT_TYPES[self.code].name}) in {self.region} "
+            f"over {first} and {second}, {len(self)} points"
+        ]
+        for point in self.special:
+            at = ", ".join(f"{n} = {point.parameters[n]:.6g}" for n in self.parameter_names)
+            if point.code != "EP":
+                lines.append(f"   {point.label}: {at}, {point.description}")
+        lines += [f"   ends: {outcome}" for outcome in dict.fromkeys(self.outcomes)]
+        return "\n".join(lines)
+
+
+class PointCurves(ImmutableSequence, tuple[PointBranch, ...]):
+    """The curves of all special points of a diagram, each once.
+
+    Attributes
+    ----------
+    parameter_names : tuple of str
+        The two parameters.
+    isolated : SpecialPoints
+        Points of the diagram from which no curve could be traced, such as branch
+        points that no symmetry keeps.
+    """
+
+    parameter_names: tuple[str, str]
+    isolated: SpecialPoints
+
+    def __new__(
+        cls,
+        curves: Iterable[PointBranch],
+        parameter_names: tuple[str, str],
+        isolated: Iterable[SpecialPoint] = (),
+    ) -> PointCurves:
+        made = super().__new__(cls, curves)
+        made.parameter_names = parameter_names
+        made.isolated = SpecialPoints(isolated)
+        return made
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        return tuple(self), self.parameter_names, self.isolated
+
+    @property
+    def special(self) -> SpecialPoints:
+        """The special points of all curves; one that lies on two of them is there twice."""
+        return SpecialPoints(point for curve in self for point in curve.special)
+
+    def __repr__(self) -> str:
+        lines = [f"{len(self)} curves over {' and '.join(self.parameter_names)}"]
+        for curve in self:
+            codes = " ".join(p.label for p in curve.special)
+            cut = "" if curve.outcome.success else f"; {curve.outcome.code}"
+            lines.append(
+                f"   {curve.code} {point_name(curve.code)} in {curve.region}, {len(curve)} points"
+                + (f": {codes}" if codes else "")
+                + cut
+            )
+        if self.isolated:
+            names = ", ".join(point.label for point in self.isolated)
+            lines.append(f"   no curve from {names}")
+        return "\n".join(lines)

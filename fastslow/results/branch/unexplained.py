@@ -1,0 +1,169 @@
+"""Changes of the number of unstable eigenvalues that no special point of a branch explains."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.points import NEUTRAL
+
+if TYPE_CHECKING:
+    from fastslow.results.branch.branch import Branch
+
+
+@dataclass(frozen=True)
+class UnexplainedChange:
+    """A change of the number of unstable eigenvalues without a special point that explains it.
+
+    Parameters
+    ----------
+    branch : int
+        Number of the branch in its diagram; 0 for a branch by itself.
+    rows : (int, int)
+        The rows of the branch between which the number changes.
+    parameter : str
+        Name of the parameter.
+    interval : (float, float)
+        Values of the parameter at these rows, in the order of the branch.
+    before, after : int
+        Number of eigenvalues with positive real part at the two rows.
+    """
+
+    branch: int
+    rows: tuple[int, int]
+    parameter: str
+    interval: tuple[float, float]
+    before: int
+    after: int
+
+    def __str__(self) -> str:
+        first, last = self.interval
+        return (
+            f"branch {self.branch}: unstable eigenvalues change from {self.before} to "
+            f"{self.after} between {self.parameter} = {first:.8g} and {last:.8g}, and no special "
+            "point explains it"
+        )
+
+
+def unstable_range(
+    eigenvalues: NDArray[np.complex128],
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Least and largest number of eigenvalues with positive real part, shape (...).
+
+    They differ by those whose real part is zero to rounding. Eigenvalues that are
+    not finite numbers are undecided, infinite ones count by their sign.
+
+    Parameters
+    ----------
+    eigenvalues : ndarray of complex, shape (..., n)
+
+    Examples
+    --------
+    >>> least, largest = unstable_range(np.array([[1.0, -2.0], [1e-17, -2.0]]))
+    >>> least.tolist(), largest.tolist()
+    ([1, 0], [1, 1])
+    """
+    # NumPy reduces a short last axis slowly
+    values = np.ascontiguousarray(np.moveaxis(np.asarray(eigenvalues), -1, 0))
+    size = np.where(np.isfinite(values), np.abs(values), 0.0)
+    small = NEUTRAL * size.max(axis=0, initial=0.0)
+    undecided = np.isnan(values) | (np.abs(values.real) <= small)
+    certain = (values.real > 0) & ~undecided
+    return certain.sum(axis=0), (certain | undecided).sum(axis=0)
+
+
+def unexplained_changes(branch: Branch, number: int = 0) -> tuple[UnexplainedChange, ...]:
+    """The changes along a branch that the special points between its rows do not explain.
+
+    At a fold or branch point the number of unstable eigenvalues changes by one, at a
+    Hopf point by two, at a neutral saddle it stays, and from one region to another it
+    may change by any number.
+    """
+    steps: dict[int, list[int | None]] = {}
+    for point, row in zip(branch.special, branch.special_rows, strict=True):
+        known = POINT_TYPES.get(point.code)
+        if known is None or known.changes_stability:
+            steps.setdefault(row, []).append(known.unstable if known else None)
+    jumps = set((np.flatnonzero(branch.region[1:] != branch.region[:-1]) + 1).tolist())
+    low, high = unstable_range(branch.eigenvalues)
+    return tuple(
+        UnexplainedChange(
+            number,
+            (since, row),
+            branch.parameter_name,
+            (float(branch.parameter[since]), float(branch.parameter[row])),
+            int(low[since]),
+            int(low[row]),
+        )
+        for since, row in unexplained_rows(low, high, steps, jumps)
+    )
+
+
+def unexplained_rows(
+    low: NDArray[np.intp],
+    high: NDArray[np.intp],
+    steps: Mapping[int, Sequence[int | None]],
+    jumps: Collection[int] = (),
+) -> list[tuple[int, int]]:
+    """Rows between which the number of unstable eigenvalues changes without an explanation.
+
+    Parameters
+    ----------
+    low, high : ndarray of int, shape (N,)
+        The least and largest number at every row.
+    steps : dict of int to list
+        By how much it changes at the special points at some rows, None for any number. The
+        number at these rows themselves is undecided.
+    jumps : collection of int
+        Rows before which it may change by any number, as another region begins there.
+
+    Returns
+    -------
+    list of (int, int)
+        The last row at which the number was certain, and the one at which it is another.
+
+    Examples
+    --------
+    >>> low = np.array([0, 0, 0, 2, 2])
+    >>> unexplained_rows(low, low, {2: [2]}), unexplained_rows(low, low, {2: [1]})
+    ([], [(1, 3)])
+    """
+    most = int(high.max(initial=0))
+    found = []
+    # the numbers that are possible at the row, and the last row at which there was only one
+    possible = set(range(most + 1))
+    since, done = 0, -1
+    for row in _eventful(low, high, [*steps, *jumps]):
+        if row - 1 > done and low[row - 1] == high[row - 1]:
+            since = row - 1
+        done = row
+        changes = steps.get(row, ())
+        if None in changes or row in jumps:
+            possible = set(range(most + 1))
+        for step in changes:
+            if step is not None:
+                possible |= {p + s for p in possible for s in (-step, step)}
+        here = set(range(int(low[row]), int(high[row]) + 1))
+        if not changes:
+            if not possible & here:
+                found.append((since, row))
+                possible = here
+            possible &= here
+            if len(here) == 1:
+                since = row
+    return found
+
+
+def _eventful(low: NDArray[np.intp], high: NDArray[np.intp], places: Collection[int]) -> list[int]:
+    """Rows that differ from the one before, some others, and the one after each of these."""
+    eventful = np.ones(len(low), dtype=bool)
+    eventful[1:] = (np.diff(low) != 0) | (np.diff(high) != 0)
+    near = np.array([*places, *(place + 1 for place in places)], dtype=np.intp)
+    eventful[near[(near >= 0) & (near < len(low))]] = True
+    rows: list[int] = np.flatnonzero(eventful).tolist()
+    return rows

@@ -1,0 +1,297 @@
+"""A window in the states: the ranges within which branches are traced."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import real_number, shown
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.angles import nearest_copy
+from fastslow.results.base.outcome import Outcome
+
+Array = NDArray[np.float64]
+
+#: Code of the outcome of a branch that ends on an edge of the window of the states.
+LEFT = "left the window"
+
+#: A default bound is this many times the size of the known equilibria away from them.
+MARGIN = 1e4
+
+#: A range of equilibria is at most this many times their typical distance from the median; of
+#: numbers spread evenly it is four times.
+TYPICAL = 8.0
+
+#: Distances below this part of the size of a state are rounding.
+ROUNDING = 1e-9
+
+#: What is beyond a bound by less than this fraction of the state's unit is on it.
+ON_EDGE = 1e-9
+
+
+@dataclass(frozen=True)
+class StateWindow:
+    """The ranges of the states within which branches are traced.
+
+    ``window["x"]`` is the range of one state, (low, high); an infinite end is no bound.
+
+    Parameters
+    ----------
+    states : tuple of str
+        State names.
+    lower, upper : tuple of float
+        Bounds, state by state, in the states' units.
+    given : tuple of (bool, bool)
+        Whether the lower and the upper bound of each state were asked for; the
+        others are defaults.
+    core : tuple of (float, float) or None
+        For each state the range of the equilibria from which the tracing
+        started without the few that are far from the others, near a pole.
+    periods : tuple of float
+        The period of each state, 0 where it has none; empty where none has one.
+
+    Examples
+    --------
+    >>> window = state_window(("x", "y"), {"x": (0, None)})
+    >>> window["x"], window.chosen
+    ((0.0, inf), True)
+    >>> window.around(np.array([[0.0, 1.0], [2.0, 3.0]]))
+    StateWindow(x in [0, 20002], y in [-29999, 30003])
+    """
+
+    states: tuple[str, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    given: tuple[tuple[bool, bool], ...]
+    core: tuple[tuple[float, float] | None, ...]
+    periods: tuple[float, ...] = ()
+
+    def __getitem__(self, state: object) -> tuple[float, float]:
+        name = str(state)
+        if name not in self.states:
+            raise unknown_name("state", name, self.states)
+        k = self.states.index(name)
+        return self.lower[k], self.upper[k]
+
+    @property
+    def chosen(self) -> bool:
+        """Whether any bound was asked for."""
+        return any(low or high for low, high in self.given)
+
+    def contains(self, state: Array, unit: Array | float = 0.0) -> NDArray[np.bool_]:
+        """Whether states, shape (…, n), lie in the window; its edges belong to it.
+
+        ``unit`` is the size of every state, by which rounding at an edge is judged.
+        """
+        slack = ON_EDGE * np.maximum(np.abs(state), unit)
+        inside = (state >= np.array(self.lower) - slack) & (state <= np.array(self.upper) + slack)
+        return np.asarray(inside.all(axis=-1))
+
+    def meets(self, lower: Array, upper: Array) -> bool:
+        """Whether a box of states, or a copy of it by whole periods, has a part in the window."""
+        low, high = np.array(self.lower), np.array(self.upper)
+        turning = (self._periods > 0) & np.isfinite(low) & np.isfinite(upper)
+        period = np.where(turning, self._periods, 1.0)
+        # the first copy that is not below the window
+        first = np.where(turning, low, 0.0) / period - np.where(turning, upper, 0.0) / period
+        move = np.where(turning, period * np.ceil(first - ON_EDGE), 0.0)
+        return bool(np.all((upper + move >= low) & (lower + move <= high)))
+
+    def around(self, points: Array, known: NDArray[np.bool_] | None = None) -> StateWindow:
+        """The window with defaults in place of the bounds that were not asked for.
+
+        A periodic state has none.
+
+        They are `MARGIN` times the size of the equilibria away from these, where
+        the size of a state is the larger of its spread and its largest modulus:
+        measured in other units, it is the same window.
+
+        Parameters
+        ----------
+        points : ndarray, shape (m, n)
+            Known equilibria.
+        known : ndarray of bool, shape (m, n), optional
+            False for what is zero but for rounding.
+        """
+        kept = np.isfinite(points) & (True if known is None else known)
+        lower, upper = list(self.lower), list(self.upper)
+        core: list[tuple[float, float] | None] = []
+        for k in range(len(self.states)):
+            column = points[kept[:, k], k]
+            if not column.size or (self.periods and self.periods[k]):
+                core.append(None)
+                continue
+            low, high = float(column.min()), float(column.max())
+            middle = float(np.median(column))
+            wide = float(typical(column[:, None], ROUNDING * max(abs(low), abs(high)))[0])
+            core.append((max(low, middle - wide), min(high, middle + wide)))
+            size = max(high - low, abs(low), abs(high))
+            if size > 0 and not self.given[k][0]:
+                lower[k] = low - MARGIN * size
+            if size > 0 and not self.given[k][1]:
+                upper[k] = high + MARGIN * size
+        return replace(self, lower=tuple(lower), upper=tuple(upper), core=tuple(core))
+
+    def near(self, states: Array) -> NDArray[np.bool_]:
+        """Whether states, shape (N, n), are not farther from the core than it is wide, shape (N,).
+
+        Figures are scaled to these where a branch goes to infinity.
+        """
+        found = np.ones(len(states), dtype=bool)
+        for k, core in enumerate(self.core):
+            if core is not None:
+                wide = core[1] - core[0] or abs(core[0])
+                found &= (states[:, k] >= core[0] - wide) & (states[:, k] <= core[1] + wide)
+        return found
+
+    def middle(self) -> Array:
+        """The middle of the core, 0 where there is none, NaN of periodic states, shape (n,)."""
+        middle = [0.0 if c is None else 0.5 * (c[0] + c[1]) for c in self.core]
+        return np.where(self._periods > 0, np.nan, middle)
+
+    @property
+    def _periods(self) -> Array:
+        return np.array(self.periods or (0.0,) * len(self.states))
+
+    def shifted(self, states: Array) -> Array:
+        """States, shape (…, n), shifted by whole periods into the window's ranges."""
+        if not self.periods:
+            return np.array(states, dtype=float)
+        low, high = np.array(self.lower), np.array(self.upper)
+        bounded = (self._periods > 0) & np.isfinite(low)
+        middle = np.where(bounded, low, 0.0) / 2.0 + np.where(bounded, high, 0.0) / 2.0
+        return np.where(bounded, nearest_copy(states, middle, self._periods), states)
+
+    def __str__(self) -> str:
+        return ", ".join(
+            f"{name} in [{low:g}, {high:g}]"
+            for name, low, high in zip(self.states, self.lower, self.upper, strict=True)
+            if math.isfinite(low) or math.isfinite(high)
+        )
+
+    def __repr__(self) -> str:
+        return f"StateWindow({self})"
+
+
+def typical(points: Array, least: Array | float) -> Array:
+    """How widely each state of some points is spread, but for the few far from the others.
+
+    `TYPICAL` times the median distance from the median, of distances above
+    ``least``; infinite where there is none. Shapes (m, n) and (n,).
+
+    Examples
+    --------
+    >>> typical(np.array([[-1.0], [0.0], [1.0], [2.0], [1e6]]), 1e-9).tolist()
+    [12.0]
+    """
+    if not len(points):
+        return np.full(points.shape[1], np.inf)
+    away = np.abs(points - np.median(points, axis=0))
+    found = [
+        a[a > bound] for a, bound in zip(away.T, np.broadcast_to(least, away.shape[1]), strict=True)
+    ]
+    return np.array([TYPICAL * float(np.median(a)) if a.size else np.inf for a in found])
+
+
+def state_window(
+    states: tuple[str, ...],
+    given: Mapping[Any, Any] | None = None,
+    periodic: Mapping[str, float] | None = None,
+) -> StateWindow:
+    """The window that a user asks for, without defaults.
+
+    Parameters
+    ----------
+    states : tuple of str
+    given : mapping, optional
+        State (symbol or name) to its range (low, high); None in place of an end
+        leaves the default there, an infinite end is no bound at all.
+    periodic : mapping, optional
+        State to its period.
+
+    Raises
+    ------
+    UnknownNameError
+        For a name that is no state.
+    ArgumentError
+        For a range that is none.
+
+    Examples
+    --------
+    >>> state_window(("x", "y"), {"x": (-5, 5)})
+    StateWindow(x in [-5, 5])
+    >>> state_window(("x",), {"x": (5, -5)})
+    Traceback (most recent call last):
+    ...
+    fastslow.errors.ArgumentError: window of x = (5, -5); expected two numbers, the lower one \
+first, or None for an end without bound; did you mean (-5, 5)?
+    """
+    lower, upper = [-math.inf] * len(states), [math.inf] * len(states)
+    asked = [(False, False)] * len(states)
+    for key, ends in (given or {}).items():
+        name = str(key)
+        if name not in states:
+            raise unknown_name("state of the window", name, states)
+        k = states.index(name)
+        lower[k], upper[k] = _range(name, ends)
+        asked[k] = (ends[0] is not None, ends[1] is not None)
+        period = (periodic or {}).get(name)
+        if period is not None and not upper[k] - lower[k] <= period * (1 + ON_EDGE):
+            raise ArgumentError(
+                f"window of {name} = {shown(ends)}; expected a range no longer than the period "
+                f"{period:g} of {name}"
+            )
+    none = (None,) * len(states)
+    periods = tuple(float((periodic or {}).get(name, 0.0)) for name in states)
+    return StateWindow(
+        states, tuple(lower), tuple(upper), tuple(asked), none, periods if any(periods) else ()
+    )
+
+
+def _range(name: str, ends: Any) -> tuple[float, float]:
+    expected = "two numbers, the lower one first, or None for an end without bound"
+    if not isinstance(ends, tuple | list | np.ndarray) or len(ends) != 2:
+        raise ArgumentError(f"window of {name} = {shown(ends)}; expected {expected}")
+    low = -math.inf if ends[0] is None else real_number(ends[0])
+    high = math.inf if ends[1] is None else real_number(ends[1])
+    if low is None or high is None or math.isnan(low) or math.isnan(high):
+        raise ArgumentError(f"window of {name} = {shown(ends)}; expected {expected}")
+    if low >= high:
+        hint = f"; did you mean ({high:g}, {low:g})?" if low > high else ""
+        raise ArgumentError(f"window of {name} = {shown(ends)}; expected {expected}{hint}")
+    return low, high
+
+
+def left_window(window: StateWindow, state: Array, unit: Array, where: str) -> Outcome:
+    """What is said of a curve that ends at a state on an edge of a window.
+
+    Parameters
+    ----------
+    window : StateWindow
+    state, unit : ndarray, shape (n,)
+        The last state, and the unit of each.
+    where : str
+        The values of the parameters there.
+    """
+    bounds = np.array([window.lower, window.upper]).T
+    off = np.abs(state[:, None] - bounds) / unit[:, None]
+    k, side = np.unravel_index(np.argmin(np.where(np.isfinite(off), off, np.inf)), off.shape)
+    name, bound = window.states[k], bounds[k, side]
+    if window.given[k][side]:
+        return Outcome(
+            "left the window",
+            f"reached {name} = {bound:g}, an edge of the window, at {where}.",
+            True,
+        )
+    return Outcome(
+        "left the window",
+        f"{name} reached {bound:.6g} at {where}, {MARGIN:g} times the size of the equilibria from "
+        f"which branches are traced, and may go to infinity; window={{'{name}': (low, high)}} "
+        "sets other bounds.",
+        False,
+    )

@@ -1,0 +1,280 @@
+"""Results as text and arrays, and back, bit for bit.
+
+Text and numbers become JSON; arrays are kept beside it under names such as
+``branches/0/state``, small ones in the text itself. Only the classes of
+`fastslow.results` are ever built.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, fields, is_dataclass
+from functools import cache
+from importlib import import_module
+from pkgutil import walk_packages
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError, raised_by_handler
+from fastslow.results.base.named_mapping import Named
+from fastslow.results.branch.tangencies import Tangencies
+from fastslow.results.points import Equilibria, SpecialPoints
+from fastslow.results.stored.model import StoredModel
+
+Array = NDArray[Any]
+
+#: Gives an array by name and type.
+Arrays = Callable[[str, str], Array]
+
+#: Arrays up to this size stand in the text.
+SMALL = 16
+
+#: What they are made of.
+INLINE = ("<f8", "<c16", "<i8", "|b1")
+
+_SEQUENCES: dict[str, Callable[..., Any]] = {
+    "list": list,
+    "tuple": tuple,
+    "SpecialPoints": SpecialPoints,
+    "Equilibria": Equilibria,
+    "Tangencies": Tangencies,
+}
+
+_NUMBERS = {"nan": math.nan, "-nan": -math.nan, "inf": math.inf, "-inf": -math.inf}
+
+
+class BrokenError(Exception):
+    """What a file holds is no result of this version; the message says why."""
+
+
+@cache
+def classes() -> dict[str, type[Any]]:
+    """Every dataclass of the results by name."""
+    found: dict[str, type[Any]] = {}
+    package = "fastslow.results"
+    for entry in walk_packages(import_module(package).__path__, f"{package}."):
+        module = import_module(entry.name)
+        for name, value in vars(module).items():
+            if not isinstance(value, type) or value.__module__ != module.__name__:
+                continue
+            if is_dataclass(value) and not name.startswith("_"):
+                found[name] = value
+    return found
+
+
+def encoded(value: Any, path: str, arrays: dict[str, Array]) -> Any:
+    """A JSON tree of a result; its arrays are put into ``arrays``.
+
+    Parameters
+    ----------
+    value : object
+    path : str
+        Where it is in the result, the name of its array.
+    arrays : dict
+        Filled.
+
+    Raises
+    ------
+    ArgumentError
+        For something that cannot be kept, with its place.
+    """
+    if isinstance(value, np.generic):
+        value = value.item()
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else {"float": _name(value)}
+    if isinstance(value, complex):
+        return {"complex": [encoded(v, path, arrays) for v in (value.real, value.imag)]}
+    if isinstance(value, np.ndarray):
+        return _array(value, path, arrays)
+    if isinstance(value, list | tuple):
+        items = [encoded(v, f"{path}/{k}", arrays) for k, v in enumerate(value)]
+        node = _sequence(value, items, path)
+        if isinstance(value, Equilibria) and value.sets:
+            node["sets"] = encoded(value.sets, f"{path}/sets", arrays)
+        return node
+    if isinstance(value, Mapping):
+        return _mapping(value, path, arrays)
+    if classes().get(type(value).__name__) is type(value):
+        return _record(value, path, arrays)
+    raise ArgumentError(f"{path or 'this'} is a {type(value).__name__}, which no file can keep")
+
+
+def _array(value: Array, path: str, arrays: dict[str, Array]) -> Any:
+    if value.dtype.hasobject or value.dtype.kind not in "biufcU":
+        raise ArgumentError(f"{path} is an array of {value.dtype}, which no file can keep")
+    if value.size <= SMALL and value.dtype.str in INLINE:
+        flat = np.ascontiguousarray(value).reshape(-1)
+        plain = flat.view(np.float64) if value.dtype.kind == "c" else flat
+        numbers = [v if math.isfinite(v) else repr(v) for v in plain.tolist()]
+        node = {"numbers": numbers, "dtype": value.dtype.str, "shape": list(value.shape)}
+        if _small(node).tobytes() == flat.tobytes():
+            return node
+    arrays[path] = value
+    return {"array": path, "dtype": value.dtype.str, "shape": list(value.shape)}
+
+
+def _name(value: float) -> str:
+    """The key in `_NUMBERS` of a float that is not finite, or the bytes of any other NaN."""
+    known = (name for name, one in _NUMBERS.items() if _bits(one) == _bits(value))
+    return next(known, _bits(value).hex())
+
+
+def _bits(value: float) -> bytes:
+    return struct.pack("<d", value)
+
+
+def _float(name: str) -> float:
+    return _NUMBERS[name] if name in _NUMBERS else struct.unpack("<d", bytes.fromhex(name))[0]
+
+
+def _small(node: dict[str, Any]) -> Array:
+    numbers = [_NUMBERS[v] if isinstance(v, str) else v for v in node["numbers"]]
+    if node["dtype"] not in INLINE:
+        raise BrokenError(f"it holds numbers of type {str(node['dtype'])[:40]}")
+    kind = np.dtype(node["dtype"])
+    if kind.kind == "c":
+        return np.array(numbers, dtype=np.float64).view(kind).reshape(node["shape"])
+    return np.array(numbers, dtype=kind).reshape(node["shape"])
+
+
+def _sequence(value: Any, items: list[Any], path: str) -> Any:
+    name = type(value).__name__
+    if _SEQUENCES.get(name) is not type(value):
+        raise ArgumentError(f"{path or 'this'} is a {name}, which no file can keep")
+    if isinstance(value, Equilibria | Tangencies):
+        return {name: items, "coverage": value.coverage}
+    return {name: items}
+
+
+def _mapping(value: Mapping[Any, Any], path: str, arrays: dict[str, Array]) -> Any:
+    for key in value:
+        if type(key) is not str:
+            raise ArgumentError(f"{path} has the key {key!r}; files keep names only")
+    entries = [[key, encoded(v, f"{path}/{_safe(key)}", arrays)] for key, v in value.items()]
+    if isinstance(value, Named):
+        return {"named": value.kind, "entries": entries}
+    return {"mapping": entries}
+
+
+def _safe(name: str) -> str:
+    """A name as a part of the name of an array."""
+    return "".join(c if c.isalnum() or c in "_-" else f"%{ord(c):x}" for c in name) or "%"
+
+
+def _record(value: Any, path: str, arrays: dict[str, Array]) -> Any:
+    kept = {}
+    for entry in fields(value):
+        if entry.metadata.get("live") and not _is_stored(entry):
+            continue
+        part = getattr(value, entry.name)
+        if _is_stored(entry):
+            part = _stored(value)
+            if part is None:
+                continue
+        where = f"{path}/{entry.name}" if path else entry.name
+        kept[entry.name] = encoded(part, where, arrays)
+    return {"class": type(value).__name__, "fields": kept}
+
+
+def _stored(value: Any) -> StoredModel | None:
+    """The stored model of a result, None where there is none.
+
+    Where it cannot be made the result is kept without it, with a warning: numbers are not lost
+    because of equations.
+    """
+    try:
+        found = value.stored_model
+    except Exception as error:
+        if raised_by_handler(error):
+            raise
+        warnings.warn(
+            f"the model of this {type(value).__name__} is not kept in the file: {error}",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return None
+    return found if isinstance(found, StoredModel) else None
+
+
+def _is_stored(entry: Field[Any]) -> bool:
+    return bool(entry.metadata.get("stored"))
+
+
+def decoded(node: Any, arrays: Arrays) -> Any:
+    """The result of a JSON tree.
+
+    Parameters
+    ----------
+    node : object
+    arrays : callable
+        Gives an array by name and type.
+
+    Raises
+    ------
+    BrokenError
+        For anything that `encoded` does not write.
+    """
+    if not isinstance(node, dict):
+        return node
+    try:
+        return _built(node, arrays)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, struct.error) as error:
+        raise BrokenError(f"it does not read as a result ({error!r})") from None
+
+
+def _built(node: dict[str, Any], arrays: Arrays) -> Any:
+    if "class" in node:
+        return _object(node, arrays)
+    if "array" in node:
+        array = arrays(node["array"], node["dtype"])
+        if array.dtype.str != node["dtype"] or list(array.shape) != node["shape"]:
+            raise BrokenError(f"the array {node['array']} is not as its description says")
+        return array
+    if "numbers" in node:
+        return _small(node)
+    if "float" in node:
+        return _float(node["float"])
+    if "complex" in node:
+        return complex(*(decoded(part, arrays) for part in node["complex"]))
+    if "mapping" in node:
+        return {key: decoded(value, arrays) for key, value in node["mapping"]}
+    if "named" in node:
+        pairs = [(key, decoded(value, arrays)) for key, value in node["entries"]]
+        return Named(node["named"], pairs)
+    for name, build in _SEQUENCES.items():
+        if name in node:
+            items = [decoded(value, arrays) for value in node[name]]
+            if "coverage" not in node:
+                return build(items)
+            sets = [decoded(node["sets"], arrays)] if "sets" in node else []
+            return build(items, node["coverage"], *sets)
+    raise BrokenError(f"it holds something unknown ({', '.join(node)})")
+
+
+def _object(node: dict[str, Any], arrays: Arrays) -> Any:
+    name = node["class"]
+    if name not in classes():
+        raise BrokenError(f"it holds a {name}, which this version does not know")
+    known = {entry.name: entry for entry in fields(classes()[name])}
+    values = {key: decoded(value, arrays) for key, value in node["fields"].items()}
+    for key in values:
+        live = key in known and known[key].metadata.get("live") and not _is_stored(known[key])
+        if key not in known or live:
+            raise BrokenError(f"its {name} has a field {key}, which this version does not know")
+    for key, entry in known.items():
+        optional = entry.default is not MISSING or entry.default_factory is not MISSING
+        if key not in values and not optional:
+            raise BrokenError(f"its {name} lacks the field {key}")
+        if _is_stored(entry) and not isinstance(values.get(key), StoredModel | None):
+            raise BrokenError(f"the {key} of its {name} is no stored model")
+    built = classes()[name](**values)
+    if isinstance(built, StoredModel):
+        built.check()
+    return built

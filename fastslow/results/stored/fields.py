@@ -1,0 +1,203 @@
+"""The frozen rates of a stored model over one parameter: what tracing branches needs of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fastslow.results.base.immutable import Immutable
+from fastslow.results.stored.arithmetic import UnknownOperationError, check_number, evaluated
+from fastslow.results.stored.unit_equations import UnitEquations
+
+
+@dataclass(frozen=True)
+class FieldOperations:
+    """Operations that fill the rates, their slopes, switching functions and theirs.
+
+    Parameters
+    ----------
+    shared : tuple of str
+        Parts ``s0``, ``s1``, … in ``u0``, … (states, then the varying parameters) and ``p0``, ….
+    outputs : tuple of (int, str)
+        Places that are filled, and with what; all others are zero.
+    size : int
+        How many places there are.
+    """
+
+    shared: tuple[str, ...]
+    outputs: tuple[tuple[int, str], ...]
+    size: int
+
+
+@dataclass(frozen=True)
+class FieldSides:
+    """What sliding along an interface lies between; see `fastslow.diagrams.modes.Sides`."""
+
+    interface: int
+    above: int
+    below: int
+    escaping: bool
+
+
+@dataclass(frozen=True)
+class Derivatives:
+    """Second and third derivatives of rates by states that do not vanish.
+
+    Parameters
+    ----------
+    entries : tuple of tuple of int
+        (i, j, k) or (i, j, k, l) with j ≤ k ≤ l.
+    shared : tuple of (str, str)
+        Names of parts, and what they are.
+    texts : tuple of str
+        The derivatives.
+    """
+
+    entries: tuple[tuple[int, ...], ...]
+    shared: tuple[tuple[str, str], ...]
+    texts: tuple[str, ...]
+
+    def __call__(self, *numbers: Any) -> list[Any]:
+        """Values at states, varying parameters and the others, u0, u1 and so on."""
+        values = {f"u{k}": number for k, number in enumerate(numbers)}
+        for name, text in self.shared:
+            values[name] = evaluated(text, values)
+        return [evaluated(text, values) for text in self.texts]
+
+
+@dataclass(frozen=True)
+class FieldMode:
+    """One region, or sliding along an interface.
+
+    Parameters
+    ----------
+    name : str
+    signs : tuple of int
+    sides : FieldSides or None
+    operations : FieldOperations
+    derivatives : Derivatives or None
+        None where they hold functions that compiled code alone has.
+    """
+
+    name: str
+    signs: tuple[int, ...]
+    sides: FieldSides | None
+    operations: FieldOperations
+    derivatives: Derivatives | None
+
+
+@dataclass(frozen=True, eq=False)
+class StoredField(Immutable):
+    """The frozen rates of every region and sliding motion over a parameter.
+
+    Parameters
+    ----------
+    parameter : str
+        The one that varies.
+    names : tuple of str
+        The parameters ``p0``, ``p1``, … of the operations.
+    modes : tuple of FieldMode
+    unit_equations : tuple of UnitEquations
+        For natural units without and with the size of the parameter.
+    levels : tuple of (str, str, str, float)
+        Interfaces that are a value of one state: name, state, the value as text in the
+        parameters and as a number.
+    values : mapping
+        Parameter values of those numbers.
+    path : mapping
+        Of a model frozen along a path, each slow quantity as text.
+    """
+
+    parameter: str
+    names: tuple[str, ...]
+    modes: tuple[FieldMode, ...]
+    unit_equations: tuple[UnitEquations, UnitEquations]
+    levels: tuple[tuple[str, str, str, float], ...]
+    values: Mapping[str, float]
+    path: Mapping[str, str]
+
+    def interface_values(self, values: Mapping[str, float]) -> dict[str, tuple[str, float]]:
+        """For every interface that is a plain value of one state, (state, value)."""
+        if values == self.values:
+            return {name: (state, value) for name, state, _, value in self.levels}
+        numbers = {f"p{k}": np.float64(values[n]) for k, n in enumerate(self.names) if n in values}
+        found = {}
+        for name, state, text, _ in self.levels:
+            with np.errstate(all="ignore"):
+                value = float(evaluated(text, numbers))
+            if np.isfinite(value):
+                found[name] = (state, value)
+        return found
+
+    def check(self, states: Sequence[str], interfaces: Sequence[str]) -> None:
+        """Refuse everything that is none of the vocabulary, or out of range.
+
+        Raises
+        ------
+        UnknownOperationError
+        """
+        n = len(states)
+        unknowns = {f"u{k}" for k in range(n + 1)}
+        names = unknowns | {f"p{k}" for k in range(len(self.names))}
+        rows = {len(mode.signs) for mode in self.modes}
+        m = rows.pop() if len(rows) == 1 else -1
+        _expect(m == len(interfaces) or m == len(interfaces) + 2, "as many signs for every mode")
+        for mode in self.modes:
+            _expect(set(mode.signs) <= {-1, 0, 1}, "signs")
+            sides = mode.sides
+            if sides is not None:
+                # its drifts are the last two rows
+                inside = 0 <= sides.interface < len(interfaces) < m
+                regions = (sides.above, sides.below)
+                _expect(inside and all(0 <= k < len(self.modes) for k in regions), "sides")
+                _expect(all(self.modes[k].sides is None for k in regions), "regions beside")
+            code = mode.operations
+            _expect(code.size == (n + m) * (n + 2), "a place for every number")
+            _expect(_distinct_below([k for k, _ in code.outputs], code.size), "places in range")
+            known = set(names)
+            for k, text in enumerate(code.shared):
+                check_number(text, known)
+                known.add(f"s{k}")
+            for _, text in code.outputs:
+                check_number(text, known)
+            if mode.derivatives is not None:
+                _check_derivatives(mode.derivatives, n, n + 1 + len(self.names))
+        for name, state, text, _ in self.levels:
+            _expect(name in interfaces and state in states, "a state of an interface")
+            check_number(text, names - unknowns)
+        _check_units(self.unit_equations, {*states, self.parameter, *self.names})
+
+
+def _expect(holds: bool, what: str) -> None:
+    if not holds:
+        raise UnknownOperationError(f"expected {what}")
+
+
+def _distinct_below(places: Sequence[int], size: int) -> bool:
+    return len(set(places)) == len(places) and all(0 <= k < size for k in places)
+
+
+def _check_derivatives(given: Derivatives, n: int, count: int) -> None:
+    _expect(len(given.entries) == len(given.texts), "a text for every derivative")
+    for entry in given.entries:
+        _expect(len(entry) in (3, 4) and all(0 <= k < n for k in entry), "places of derivatives")
+    known = {f"u{k}" for k in range(count)}
+    for name, text in given.shared:
+        check_number(text, known)
+        _expect(name.isidentifier() and name not in known, "a new name")
+        known.add(name)
+    for text in given.texts:
+        check_number(text, known)
+
+
+def _check_units(both: Sequence[UnitEquations], names: set[str]) -> None:
+    for one in both:
+        rows = len(one.matrix)
+        _expect(names.issuperset((*one.parameters, *one.gone, *one.fixed)), "names of the model")
+        _expect(one.matrix.shape == (rows, len(one.columns)), "a matrix of units")
+        _expect(one.right.shape == (rows, 1 + len(one.parameters)), "right-hand sides of units")
+        _expect(one.matrix.dtype == one.right.dtype == np.dtype(float), "real numbers")
+        _expect(bool(np.isfinite(one.matrix).all() and np.isfinite(one.right).all()), "numbers")

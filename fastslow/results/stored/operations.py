@@ -1,0 +1,257 @@
+"""What the code of a model is made from: operations of a small, fixed vocabulary.
+
+An operation on series names its operands by numbers of rows. What is plain arithmetic stands as
+text in canonical names: ``t`` is time, ``y0`` the first state, ``w0`` the first slow quantity,
+``p0`` the first parameter, and, where there are such, ``c0`` the first scalar, ``s0`` the first
+shared part and ``r0`` the value of the first row. What is read from a file is checked to be
+this and nothing else before anything is made of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from fastslow.results.base.equality import content_hash
+from fastslow.results.base.immutable import Immutable
+from fastslow.results.stored.arithmetic import UnknownOperationError, check_literal, check_number
+
+#: Kinds of operations on series. Behind the kind stand the row that is filled and the operands.
+SCALAR, TIME, SUM, MULTIPLE, PRODUCT = "scalar", "time", "sum", "multiple", "product"
+QUOTIENT, ROOT, POWER, LOGARITHM = "quotient", "root", "power", "logarithm"
+FUNCTION = "function"
+
+
+@dataclass(frozen=True)
+class SeriesOperations:
+    """Operations that fill the Taylor series of one smooth motion, for any order.
+
+    Parameters
+    ----------
+    name : str
+        Of the motion: a region, or ``"A|B"`` for sliding between two.
+    signs : tuple of int
+        Sign of every interface function; 0 along those that are slid along.
+    scalars : tuple of str
+        Numbers that follow from parameters, computed once.
+    nodes : tuple of tuple
+        Operations in the order in which values are computed.
+    rates : tuple of int
+        Row of the rate of each state and slow state.
+    outputs : tuple of int
+        Rows of slow quantities, interface functions and bounds of sliding.
+    """
+
+    name: str
+    signs: tuple[int, ...]
+    scalars: tuple[str, ...]
+    nodes: tuple[tuple[Any, ...], ...]
+    rates: tuple[int, ...]
+    outputs: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class ValueOperations:
+    """Values and rates of one smooth motion with functions that have no Taylor series.
+
+    Parameters
+    ----------
+    name, signs
+        As of `SeriesOperations`.
+    laws : tuple of str
+        Values of the slow quantities.
+    shared : tuple of str
+        Parts that stand in several of the others.
+    rates : tuple of str
+        Of states and slow states.
+    heights : tuple of (str, str)
+        Each interface function, and its rate along the motion.
+    bounds : tuple of str
+        The bounds of sliding.
+    """
+
+    name: str
+    signs: tuple[int, ...]
+    laws: tuple[str, ...]
+    shared: tuple[str, ...]
+    rates: tuple[str, ...]
+    heights: tuple[tuple[str, str], ...]
+    bounds: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Operations(Immutable):
+    """All smooth motions of a model as operations, and the gradients of its interfaces.
+
+    Parameters
+    ----------
+    sizes : tuple of int
+        Numbers of states with slow states, slow quantities and interfaces.
+    parameters : tuple of str
+        Names of ``p0``, ``p1``, …
+    motions : tuple of SeriesOperations or ValueOperations
+        Regions, then sliding motions; all of one kind.
+    gradients : tuple of (tuple of str, tuple of str)
+        For every interface the terms of its function, and its derivatives by states.
+    continuous : tuple of bool
+        Whether the rates are continuous across each interface.
+    values_only : tuple of str
+        Functions without a Taylor recurrence.
+    undecided : tuple of (str, str)
+        Intersections of discontinuities along which no sliding is derived, and why.
+    """
+
+    sizes: tuple[int, int, int]
+    parameters: tuple[str, ...]
+    motions: tuple[SeriesOperations | ValueOperations, ...]
+    gradients: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]
+    continuous: tuple[bool, ...]
+    values_only: tuple[str, ...] = ()
+    undecided: tuple[tuple[str, str], ...] = ()
+
+    @cached_property
+    def _hash(self) -> int:
+        return content_hash((self.sizes, self.parameters, len(self.motions), self.motions[0]))
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def regions(self) -> Mapping[str, tuple[int, ...]]:
+        """The signs of the interface functions in each region by its name."""
+        return {motion.name: motion.signs for motion in self.motions if 0 not in motion.signs}
+
+    @cached_property
+    def n_bounds(self) -> int:
+        """Number of rows for the bounds of sliding, the same in every motion."""
+        return max(2, *(_bounds(motion, self.sizes) for motion in self.motions), 0)
+
+    @property
+    def first_free(self) -> int:
+        """The first row after those that every motion fills."""
+        return sum(self.sizes) + self.n_bounds
+
+    def check(self) -> None:
+        """Refuse everything that is none of the vocabulary, or out of range.
+
+        Raises
+        ------
+        UnknownOperationError
+        """
+        m, q, p = self.sizes
+        _expect(min(m - 1, q, p) >= 0, "numbers of rows")
+        _expect(len(self.motions) > 0 and len(self.gradients) == p, "a motion")
+        _expect(len(self.continuous) == p, "a flag for every interface")
+        kind = ValueOperations if self.values_only else SeriesOperations
+        moving = {"t", *_numbered("y", m), *_numbered("w", q)}
+        known = {*_numbered("p", len(self.parameters))}
+        done: set[str] = set()
+        for motion in self.motions:
+            _expect(type(motion) is kind and len(motion.signs) == p, "motions of one kind")
+            _expect(set(motion.signs) <= {-1, 0, 1}, "signs")
+            if isinstance(motion, SeriesOperations):
+                _check_series(motion, self, known, done)
+            else:
+                _check_values(motion, self, known, moving)
+        for terms, slopes in self.gradients:
+            _expect(len(terms) > 0 and len(slopes) == m, "a slope by every state")
+            for text in (*terms, *slopes):
+                check_number(text, known | moving)
+
+
+def _bounds(motion: SeriesOperations | ValueOperations, sizes: tuple[int, int, int]) -> int:
+    if isinstance(motion, ValueOperations):
+        return len(motion.bounds)
+    return len(motion.outputs) - sizes[1] - sizes[2]
+
+
+def _numbered(letter: str, count: int) -> Iterator[str]:
+    return (f"{letter}{k}" for k in range(count))
+
+
+def _expect(holds: bool, what: str) -> None:
+    if not holds:
+        raise UnknownOperationError(f"expected {what}")
+
+
+def _check_values(
+    motion: ValueOperations, whole: Operations, known: set[str], moving: set[str]
+) -> None:
+    m, q, p = whole.sizes
+    counts = (len(motion.laws), len(motion.rates), len(motion.heights))
+    _expect(counts == (q, m, p), "a text for every row")
+    # a law stands before all quantities
+    for text in motion.laws:
+        check_number(text, known | moving)
+    names = known | moving
+    for k, text in enumerate(motion.shared):
+        check_number(text, names)
+        names = names | {f"s{k}"}
+    for text in (*motion.rates, *motion.bounds, *(t for pair in motion.heights for t in pair)):
+        check_number(text, names)
+
+
+def _check_series(
+    motion: SeriesOperations, whole: Operations, known: set[str], done: set[str]
+) -> None:
+    m, q, p = whole.sizes
+    last = whole.first_free + len(motion.nodes)
+    names = {*known, *_numbered("c", len(motion.scalars))}
+    filled = set(range(m))
+
+    def number(text: Any) -> None:
+        if not (isinstance(text, str) and text in names):
+            check_literal(text)
+
+    def row(given: Any, among: Iterable[int] = filled) -> None:
+        _expect(type(given) is int and given in among, "a row that is known")
+
+    for text in motion.scalars:
+        if text not in done:
+            check_number(text, known)
+            done.add(text)
+    everything = filled | {node[1] for node in motion.nodes}
+    for kind, place, *operands in motion.nodes:
+        _expect(type(place) is int and m <= place < last and place not in filled, "a new row")
+        match (kind, *operands):
+            case (str(), text) if kind == SCALAR:
+                number(text)
+            case (str(),) if kind == TIME:
+                pass
+            case (str(), tuple() as terms, str() as text) if kind == SUM and (terms or text):
+                for factor, term in terms:
+                    row(term)
+                    if factor not in ("+", "-"):
+                        number(factor)
+                if text:
+                    number(text)
+            case (str(), text, a) if kind == MULTIPLE:
+                number(text)
+                row(a)
+            case (str(), a, b) if kind == PRODUCT:
+                row(a)
+                row(b)
+            case (str(), a, b) if kind == QUOTIENT:
+                (number if isinstance(a, str) else row)(a)
+                row(b)
+            case (str(), text, a) if kind in (ROOT, POWER):
+                number(text)
+                row(a)
+            case (str(), text, a) if kind == LOGARITHM:
+                row(a)
+                check_number(text, {*names, f"r{a}"})
+            case (str(), text, tuple() as slots) if kind == FUNCTION:
+                for a, slope, steady in slots:
+                    row(a)
+                    row(slope, everything)
+                    if steady != "":
+                        number(steady)
+                check_number(text, {*names, *(f"r{a}" for a, _, _ in slots)})
+            case _:
+                raise UnknownOperationError(f"expected an operation, received {kind!a}"[:200])
+        filled.add(place)
+    _expect(len(motion.rates) == m and len(motion.outputs) >= q + p, "a row for every result")
+    for a in (*motion.rates, *motion.outputs):
+        row(a)

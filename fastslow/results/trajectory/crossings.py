@@ -1,0 +1,147 @@
+"""Crossings of interfaces, and the stretches of time between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import among, takes
+from fastslow.errors import unknown_name
+from fastslow.results.base.immutable import Immutable, ImmutableSequence
+
+if TYPE_CHECKING:
+    from fastslow.results.trajectory.trajectory import Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing(Immutable):
+    """One passage through an interface, or one touch.
+
+    Parameters
+    ----------
+    time : float
+    state : ndarray, shape (n,)
+        States and slow states, on the interface.
+    interface : str
+    direction : int
+        +1 where h grows, −1 where it falls, 0 where it only touches zero.
+    from_region, to_region : str
+        The same region for a touch; ``"A|B"`` is sliding between A and B.
+    tangential : bool
+        Whether a change of h by a millionth of its size would undo the crossing,
+        so that its time is known less well than others.
+    """
+
+    time: float
+    state: NDArray[np.float64]
+    interface: str
+    direction: int
+    from_region: str
+    to_region: str
+    tangential: bool
+
+    def __repr__(self) -> str:
+        arrow = {1: "upwards", -1: "downwards", 0: "touching"}[self.direction]
+        near = ", near-tangential" if self.tangential and self.direction else ""
+        return (
+            f"Crossing(t = {self.time:.9g}, {self.interface} {arrow}, "
+            f"{self.from_region} → {self.to_region}{near})"
+        )
+
+
+class Crossings(ImmutableSequence, tuple[Crossing, ...]):
+    """Crossings in order of time; called with an interface, those of that interface.
+
+    ``crossings("x - D", direction=+1)`` are the upward ones of an interface.
+
+    Parameters
+    ----------
+    items : iterable of Crossing
+    interfaces : tuple of str
+        Those that can be asked for.
+    """
+
+    interfaces: tuple[str, ...]
+
+    def __new__(cls, items: Iterable[Crossing] = (), interfaces: tuple[str, ...] = ()) -> Crossings:
+        made = super().__new__(cls, items)
+        made.interfaces = interfaces
+        return made
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        return tuple(self), self.interfaces
+
+    @takes(direction=among(-1, 0, 1, None))
+    def __call__(self, interface: object = None, *, direction: int | None = None) -> Crossings:
+        """Those of an interface, upwards (+1), downwards (−1) or only touching (0).
+
+        Raises
+        ------
+        UnknownNameError
+            For an interface that is not in the model.
+        """
+        if interface is not None and str(interface) not in self.interfaces:
+            raise unknown_name("interface", interface, self.interfaces)
+        kept = (
+            crossing
+            for crossing in self
+            if (interface is None or crossing.interface == str(interface))
+            and (direction is None or crossing.direction == direction)
+        )
+        return Crossings(kept, self.interfaces)
+
+
+def crossings_of(run: Trajectory) -> Crossings:
+    """Every crossing in order of time."""
+    found = (
+        Crossing(
+            float(entry[0]),
+            entry[6:].copy(),
+            run.interfaces[int(entry[1])],
+            int(entry[2]),
+            run.modes[int(entry[3])],
+            run.modes[int(entry[4])],
+            bool(entry[5]),
+        )
+        for entry in run.crossing_table
+    )
+    return Crossings(found, run.interfaces)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of time within one region (or of sliding between two)."""
+
+    start: float
+    end: float
+    region: str
+
+    @property
+    def duration(self) -> float:
+        return self.end - self.start
+
+
+def segments_of(run: Trajectory) -> tuple[Segment, ...]:
+    """Stretches of one region, in order."""
+    if not len(run.steps):
+        return ()
+    mode = run.steps[:, 2].astype(int)
+    starts = np.flatnonzero(np.r_[True, mode[1:] != mode[:-1]])
+    times = np.append(run.steps[starts, 0], run.span[1])
+    return tuple(
+        Segment(float(times[i]), float(times[i + 1]), run.modes[mode[first]])
+        for i, first in enumerate(starts)
+    )
+
+
+def regions_at(run: Trajectory, times: NDArray[np.float64]) -> NDArray[np.str_]:
+    """The region at each of some times; at a crossing the one that is entered."""
+    if not len(run.steps):
+        return np.full(len(times), "")
+    row = np.searchsorted(run.step_starts, times, side="right") - 1
+    mode = run.steps[np.maximum(row, 0), 2].astype(int)
+    return np.array(run.modes)[mode]

@@ -1,0 +1,98 @@
+"""What the stepping loop's end means, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.results.base.outcome import Outcome
+
+#: A state this much larger than where it began counts as a blow-up, where a run cannot go on.
+_BLOW_UP = 1e6
+
+
+def outcome_of(
+    code: int,
+    mode: int,
+    end: NDArray[np.float64],
+    n_steps: int,
+    begin: NDArray[np.float64],
+    modes: tuple[str, ...],
+    limits: tuple[int, int],
+    undecided: tuple[tuple[str, str], ...] = (),
+) -> Outcome:
+    """The outcome of a run, from the code of the loop (see `fastslow.simulation.stepper.driver`).
+
+    ``begin`` is the initial state, ``end`` the time and state reached; ``undecided`` names
+    intersections of interfaces without a sliding motion, and why.
+    """
+    time = f"t = {end[0]:.10g}"
+    if code == 0:
+        return Outcome("end of time", f"reached {time}, the end of the time asked for.", True)
+    if code == 2:
+        return Outcome(
+            "too many crossings",
+            f"stopped at {time} after {limits[1]} crossings; raise max_crossings= of Integration.",
+            False,
+        )
+    size = float(np.abs(end[1:]).max())
+    most = _BLOW_UP * (1.0 + float(np.abs(begin).max()))
+    if code in (1, 3, 4) and n_steps and not size <= most:
+        return Outcome(
+            "blow-up",
+            f"the state grew to {size:.3g} within {n_steps} steps, by {time}.",
+            False,
+        )
+    if code == 1:
+        return Outcome(
+            "too many steps",
+            f"stopped at {time} after {limits[0]} steps; raise max_steps= or rtol= of Integration.",
+            False,
+        )
+    if code in (3, 4) and n_steps:
+        return Outcome(
+            "singular",
+            f"the step was driven to nothing at {time}, where the rates or their derivatives "
+            "are not finite; end the time span before it, or write the rates without a "
+            "singularity there.",
+            False,
+        )
+    if code in (3, 4):
+        return Outcome(
+            "not finite at start",
+            f"the rates or their derivatives are not finite at the initial state, {time}; "
+            "start inside the domain of every function in the rates.",
+            False,
+        )
+    if code == 5:
+        return Outcome(
+            "not unique",
+            f"at {time} the forward motion is not unique: several solutions go on, because the "
+            "fields on the sides of an interface point away from it; start a little off the "
+            "interface to choose one.",
+            False,
+        )
+    if code == 6 and mode >= 0 and undecided:
+        reasons = "; ".join(f"at {where} {why}" for where, why in undecided)
+        return Outcome(
+            "not decided",
+            f"at {time}, after {modes[mode]}, the flow reaches several discontinuities at once, "
+            f"where no sliding motion is defined: {reasons}; write the rates as a sum of terms "
+            "with one sign each, smooth one of the signs, or start off the intersection.",
+            False,
+        )
+    if code == 6:
+        since = f", after {modes[mode]}," if mode >= 0 else ""
+        return Outcome(
+            "no way on",
+            f"at {time}{since} no motion goes on: the state lies outside every region, or on "
+            "several interfaces where neither a region nor sliding continues; start a little "
+            "off them, or perturb a parameter.",
+            False,
+        )
+    return Outcome(
+        "accumulation",
+        f"crossings accumulate at {time}: infinitely many within a finite time; the motion "
+        "beyond is not defined by the regions alone.",
+        False,
+    )

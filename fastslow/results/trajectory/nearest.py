@@ -1,0 +1,124 @@
+"""The moment of a trajectory nearest to given values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import finite
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.angles import copies, periods_of
+from fastslow.results.branch.nearest import along_line
+from fastslow.results.trajectory.dense import refined_table
+from fastslow.results.trajectory.state_at import Moment, check_readable, is_dense, moments_at
+from fastslow.results.trajectory.step_polynomials import StepPolynomials, along_steps
+from fastslow.results.trajectory.step_roots import find_zeros
+
+if TYPE_CHECKING:
+    from fastslow.results.trajectory.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+#: Steps that are looked at along their series: a motion that repeats is near everywhere.
+STEPS = 24
+
+
+def checked_values(values: Mapping[str, float], valid: tuple[str, ...]) -> None:
+    """Refuse names that are no columns, and numbers that are none."""
+    if not values:
+        raise ArgumentError(f"expected values of some of {', '.join(valid)}, received none")
+    for name, value in values.items():
+        if name not in valid:
+            raise unknown_name("column", name, valid)
+        finite(name, value)
+
+
+def nearest_time(times: Array, table: Array, target: Array) -> tuple[float, Array]:
+    """The nearest time on straight lines between rows, and the distances² of all steps.
+
+    Parameters
+    ----------
+    times : ndarray, shape (N,)
+    table : ndarray, shape (N, k)
+        Columns in units of their ranges, as the target is.
+    target : ndarray, shape (k,)
+    """
+    if len(times) == 1:
+        return float(times[0]), np.zeros(0)
+    distance, part = along_line(table, target)
+    row = int(np.argmin(distance))
+    return float((1 - part[row]) * times[row] + part[row] * times[row + 1]), distance
+
+
+def units_of(table: Array) -> Array:
+    """The range of every column, 1 for one that stands still."""
+    reach = np.ptp(table, axis=0)
+    return np.where(reach > 0, reach, 1.0)
+
+
+def nearest_target(table: Array, target: Array, scale: Array, periods: Array) -> Array:
+    """Of the copies of a target by whole periods the one that a table comes nearest to."""
+    if not periods.any() or not len(table):
+        return target
+    low, high = table.min(axis=0), table.max(axis=0)
+    ways = [copies(*entry) for entry in zip(target.tolist(), low, high, periods, strict=True)]
+    found = [np.array(way) for way in product(*ways)]
+    distances = [
+        nearest_time(np.arange(len(table), dtype=float), table / scale, t / scale)[1] for t in found
+    ]
+    return found[int(np.argmin([d.min(initial=np.inf) for d in distances]))]
+
+
+def nearest_moment(run: Trajectory, values: Mapping[str, float]) -> Moment:
+    """The nearest moment of a trajectory; see `Trajectory.nearest`."""
+    checked_values(values, (*run.columns, "t"))
+    check_readable(run)
+    if is_dense(run) and run.sampled is not None:
+        # samples may be few
+        times, columns = refined_table(run)
+        known = {**dict(zip(run.columns, columns, strict=True)), "t": times}
+        table = np.column_stack([known[name] for name in values])
+    else:
+        times, table = run.t, np.column_stack([run[name] for name in values])
+    periods = periods_of(tuple(values), run.periods)
+    scale = np.where(periods > 0, periods, units_of(table))
+    target = nearest_target(table, np.array([float(v) for v in values.values()]), scale, periods)
+    time, distance = nearest_time(times, table / scale, target / scale)
+    if is_dense(run) and len(distance):
+        close = np.argpartition(distance, min(4 * STEPS, len(distance)) - 1)[: 4 * STEPS]
+        close = close[np.argsort(distance[close], kind="stable")]
+        starts = times[close]
+        steps = np.searchsorted(run.step_starts, starts, side="right") - 1
+        # of those nearest by straight lines, in that order, each step once
+        _, order = np.unique(steps, return_index=True)
+        time = _along_series(run, steps[np.sort(order)[:STEPS]], list(values), target, scale)
+    return moments_at(run, np.array([time]))[0]
+
+
+def _along_series(
+    run: Trajectory, steps: NDArray[np.intp], names: list[str], target: Array, scale: Array
+) -> float:
+    """The time of least distance on some steps."""
+    assert run.series is not None
+    some = replace(run, steps=run.steps[steps], series=run.series[steps])
+    total = StepPolynomials(np.zeros((len(steps), 1)), np.zeros(len(steps)))
+    for name, value, unit in zip(names, target, scale, strict=True):
+        apart = along_steps(some, name).minus(float(value))
+        apart = StepPolynomials(apart.coefficients / unit, apart.size / unit)
+        total += apart * apart
+    power = np.arange(1, total.coefficients.shape[1])
+    slope = total.coefficients[:, 1:] * power
+    best = (np.inf, run.span[0])
+    for k, (start, length) in enumerate(some.steps[:, :2]):
+        one = StepPolynomials(slope[k : k + 1], np.abs(slope[k : k + 1]).sum(axis=1))
+        inside = [zero.middle for zero in find_zeros(one)]
+        parts = np.array([0.0, 1.0, *inside])
+        found = np.polynomial.polynomial.polyval(parts, total.coefficients[k])
+        least = int(np.argmin(found))
+        best = min(best, (float(found[least]), float(start + parts[least] * length)))
+    return min(max(best[1], run.span[0]), run.span[1])

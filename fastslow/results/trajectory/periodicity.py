@@ -1,0 +1,209 @@
+"""Whether a run has settled, and after how many periods it repeats."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError
+from fastslow.results.angles import apart, periods_of
+from fastslow.results.base.outcome import Outcome, stopped_early
+from fastslow.results.base.result import Result
+from fastslow.results.trajectory.section import Section, poincare_section, stroboscopic_section
+
+if TYPE_CHECKING:
+    from fastslow.results.trajectory.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+#: Only the last half of a run says what it settles on.
+LATE = 0.5
+
+#: A state whose range is below this part of its size does not move.
+STILL = 1e-9
+
+#: Changes below this many relative tolerances of the integration are its errors: on an
+#: attracting orbit those of one period add up to some tens of them.
+ERRORS = 1e3
+
+#: A run has settled when no more than this many tolerances are left to its limit.
+NEARLY = 100.0
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyState(Result):
+    """What a run settles on.
+
+    Parameters
+    ----------
+    multiple : int or None
+        After how many periods of the forcing (without forcing: after how many
+        returns to the section) the states repeat: 1, 2 for a doubled period, …;
+        None when they do not.
+    period : float or None
+        Length of time after which they repeat.
+    since : float or None
+        Time from which they do.
+    distance : float
+        Largest change over that time, in units of each state's range; without
+        a period, the smallest among those tried.
+    section : Section
+        The states compared.
+    outcome : Outcome
+        ``"periodic"``, ``"equilibrium"``, ``"too short"``, ``"not periodic"``, or
+        ``"drifting"`` where changes below the tolerance do not shrink, as near a
+        fold of periodic solutions.
+    left : float
+        How far the states still are from those they settle on, in the same units, by
+        the rate at which the changes shrink; infinite where they do not.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, v, t = sp.symbols("x v t")
+    >>> run = fs.simulate(fs.Model({x: v, v: sp.sin(t) - x - v}), [-1, 0], periods=20)
+    >>> run.steady()
+    SteadyState: repeats after 1 period, 6.28318531, from t = 0 on.
+    """
+
+    multiple: int | None
+    period: float | None
+    since: float | None
+    distance: float
+    section: Section
+    outcome: Outcome
+    left: float = float("nan")
+
+    def __repr__(self) -> str:
+        return f"SteadyState: {self.outcome}"
+
+
+def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -> SteadyState:
+    """Look for a period; see `Trajectory.steady`."""
+    if not tol > 0:
+        raise ArgumentError(f"tol = {tol!r}; expected a positive number")
+    if most < 1:
+        raise ArgumentError(f"most = {most!r}; expected at least 1")
+    # says what is wrong with a run that kept nothing, or made no step
+    run.dense_columns(run.span[1])
+    assert run.series is not None
+    late = run.span[1] - LATE * (run.span[1] - run.span[0])
+    # the ends of steps are close enough to each other to tell how far a state ranges
+    everywhere = np.vstack([run.series[:, : len(run.states), 0], run.end[1:]])
+    settled = everywhere[np.append(run.steps[:, 0] >= late, True)]
+    periods = periods_of(run.states, run.periods)
+    most_apart = np.where(periods > 0, periods, np.inf)
+    ranges, whole = (
+        np.minimum(np.ptp(table, axis=0), most_apart) for table in (settled, everywhere)
+    )
+    # a state that does not move is compared with its own size, or that of where it came from
+    size = np.abs(everywhere).max(axis=0)
+    least = STILL * np.where(size > 0, size, 1.0)
+    scale = np.maximum(ranges, least)
+    if period is not None or run.period is not None:
+        section = stroboscopic_section(run, period, 0.0, None)
+        unit = "periods"
+    else:
+        if (ranges <= tol * np.maximum(whole, least)).all():
+            section = Section("", run.states, np.empty(0), np.empty((len(run.states), 0)), _NONE)
+            text = "the run settles on an equilibrium." + stopped_early(run)
+            still = Outcome("equilibrium", text, True)
+            return SteadyState(None, None, late, float(ranges.max()), section, still)
+        widest = int(np.argmax(ranges))
+        mean = _mean(run, widest, late)
+        name = run.states[widest]
+        section = poincare_section(run, name, mean, 1, None, run.span)
+        unit = f"returns to {name} = {mean:.6g}"
+    states = section.table[: len(run.states)] / scale[:, None]
+    noise = ERRORS * float(run.settings.get("rtol", 0.0))
+    smallest = np.inf
+    for multiple in range(1, most + 1):
+        if multiple >= len(section):
+            break
+        later, former = states[:, multiple:], states[:, :-multiple]
+        change = np.abs(apart(later, former, (periods / scale)[:, None])).max(axis=0)
+        wrong = np.flatnonzero(change > tol)
+        first = int(wrong[-1]) + 1 if len(wrong) else 0
+        agreeing = change[first:]
+        smallest = min(smallest, float(change[-max(multiple, 2) :].max()))
+        # as many repeats as there are points, or the next point might still differ
+        if len(agreeing) >= max(multiple, 2):
+            length = float(section.times[-1] - section.times[-1 - multiple])
+            left, moved = _left(states[:, first:], periods / scale, multiple, noise)
+            if left > NEARLY * tol:
+                text = (
+                    f"the changes over {_some(multiple, unit)}, up to {agreeing.max():.2g} of the "
+                    f"range, hardly shrink: they add up to {moved:.2g} since "
+                    f"t = {section.times[first]:.6g}; a slow passage, as near a fold of periodic "
+                    "solutions, or not yet settled: simulate for longer."
+                )
+                drifting = Outcome("drifting", text, False)
+                worst = float(agreeing.max())
+                return SteadyState(None, None, None, worst, section, drifting, left)
+            text = f"repeats after {_some(multiple, unit)}"
+            text += f", {length:.9g}, from t = {section.times[first]:.6g} on."
+            if left > tol:
+                text = f"{text[:-1]}; the changes shrink, {left:.2g} of the range is left."
+            text += stopped_early(run)
+            return SteadyState(
+                multiple,
+                length,
+                float(section.times[first]),
+                float(agreeing.max()),
+                section,
+                Outcome("periodic", text, True),
+                left,
+            )
+    if len(section) < 3:
+        text = f"only {_some(len(section), unit)} within the run; simulate for longer."
+        text += stopped_early(run)
+        return SteadyState(None, None, None, smallest, section, Outcome("too short", text, False))
+    text = (
+        f"no repeat within {tol:g} after up to {most} {unit}: quasi-periodic, chaotic, or not "
+        "yet settled; simulate for longer, or raise most= or tol=."
+    )
+    text += stopped_early(run)
+    return SteadyState(None, None, None, smallest, section, Outcome("not periodic", text, False))
+
+
+_NONE = np.empty(0, dtype=np.int64)
+
+
+def _left(states: Array, periods: Array, multiple: int, noise: float) -> tuple[float, float]:
+    """How far states are from their limit, and how far they moved, from both halves of a run.
+
+    Geometric convergence moves them by a ratio less in the second half.
+    """
+    same = states[:, (states.shape[1] - 1) % multiple :: multiple]
+    middle, extra = divmod(same.shape[1] - 1, 2)
+    middle += extra
+
+    def distance(first: int, last: int) -> float:
+        return float(np.abs(apart(same[:, last], same[:, first], periods)).max())
+
+    before, after, moved = distance(extra, middle), distance(middle, -1), distance(0, -1)
+    left = after**2 / (before - after) if after < before else float("inf")
+    return (min(left, after) if after <= noise else left), moved
+
+
+def _some(count: int, unit: str) -> str:
+    return f"{count} {unit if count != 1 else _single(unit)}"
+
+
+def _single(unit: str) -> str:
+    return unit.replace("periods", "period").replace("returns", "return")
+
+
+def _mean(run: Trajectory, row: int, since: float) -> float:
+    """Time average of a state over the steps that begin after a time."""
+    assert run.series is not None
+    late = run.steps[:, 0] >= since
+    if not late.any():
+        late = np.ones(len(run.steps), dtype=bool)
+    length = run.steps[late, 1]
+    k = np.arange(run.series.shape[2])
+    area = run.series[late, row] * length[:, None] ** (k + 1) / (k + 1)
+    return float(area.sum() / length.sum())

@@ -1,0 +1,347 @@
+"""How the sides of a gap are touched, period by period, and what the periods amount to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError
+from fastslow.results.angles import apart, periods_of
+from fastslow.results.base.outcome import Outcome, stopped_early
+from fastslow.results.base.result import Result
+from fastslow.results.trajectory.lyapunov import LyapunovExponent
+from fastslow.results.trajectory.section import period_of, window_of
+
+if TYPE_CHECKING:
+    from fastslow.results.trajectory.trajectory import Trajectory
+
+Floats = NDArray[np.float64]
+Bits = NDArray[np.int64]
+
+#: The regimes by which sides of a gap were touched: lower, inside, upper as bits 1, 2, 4.
+REGIMES = (
+    "",
+    "meshed lower",
+    "free",
+    "unilateral lower",
+    "meshed upper",
+    "bilateral",
+    "unilateral upper",
+    "bilateral",
+)
+
+#: Labels of motions that are no regime.
+NOT_SETTLED, CHAOTIC = "not settled", "chaotic"
+
+#: What comes before the names of several regimes at one set of parameters.
+COEXISTING = "coexisting: "
+
+#: States that differ by less, in units of their range, are the same.
+SAME = 1e-6
+
+#: Errors of an integration over some periods, in units of its relative tolerance.
+ERRORS = 1e3
+
+#: Largest number of periods after which states are expected to repeat.
+MOST = 16
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Regimes(Result):
+    """The regime of a run in each of many periods, and of its motion.
+
+    Parameters
+    ----------
+    label : str
+        The regime: which sides are touched in all periods or, where the motion repeats
+        after several, in those together; ``"chaotic"`` with a positive Lyapunov exponent
+        as evidence; else ``"not settled"``.
+    kinds : tuple of str
+        Of each period, in order of time: ``"bilateral"``, ``"unilateral upper"``,
+        ``"unilateral lower"``, ``"meshed upper"``, ``"meshed lower"`` or ``"free"``.
+    period : float
+        Length of each.
+    span : tuple of float
+        Begin of the first and end of the last of them.
+    multiple : int or None
+        After how many periods the states repeat, None where they do not.
+    change : float
+        Largest change of a state over so many periods (without a multiple: over one), in
+        units of its range; NaN without states.
+    outcome : Outcome
+        ``"settled"``, ``"not settled"`` or ``"chaotic"``.
+    exponent : LyapunovExponent or None
+        Measured where the states do not repeat, by `fastslow.classify_regime`.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> run = fs.simulate(fs.systems.harmonic_gear(D=0.5, omega=1.3), [0, 0], periods=60)
+    >>> regimes = run.regimes()
+    >>> regimes.label, len(regimes.kinds), sorted(regimes.fractions)
+    ('not settled', 30, ['bilateral', 'unilateral upper'])
+    """
+
+    label: str
+    kinds: tuple[str, ...]
+    period: float
+    span: tuple[float, float]
+    multiple: int | None
+    change: float
+    outcome: Outcome
+    exponent: LyapunovExponent | None = None
+
+    @property
+    def fractions(self) -> dict[str, float]:
+        """The fraction of the periods of each kind, the most frequent first."""
+        return fractions_of(self.kinds)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the states repeat."""
+        return self.multiple is not None
+
+    def __repr__(self) -> str:
+        return f"Regimes: {self.words}. {self.outcome}"
+
+    @property
+    def words(self) -> str:
+        """The label and the fractions of the periods."""
+        return in_words(self.label, self.kinds)
+
+
+def fractions_of(kinds: Sequence[str]) -> dict[str, float]:
+    """The fraction of each kind, the most frequent first."""
+    names, counts = np.unique(np.array(kinds), return_counts=True)
+    order = np.argsort(-counts, kind="stable")
+    return {str(names[k]): float(counts[k] / len(kinds)) for k in order}
+
+
+def in_words(label: str, kinds: Sequence[str]) -> str:
+    """A label, with the fractions of the periods where they differ.
+
+    Examples
+    --------
+    >>> in_words("bilateral", ["bilateral"] * 3)
+    'bilateral in each of the last 3 periods'
+    >>> in_words("not settled", ["free", "bilateral", "free"])
+    'not settled: free in 66.7 %, bilateral in 33.3 % of the last 3 periods'
+    """
+    count = len(kinds)
+    last = "the last period" if count == 1 else f"the last {count} periods"
+    shares = fractions_of(kinds)
+    if list(shares) == [label]:
+        return f"{label} in {'each of ' if count > 1 else ''}{last}"
+    told = ", ".join(f"{kind} in {share:.1%}".replace("%", " %") for kind, share in shares.items())
+    return f"{label}: {told} of {last}"
+
+
+def bits_of(modes: Sequence[str], gap: tuple[str, str, str]) -> Bits:
+    """Which sides each mode touches; sliding along an edge is rest against its side."""
+    lower, inside, upper = gap
+    bits = np.zeros(len(modes), dtype=np.int64)
+    for column, mode in enumerate(modes):
+        sides = mode.split("|")
+        bits[column] = (lower in sides) + 2 * (mode == inside) + 4 * (upper in sides)
+    return bits
+
+
+def periods_at_the_end(length: Floats, period: Floats) -> NDArray[np.int64]:
+    """How many periods are looked at: those in the second half of a run, one at least.
+
+    Examples
+    --------
+    >>> periods_at_the_end(np.array([1.0, 6.0, 60.0]), np.array([2.0, 2.0, np.nan]))
+    array([1, 1, 1])
+    """
+    with np.errstate(invalid="ignore"):
+        count = np.where(np.isfinite(period), length / period + 1e-9, 0.0)
+    return np.maximum(1, count.astype(np.int64) // 2)
+
+
+def repeats(
+    states: Floats, scale: Floats, turns: Floats, allowed: float
+) -> tuple[NDArray[np.int64], Floats]:
+    """After how many periods states repeat, 0 where they do not, and by how much they change.
+
+    Parameters
+    ----------
+    states : ndarray, shape (m, k + 1, n)
+        Of m runs at the ends of successive periods.
+    scale : ndarray, shape (m, n)
+        Ranges of the states.
+    turns : ndarray, shape (n,)
+        Their own periods, 0 for those without.
+    allowed : float
+        Largest change, in units of the scale.
+
+    Returns
+    -------
+    multiples : ndarray of int, shape (m,)
+    changes : ndarray, shape (m,)
+        Over so many periods; over one where the states do not repeat.
+    """
+    m, count, n = states.shape
+    multiples, changes = np.zeros(m, dtype=np.int64), np.full(m, np.nan)
+    for multiple in range(1, max(1, min(MOST, (count - 1) // 2)) + 1):
+        if multiple >= count:
+            break
+        moved = apart(
+            states[:, multiple:].reshape(-1, n).T,
+            states[:, :-multiple].reshape(-1, n).T,
+            turns[:, None],
+        )
+        distance = np.abs(moved.T.reshape(m, -1, n)).max(axis=1) / scale
+        change = distance.max(axis=1)
+        if multiple == 1:
+            changes = change
+        with np.errstate(invalid="ignore"):
+            new = (multiples == 0) & (change <= allowed)
+        multiples[new] = multiple
+        changes = np.where(new, change, changes)
+    return multiples, changes
+
+
+def labels_of(touched: Bits, multiples: NDArray[np.int64]) -> list[str]:
+    """The regime of successive periods of each run, from the sides touched in each.
+
+    Parameters
+    ----------
+    touched : ndarray of int, shape (m, k)
+    multiples : ndarray of int, shape (m,)
+
+    Examples
+    --------
+    >>> labels_of(np.array([[7, 5], [6, 3], [6, 7]]), np.array([0, 0, 2]))
+    ['bilateral', 'not settled', 'bilateral']
+    """
+    # both kinds of bilateral are one
+    names = np.where(touched == 7, 5, touched)
+    same = (names == names[:, :1]).all(axis=1)
+    found = [REGIMES[bits] for bits in names[:, 0].tolist()]
+    for row in np.flatnonzero(~same).tolist():
+        last = touched[row, touched.shape[1] - multiples[row] :]
+        found[row] = REGIMES[int(np.bitwise_or.reduce(last))] if len(last) else NOT_SETTLED
+    return found
+
+
+def regimes_of(
+    run: Trajectory, period: float | None, since: float | None, until: float | None, tol: float
+) -> Regimes:
+    """The regimes of a run, period by period; see `Trajectory.regimes`."""
+    if run.gap is None:
+        raise ArgumentError(
+            "this run has no gap: no three regions between two parallel interfaces; name the "
+            "region inside as gap= of simulate"
+        )
+    length = period_of(run, period)
+    first, last = window_of(run, since, until)
+    count = (
+        int(periods_at_the_end(np.array(last - first), np.array(length)))
+        if since is None
+        else max(1, int((last - first) / length + 1e-9))
+    )
+    edges = last - length * np.arange(count, -1, -1.0)
+    bits = dict(zip(run.modes, bits_of(run.modes, run.gap), strict=True))
+    touched = np.zeros(count, dtype=np.int64)
+    begins = np.array([s.start for s in run.segments])
+    ends = np.array([s.end for s in run.segments])
+    sides = np.array([bits[s.region] for s in run.segments], dtype=np.int64)
+    for k in range(count):
+        inside = (ends > edges[k]) & (begins < edges[k + 1])
+        touched[k] = np.bitwise_or.reduce(sides[inside], initial=0)
+    multiple, change = 0, float("nan")
+    slack = 1e-9 * length
+    if run.series is not None and len(run.steps) and edges[0] >= run.span[0] - slack:
+        everywhere = np.vstack([run.series[:, : len(run.states), 0], run.end[1:]])
+        ranges = np.ptp(everywhere, axis=0)
+        scale = np.where(ranges > 0, ranges, 1.0)
+        allowed = max(tol, ERRORS * float(run.settings.get("rtol", 0.0)))
+        turns = periods_of(run.states, run.periods)
+        states = run(np.clip(edges, *run.span)).T
+        (multiple,), (change,) = repeats(states[None], scale[None], turns, allowed)
+    kinds = tuple(REGIMES[b] for b in touched)
+    (label,) = labels_of(touched[None], np.array([multiple]))
+    return Regimes(
+        label,
+        kinds,
+        length,
+        (max(float(edges[0]), run.span[0]), last),
+        int(multiple) or None,
+        float(change),
+        ending_of(int(multiple), float(change), count, stopped_early(run)),
+    )
+
+
+def ending_of(multiple: int, change: float, count: int, early: str = "") -> Outcome:
+    """Whether the states repeat over the last periods, in words."""
+    if multiple:
+        each = "1 period" if multiple == 1 else f"{multiple} periods"
+        text = f"The states repeat after {each}, to {change:.2g} of their ranges." + early
+        return Outcome("settled", text, True)
+    periods = "the last period" if count == 1 else f"the last {count} periods"
+    if np.isnan(change):
+        text = f"Whether the states repeat over {periods} is not known." + early
+        return Outcome("not settled", text, False)
+    text = (
+        f"Over {periods} the states do not repeat: in one they change by {change:.2g} of their "
+        "ranges. classify_regime() tells chaos from a transient." + early
+    )
+    return Outcome("not settled", text, False)
+
+
+def coexisting(labels: Sequence[str]) -> str:
+    """The label of motions at one set of parameters: one, or several that coexist.
+
+    Examples
+    --------
+    >>> coexisting(["chaotic", "bilateral", "chaotic"]), coexisting(["free", "free"])
+    ('coexisting: bilateral + chaotic', 'free')
+    """
+    names = sorted(set(labels))
+    return names[0] if len(names) == 1 else COEXISTING + " + ".join(names)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RegimeSet(Result):
+    """The motions that runs from several states settle on, at one set of parameters.
+
+    Parameters
+    ----------
+    motions : tuple of Regimes
+        Different motions, in the order in which they were found.
+    starts : ndarray, shape (m, n)
+        The initial states.
+    index : ndarray of int, shape (m,)
+        The motion that each of them comes to.
+    parameters : mapping
+    equations : str
+        The model as text.
+    """
+
+    motions: tuple[Regimes, ...]
+    starts: Floats
+    index: NDArray[np.int64]
+    parameters: Mapping[str, float]
+    equations: str = ""
+
+    @property
+    def label(self) -> str:
+        """The regime, or ``"coexisting: "`` and those of all motions."""
+        return coexisting([motion.label for motion in self.motions])
+
+    @property
+    def fractions(self) -> dict[str, float]:
+        """The fraction of the periods of each kind, over all starts."""
+        return fractions_of([kind for k in self.index for kind in self.motions[k].kinds])
+
+    def __repr__(self) -> str:
+        lines = [f"RegimeSet from {len(self.starts)} initial states: {self.label}"]
+        for k, motion in enumerate(self.motions):
+            count = int(np.count_nonzero(self.index == k))
+            lines.append(f"  {count} of {len(self.starts)}: {motion.words}. {motion.outcome}")
+        return "\n".join(lines)

@@ -1,0 +1,252 @@
+"""Where a quantity known as a polynomial on every step passes zero: no root missed, none twice.
+
+The sign changes of the Bernstein coefficients bound the number of roots in an
+open interval, with equality for none and one (Descartes' rule); intervals with
+more are halved. Steps share their ends, so that a root there is found once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.results.trajectory.step_polynomials import StepPolynomials
+
+Array = NDArray[np.float64]
+
+#: Intervals are not halved more often.
+DEEPEST = 44
+
+#: Roots closer than this part of a step are looked at again: are they one touch?
+CLOSE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class StepRoots:
+    """Zeros in order of time.
+
+    Parameters
+    ----------
+    step : ndarray of int, shape (K,)
+    part : ndarray, shape (K,)
+        How far into the step, 0 to 1.
+    direction : ndarray of int, shape (K,)
+        +1 where the quantity grows through zero, −1 where it falls, 0 where it only touches.
+    """
+
+    step: NDArray[np.intp]
+    part: Array
+    direction: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Zero:
+    """Zero from ``low`` to ``high`` (step + part), with the signs on both sides.
+
+    The sign is 0 on the side of an end of the run that lies on zero.
+    """
+
+    low: float
+    high: float
+    before: int
+    after: int
+
+    @property
+    def long(self) -> bool:
+        """Whether the quantity rests on zero for a step or longer."""
+        return self.high - self.low >= 1
+
+    @property
+    def middle(self) -> float:
+        return (self.low + self.high) / 2
+
+    @property
+    def direction(self) -> int:
+        """+1 where the quantity grows through zero, −1 where it falls, 0 where it touches."""
+        after = self.after or -self.before
+        return 0 if after == self.before else after
+
+
+def find_roots(quantity: StepPolynomials) -> StepRoots:
+    """All zeros along consecutive steps; a run that begins on zero has none there.
+
+    Parameters
+    ----------
+    quantity : StepPolynomials
+
+    Returns
+    -------
+    StepRoots
+        A stretch on which the quantity is zero to rounding counts once, at its beginning
+        (at its middle when it is shorter than a step).
+    """
+    found = [zero for zero in find_zeros(quantity) if zero.before != 0]
+    where = np.array([zero.low if zero.long else zero.middle for zero in found])
+    step = np.minimum(where.astype(np.intp), len(quantity.coefficients) - 1)
+    direction = np.array([zero.direction for zero in found], dtype=np.int64)
+    return StepRoots(step, where - step, direction)
+
+
+def find_zeros(quantity: StepPolynomials) -> list[Zero]:
+    """All zeros along consecutive steps in order, those at the ends of the run too."""
+    b = quantity.coefficients
+    if not len(b):
+        return []
+    if b.shape[1] == 1:
+        b = np.column_stack([b, np.zeros(len(b))])
+    noise = 8.0 * np.finfo(float).eps * quantity.size
+    # where the constant term outweighs the others there is no root
+    near = np.flatnonzero(np.abs(b[:, 0]) <= np.abs(b[:, 1:]).sum(axis=1) + noise)
+    transform = _to_bernstein(b.shape[1] - 1)
+    bernstein = b[near] @ transform.T
+    # continuous by construction: the end of a step is the beginning of the next
+    ends = np.append(b[:, 0], b[-1] @ transform[-1])
+    ends[np.abs(ends) <= np.append(noise, noise[-1])] = 0.0
+    bernstein[:, 0], bernstein[:, -1] = ends[near], ends[near + 1]
+    single, vague = _inside(bernstein, near, noise, b)
+    vague += [(float(j), float(j)) for j in np.flatnonzero(ends == 0.0)]
+    zeros = single + [
+        Zero(low, high, _sign_beyond(b, noise, low, -1), _sign_beyond(b, noise, high, 1))
+        for low, high in _joined(sorted(vague))
+    ]
+    return _merged(sorted(zeros, key=lambda z: z.low), b, noise)
+
+
+@cache
+def _to_bernstein(n: int) -> Array:
+    rows = [[comb(j, k) / comb(n, k) for k in range(n + 1)] for j in range(n + 1)]
+    return np.array(rows)
+
+
+@cache
+def _halves(n: int) -> tuple[Array, Array]:
+    """Matrices that give the Bernstein coefficients of the left and the right half."""
+    left = np.array([[comb(j, k) / 2.0**j for k in range(n + 1)] for j in range(n + 1)])
+    return left, np.ascontiguousarray(left[::-1, ::-1])
+
+
+def _changes(bernstein: Array) -> tuple[NDArray[np.int64], Array, Array]:
+    """Sign changes of every row, and the signs of its first and last coefficient but zeros."""
+    signs = np.sign(bernstein)
+    count = np.zeros(len(signs), dtype=np.int64)
+    first, last = np.zeros(len(signs)), np.zeros(len(signs))
+    for column in signs.T:
+        count += column * last < 0
+        first = np.where(first == 0, column, first)
+        last = np.where(column != 0, column, last)
+    return count, first, last
+
+
+def _inside(
+    bernstein: Array, step: NDArray[np.intp], noise: Array, b: Array
+) -> tuple[list[Zero], list[tuple[float, float]]]:
+    """Single roots in open steps, and intervals that are zero to rounding.
+
+    The Bernstein coefficients are those of some steps only.
+    """
+    low, width = np.zeros(len(step)), np.ones(len(step))
+    left, right = _halves(b.shape[1] - 1)
+    single: list[tuple[Array, ...]] = []
+    vague: list[tuple[float, float]] = []
+    for depth in range(DEEPEST + 1):
+        count, first, last = _changes(bernstein)
+        small = np.abs(bernstein).max(axis=1) <= noise[step]
+        one = (count == 1) & ~small
+        single.append((step[one], low[one], low[one] + width[one], first[one], last[one]))
+        begin = (step + low)[small | ((count > 1) & (depth == DEEPEST))]
+        vague += [(float(u), float(u) + 0.5**depth) for u in begin]
+        more = (count > 1) & ~small
+        if not more.any():
+            break
+        step, low, width = step[more], low[more], 0.5 * width[more]
+        bernstein = np.vstack([bernstein[more] @ left.T, bernstein[more] @ right.T])
+        # a middle that is zero to rounding is a root of its own, of neither half
+        zero = np.abs(bernstein[: len(step), -1]) <= noise[step]
+        bernstein[: len(step), -1][zero] = bernstein[len(step) :, 0][zero] = 0.0
+        vague += [(float(u), float(u)) for u in (step + low + width)[zero]]
+        step, low, width = np.tile(step, 2), np.append(low, low + width), np.tile(width, 2)
+    row, lower, upper, first, last = (np.concatenate(parts) for parts in zip(*single, strict=True))
+    root = row + _refined(b[row.astype(np.intp)], lower, upper, first)
+    found = zip(root.tolist(), first.tolist(), last.tolist(), strict=True)
+    return [Zero(u, u, int(before), int(after)) for u, before, after in found], vague
+
+
+def _joined(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Sorted intervals, those that touch each other made one."""
+    kept: list[tuple[float, float]] = []
+    for low, high in intervals:
+        if kept and low <= kept[-1][1]:
+            kept[-1] = kept[-1][0], max(high, kept[-1][1])
+        else:
+            kept.append((low, high))
+    return kept
+
+
+def _refined(b: Array, low: Array, high: Array, sign: Array) -> Array:
+    """Roots to rounding: Newton, kept inside brackets at whose lower ends the sign is given."""
+    s = 0.5 * (low + high)
+    for _ in range(100):
+        value, slope = np.zeros(len(s)), np.zeros(len(s))
+        for k in range(b.shape[1] - 1, -1, -1):
+            slope = slope * s + value
+            value = value * s + b[:, k]
+        same = value * sign > 0
+        low, high = np.where(same, s, low), np.where(same, high, s)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            new = s - value / slope
+        # where the correction is below rounding the root is found, if at an end of the bracket
+        kept = ((low < new) & (new < high)) | (new == s)
+        new = np.where(kept, new, 0.5 * (low + high))
+        new = np.where(value == 0.0, s, new)
+        done = np.abs(new - s) <= 2e-16 * new
+        s = new
+        if done.all():
+            break
+    return s
+
+
+def _value(b: Array, u: float) -> tuple[int, float]:
+    step = min(int(u), len(b) - 1)
+    return step, float(np.polynomial.polynomial.polyval(u - step, b[step]))
+
+
+def _sign_beyond(b: Array, noise: Array, u: float, side: int) -> int:
+    """The first sign above rounding on one side, 0 where the run ends before there is one."""
+    reach = 2.0**-DEEPEST
+    while True:
+        at = u + side * reach
+        if not 0.0 <= at <= len(b):
+            at = 0.0 if side < 0 else float(len(b))
+            step, value = _value(b, at)
+            return int(np.sign(value)) if abs(value) > noise[step] else 0
+        step, value = _value(b, at)
+        if abs(value) > noise[step]:
+            return int(np.sign(value))
+        # not farther than half a step at once: whole runs may rest on zero
+        reach += min(reach, 0.5)
+
+
+def _merged(zeros: list[Zero], b: Array, noise: Array) -> list[Zero]:
+    """Neighbours between which the quantity stays within rounding are one zero."""
+    kept: list[Zero] = []
+    for zero in zeros:
+        if kept:
+            last = kept[-1]
+            gap = zero.low - last.high
+            if gap <= CLOSE:
+                step, value = _value(b, last.high + 0.5 * gap)
+                # signs that contradict each other were read from rounding
+                doubt = last.after != zero.before or abs(value) <= 2.0 * noise[step]
+                if gap <= 0.0 or doubt:
+                    low, high = last.low, max(last.high, zero.high)
+                    before, after = (
+                        _sign_beyond(b, noise, u, side) for u, side in ((low, -1), (high, 1))
+                    )
+                    kept[-1] = Zero(low, high, before, after)
+                    continue
+        kept.append(zero)
+    return kept

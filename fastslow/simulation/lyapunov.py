@@ -1,0 +1,490 @@
+"""Lyapunov exponents from the separation of nearby trajectories."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import finite, instance, positive, takes, whole
+from fastslow.errors import ArgumentError
+from fastslow.model.model import Model
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.trajectory.lyapunov import DECIDED, GROWN, LyapunovExponent, sign_of
+from fastslow.results.trajectory.periodicity import STILL
+from fastslow.simulation.arguments import initial_state, require_values, time_span
+from fastslow.simulation.many import arrivals
+from fastslow.simulation.many_arguments import threads_of
+from fastslow.simulation.one import simulate
+from fastslow.simulation.settings import Integration, Resolved, integration_settings, resolve
+
+Floats = NDArray[np.float64]
+
+#: Tighter than that of a run: separations are differences of states.
+FINE = Integration(rtol=1e-11)
+
+#: Separation by the root of the tolerance: the error of a central difference is then a few
+#: roots from rounding, and of the order of the tolerance from curvature.
+SEPARATION = 3.0
+
+#: Growth of a separation within one interval, between curvature and rounding.
+LEAST, MOST = 1e-2, 1e2
+
+#: Blocks whose spread gives the uncertainty, at most.
+BLOCKS = 10
+
+#: Intervals at first, and at most.
+FIRST, COUNTLESS = 60, 200_000
+
+#: The part of the measurement over which the vector turns before anything is counted.
+ALIGNED = 0.1
+
+#: Trajectories followed in one call.
+TOGETHER = 100_000
+
+#: A run that ends with states larger by this factor than where the measurement begins leaves.
+LEAVING = 10.0
+
+#: Periods and steps in which a motion may show that it repeats.
+REPEATS, WATCHED = 64, 20_000
+
+#: By which part of the longest interval all of them are moved, the golden section.
+OFF = 0.381966
+
+#: Points of a run that say how far each state ranges.
+RANGING = 256
+
+
+@takes(
+    model=instance(Model),
+    start=finite,
+    period=positive,
+    discard=finite,
+    integration=integration_settings,
+    threads=whole(1, 1024),
+)
+def lyapunov_exponent(
+    model: Model,
+    state: Any,
+    *,
+    t: tuple[float, float] | None = None,
+    periods: float | None = None,
+    start: float = 0.0,
+    period: float | None = None,
+    discard: float | None = None,
+    integration: Integration = FINE,
+    threads: int | None = None,
+) -> LyapunovExponent:
+    """Compute the largest Lyapunov exponent of the motion that a run settles on.
+
+    The run is divided into intervals. From the state at the beginning of each,
+    trajectories displaced in both directions of every state are integrated to its end;
+    their central differences are the derivative of the flow over the interval. The
+    product of the derivatives is applied to one vector, which is normalised after each,
+    and the logarithms of its growth are averaged (Benettin, Galgani, Giorgilli and
+    Strelcyn, Meccanica 15, 9-20, 1980). Crossings are located in the displaced
+    trajectories as in any other, so that saltation at interfaces and sliding are included.
+
+    Parameters
+    ----------
+    model : Model
+        Forced, with slow states, or frozen with every parameter given.
+    state : sequence of float, shape (n,), or mapping
+        Initial states and slow states, in order or by name.
+    t : (float, float)
+        Start and end of time.
+    periods : float
+        Instead of ``t``: how many periods of the forcing.
+    start : float
+        Start of time with ``periods``.
+    period : float, optional
+        The period, where the model's own is not wanted or cannot be found.
+    discard : float, optional
+        How much of the run is left out at the beginning, in periods with ``periods``, in
+        time with ``t``; a fifth of it by default.
+    integration : Integration
+        Error control of all runs; the displacement is three roots of ``rtol`` of each
+        state's size.
+    threads : int, optional
+        By default the cores that this process may use.
+
+    Returns
+    -------
+    LyapunovExponent
+        Its ``outcome`` says whether the motion is chaotic: the exponent is positive by
+        four standard errors, its sum over the run exceeds 10, and the run neither
+        repeats nor leaves for infinity.
+
+    Raises
+    ------
+    ArgumentError
+        For a wrong state or span, or a ``discard`` that leaves nothing.
+    UnknownNameError
+        For an initial value of what is no state.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> gear = fs.systems.harmonic_gear(D=0.5, omega=1.3)
+    >>> lyapunov_exponent(gear, [0, 0], periods=120).chaotic
+    True
+    """
+    require_values(model)
+    begin = initial_state(model, state)
+    span, period = time_span(t, periods, start, period, model.period)
+    unit = period if periods is not None and period is not None else 1.0
+    whole_length = span[1] - span[0]
+    left_out = 0.2 * whole_length if discard is None else discard * unit
+    if not 0.0 <= left_out < whole_length:
+        raise ArgumentError(
+            f"discard = {discard:g}; expected a number from 0 below the length of the run, "
+            f"{whole_length / unit:g}"
+        )
+    first = span[0] + left_out
+    measured = (span[1] - first) / unit
+    # blocks of whole periods, where there are any
+    units = round(measured) if abs(measured - round(measured)) < 1e-9 * measured else 0
+    found = exponents(
+        model,
+        begin[None],
+        {},
+        np.array([[span[0], first, span[1]]]),
+        integration,
+        threads,
+        units if period is not None else 0,
+    )
+    again = _recurrence(model, found, period, integration, span[1] - first)
+    return found.of(0, model, period, integration, again)
+
+
+@dataclass(frozen=True, eq=False)
+class Exponents:
+    """Largest Lyapunov exponents of m runs.
+
+    Parameters
+    ----------
+    value, uncertainty : ndarray, shape (m,)
+        NaN for a run that ended early.
+    blocks : ndarray, shape (m, k)
+    final : ndarray, shape (m, n)
+    largest : ndarray, shape (m, 2)
+        Largest size of a state without a period, in the first and in the last quarter of the
+        measurement, in units of its size over all of it.
+    spans : ndarray, shape (m, 2)
+        First and last time of the measurements.
+    interval : ndarray, shape (m,)
+        Time over which each separation was followed.
+    ended : dict
+        Outcomes of runs that ended early.
+    """
+
+    value: Floats
+    uncertainty: Floats
+    blocks: Floats
+    final: Floats
+    largest: Floats
+    spans: Floats
+    interval: Floats
+    ended: dict[int, Outcome]
+
+    def sign(self, row: int) -> int:
+        """The sign of an exponent, 0 where it is not decided or the run leaves."""
+        if self.leaves(row) or row in self.ended:
+            return 0
+        length = float(self.spans[row, 1] - self.spans[row, 0])
+        return sign_of(float(self.value[row]), float(self.uncertainty[row]), length)
+
+    def leaves(self, row: int) -> bool:
+        """Whether the states of a run grow throughout."""
+        before, after = self.largest[row]
+        return bool(after > LEAVING * before)
+
+    def of(
+        self,
+        row: int,
+        model: Model,
+        period: float | None,
+        integration: Integration,
+        again: Outcome,
+    ) -> LyapunovExponent:
+        """The exponent of one run.
+
+        Parameters
+        ----------
+        row : int
+        model : Model
+            At the parameters of the run.
+        period : float or None
+        integration : Integration
+        again : Outcome
+            Whether the run repeats.
+        """
+        first, last = self.spans[row]
+        return LyapunovExponent(
+            float(self.value[row]),
+            float(self.uncertainty[row]),
+            self.blocks[row],
+            (float(first), float(last)),
+            period,
+            float(self.interval[row]),
+            self._outcome(row, again),
+            self.final[row],
+            dict(model.parameters),
+            model.equations,
+            resolve(integration, model, implicit=False).recorded(),
+        )
+
+    def _outcome(self, row: int, again: Outcome) -> Outcome:
+        """What the exponent of a run says about its motion."""
+        if row in self.ended:
+            return self.ended[row]
+        if self.leaves(row):
+            text = "not decided: the states grow throughout, and the run may leave for infinity."
+            return Outcome("not decided", text, False)
+        sign = self.sign(row)
+        if sign < 0:
+            text = "not chaotic: nearby trajectories approach each other."
+            return Outcome("not chaotic", text, True)
+        if again:
+            grow = "; it is unstable, as nearby trajectories separate" if sign > 0 else ""
+            return Outcome("not chaotic", f"not chaotic: {again.message[:-1]}{grow}.", True)
+        if sign > 0:
+            text = "chaotic: nearby trajectories separate exponentially, and the motion is bounded "
+            return Outcome("chaotic", text + "and does not repeat.", True)
+        length = float(self.spans[row, 1] - self.spans[row, 0])
+        bound = abs(self.value[row]) + max(DECIDED * float(self.uncertainty[row]), GROWN / length)
+        text = (
+            "not decided: the exponent is zero within its uncertainty, as of quasi-periodic "
+            f"motion or of chaos weaker than {bound:.2g} per unit of time; simulate for longer."
+        )
+        return Outcome("not decided", text, False)
+
+
+def exponents(
+    model: Model,
+    starts: Floats,
+    swept: dict[str, Floats],
+    times: Floats,
+    integration: Integration,
+    threads: int | None,
+    units: int = 0,
+    finest: int = COUNTLESS,
+) -> Exponents:
+    """Measure the exponents of many runs.
+
+    Parameters
+    ----------
+    model : Model
+    starts : ndarray, shape (m, n)
+    swept : dict
+        Parameter to its values, shape (m,).
+    times : ndarray, shape (m, 3)
+        Begin of each run, and first and last time of its measurement.
+    integration : Integration
+    threads : int, optional
+    units : int
+        Equal parts of the measurement, of whole numbers of which blocks consist; by default
+        there are as many as intervals at first.
+    finest : int
+        Intervals in a measurement, at most.
+    """
+    resolved = resolve(integration, model, implicit=False)
+    workers = threads_of(threads)
+    m, n = starts.shape
+    begin, first, last = times.T
+    length = last - first
+    units = units if units > 1 else FIRST
+    lead = ALIGNED if ((first - begin) >= 2 * ALIGNED * length).all() else 0.0
+    states, codes = starts, np.zeros(m, dtype=np.int64)
+    # a forcing switches at simple parts of its period: no interval begins there
+    shift = OFF * length / (FIRST if lead else np.inf)
+    first, last = first - shift, last - shift
+    opening = first - lead * length
+    if (opening > begin).all():
+        spans = np.stack([begin, opening], axis=1)
+        states, codes = arrivals(model, starts, swept, spans, resolved, workers)[:2]
+    followed = _Followed(model, resolved, workers, starts, states)
+    followed.measure(swept, np.linspace(opening, last, RANGING, axis=1))
+    each = np.full(m, max(1, -(-FIRST // units)))
+    grid = np.linspace(opening, last, 9, axis=1)
+    coarse = np.arange(m)
+    while len(coarse):
+        growth = followed.trial(swept, grid, length / (each * units), coarse)
+        with np.errstate(invalid="ignore"):
+            wrong = (growth > MOST).any(axis=1) | (growth < LEAST).any(axis=1)
+        coarse = coarse[wrong & (2 * each[coarse] * units <= finest)]
+        each[coarse] *= 2
+    sums, final, largest = np.empty((m, units)), np.empty((m, n)), np.empty((m, 2))
+    free = np.array([name not in model.periodic for name in (*model.states, *model.slow_states)])
+    step = length / (each * units)
+    for pieces in np.unique(each) * units:
+        alike = np.flatnonzero(each * units == pieces)
+        before = round(lead * pieces)
+        together = max(1, TOGETHER // (2 * n * (pieces + before)))
+        for low in range(0, len(alike), together):
+            rows = alike[low : low + together]
+            grid = last[rows, None] - step[rows, None] * np.arange(pieces + before, -1, -1.0)
+            grid[:, 0] = opening[rows]
+            edges, derivatives = followed.over(swept, grid, rows)
+            logs = _growth(derivatives)[:, before:]
+            sums[rows] = logs.reshape(len(rows), units, -1).sum(axis=2)
+            final[rows] = edges[:, -1]
+            scaled = np.where(free, np.abs(edges / followed.size[rows, None]), 0.0).max(axis=2)
+            quarter = max(1, pieces // 4)
+            largest[rows, 0] = scaled[:, before : before + quarter].max(axis=1)
+            largest[rows, 1] = scaled[:, -quarter:].max(axis=1)
+    value = sums.sum(axis=1) / length
+    parts = np.array_split(np.arange(units), min(BLOCKS, units))
+    blocks = np.stack(
+        [sums[:, part].sum(axis=1) / (len(part) * length / units) for part in parts], axis=1
+    )
+    with np.errstate(invalid="ignore"):
+        spread = blocks.std(axis=1, ddof=1) / np.sqrt(len(parts))
+    uncertainty = np.where(np.isneginf(value), 0.0, spread)
+    ended: dict[int, Outcome] = {}
+    for row in np.flatnonzero((codes != 0) | np.isnan(value)):
+        text = "a run ended before the measurement did; simulate() says why."
+        ended[int(row)] = Outcome("stopped early", text, False)
+        value[row] = uncertainty[row] = np.nan
+    measured = np.stack([first, last], axis=1)
+    return Exponents(value, uncertainty, blocks, final, largest, measured, step, ended)
+
+
+class _Followed:
+    """Runs and the derivatives of their flow, in units of each state's size."""
+
+    def __init__(
+        self, model: Model, resolved: Resolved, threads: int, starts: Floats, states: Floats
+    ) -> None:
+        self.model, self.resolved, self.threads = model, resolved, threads
+        self.starts, self.states = starts, states
+        self.size = np.empty(0)
+
+    def arrivals(
+        self, states: Floats, swept: dict[str, Floats], spans: Floats, times: Floats | None = None
+    ) -> Floats:
+        """Where runs arrive, or what they are at some times; NaN where they ended early."""
+        good = np.isfinite(states).all(axis=1)
+        shape = states.shape if times is None else (len(states), times.shape[1], states.shape[1])
+        found = np.full(shape, np.nan)
+        if good.any():
+            given = {name: np.ascontiguousarray(values[good]) for name, values in swept.items()}
+            ends, codes, samples = arrivals(
+                self.model,
+                np.ascontiguousarray(states[good]),
+                given,
+                np.ascontiguousarray(spans[good]),
+                self.resolved,
+                self.threads,
+                None if times is None else np.ascontiguousarray(times[good]),
+            )
+            if times is None:
+                found[good] = np.where((codes == 0)[:, None], ends, np.nan)
+            else:
+                found[good] = np.swapaxes(samples, 1, 2)
+        return found
+
+    def references(self, swept: dict[str, Floats], grid: Floats, rows: NDArray[np.intp]) -> Floats:
+        """States of some runs at the times of a grid (m, k), shape (m, k, n)."""
+        states = self.states[rows]
+        found = self.arrivals(
+            states, {n: v[rows] for n, v in swept.items()}, grid[:, [0, -1]], grid
+        )
+        found[:, 0] = states
+        return found
+
+    def measure(self, swept: dict[str, Floats], grid: Floats) -> None:
+        """Find the size of each state, shape (m, n): its range, else what it was, else 1."""
+        found = self.references(swept, grid, np.arange(len(grid)))
+        with np.errstate(invalid="ignore"):
+            largest = np.maximum(np.abs(found).max(axis=1), np.abs(self.starts))
+            ranges = np.ptp(found, axis=1)
+        size = np.where(ranges > STILL * largest, ranges, largest)
+        self.size = np.where(np.isfinite(size) & (size > 0), size, 1.0)
+
+    def trial(
+        self, swept: dict[str, Floats], grid: Floats, step: Floats, rows: NDArray[np.intp]
+    ) -> Floats:
+        """Norms of derivatives over intervals of some length that begin along the runs, (m, k)."""
+        edges = self.references(swept, grid[rows], rows)
+        begins = grid[rows, :-1]
+        spans = np.stack([begins, begins + step[rows, None]], axis=2)
+        derivatives = self.derivatives(edges[:, :-1], swept, spans, rows)
+        return np.asarray(np.linalg.norm(derivatives, axis=(2, 3)))
+
+    def over(
+        self, swept: dict[str, Floats], grid: Floats, rows: NDArray[np.intp]
+    ) -> tuple[Floats, Floats]:
+        """States at the times of a grid, and the derivatives between them."""
+        edges = self.references(swept, grid, rows)
+        spans = np.stack([grid[:, :-1], grid[:, 1:]], axis=2)
+        return edges, self.derivatives(edges[:, :-1], swept, spans, rows)
+
+    def derivatives(
+        self, states: Floats, swept: dict[str, Floats], spans: Floats, rows: NDArray[np.intp]
+    ) -> Floats:
+        """Derivatives of the flow over intervals, shape (m, k, n, n).
+
+        Parameters
+        ----------
+        states : ndarray, shape (m, k, n)
+            At the beginning of each interval.
+        spans : ndarray, shape (m, k, 2)
+        rows : ndarray of int, shape (m,)
+            Which of the runs.
+        """
+        m, k, n = states.shape
+        size = self.size[rows]
+        # axes: run, interval, state displaced, direction, state
+        begin = np.broadcast_to(states[:, :, None, None, :], (m, k, n, 2, n)).copy()
+        displaced = SEPARATION * np.sqrt(self.resolved.rtol) * size
+        for j in range(n):
+            begin[:, :, j, 0, j] += displaced[:, None, j]
+            begin[:, :, j, 1, j] -= displaced[:, None, j]
+        own = {name: np.repeat(values[rows], k * n * 2) for name, values in swept.items()}
+        spread = np.broadcast_to(spans[:, :, None, None, :], (m, k, n, 2, 2)).reshape(-1, 2)
+        ends = self.arrivals(begin.reshape(-1, n), own, spread).reshape(m, k, n, 2, n)
+        # the displacement as it was rounded
+        width = np.einsum("mkjj->mkj", begin[:, :, :, 0] - begin[:, :, :, 1])
+        with np.errstate(invalid="ignore"):
+            columns = (ends[:, :, :, 0] - ends[:, :, :, 1]) / width[..., None]
+        scaled = columns * size[:, None, :, None] / size[:, None, None, :]
+        return np.asarray(np.swapaxes(scaled, 2, 3))
+
+
+def _growth(derivatives: Floats) -> Floats:
+    """Logarithms of the growth of a vector over each interval, shape (m, k)."""
+    m, k, n, _ = derivatives.shape
+    vector = np.random.default_rng(1).normal(size=n)
+    vectors = np.tile(vector / np.linalg.norm(vector), (m, 1))
+    logs = np.empty((m, k))
+    for step in range(k):
+        vectors = np.einsum("mij,mj->mi", derivatives[:, step], vectors)
+        lengths = np.linalg.norm(vectors, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            logs[:, step] = np.log(lengths)
+            vectors = np.where(lengths[:, None] > 0, vectors / lengths[:, None], 0.0)
+    return logs
+
+
+def _recurrence(
+    model: Model,
+    found: Exponents,
+    period: float | None,
+    integration: Integration,
+    length: float,
+) -> Outcome:
+    """Whether the motion of one run repeats, where its exponent leaves that open."""
+    if found.ended or found.leaves(0) or found.sign(0) < 0:
+        return Outcome("not periodic", "", False)
+    last = float(found.spans[0, 1])
+    run = simulate(
+        model,
+        found.final[0],
+        t=(last, last + (REPEATS * period if period is not None else length)),
+        period=period,
+        integration=replace(integration, max_steps=WATCHED),
+    )
+    return run.steady(tol=1e-5).outcome

@@ -1,0 +1,515 @@
+"""Simulating a model from many states or at many parameter sets."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastslow.arguments import finite, flag, instance, mapping, takes, text, whole
+from fastslow.kernels.loops import load_loop
+from fastslow.kernels.simd.steps import CompiledSteps, compile_steps
+from fastslow.kernels.taylor.series import CompiledSeries, compile_series
+from fastslow.model.model import Model
+from fastslow.results.angles import periods_of as turns_of
+from fastslow.results.base.named_mapping import Named
+from fastslow.results.trajectory.ensemble import Ensemble
+from fastslow.results.trajectory.regimes import (
+    ERRORS,
+    SAME,
+    bits_of,
+    labels_of,
+    periods_at_the_end,
+    repeats,
+)
+from fastslow.simulation.arguments import gap_regions
+from fastslow.simulation.grouping import alike
+from fastslow.simulation.loops import DRIVE_MANY
+from fastslow.simulation.many_arguments import (
+    periods_of,
+    spans_of,
+    starts_and_parameters,
+    threads_of,
+    times_of,
+)
+from fastslow.simulation.noise_notes import notes_on_noise
+from fastslow.simulation.one import (
+    error_rules,
+    problem_of,
+)
+from fastslow.simulation.pauses import Pace, provide, with_late_code
+from fastslow.simulation.settings import (
+    DEFAULT,
+    Integration,
+    Resolved,
+    integration_settings,
+    resolve,
+)
+from fastslow.simulation.stepper.driver import OUT_OF_WORK, REACHED_END
+from fastslow.simulation.stepper.lanes import LEFT, Pool, Runs, pool_for
+from fastslow.simulation.stepper.problems import Problem
+from fastslow.simulation.stepper.workspace import MODE, STEPS, Workspace, beginnings, workspace_for
+
+Floats = NDArray[np.float64]
+
+
+#: Trajectories that a thread takes at a time, at most.
+_CHUNK = 512
+
+
+@takes(
+    model=instance(Model),
+    parameters=mapping,
+    start=finite,
+    settle=finite,
+    integration=integration_settings,
+    gap=text,
+    threads=whole(1, 1024),
+    progress=flag,
+)
+def simulate_many(
+    model: Model,
+    states: ArrayLike | Mapping[Any, ArrayLike],
+    *,
+    parameters: Mapping[Any, ArrayLike] | None = None,
+    t: tuple[float, float] | None = None,
+    periods: float | None = None,
+    start: float = 0.0,
+    period: ArrayLike | None = None,
+    settle: float = 0.0,
+    integration: Integration = DEFAULT,
+    samples: int | Sequence[float] | Floats | None = None,
+    gap: str | None = None,
+    threads: int | None = None,
+    progress: bool = False,
+) -> Ensemble:
+    """Follow many trajectories, and keep of each what sums it up.
+
+    Plain steps are taken for several trajectories at once, by vector
+    instructions; crossings and all that is not plain one by one, as `simulate`
+    takes them. A trajectory is the same to the last bit whatever the others,
+    their order and the number of threads, and that of `simulate` to the tolerance.
+    One that cannot go on stops nothing; `Ensemble.outcomes` says why it ended.
+
+    Parameters
+    ----------
+    model : Model
+        With forcing, with slow states, or frozen with every parameter given.
+    states : array_like, shape (m, n) or (n,), or mapping
+        Initial states and slow states; by name, each a number or of shape (m,).
+    parameters : mapping, optional
+        Parameter to its values, a number or of shape (m,): the first values make
+        the first set, and so on; no product is formed.
+    t : (float, float)
+        Start and end of time, for all.
+    periods : float
+        Instead of ``t``: how many periods of the forcing, each trajectory by its own.
+    start : float
+        Start of time with ``periods``.
+    period : float or array_like, shape (m,), optional
+        The period, where the model's own is not wanted or cannot be found.
+    settle : float
+        How much is left out of extremes, hits and evenly spaced samples at the
+        beginning: periods with ``periods``, time with ``t``.
+    integration : Integration
+        Error allowed, order and method of the steps, and where to stop a trajectory.
+    samples : int or sequence of float, optional
+        How many evenly spaced samples of every column to keep, or at which times.
+    gap : str, optional
+        The region that counts as the gap for `Ensemble.regime`.
+    threads : int, optional
+        By default the cores that this process may use.
+    progress : bool
+        Whether to show a progress bar.
+
+    Returns
+    -------
+    Ensemble
+
+    Raises
+    ------
+    ArgumentError
+        For lengths that differ, numbers that are not finite, a wrong span, or
+        ``periods`` without a common period.
+    UnknownNameError
+        For a state, parameter or gap that is not in the model.
+    ModelError
+        For a function that cannot be compiled.
+
+    Examples
+    --------
+    >>> import numpy as np, sympy as sp
+    >>> x, v, k = sp.symbols("x v k")
+    >>> oscillator = Model({x: v, v: -k * x}, parameters={k: 1})
+    >>> fine = Integration(rtol=1e-12)
+    >>> many = simulate_many(
+    ...     oscillator, [1, 0], parameters={k: [1, 4]}, t=(0, np.pi), integration=fine
+    ... )
+    >>> many.minimum.round(9)
+    array([[-1., -1.],
+           [-1., -2.]])
+    """
+    starts, swept = starts_and_parameters(model, states, parameters)
+    count = len(starts)
+    resolved = resolve(integration, model, implicit=False)
+    threads = threads_of(threads)
+    own = periods_of(model, period, count, swept)
+    spans, since = spans_of(t, periods, start, settle, own)
+    times = times_of(samples, spans, since)
+    groups = [
+        (one, chosen, compile_series(one, resolved.order), compile_steps(one, resolved.order))
+        for one, chosen in alike(model, swept, count)
+    ]
+    gaps = [gap_regions(one, gap) for one, *_ in groups]
+    modes = tuple(dict.fromkeys(name for *_, compiled, _ in groups for name in compiled.modes))
+    interfaces = tuple(dict.fromkeys(name for one, *_ in groups for name in one.interfaces))
+    n = starts.shape[1]
+    columns = n + len(model.forcing)
+    extremes = np.empty((count, 2, n))
+    hits = np.zeros((count, len(interfaces), 2), dtype=np.int64)
+    ends = np.empty((count, 1 + n))
+    codes = np.empty((count, 3), dtype=np.int64)
+    regime = np.zeros(count, dtype="U16")
+    windows = periods_at_the_end(spans[:, 1] - spans[:, 0], own)
+    looked = int(windows.max()) if any(between is not None for between in gaps) else 0
+    touched = np.zeros((count, looked), dtype=np.int64)
+    multiples, changes = np.zeros(count, dtype=np.int64), np.full(count, np.nan)
+    turns = turns_of((*model.states, *model.slow_states), dict(model.periodic))
+    sampled = np.empty((count, columns if times.size else 0, times.shape[1]))
+    with _bar(count, progress) as bar:
+        for (one, chosen, compiled, lanes), between in zip(groups, gaps, strict=True):
+            values = _parameter_table(compiled, one, swept, chosen)
+            rules = error_rules(one, resolved, compiled)
+            run = _run(
+                compiled,
+                lanes,
+                problem_of(model, compiled, resolved, rules),
+                threads,
+                (values, starts[chosen], spans[chosen], since[chosen]),
+                times if len(times) == 1 else times[chosen],
+                columns if times.size else 0,
+                bar.update,
+                _Ends(own[chosen], windows[chosen], bits_of(compiled.modes, between))
+                if between is not None and not np.isnan(own[chosen]).any()
+                else None,
+            )
+            extremes[chosen], ends[chosen], codes[chosen], sampled[chosen] = run[0], *run[3:6]
+            for j, name in enumerate(one.interfaces):
+                hits[chosen, interfaces.index(name)] = run[1][:, j]
+            # the mode is -1 before any was chosen
+            names = [*map(modes.index, compiled.modes), -1]
+            codes[chosen, 1] = np.array(names)[codes[chosen, 1]]
+            if run[6] is not None:
+                last, visited = run[6]
+                touched[chosen, looked - last.shape[1] :] = last
+                ranges = np.ptp(run[0], axis=1)
+                for k in np.unique(windows[chosen]):
+                    rows = np.flatnonzero((windows[chosen] == k) & (codes[chosen, 0] == 0))
+                    of = chosen[rows]
+                    if not len(of):
+                        continue
+                    kept = visited[rows, -1 - k :]
+                    widths = np.fmax(ranges[rows], np.ptp(kept, axis=1))
+                    scale = np.where(widths > 0, widths, 1.0)
+                    found, moved = repeats(kept, scale, turns, max(SAME, ERRORS * resolved.rtol))
+                    short = np.diff(spans[of], axis=1)[:, 0] < (k - 1e-9) * own[of]
+                    multiples[of] = np.where(short, 0, found)
+                    changes[of] = np.where(short, np.nan, moved)
+                    regime[of] = labels_of(touched[of, looked - k :], multiples[of])
+    return Ensemble(
+        (*model.states, *model.slow_states),
+        tuple(model.forcing),
+        interfaces,
+        modes,
+        Named("parameter", swept),
+        starts,
+        spans,
+        since,
+        extremes[:, 0],
+        extremes[:, 1],
+        ends[:, 1:],
+        ends[:, 0],
+        hits,
+        regime,
+        codes[:, 2],
+        codes[:, 0],
+        codes[:, 1],
+        (times if len(times) > 1 else times[0], sampled) if samples is not None else None,
+        "; ".join(dict.fromkeys(compiled.method for *_, compiled, _ in groups)),
+        resolved.limits,
+        {n: v for n, v in model.parameters.items() if n not in swept},
+        model.equations,
+        resolved.recorded(),
+        tuple(dict.fromkeys(u for *_, compiled, _ in groups for u in compiled.undecided)),
+        notes_on_noise(
+            (*model.states, *model.slow_states),
+            resolved,
+            (*model.traits.vanishing, *(name for some in model.traits.together for name in some)),
+            starts,
+            extremes,
+            ends[:, 1:],
+        ),
+        touched,
+        multiples,
+        changes,
+    )
+
+
+def arrivals(
+    model: Model,
+    starts: Floats,
+    swept: Mapping[str, Floats],
+    spans: Floats,
+    resolved: Resolved,
+    threads: int,
+    times: Floats | None = None,
+) -> tuple[Floats, NDArray[np.int64], Floats]:
+    """Where trajectories of different spans arrive, and what they are at some times.
+
+    Parameters
+    ----------
+    model : Model
+    starts : ndarray, shape (m, n)
+    swept : mapping
+        Parameter to its values, shape (m,).
+    spans : ndarray, shape (m, 2)
+    resolved : Resolved
+    threads : int
+    times : ndarray, shape (m, k), optional
+        Increasing, within the spans.
+
+    Returns
+    -------
+    ends : ndarray, shape (m, n)
+    codes : ndarray of int, shape (m,)
+        How each ended, 0 where it reached the end of its span.
+    samples : ndarray, shape (m, n, k)
+        NaN after the end of a trajectory.
+    """
+    count, n = starts.shape
+    ends, codes = np.empty((count, n)), np.empty(count, dtype=np.int64)
+    grid = np.empty((count, 0)) if times is None else times
+    samples = np.empty((count, n, grid.shape[1]))
+    for one, chosen in alike(model, swept, count):
+        compiled = compile_series(one, resolved.order)
+        problem = problem_of(model, compiled, resolved, error_rules(one, resolved, compiled))
+        run = _run(
+            compiled,
+            compile_steps(one, resolved.order),
+            problem,
+            threads,
+            (
+                _parameter_table(compiled, one, swept, chosen),
+                starts[chosen],
+                spans[chosen],
+                spans[chosen, 1],
+            ),
+            grid[chosen],
+            n if grid.shape[1] else 0,
+            lambda _: None,
+        )
+        ends[chosen], codes[chosen] = run[3][:, 1:], run[4][:, 0]
+        if grid.shape[1]:
+            samples[chosen] = run[5]
+    return ends, codes, samples
+
+
+def _parameter_table(
+    compiled: CompiledSeries, model: Model, swept: Mapping[str, Floats], chosen: NDArray[np.intp]
+) -> Floats:
+    """Parameter values for each trajectory in the order of the compiled function."""
+    table = np.zeros((len(chosen), max(1, len(compiled.parameters))))
+    for column, name in enumerate(compiled.parameters):
+        table[:, column] = swept[name][chosen] if name in swept else model.parameters[name]
+    return table
+
+
+@dataclass(frozen=True, eq=False)
+class _Ends:
+    """The periods at the end of runs that are looked at one by one.
+
+    Parameters
+    ----------
+    period, windows : ndarray, shape (m,)
+        Their length and number.
+    bits : ndarray of int, shape (n_modes,)
+        The sides of a gap that each mode touches.
+    """
+
+    period: Floats
+    windows: NDArray[np.int64]
+    bits: NDArray[np.int64]
+
+
+class _Kept:
+    """What runs do in their last periods, gathered at stops at the ends of them.
+
+    A run goes on after a stop as if there were none, but for the end of a step.
+    """
+
+    def __init__(self, ending: _Ends, spans: Floats, starts: Floats, n_regions: int) -> None:
+        self.ending, self.spans, self.n_regions = ending, spans, n_regions
+        most = int(ending.windows.max())
+        self.touched = np.zeros((len(spans), most), dtype=np.int64)
+        self.states = np.repeat(starts[:, None], most + 1, axis=1)
+        self.failed = np.zeros(len(spans), dtype=np.int64)
+
+    def stops(self, chunk: tuple[int, int]) -> int:
+        """How often the runs of a chunk stop: before the first of the periods, and after each."""
+        return int(self.ending.windows[slice(*chunk)].max()) + 1
+
+    def _edge(self, chunk: tuple[int, int], left: NDArray[np.int64]) -> Floats:
+        """When so many periods are left of each run, at its begin at the earliest."""
+        rows = slice(*chunk)
+        edge = self.spans[rows, 1] - left * self.ending.period[rows]
+        return np.asarray(np.maximum(edge, self.spans[rows, 0]))
+
+    def before(
+        self,
+        stop: int,
+        chunk: tuple[int, int],
+        stops: Floats,
+        counted: NDArray[np.int64],
+        codes: NDArray[np.int64],
+    ) -> None:
+        """Set where the runs of a chunk stop next."""
+        rows = slice(*chunk)
+        most = self.ending.windows[rows]
+        left = np.minimum(self.stops(chunk) - 1 - stop, most)
+        # a period that begins with the run needs no stop before it
+        left = np.where(self._edge(chunk, left) > self.spans[rows, 0], left, most - 1)
+        stops[rows, 1] = self._edge(chunk, left)
+        if stop > 0:
+            self.failed[rows] = codes[rows]
+            # what has ended goes no further
+            stops[rows, 1] = np.where(codes[rows] != 0, -np.inf, stops[rows, 1])
+            # a sliding motion is chosen anew, as at the begin of a run
+            sliding = counted[rows, MODE] >= self.n_regions
+            counted[rows, MODE] = np.where(sliding & (codes[rows] == 0), -1, counted[rows, MODE])
+
+    def after(
+        self,
+        stop: int,
+        chunk: tuple[int, int],
+        places: Floats,
+        seen: Floats,
+        codes: NDArray[np.int64],
+    ) -> None:
+        """Note which sides were touched since the stop before, and the states."""
+        rows = slice(*chunk)
+        if stop > 0:
+            codes[rows] = np.where(self.failed[rows] != 0, self.failed[rows], codes[rows])
+        left = self.stops(chunk) - 1 - stop
+        most = self.ending.windows[rows]
+        width = self.touched.shape[1]
+        begun = self._edge(chunk, np.minimum(left, most)) > self.spans[rows, 0]
+        now = places[rows, 1 : 1 + self.states.shape[2]]
+        self.states[rows, width - left] = np.where(
+            begun[:, None], now, self.states[rows, width - left]
+        )
+        if stop > 0:
+            begin = self._edge(chunk, np.full(len(most), left + 1))
+            inside = seen[rows] > begin[:, None]
+            sides = np.bitwise_or.reduce(np.where(inside, self.ending.bits, 0), axis=1)
+            self.touched[rows, width - 1 - left] = np.where(left < most, sides, 0)
+
+
+def _run(
+    compiled: CompiledSeries,
+    lanes: CompiledSteps,
+    problem: Problem,
+    threads: int,
+    rows: tuple[Floats, Floats, Floats, Floats],
+    times: Floats,
+    n_columns: int,
+    report: Callable[[int], object],
+    ending: _Ends | None = None,
+) -> tuple[Any, ...]:
+    """Extremes, hits, times seen, ends, codes, samples and last periods of trajectories.
+
+    All have one series.
+    """
+    values, starts, spans, since = rows
+    count, n = starts.shape
+    counted = (since <= spans[:, 0])[:, None]
+    extremes = np.stack(
+        [np.where(counted, starts, np.inf), np.where(counted, starts, -np.inf)], axis=1
+    )
+    hits = np.zeros((count, compiled.n_interfaces, 2), dtype=np.int64)
+    seen = np.full((count, len(compiled.modes)), -np.inf)
+    places, carried, whole = beginnings(spans[:, 0], starts, compiled.n_forcing, problem.rules)
+    codes = np.empty(count, dtype=np.int64)
+    samples = np.full((count, n_columns, times.shape[1]), np.nan)
+    many = load_loop(DRIVE_MANY)
+    stops = spans.copy()
+    runs = Runs(
+        values, stops, since, times, samples, extremes, hits, seen, places, carried, whole, codes
+    )
+    kept = _Kept(ending, spans, starts, lanes.regions) if ending is not None else None
+    stopping = threading.Event()
+
+    def follow(chunk: tuple[int, int]) -> Iterator[int]:
+        """Follow a chunk to its end; what is yielded on the way has to be provided."""
+        pool = pool_for(problem, lanes.regions, values.shape[1], count)
+        workspace = workspace_for(problem, compiled.n_rows)
+        for stop in range(1 if kept is None else kept.stops(chunk)):
+            if kept is not None:
+                kept.before(stop, chunk, stops, whole, codes)
+            yield from advance(chunk, pool, workspace)
+            if kept is not None:
+                kept.after(stop, chunk, places, seen, codes)
+
+    def advance(chunk: tuple[int, int], pool: Pool, workspace: Workspace) -> Iterator[int]:
+        pace = Pace(compiled.n_rows, compiled.order)
+        while True:
+            pool.progress[LEFT] = pace.begin()
+            given = with_late_code(problem)
+            code = many(given, lanes.address, lanes.regions, runs, pool, workspace, *chunk)
+            if code == REACHED_END:
+                return
+            if stopping.is_set():
+                raise CancelledError
+            if code == OUT_OF_WORK:
+                pace.end()
+            else:
+                yield code
+
+    size = min(_CHUNK, max(1, count // (4 * threads)))
+    chunks = [(i, min(i + size, count)) for i in range(0, count, size)]
+    under_way = {follow(chunk): chunk[1] - chunk[0] for chunk in chunks}
+    if min(threads, len(chunks)) == 1:
+        for following, number in under_way.items():
+            for code in following:
+                provide(code, problem.n_fast)
+            report(number)
+    else:
+        executor = ThreadPoolExecutor(min(threads, len(chunks)))
+        try:
+            waiting = {executor.submit(next, f, None): f for f in under_way}
+            while waiting:
+                # signals are handled in this thread, on some systems between two waits only
+                for done in wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED).done:
+                    following, needed = waiting.pop(done), done.result()
+                    if needed is None:
+                        report(under_way[following])
+                    else:
+                        provide(needed, problem.n_fast)
+                        waiting[executor.submit(next, following, None)] = following
+        finally:
+            stopping.set()
+            executor.shutdown(cancel_futures=True)
+    extremes[np.isinf(extremes)] = np.nan
+    endings = np.column_stack([codes, whole[:, MODE], whole[:, STEPS]])
+    last = None if kept is None else (kept.touched, kept.states)
+    return extremes, hits, seen, places[:, : 1 + n], endings, samples, last
+
+
+def _bar(count: int, shown: bool) -> Any:
+    from tqdm import tqdm
+
+    return tqdm(total=count, disable=not shown, unit="run")

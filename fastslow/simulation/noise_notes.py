@@ -1,0 +1,154 @@
+"""Whether a run was left by noise: what fell below its tolerance, or the smallest number."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.results.base.outcome import Outcome, with_notes
+from fastslow.results.stored.arithmetic import UnknownOperationError, value_of
+from fastslow.simulation.arguments import Simulated
+from fastslow.simulation.settings import Resolved
+from fastslow.simulation.stepper.scales import SMALLEST
+
+Floats = NDArray[np.float64]
+
+#: A state has left zero when it is this much larger than the noise in it.
+LEFT = 1e3
+
+
+def with_noise(
+    outcome: Outcome,
+    model: Simulated,
+    resolved: Resolved,
+    vanishing: tuple[str, ...],
+    together: tuple[tuple[str, ...], ...],
+    steps: Floats,
+    columns: dict[str, Floats],
+    modes: tuple[str, ...],
+) -> Outcome:
+    """The outcome, with a sentence for every state whose noise decided when it left zero.
+
+    Parameters
+    ----------
+    outcome : Outcome
+    model : Model
+    resolved : Resolved
+    vanishing : tuple of str
+        States that their rates have as a factor: only of those, and of those that vanish
+        together, it is known what they leave.
+    together : tuple of tuple of str
+        See `states_together`.
+    steps : ndarray, shape (N, 4)
+        Time, length and mode of every step, and at last of the end.
+    columns : dict
+        Values of states and slow quantities there, each of shape (N,).
+    modes : tuple of str
+    """
+    found = []
+    for name in (*vanishing, *dict.fromkeys(n for some in together for n in some)):
+        absolute = resolved.atol[name] or 0.0
+        size = np.abs(columns[name])
+        below = np.flatnonzero(size < max(absolute, SMALLEST))
+        if not len(below):
+            continue
+        first, rest = below[0], size[below[0] :]
+        time = f"t = {steps[first, 0]:.6g}"
+        if absolute > SMALLEST and rest.max() > LEFT * absolute:
+            found.append(
+                f"{name} fell below its atol = {absolute:g} at {time} and was left from there: the "
+                "tolerance decides when; give atol=0."
+            )
+        elif (
+            name in vanishing
+            and size[0] >= SMALLEST
+            and any(_grows(model, name, columns, steps, modes, below))
+        ):
+            found.append(
+                f"{name} fell below {SMALLEST:g}, the smallest number kept, at {time}: what it "
+                "would grow to afterwards is lost; take its logarithm for a state."
+            )
+    for some in together:
+        sizes = np.abs([columns[name] for name in some]).max(axis=0)
+        gone = np.flatnonzero(sizes < SMALLEST)
+        if len(gone) and sizes[0] >= SMALLEST:
+            found.append(
+                f"{' and '.join(some)} fell below {SMALLEST:g}, the smallest number kept, at "
+                f"t = {steps[gone[0], 0]:.6g}: what they might grow to afterwards is lost; take "
+                "their logarithms for states."
+            )
+    return with_notes(outcome, found)
+
+
+def _grows(
+    model: Simulated,
+    name: str,
+    columns: dict[str, Floats],
+    steps: Floats,
+    modes: tuple[str, ...],
+    below: NDArray[np.intp],
+) -> Iterator[bool]:
+    """Whether the growth rate at zero is positive after a state was lost, region by region."""
+    traits, names = model.traits, (*model.states, *model.slow_states)
+    values: dict[str, Any] = {f"y{k}": columns[n] for k, n in enumerate(names)}
+    values["t"] = steps[:, 0]
+    values = {n: column[below] for n, column in values.items()}
+    values |= {f"p{k}": model.parameters[n] for k, n in enumerate(traits.names)}
+    lost = np.array([modes[int(k)] for k in steps[below, 2]])
+    rates = traits.growth[traits.vanishing.index(name)]
+    for region, rate in zip(model.regions, rates, strict=True):
+        rows = lost == region
+        if rows.any():
+            try:
+                yield bool((np.broadcast_to(value_of(rate, values), rows.shape)[rows] > 0).any())
+            except UnknownOperationError:
+                # a special function: it may grow
+                yield True
+
+
+def notes_on_noise(
+    names: tuple[str, ...],
+    resolved: Resolved,
+    vanishing: tuple[str, ...],
+    start: Floats,
+    extremes: Floats,
+    final: Floats,
+) -> tuple[str, ...]:
+    """Sentences on the trajectories of an ensemble in which noise may decide, as `with_noise`.
+
+    Parameters
+    ----------
+    names : tuple of str
+    resolved : Resolved
+    vanishing : tuple of str
+        States that their rates have as a factor, or that vanish together.
+    start, final : ndarray, shape (m, n)
+    extremes : ndarray, shape (m, 2, n)
+        Smallest and largest values.
+    """
+    found = []
+    for i, name in enumerate(names):
+        if name not in vanishing:
+            continue
+        absolute = resolved.atol[name] or 0.0
+        low, high = extremes[:, 0, i], extremes[:, 1, i]
+        least = np.where(low > 0.0, low, np.where(high < 0.0, -high, 0.0))
+        first, last = np.abs(start[:, i]), np.abs(final[:, i])
+        least = np.fmin(np.fmin(least, first), last)
+        left = int(np.count_nonzero((least < absolute) & (last > LEFT * absolute)))
+        if absolute > SMALLEST and left:
+            found.append(
+                f"{name} fell below its atol = {absolute:g} in {left} of {len(start)} and was left "
+                "from there: the tolerance decides when; give atol=0."
+            )
+        lost = int(np.count_nonzero((first >= SMALLEST) & (last < SMALLEST)))
+        if absolute <= SMALLEST and lost:
+            found.append(
+                f"{name} fell below {SMALLEST:g}, the smallest number kept, in {lost} of "
+                f"{len(start)}: what it might grow to afterwards is lost; take its logarithm for "
+                "a state."
+            )
+    return tuple(found)

@@ -1,0 +1,442 @@
+"""Simulating a model: one trajectory with its crossings."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import finite, flag, positive, takes, text
+from fastslow.kernels.loops import load_loop
+from fastslow.kernels.taylor.series import KEPT, CompiledSeries, compile_series
+from fastslow.results.base.immutable import fixed, read_only
+from fastslow.results.trajectory.endings import outcome_of
+from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.simulation.arguments import (
+    Simulated,
+    gap_regions,
+    initial_state,
+    require_values,
+    sample_times,
+    simulated,
+    time_span,
+)
+from fastslow.simulation.loops import DRIVE
+from fastslow.simulation.noise_notes import with_noise
+from fastslow.simulation.pauses import Pace, provide, with_late_code
+from fastslow.simulation.settings import (
+    DEFAULT,
+    Integration,
+    Resolved,
+    integration_settings,
+    resolve,
+)
+from fastslow.simulation.stepper.driver import OUT_OF_WORK, TABLE_FULL
+from fastslow.simulation.stepper.implicit import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
+from fastslow.simulation.stepper.problems import Problem, Record, Run
+from fastslow.simulation.stepper.radau import RADAU_ORDER
+from fastslow.simulation.stepper.scales import FORGETTING, rules_of
+from fastslow.simulation.stepper.workspace import (
+    CROSSINGS,
+    MODE,
+    SAMPLES,
+    STEPS,
+    WORK,
+    Workspace,
+    beginnings,
+    workspace_for,
+)
+
+#: No extremes, hits and times of modes: steps and crossings are listed instead.
+_LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
+
+
+@takes(
+    model=simulated,
+    start=finite,
+    period=positive,
+    integration=integration_settings,
+    dense=flag,
+    gap=text,
+)
+def simulate(
+    model: Simulated,
+    state: Sequence[float] | Mapping[Any, float] | NDArray[np.float64],
+    *,
+    t: tuple[float, float] | None = None,
+    periods: float | None = None,
+    start: float = 0.0,
+    period: float | None = None,
+    integration: Integration = DEFAULT,
+    samples: int | Sequence[float] | NDArray[np.float64] | None = None,
+    dense: bool = True,
+    gap: str | None = None,
+) -> Trajectory:
+    """Follow one trajectory, with every crossing of an interface located.
+
+    Taylor series of the rates, step by step (Jorba and Zou 2005); crossings
+    are roots of the interface functions along the series of a step, so that
+    two crossings within one step are both found. Where a function has no
+    recurrence (gamma, Bessel functions, …), or a series is singular at a point
+    where the rates are not, collocation polynomials take their place.
+
+    Parameters
+    ----------
+    model : Model or StoredModel
+        With forcing, with slow states, or frozen with every parameter given; the model of a
+        run that was loaded is a stored one, and needs no SymPy.
+    state : sequence of float, shape (n,), or mapping
+        Initial states and slow states, in order or by name.
+    t : (float, float)
+        Start and end of time.
+    periods : float
+        Instead of ``t``: how many periods of the forcing.
+    start : float
+        Start of time with ``periods``.
+    period : float, optional
+        The period, where the model's own is not wanted or cannot be found.
+    integration : Integration
+        Error allowed, order and method of the steps, and where to stop.
+    samples : int or sequence of float, optional
+        How many evenly spaced samples, or at which times. By default the
+        steps themselves are refined enough to plot.
+    dense : bool
+        Whether the series is kept, for evaluation at any time. Without it the
+        memory does not grow with the number of steps by more than 24 bytes each, and
+        whether noise decided when a state left zero is judged by samples and the end.
+    gap : str, optional
+        The region that counts as the gap for `Trajectory.regime`.
+
+    Returns
+    -------
+    Trajectory
+        What was computed, whatever the end; ``outcome`` says why it ended.
+
+    Raises
+    ------
+    ArgumentError
+        For a wrong initial state, span or sample times, a frozen
+        model without values, or ``periods`` without a common period.
+    UnknownNameError
+        For an initial value or gap that is not in the model.
+    ModelError
+        For a function that cannot be compiled.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, v = sp.symbols("x v")
+    >>> oscillator = fs.Model({x: v, v: -x})
+    >>> fine = Integration(rtol=1e-12)
+    >>> run = simulate(oscillator, [1, 0], t=(0, 2 * sp.pi), integration=fine)
+    >>> run(sp.pi).round(10) + 0.0
+    array([-1.,  0.])
+    """
+    prepared = prepared_run(model, integration, gap)
+    compiled, problem, names = prepared.compiled, prepared.problem, prepared.names
+    begin = initial_state(model, state)
+    span, period = time_span(t, periods, start, period, lambda: prepared.period)
+    times = sample_times(samples, span)
+    kept = compiled.n_states + compiled.n_forcing
+    rows = compiled.n_states if dense else kept
+    sampled = np.empty((rows, len(times)))
+    run = prepared.run(begin, span)
+    place, counted = run.inputs, run.counted
+    stride = kept * (compiled.order + 1) if dense else 0
+    tables = _memory.tables(compiled.n_states, stride)
+    workspace = _memory.workspace(prepared)
+    loop, pace = load_loop(DRIVE), Pace(compiled.n_rows, compiled.order)
+    while True:
+        counted[WORK] = pace.begin()
+        record = Record(times, sampled, *tables, *_LISTED)
+        code = loop(with_late_code(problem), run, record, workspace, 0)
+        if code == OUT_OF_WORK:
+            pace.end()
+        elif code == TABLE_FULL:
+            tables = tables.with_space(counted, compiled.n_interfaces, stride)
+        elif code < 0:
+            provide(code, problem.n_fast)
+        else:
+            break
+    _memory.workspaces[prepared.shape] = workspace
+    steps, crossings, store = _memory.filled(tables, counted, stride)
+    end = read_only(place[: 1 + compiled.n_states].copy())
+    n_steps, reached, mode = len(steps), int(counted[SAMPLES]), int(counted[MODE])
+    outcome = outcome_of(
+        code,
+        mode,
+        end,
+        n_steps,
+        begin,
+        compiled.modes,
+        prepared.resolved.limits,
+        compiled.undecided,
+    )
+    series = store.reshape(n_steps, kept, compiled.order + 1) if dense else None
+    vanishing, together = prepared.vanishing, prepared.together
+    if vanishing or together:
+        if series is not None:
+            table, known = steps, series[:, :, 0]
+        else:
+            # what there is: the beginning, samples and the end
+            table = np.zeros((1 + reached, 4))
+            table[:, 0], table[:, 2] = [span[0], *times[:reached]], mode
+            known = np.full((1 + reached, kept), np.nan)
+            known[0, : compiled.n_states], known[1:] = begin, sampled[:, :reached].T
+        ends = np.vstack([known, place[1 : 1 + kept]])
+        columns = dict(zip((*names, *model.forcing), ends.T, strict=True))
+        whole = np.vstack([table, [end[0], 0.0, mode, 0.0]])
+        outcome = with_noise(
+            outcome, model, prepared.resolved, vanishing, together, whole, columns, compiled.modes
+        )
+    if reached < len(times):
+        times, sampled = times[:reached].copy(), sampled[:, :reached].copy()
+    return Trajectory.of_fixed(
+        prepared.shared,
+        period=period,
+        outcome=outcome,
+        span=(span[0], float(end[0])),
+        end=end,
+        method=_method(compiled, steps),
+        steps=steps,
+        crossing_table=crossings,
+        series=series,
+        sampled=read_only((times, sampled)) if samples is not None else None,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What all runs of a model with the same settings share.
+
+    Parameters
+    ----------
+    model : Model
+    names : tuple of str
+        States and slow states.
+    compiled : CompiledSeries
+    resolved : Resolved
+    problem : Problem
+    gap : tuple of str or None
+    vanishing, together : tuple
+        See `with_noise`.
+    """
+
+    model: Simulated
+    names: tuple[str, ...]
+    compiled: CompiledSeries
+    resolved: Resolved
+    problem: Problem
+    gap: tuple[str, str, str] | None
+    vanishing: tuple[str, ...]
+    together: tuple[tuple[str, ...], ...]
+
+    @cached_property
+    def period(self) -> float | None:
+        """The common period of the forcing."""
+        return self.model.period()
+
+    @cached_property
+    def shared(self) -> dict[str, Any]:
+        """The fields of a `Trajectory` that all runs have in common."""
+        model = self.model
+        content = {
+            "states": self.names,
+            "forcing": tuple(model.forcing),
+            "interfaces": tuple(model.interfaces),
+            "regions": tuple(model.regions),
+            "parameters": dict(model.parameters),
+            "gap": self.gap,
+            "modes": self.compiled.modes,
+            "equations": model.equations,
+            "settings": self.resolved.recorded(),
+            "periods": dict(model.periodic),
+            "model": model,
+        }
+        return {name: fixed(name, value) for name, value in content.items()}
+
+    @cached_property
+    def shape(self) -> tuple[int, ...]:
+        """What the work space depends on."""
+        problem = self.problem
+        sizes = (problem.n_states, problem.n_forcing, problem.n_interfaces, problem.order)
+        return (*sizes, problem.n_fast, self.compiled.n_rows)
+
+    @cached_property
+    def _beginning(self) -> tuple[NDArray[Any], ...]:
+        """Parameters, and what a run carries at its beginning."""
+        (_,), (carried,), (counted,) = beginnings(
+            np.zeros(1), np.zeros((1, len(self.names))), 0, self.problem.rules
+        )
+        return self.compiled.parameter_array(self.model), carried, counted
+
+    def run(self, state: NDArray[np.float64], span: tuple[float, float]) -> Run:
+        """A run at its beginning."""
+        parameters, carried, counted = self._beginning
+        place = np.zeros(1 + len(state) + self.compiled.n_forcing)
+        place[0] = span[0]
+        place[1 : 1 + len(state)] = state
+        return Run(*span, span[0], parameters, place, carried.copy(), counted.copy())
+
+
+@lru_cache(maxsize=KEPT)
+def prepared_run(model: Simulated, integration: Integration, gap: str | None) -> Prepared:
+    """What a run needs of its model, with every parameter given, and its settings."""
+    require_values(model)
+    resolved = resolve(integration, model, implicit=True)
+    between = gap_regions(model, gap)
+    compiled = compile_series(model, resolved.order)
+    return Prepared(
+        model,
+        (*model.states, *model.slow_states),
+        compiled,
+        resolved,
+        problem_of(model, compiled, resolved, error_rules(model, resolved, compiled)),
+        between,
+        model.traits.vanishing,
+        model.traits.together,
+    )
+
+
+#: Numbers that are copied at a time, with which a table begins at least, and at most.
+_BLOCK, _LEAST, _MOST = 2**22, 2**12, 2**23
+
+
+class _Tables(NamedTuple):
+    """What `drive` fills: steps, crossings, and the coefficients of all steps one after another."""
+
+    steps: NDArray[np.float64]
+    crossings: NDArray[np.float64]
+    store: NDArray[np.float64]
+
+    def filled(self, counted: NDArray[np.int64], stride: int) -> tuple[int, int, int]:
+        """How many rows of each hold something, of `stride` coefficients for each step."""
+        steps = int(counted[STEPS])
+        return steps, int(counted[CROSSINGS]), steps * stride
+
+    def with_space(self, counted: NDArray[np.int64], n_interfaces: int, stride: int) -> _Tables:
+        """Tables with space for another step and a crossing of every interface."""
+        needed = (1, n_interfaces, stride)
+        return _Tables(
+            *(
+                table if used + more <= len(table) else _larger(table, used, more)
+                for table, used, more in zip(
+                    self, self.filled(counted, stride), needed, strict=True
+                )
+            )
+        )
+
+
+def _larger(table: NDArray[np.float64], used: int, more: int) -> NDArray[np.float64]:
+    """A copy with space for twice as many rows, made in parts."""
+    copy = np.empty((2 * len(table) + more, *table.shape[1:]))
+    rows = max(1, _BLOCK // math.prod(table.shape[1:]))
+    for first in range(0, used, rows):
+        last = min(first + rows, used)
+        copy[first:last] = table[first:last]
+    return copy
+
+
+class _Memory(threading.local):
+    """What runs of a thread have in common: work space, and how much the last one kept."""
+
+    def __init__(self) -> None:
+        self.kept = (0, 0, 0)
+        self.sizes = (_LEAST, _LEAST, _LEAST)
+        self.workspaces: dict[tuple[int, ...], Workspace] = {}
+
+    def workspace(self, prepared: Prepared) -> Workspace:
+        """Work space, which a run gives back under its shape."""
+        found = self.workspaces.pop(prepared.shape, None)
+        if found is None:
+            # of other models there may be many
+            self.workspaces.clear()
+            found = workspace_for(prepared.problem, prepared.compiled.n_rows)
+        return found
+
+    def tables(self, n_states: int, stride: int) -> _Tables:
+        """Tables for a run that keeps as much as the last one."""
+        steps, crossings, store = self.sizes
+        # an empty store is for none
+        return _Tables(
+            np.empty((steps // 4, 4)),
+            np.empty((crossings // (6 + n_states), 6 + n_states)),
+            np.empty(store if stride else 0),
+        )
+
+    def filled(self, tables: _Tables, counted: NDArray[np.int64], stride: int) -> _Tables:
+        """Tables cut, where they are, to what a run has filled of them."""
+        for table, used in zip(tables, tables.filled(counted, stride), strict=True):
+            table.resize((used, *table.shape[1:]), refcheck=False)
+            table.flags.writeable = False
+        kept = (tables.steps.size, tables.crossings.size, tables.store.size)
+        if kept != self.kept:
+            steps, crossings, store = (min(max(n + n // 8, _LEAST), _MOST) for n in kept)
+            self.kept, self.sizes = kept, (steps, crossings, store)
+        return tables
+
+
+_memory = _Memory()
+
+
+def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
+    """How a run was stepped, in words."""
+    if not np.count_nonzero(steps[:, 3]):
+        return compiled.method
+    words = [compiled.method]
+    collocated, implicit, stiff = (
+        int(np.count_nonzero(steps[:, 3] == k)) for k in (1, IMPLICIT, RADAU)
+    )
+    if collocated and not compiled.values_only:
+        words.append(f"{collocated} steps by collocation where it is singular")
+    if implicit:
+        words.append(f"{implicit} implicit steps of order {SETTLED_ORDER} through settled phases")
+    if stiff:
+        words.append(f"{stiff} steps of Radau IIA of order {RADAU_ORDER} through stiff phases")
+    return ", ".join(words)
+
+
+def problem_of(
+    model: Simulated, compiled: CompiledSeries, resolved: Resolved, rules: NDArray[np.float64]
+) -> Problem:
+    """What the stepping loops need of a model, its series, and the errors allowed."""
+    settling = resolved.implicit and compiled.order >= DEGREE and not compiled.values_only
+    return Problem(
+        compiled.address,
+        0,
+        0,
+        compiled.n_states,
+        compiled.n_forcing,
+        compiled.n_interfaces,
+        len(compiled.modes),
+        compiled.order,
+        len(model.states) if settling else 0,
+        *resolved.limits,
+        resolved.rtol,
+        compiled.signs,
+        compiled.continuous,
+        rules,
+    )
+
+
+def error_rules(
+    model: Simulated, resolved: Resolved, compiled: CompiledSeries
+) -> NDArray[np.float64]:
+    """In what sizes the errors of a run are measured, from its tolerances."""
+    names = (*model.states, *model.slow_states)
+    fixed, lasting = np.zeros(len(names)), np.zeros(len(names))
+    traits = model.traits
+    vanishing = {*traits.vanishing, *(n for some in traits.together for n in some)}
+    for i, name in enumerate(names):
+        given = resolved.atol[name]
+        if given is not None:
+            fixed[i] = given / resolved.rtol
+        elif name not in vanishing:
+            lasting[i] = FORGETTING
+    return rules_of(fixed, lasting, compiled.n_forcing, compiled.n_interfaces)

@@ -1,0 +1,414 @@
+"""The stepping loop: Taylor steps, crossings and samples, compiled once for all models."""
+
+from __future__ import annotations
+
+from fastslow.kernels.decorators import inlined_part
+from fastslow.kernels.pointers import call_address
+from fastslow.kernels.simd.lane_steps import SUDDEN
+from fastslow.simulation.stepper.events import find_event, holds, put_on_all
+from fastslow.simulation.stepper.extremes import widen_extremes
+from fastslow.simulation.stepper.implicit import (
+    DAMPING,
+    IMPLICIT,
+    LONGEST_WAIT,
+    PAYS,
+    RADAU,
+    WAIT,
+    Lengths,
+    Series,
+    long_step,
+    settled,
+)
+from fastslow.simulation.stepper.modes import (
+    MANY_MODES,
+    MISSING,
+    NOT_DEFINED,
+    UNKNOWN_MODE,
+    across,
+    choose_mode,
+    expand,
+    expanded,
+    interface_noise,
+    leaves,
+)
+from fastslow.simulation.stepper.polynomials import ZERO, horner, take_samples
+from fastslow.simulation.stepper.scales import (
+    REACHED,
+    flush,
+    raise_sizes,
+    remember_sizes,
+    step_length,
+)
+from fastslow.simulation.stepper.workspace import (
+    CALM,
+    CHOOSING,
+    COLLOCATED_WORK,
+    CROSSINGS,
+    CROWDED,
+    DEPTH,
+    FLOOR,
+    FRESH,
+    IMPLICIT_WORK,
+    IN_A_ROW,
+    INTERFACE,
+    LAST_EVENT,
+    LATE,
+    LONGEST,
+    MODE,
+    PAUSE,
+    PAUSED,
+    SAMPLES,
+    SIZES,
+    STEPS,
+    TOUCHED,
+    USUAL,
+    WANTED,
+    WORK,
+)
+
+#: How the loop ended.
+REACHED_END = 0
+TOO_MANY_STEPS = 1
+TOO_MANY_CROSSINGS = 2
+STEP_TOO_SMALL = 3
+NOT_FINITE = 4
+NOT_UNIQUE = 5
+NO_WAY_ON = 6
+ACCUMULATION = 7
+
+#: It did not end: in a region, after a plain step or a crossing, others may take the next one.
+HANDED_OVER = -1
+
+#: It pauses between two steps, and goes on as if it had not when it is called again: its work is
+#: done, there is no room for another step or crossing, or it needs code that is not there.
+OUT_OF_WORK, TABLE_FULL, NEEDS_COLLOCATION, NEEDS_RADAU = -2, -3, -4, -5
+
+#: Crossings in a row, none farther from the last than rounding of time, that end a run.
+CROWD = 40
+
+#: A crossing is near-tangential when moving h by this part of its scale would undo it.
+TANGENTIAL = 1e-6
+
+
+@inlined_part
+def drive(problem, run, record, workspace, handed):
+    """Follow one trajectory to its end, until others may take its next step, or to a pause.
+
+    Every step and every crossing is put into a table, or, where there are
+    arrays for it, they are summed up as the run goes.
+
+    Parameters
+    ----------
+    problem : Problem
+    run : Run
+        Changed here.
+    record : Record
+        Filled here.
+    workspace : Workspace
+        From `workspace_for`; after a pause the one that the run paused in.
+    handed : int
+        In one of so many first modes the run is handed over after a plain step or a crossing.
+
+    Returns
+    -------
+    int
+        How it ended, `HANDED_OVER`, or why it pauses. Nothing but a number is returned: to make
+        an array Numba runs Python, in which an interrupt would be raised and lost.
+    """
+    address, n_states, n_modes, tol = problem.series, problem.n_states, problem.n_modes, problem.tol
+    n_interfaces, n_fast, order = problem.n_interfaces, problem.n_fast, problem.order
+    signs, continuous, rules = problem.signs, problem.continuous, problem.rules
+    parameters, inputs, carried, counted = run.parameters, run.inputs, run.carried, run.counted
+    times, steps, crossings, store = record.times, record.steps, record.crossings, record.store
+    extremes, hits, seen, since = record.extremes, record.hits, record.seen, run.since
+    W, work, scales = workspace.W, workspace.work, workspace.scales
+    search, collocation = workspace.search, workspace.collocation
+    implicit, memory = workspace.implicit, workspace.collocation.memory
+    right, poly, phase = implicit.right, implicit.poly, implicit.radau.phase
+    on, hit, rests, side, noise = search.on, search.hit, search.rests, search.side, search.noise
+    gradient, offsets, samples = search.gradient, workspace.offsets, record.samples
+    columns = order + 1
+    kept = n_states + problem.n_forcing
+    stride = kept * columns
+    t, late, stop = inputs[0], carried[LATE], run.stop
+    whole = stop - run.begin
+    n_rows = kept + n_interfaces
+    listing, dense = extremes.shape[0] == 0, store.shape[0] > 0
+    n_steps, n_crossings = counted[STEPS], counted[CROSSINGS]
+    n_samples, crowd = counted[SAMPLES], counted[CROWDED]
+    mode, interface = counted[MODE], ZERO - 1
+    usual, last_event, depth, floor = carried[USUAL], carried[LAST_EVENT], 1.0, 0.0
+    # implicit steps: when to try again, how long to wait after a failure, how many, how long
+    calm, pause, in_a_row = counted[CALM], counted[PAUSE], ZERO
+    wanted = longest = 0.0
+    code = REACHED_END
+    choosing, touched, ahead, fresh, raised = mode < 0, False, False, mode < 0, False
+    left = counted[WORK]
+    if counted[PAUSED] > 0:
+        in_a_row, interface = counted[IN_A_ROW], counted[INTERFACE]
+        wanted, longest = carried[WANTED], carried[LONGEST]
+        depth, floor = carried[DEPTH], carried[FLOOR]
+        choosing, touched = counted[CHOOSING] > 0, counted[TOUCHED] > 0
+        fresh = counted[FRESH] > 0
+    else:
+        for i in range(memory.shape[0]):
+            memory[i] = 0.0
+        for i in range(n_rows):
+            scales[REACHED, i] = carried[SIZES + i]
+        for j in range(n_interfaces):
+            on[j] = hit[j] = rests[j] = False
+        interface = counted[INTERFACE]
+        if interface >= 0:
+            # others did not take the step that leaves an interface after all
+            on[interface], noise[interface], fresh = True, carried[FLOOR], True
+    while True:
+        if listing and (
+            n_steps == steps.shape[0]
+            or n_crossings + n_interfaces > crossings.shape[0]
+            or (dense and (n_steps + 1) * stride > store.shape[0])
+        ):
+            code = TABLE_FULL
+            break
+        if choosing:
+            left -= n_modes
+            # most often one interface is crossed where the rates are continuous
+            before = mode
+            mode = across(signs, before, interface) if interface >= 0 and not touched else before
+            call_address(address, max(mode, 0), inputs, parameters, W)
+            for i in range(n_states, kept):
+                inputs[1 + i] = W[i * columns]
+            others = ZERO
+            for j in range(n_interfaces):
+                noise[j] = interface_noise(problem, run, j, gradient)
+                if j == interface:
+                    noise[j] = max(noise[j], floor)
+                on[j] = hit[j] or abs(gradient[0]) <= noise[j]
+                side[j] = 1 if gradient[0] > 0.0 else -1
+                others += on[j] and j != interface
+            ahead = (
+                mode != before
+                and others == 0
+                and continuous[interface]
+                and leaves(problem, W, interface, signs[mode, interface], whole, scales, noise)
+            )
+            if not ahead:
+                mode = choose_mode(problem, run, before, whole, work, scales, search, collocation)
+            if mode < 0:
+                code = NO_WAY_ON
+                if mode == MANY_MODES:
+                    code = NOT_UNIQUE
+                elif mode == NOT_DEFINED:
+                    code = NOT_FINITE
+                elif mode == UNKNOWN_MODE:
+                    code = NEEDS_COLLOCATION
+                mode = before
+                break
+            for j in range(n_interfaces):
+                changed = before >= 0 and signs[before, j] != signs[mode, j]
+                if changed or (touched and mode == before and j == interface):
+                    turn = signs[mode, j] - signs[before, j]
+                    if listing:
+                        crossings[n_crossings, 0] = t
+                        crossings[n_crossings, 1] = j
+                        crossings[n_crossings, 2] = min(max(turn, -1), 1)
+                        crossings[n_crossings, 3] = before
+                        crossings[n_crossings, 4] = mode
+                        crossings[n_crossings, 5] = depth < TANGENTIAL or not changed
+                        for i in range(n_states):
+                            crossings[n_crossings, 6 + i] = inputs[1 + i]
+                    else:
+                        hits[j, 0 if turn > 0 else 1] += turn != 0 and t >= since
+                    n_crossings += 1
+            if n_crossings >= problem.max_crossings:
+                code = TOO_MANY_CROSSINGS
+                break
+            choosing = touched = False
+            fresh = True
+            calm = pause = ZERO + WAIT
+            in_a_row = ZERO
+            if ahead and mode < handed:
+                code = HANDED_OVER
+                break
+        remaining = (stop - t) - late
+        if not remaining > 0.0:
+            break
+        if n_steps == problem.max_steps:
+            code = TOO_MANY_STEPS
+            break
+        if in_a_row > 0:
+            # an implicit step has left the first coefficients of the series at its end
+            W, right = right, W
+        else:
+            if ahead:
+                longest = expanded(problem, run, mode, remaining, W, scales, collocation, True)
+            else:
+                longest = expand(problem, run, mode, remaining, W, scales, collocation, True)
+            ahead = raised = False
+            if longest == MISSING:
+                code = NEEDS_COLLOCATION
+                break
+            if fresh and longest < SUDDEN * (usual if usual > 0.0 else remaining):
+                # should the step have to be taken again, it begins with the sizes as they were
+                raised = True
+                for i in range(n_rows):
+                    carried[SIZES + i] = scales[REACHED, i]
+                raise_sizes(W, n_rows, order, tol, remaining, rules, scales)
+                if memory[0] == 0.0:
+                    longest = step_length(W, n_rows, order, tol, scales)
+            if not longest > 0.0:
+                code = NOT_FINITE
+                break
+            if memory[0] > 0.0:
+                left -= COLLOCATED_WORK
+        taken, long = 0.0, False
+        for i in range(n_states, kept):
+            inputs[1 + i] = W[i * columns]
+        calm -= 1
+        if n_fast > 0 and calm <= 0 and (in_a_row > 0 or settled(problem, W, longest, scales)):
+            if in_a_row == 0:
+                wanted = 1.25 * longest
+                phase[0] = 0.0
+            left -= IMPLICIT_WORK + n_fast * n_fast // 8
+            least = (1.1 if in_a_row < DAMPING else PAYS) * longest
+            taken, growth = long_step(
+                problem,
+                run,
+                mode,
+                Lengths(wanted, least, longest, remaining),
+                Series(W, right, poly, work),
+                scales,
+                search,
+                implicit,
+            )
+            if taken == MISSING:
+                code = NEEDS_RADAU
+                if in_a_row > 0:
+                    W, right = right, W
+                elif raised:
+                    for i in range(n_rows):
+                        scales[REACHED, i] = carried[SIZES + i]
+                calm += 1
+                break
+            long = taken > 0.0
+            if long:
+                wanted, pause, in_a_row = growth * taken, ZERO + WAIT, in_a_row + 1
+                W, poly = poly, W
+                s, h, interface, final = 2.0, taken, ZERO - 1, taken >= remaining
+            else:
+                pause = min(2 * pause, LONGEST_WAIT)
+                calm = pause
+                if in_a_row > 0:
+                    in_a_row = ZERO
+                    longest = expand(problem, run, mode, remaining, W, scales, collocation, True)
+                    if longest == MISSING:
+                        code = NEEDS_COLLOCATION
+                        calm += 1
+                        break
+                    if not longest > 0.0:
+                        code = NOT_FINITE
+                        break
+        fresh = False
+        if not long:
+            final = longest >= remaining
+            # a step between two times that are exact in floating point loses none of it
+            h = remaining if final else (t + longest) - t
+            if h == 0.0:
+                code = STEP_TOO_SMALL
+                break
+            while True:
+                s, interface, touched, depth, floor = find_event(problem, run, mode, W, h, search)
+                taken = s * h if interface >= 0 else h
+                # where a step grew much its last terms may be small by accident
+                doubtful = taken > 2.0 * usual or longest > 4.0 * remaining
+                if (
+                    h == 0.0
+                    or not doubtful
+                    or holds(problem, run, mode, W, taken, scales, work, search)
+                ):
+                    break
+                h, final = (t + 0.25 * taken) - t, False
+            usual = max(taken, 0.1 * usual)
+        if h == 0.0:
+            code = STEP_TOO_SMALL
+            break
+        begin, lag = t, late
+        if interface >= 0:
+            t = begin + taken
+            late = lag + (taken - (t - begin))
+            if s == 1.0 and final:
+                t, late = stop, 0.0
+        elif final:
+            t, late = stop, 0.0
+        else:
+            t = begin + h
+        if taken > 0.0:
+            remember_sizes(rules, scales)
+            if listing:
+                steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, taken, mode
+                kind = RADAU if phase[0] > 0.0 else IMPLICIT
+                steps[n_steps, 3] = kind if long else memory[0]
+            else:
+                seen[mode] = t
+                if t > since:
+                    unused = (since - begin) - lag
+                    widen_extremes(W, order, unused, taken, extremes, search)
+            if dense:
+                coefficients = store[n_steps * stride : (n_steps + 1) * stride]
+                for i in range(stride):
+                    coefficients[i] = W[i]
+            n_steps += 1
+            step = (begin, lag, t)
+            n_samples = take_samples(W, columns, step, times, samples, n_samples, offsets)
+            for i in range(kept):
+                inputs[1 + i] = horner(W, i * columns, i * columns + order, taken)
+            flush(rules, inputs, n_states)
+        inputs[0] = t
+        for j in range(n_interfaces):
+            hit[j] = signs[mode, j] == 0
+            # a motion that rests on an interface may leave it in the next step: look again
+            on[j] = rests[j]
+            choosing = choosing or rests[j]
+        if interface >= 0:
+            hit[interface] = choosing = True
+        put_on_all(problem, run, search)
+        left -= 1
+        if interface >= 0:
+            crowd = crowd + 1 if t - last_event <= 1e-13 * max(abs(t), whole) else 0
+            last_event = t
+            if crowd == CROWD:
+                code = ACCUMULATION
+                break
+        elif mode < handed and not choosing and not final and in_a_row == 0:
+            code = HANDED_OVER
+            break
+        if left <= 0:
+            code = OUT_OF_WORK
+            break
+    counted[PAUSED] = code < HANDED_OVER
+    if code < HANDED_OVER:
+        if in_a_row > 0:
+            # the arrays have changed their places
+            held_W, held_right = workspace.W, implicit.right
+            for i in range(W.shape[0]):
+                work[i] = right[i]
+            for i in range(W.shape[0]):
+                held_W[i] = W[i]
+            for i in range(W.shape[0]):
+                held_right[i] = work[i]
+        counted[IN_A_ROW], counted[INTERFACE] = in_a_row, interface
+        counted[CHOOSING], counted[TOUCHED], counted[FRESH] = choosing, touched, fresh
+        carried[WANTED], carried[LONGEST] = wanted, longest
+        carried[DEPTH], carried[FLOOR] = depth, floor
+    else:
+        # the interface that it has crossed, where it is handed over before the step that leaves it
+        counted[INTERFACE] = interface if code == HANDED_OVER else -1
+        if code == HANDED_OVER and interface >= 0:
+            carried[FLOOR] = noise[interface]
+    counted[WORK] = left
+    carried[LATE], carried[USUAL], carried[LAST_EVENT] = late, usual, last_event
+    for i in range(n_rows):
+        carried[SIZES + i] = scales[REACHED, i]
+    counted[STEPS], counted[CROSSINGS] = n_steps, n_crossings
+    counted[SAMPLES], counted[CROWDED], counted[MODE] = n_samples, crowd, mode
+    counted[CALM], counted[PAUSE] = calm, pause
+    return code

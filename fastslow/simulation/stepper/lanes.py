@@ -1,0 +1,383 @@
+"""Many trajectories: their plain steps several at once, everything else one by one.
+
+What becomes of a trajectory depends on itself alone: a step that can be taken in
+lanes is taken in lanes, beside copies of another one where there are too few.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from fastslow.kernels.decorators import part
+from fastslow.kernels.pointers import call_address
+from fastslow.kernels.records import (
+    IntegerMatrix,
+    Integers,
+    IntegerTensor,
+    Matrix,
+    Tensor,
+    Vector,
+    zeros,
+)
+from fastslow.kernels.simd import lane_steps as step
+from fastslow.kernels.simd.lanes import WIDTH
+from fastslow.simulation.stepper.driver import HANDED_OVER, OUT_OF_WORK, REACHED_END, drive
+from fastslow.simulation.stepper.extremes import widen_extremes
+from fastslow.simulation.stepper.polynomials import ZERO, take_samples
+from fastslow.simulation.stepper.problems import Problem, Record, Run
+from fastslow.simulation.stepper.scales import FIXED, LASTING
+from fastslow.simulation.stepper.workspace import (
+    CALM,
+    INTERFACE,
+    LATE,
+    MODE,
+    SAMPLES,
+    SIZES,
+    STEPS,
+    USUAL,
+    WORK,
+)
+
+#: Trajectories under way at a time, so that some region has one for every lane.
+UNDER_WAY = 8 * WIDTH
+
+#: Steps in lanes before the loop is asked whether to go on.
+IN_LANES = 1000
+
+#: What the loop goes on from after a pause: that it paused, the next trajectory that is not yet
+#: under way, how many are to be followed alone and in lanes, the mode of those, the work left.
+PAUSED, FOLLOWING, ALONE, COUNT, LANES_MODE, LEFT = range(6)
+
+
+class Runs(NamedTuple):
+    """Many runs of a problem, and what is kept of them: as `Run` and `Record`, row by row.
+
+    Parameters
+    ----------
+    parameters : float64 array, shape (m, n_parameters)
+    spans : float64 array, shape (m, 2)
+    since : float64 array, shape (m,)
+    times : float64 array, shape (m, n_times) or (1, n_times)
+    samples : float64 array, shape (m, n_rows, n_times)
+    extremes : float64 array, shape (m, 2, n_states)
+    hits : int64 array, shape (m, n_interfaces, 2)
+    seen : float64 array, shape (m, n_modes)
+    places : float64 array, shape (m, 1 + n_states + n_forcing)
+    carried : float64 array, shape (m, SIZES + rows)
+    counted : int64 array, shape (m, 14)
+    codes : int64 array, shape (m,)
+        How each ended.
+    """
+
+    parameters: Matrix
+    spans: Matrix
+    since: Vector
+    times: Matrix
+    samples: Tensor
+    extremes: Tensor
+    hits: IntegerTensor
+    seen: Matrix
+    places: Matrix
+    carried: Matrix
+    counted: IntegerMatrix
+    codes: Integers
+
+
+class Pool(NamedTuple):
+    """Who is in the lanes, and who waits for what.
+
+    Parameters
+    ----------
+    rows, given, series : float64 arrays, shape (., WIDTH)
+        What the compiled steps are called with.
+    held : int64 array, shape (WIDTH,)
+        The run in each lane, -1 for none.
+    ready : int64 array, shape (regions, under way)
+        Runs that wait for a lane, region by region; ``n_ready`` says how many.
+    n_ready : int64 array, shape (regions,)
+    alone : int64 array, shape (under way,)
+        Runs whose next step is taken alone.
+    beyond : int64 array, shape (WIDTH,)
+        Steps that each lane is allowed beyond those that it was told of.
+    progress : int64 array, shape (6,)
+        What the loop goes on from after a pause, and the work up to the next one.
+    table : float64 array, shape (0, 0)
+    nothing : float64 array, shape (0,)
+    """
+
+    rows: Matrix
+    given: Matrix
+    series: Matrix
+    held: Integers
+    ready: IntegerMatrix
+    n_ready: Integers
+    alone: Integers
+    beyond: Integers
+    progress: Integers
+    table: Matrix
+    nothing: Vector
+
+
+def pool_for(problem: Problem, regions: int, n_values: int, count: int) -> Pool:
+    """An empty pool for so many runs, with so many parameters."""
+    n, n_forcing, order = problem.n_states, problem.n_forcing, problem.order
+    rows = n + n_forcing + problem.n_interfaces
+    under_way = min(UNDER_WAY, count)
+    return zeros(
+        Pool,
+        (1 + n + step.ROWS + 2 * n + rows, WIDTH),
+        (n_values + 1 + 2 * rows, WIDTH),
+        ((n + n_forcing) * (order + 1), WIDTH),
+        WIDTH,
+        (max(1, regions), under_way),
+        max(1, regions),
+        under_way,
+        WIDTH,
+        LEFT + 1,
+        (0, 0),
+        0,
+    )
+
+
+@part
+def drive_many(problem, steps, regions, runs, pool, workspace, first, last):
+    """Follow the trajectories from one number to another to their ends, or to a pause.
+
+    Parameters
+    ----------
+    problem : Problem
+    steps, regions : int
+        Address of the plain steps, and the number of their regions.
+    runs : Runs
+        Changed here.
+    pool : Pool
+        From `pool_for`.
+    workspace : Workspace
+        Both keep what the loop goes on from after a pause.
+    first, last : int
+        The runs from the first up to, but not including, the last are followed.
+
+    Returns
+    -------
+    int
+        `REACHED_END`, or why it pauses, as `drive`.
+    """
+    n_states, n_values = problem.n_states, runs.parameters.shape[1]
+    rules, times = problem.rules, runs.times
+    rows, given, held, beyond = pool.rows, pool.given, pool.held, pool.beyond
+    ready, n_ready, alone, progress = pool.ready, pool.n_ready, pool.alone, pool.progress
+    counted, codes, left = runs.counted, runs.codes, progress[LEFT]
+    following, n_alone = progress[FOLLOWING], progress[ALONE]
+    count, mode = progress[COUNT], progress[LANES_MODE]
+    if progress[PAUSED] == 0:
+        following = first
+        n_alone = count = mode = ZERO
+        for region in range(n_ready.shape[0]):
+            n_ready[region] = 0
+        for lane in range(WIDTH):
+            held[lane] = -1
+            given[n_values, lane] = math.log2(problem.tol)
+            for k in range(rules.shape[1]):
+                given[n_values + 1 + k, lane] = rules[FIXED, k]
+                given[n_values + 1 + rules.shape[1] + k, lane] = rules[LASTING, k]
+        while n_alone < min(alone.shape[0], last - first):
+            alone[n_alone] = following
+            n_alone += 1
+            following += 1
+    code = ZERO + REACHED_END
+    while True:
+        while n_alone > 0:
+            i = alone[n_alone - 1]
+            counted[i, WORK] = left
+            run = Run(
+                runs.spans[i, 0],
+                runs.spans[i, 1],
+                runs.since[i],
+                runs.parameters[i],
+                runs.places[i],
+                runs.carried[i],
+                counted[i],
+            )
+            record = Record(
+                times[min(i, times.shape[0] - 1)],
+                runs.samples[i],
+                pool.table,
+                pool.table,
+                pool.nothing,
+                runs.extremes[i],
+                runs.hits[i],
+                runs.seen[i],
+            )
+            codes[i] = drive(problem, run, record, workspace, regions)
+            left = counted[i, WORK]
+            if codes[i] < HANDED_OVER:
+                code = codes[i]
+                break
+            if codes[i] != HANDED_OVER and following < last:
+                alone[n_alone - 1] = following
+                following += 1
+                continue
+            n_alone -= 1
+            if codes[i] == HANDED_OVER:
+                region = counted[i, MODE]
+                ready[region, n_ready[region]] = i
+                n_ready[region] += 1
+        if code != REACHED_END:
+            break
+        fullest = mode
+        for region in range(regions):
+            if n_ready[region] > n_ready[fullest]:
+                fullest = region
+        if count == 0 or count + n_ready[mode] < min(n_ready[fullest], WIDTH):
+            # another region fills more lanes
+            for lane in range(WIDTH):
+                i = held[lane]
+                if i >= 0:
+                    put_down(problem, runs, pool, lane, i)
+                    ready[mode, n_ready[mode]] = i
+                    n_ready[mode] += 1
+                    held[lane] = -1
+            count, mode = ZERO, fullest
+        if count + n_ready[mode] == 0:
+            break
+        for lane in range(WIDTH):
+            if held[lane] < 0 and n_ready[mode] > 0:
+                n_ready[mode] -= 1
+                count += 1
+                i = held[lane] = ready[mode, n_ready[mode]]
+                take_up(problem, runs, pool, lane, i)
+        if count < WIDTH:
+            copy_into_the_rest(held, rows, given)
+        allowed = rows[1 + n_states + step.ALLOWED, 0]
+        call_address(steps, mode, rows, given, pool.series)
+        # the lanes go together, two steps of a trajectory alone in one of theirs
+        left -= 2 + 2 * np.int64(allowed - rows[1 + n_states + step.ALLOWED, 0])
+        for lane in range(WIDTH):
+            i = held[lane]
+            if i < 0:
+                continue
+            outcome = rows[1 + n_states + step.OUTCOME, lane]
+            if outcome == step.REPORTED:
+                report(problem, runs, pool, workspace, lane, i)
+            elif outcome == step.NOT_TAKEN:
+                if rows[1 + n_states + step.ALLOWED, lane] < 1.0 and beyond[lane] > 0:
+                    allow(rows, lane, n_states, beyond, beyond[lane])
+                    continue
+                put_down(problem, runs, pool, lane, i)
+                held[lane] = -1
+                count -= 1
+                alone[n_alone] = i
+                n_alone += 1
+        if left <= 0:
+            code = ZERO + OUT_OF_WORK
+            break
+    progress[PAUSED] = code != REACHED_END
+    progress[FOLLOWING], progress[ALONE] = following, n_alone
+    progress[COUNT], progress[LANES_MODE] = count, mode
+    return code
+
+
+@part
+def allow(rows, lane, n, beyond, steps):
+    """Allow a lane so many steps, a part of them at a time."""
+    first = min(steps, IN_LANES)
+    rows[1 + n + step.ALLOWED, lane] = first
+    beyond[lane] = steps - first
+
+
+@part
+def take_up(problem, runs, pool, lane, i):
+    """Give a trajectory a lane."""
+    n, rows, given, begin = problem.n_states, pool.rows, pool.given, runs.places[i, 0]
+    carried, counted, extremes, since = runs.carried, runs.counted, runs.extremes, runs.since[i]
+    for k in range(1 + n):
+        rows[k, lane] = runs.places[i, k]
+    rows[1 + n + step.LATE, lane] = carried[i, LATE]
+    rows[1 + n + step.USUAL, lane] = carried[i, USUAL]
+    first = 1 + n + step.ROWS + 2 * n
+    for k in range(rows.shape[0] - first):
+        rows[first + k, lane] = carried[i, SIZES + k]
+    allow(rows, lane, n, pool.beyond, problem.max_steps - counted[i, STEPS])
+    # without a fast state there are no implicit steps to be tried
+    rows[1 + n + step.CALM, lane] = counted[i, CALM] if problem.n_fast > 0 else np.inf
+    rows[1 + n + step.NEXT, lane] = next_time(runs.times, i, counted[i, SAMPLES])
+    rows[1 + n + step.LEFT, lane] = counted[i, INTERFACE]
+    # no extremes are widened before they count, and no step goes from there to where they do
+    counting, stop = begin >= since, runs.spans[i, 1]
+    rows[1 + n + step.LIMIT, lane] = stop if counting else min(since, stop)
+    for k in range(n):
+        rows[1 + n + step.ROWS + k, lane] = extremes[i, 0, k] if counting else -np.inf
+        rows[1 + n + step.ROWS + n + k, lane] = extremes[i, 1, k] if counting else np.inf
+    for k in range(runs.parameters.shape[1]):
+        given[k, lane] = runs.parameters[i, k]
+
+
+@part
+def put_down(problem, runs, pool, lane, i):
+    """Take a trajectory from its lane."""
+    n, rows, places = problem.n_states, pool.rows, runs.places
+    carried, counted, extremes = runs.carried, runs.counted, runs.extremes
+    steps = problem.max_steps - pool.beyond[lane] - np.int64(rows[1 + n + step.ALLOWED, lane])
+    if steps > counted[i, STEPS]:
+        runs.seen[i, counted[i, MODE]] = rows[0, lane]
+        counted[i, STEPS] = steps
+        if rows[1 + n + step.CALM, lane] < np.inf:
+            counted[i, CALM] = np.int64(rows[1 + n + step.CALM, lane])
+    if places[i, 0] >= runs.since[i]:
+        for k in range(n):
+            extremes[i, 0, k] = rows[1 + n + step.ROWS + k, lane]
+            extremes[i, 1, k] = rows[1 + n + step.ROWS + n + k, lane]
+    counted[i, INTERFACE] = np.int64(rows[1 + n + step.LEFT, lane])
+    for k in range(1 + n):
+        places[i, k] = rows[k, lane]
+    carried[i, USUAL] = rows[1 + n + step.USUAL, lane]
+    first = 1 + n + step.ROWS + 2 * n
+    for k in range(rows.shape[0] - first):
+        carried[i, SIZES + k] = rows[first + k, lane]
+
+
+@part
+def copy_into_the_rest(held, rows, given):
+    """Put copies of one trajectory into the lanes that hold none."""
+    first = 0
+    while held[first] < 0:
+        first += 1
+    for lane in range(WIDTH):
+        if held[lane] < 0:
+            for k in range(rows.shape[0]):
+                rows[k, lane] = rows[k, first]
+            for k in range(given.shape[0]):
+                given[k, lane] = given[k, first]
+
+
+@part
+def report(problem, runs, pool, workspace, lane, i):
+    """Add the samples and the extremes within the last step of a lane."""
+    n, order, rows, times = problem.n_states, problem.order, pool.rows, runs.times
+    W, extremes, counted = workspace.W, runs.extremes, runs.counted
+    began, length = rows[1 + n + step.BEGAN, lane], rows[1 + n + step.LENGTH, lane]
+    for k in range(pool.series.shape[0]):
+        W[k] = pool.series[k, lane]
+    if began >= runs.since[i]:
+        for k in range(n):
+            extremes[i, 0, k] = rows[1 + n + step.ROWS + k, lane]
+            extremes[i, 1, k] = rows[1 + n + step.ROWS + n + k, lane]
+        widen_extremes(W, order, 0.0, length, extremes[i], workspace.search)
+        for k in range(n):
+            rows[1 + n + step.ROWS + k, lane] = extremes[i, 0, k]
+            rows[1 + n + step.ROWS + n + k, lane] = extremes[i, 1, k]
+    whole = (began, rows[1 + n + step.LATE, lane], rows[0, lane])
+    own, samples, offsets = times[min(i, times.shape[0] - 1)], runs.samples[i], workspace.offsets
+    counted[i, SAMPLES] = take_samples(
+        W, order + 1, whole, own, samples, counted[i, SAMPLES], offsets
+    )
+    rows[1 + n + step.NEXT, lane] = next_time(times, i, counted[i, SAMPLES])
+
+
+@part
+def next_time(times, i, k):
+    """When a sample of a trajectory is due, infinite after the last."""
+    return times[min(i, times.shape[0] - 1), k] if k < times.shape[1] else np.inf

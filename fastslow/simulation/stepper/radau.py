@@ -1,0 +1,450 @@
+"""Radau IIA steps, for motions so stiff that their Taylor coefficients are rounding.
+
+The polynomial of degree s through the state at the beginning of a step whose
+derivative equals the rates at the s points of Radau (Hairer and Wanner 1996,
+section IV.5) is of order 2 s - 1 at the end of the step and of order s within it,
+and L-stable. A Taylor coefficient of order k has the rounding of the states
+magnified by p**k, where p is the fastest rate; the increments of the stages
+have it only once, and the equations that they solve divide it by p again. Their
+linear systems are taken apart by the eigenvectors of the method (section IV.8).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import Polynomial, legendre
+from numpy.typing import NDArray
+
+from fastslow.kernels.decorators import part
+from fastslow.kernels.pointers import call_address
+from fastslow.kernels.records import (
+    ComplexMatrix,
+    ComplexTensor,
+    ComplexVector,
+    Matrix,
+    Vector,
+    zeros,
+)
+from fastslow.kernels.taylor.modes import DIRECTIONAL, RATES
+from fastslow.simulation.stepper.matrices import (
+    Spectrum,
+    eigenvalues_of,
+    factorise_in_place,
+    solve_in_place,
+    spectrum_for,
+)
+from fastslow.simulation.stepper.polynomials import EPSILON
+from fastslow.simulation.stepper.problems import Problem, Run
+from fastslow.simulation.stepper.scales import NOW, REACHED, ratio_of
+
+#: Number of stages, and order at the end of a step.
+STAGES = 5
+RADAU_ORDER = 2 * STAGES - 1
+
+#: A mode is followed where |lambda| h is not larger, and forgotten where it decays by more.
+FOLLOWED = 0.5
+
+#: Decay, as an exponent, after which rounding has erased a motion.
+ERASED = 36.0
+
+#: Rounding of a rate, in units of the last place of the sum of the moduli of its terms.
+NOISE = 8.0
+
+#: Most iterations of Newton's method, and what they may leave of the error allowed.
+ITERATIONS, LEFT = 12, 1e-3
+
+
+def _nodes() -> NDArray[np.float64]:
+    """The points c of Radau IIA: roots of P_s - P_(s-1), moved to [0, 1]."""
+    rule = np.zeros(STAGES + 1)
+    rule[STAGES], rule[STAGES - 1] = 1.0, -1.0
+    roots = np.sort(legendre.legroots(rule).real)
+    for _ in range(3):
+        inner = roots[:-1]
+        inner -= legendre.legval(inner, rule) / legendre.legval(inner, legendre.legder(rule))
+    roots[-1] = 1.0
+    return 0.5 * (1.0 + roots)
+
+
+def _powers() -> NDArray[np.float64]:
+    """From increments at the points to the coefficients of s, ..., s**STAGES."""
+    return np.asarray(np.linalg.inv(C[:, None] ** np.arange(1, STAGES + 1)), dtype=np.float64)
+
+
+def _modes() -> tuple[NDArray[np.complex128], ...]:
+    """Eigenvalues of the inverse method, the real one first, with right and left vectors.
+
+    Of each pair of conjugates one is kept, its right vectors doubled.
+    """
+    powers = np.arange(1, STAGES + 1)
+    # derivatives at the points from increments there: the inverse of the matrix of the method
+    inverse = (powers * C[:, None] ** (powers - 1)) @ POWERS
+    values, right = np.linalg.eig(inverse)
+    left = np.linalg.inv(right)
+    real = np.flatnonzero(np.abs(values.imag) < 1e-8)
+    kept = np.concatenate([real, np.flatnonzero(values.imag > 1e-8)])
+    factor = np.where(np.arange(len(kept)) > 0, 2.0, 1.0)
+    return values[kept], right[:, kept] * factor, left[kept]
+
+
+def _interpolation() -> tuple[float, float]:
+    """Where the polynomials are farthest from what they interpolate, and by how much.
+
+    The second number: the error within a step in units of the filtered defect at its
+    beginning, both for rates that do not depend on the state.
+    """
+    nodal = Polynomial.fromroots(C)
+    s = np.linspace(0.0, 1.0, 4001)
+    within = np.abs(nodal.integ()(s)).max()
+    between = float(s[np.abs(s * nodal(s)).argmax()])
+    return between, float(within / (abs(nodal(0.0)) / VALUES[0].real))
+
+
+C = _nodes()
+POWERS = _powers()
+VALUES, OUT_OF, INTO = _modes()
+BETWEEN, WITHIN = _interpolation()
+
+
+class Radau(NamedTuple):
+    """What a phase of such steps goes on from, and the work space of a step.
+
+    Parameters
+    ----------
+    phase : float64 array, shape (1 + 4 n_states,)
+        Length of the last step, 0 at the beginning of a phase, and eigenvalues at both ends.
+    jacobian : float64 array, shape (n_states, n_states)
+    start, least, allowed : float64 arrays, shape (n_states,)
+    increments, rates : float64 arrays, shape (STAGES, n_states)
+    held : float64 array, shape (n_states + n_forcing + n_interfaces, STAGES + 1)
+    point : float64 array, shape (1 + n_states + n_forcing,)
+    out : float64 array
+        As large as the series.
+    given : complex array, shape (n_states,)
+    moved : complex array, shape (pairs, n_states)
+    factors : complex array, shape (pairs, n_states, n_states + 1)
+    spectrum : Spectrum
+    """
+
+    phase: Vector
+    jacobian: Matrix
+    start: Vector
+    least: Vector
+    allowed: Vector
+    increments: Matrix
+    rates: Matrix
+    held: Matrix
+    point: Vector
+    out: Vector
+    given: ComplexVector
+    moved: ComplexMatrix
+    factors: ComplexTensor
+    spectrum: Spectrum
+
+
+def radau_for(n_states: int, n_forcing: int, n_interfaces: int, size: int) -> Radau:
+    """Work space for a model of these sizes, whose series is so large."""
+    n, pairs = n_states, len(VALUES)
+    return zeros(
+        Radau,
+        1 + 4 * n,
+        (n, n),
+        *(n, n, n),
+        *((STAGES, n), (STAGES, n)),
+        (n + n_forcing + n_interfaces, STAGES + 1),
+        1 + n + n_forcing,
+        size,
+        n,
+        (pairs, n),
+        (pairs, n, n + 1),
+        spectrum_for(n),
+    )
+
+
+class RadauStep(NamedTuple):
+    """What `radau_step` is given.
+
+    Parameters
+    ----------
+    problem : Problem
+    run : Run
+    mode : int
+    rate : float
+        Modes that decay faster are forgotten whatever the length of the step.
+    h : float
+    right : float64 array
+        The polynomials of the last step of the phase.
+    poly : float64 array
+        Filled with those of this one.
+    scales : float64 array
+    space : Radau
+        The eigenvalues at the end are filled in; see `accept`.
+    """
+
+    problem: Problem
+    run: Run
+    mode: int
+    rate: float
+    h: float
+    right: Vector
+    poly: Vector
+    scales: Matrix
+    space: Radau
+
+
+@part
+def radau_step(step):
+    """One step; its polynomials are put into ``poly``; returns its error in units of ``tol``.
+
+    Returns
+    -------
+    float
+        Infinite where the equations are not solved.
+    """
+    problem, run, mode, rate, h, right, poly, scales, space = step
+    series, parameters, inputs = problem.series, run.parameters, run.inputs
+    n, n_forcing, n_fast, tol = problem.n_states, problem.n_forcing, problem.n_fast, problem.tol
+    columns = problem.order + 1
+    number = problem.n_modes + problem.n_interfaces
+    rows = n + n_forcing + problem.n_interfaces
+    half = VALUES.shape[0]
+    jacobian, start, Z, F = space.jacobian, space.start, space.increments, space.rates
+    point, out, held, carried = space.point, space.out, space.held, space.phase
+    least, allowed_in = space.least, space.allowed
+    factors, given, moved = space.factors, space.given, space.moved
+    last = carried[0]
+    if last > 0.0:
+        # the last polynomial, continued
+        for j in range(STAGES):
+            for i in range(n):
+                row = i * columns
+                s = last + C[j] * h
+                there = here = 0.0
+                for k in range(STAGES, 0, -1):
+                    there = (there + right[row + k]) * s
+                    here = (here + right[row + k]) * last
+                Z[j, i] = there - here
+    else:
+        for j in range(STAGES):
+            for i in range(n):
+                Z[j, i] = 0.0
+    for i in range(inputs.shape[0]):
+        point[i] = inputs[i]
+    jacobian_at(problem, run, mode, space)
+    call_address(series, RATES * number + mode, point, parameters, out)
+    for i in range(rows):
+        held[i, 0] = out[i * columns]
+    for i in range(n):
+        start[i] = out[i * columns + 1]
+    for m in range(half):
+        for i in range(n):
+            for k in range(n):
+                factors[m, i, k] = -jacobian[i, k]
+            factors[m, i, i] += VALUES[m] / h
+        if not factorise_in_place(factors[m], n):
+            return np.inf
+    # no state is known better than rounding of the terms of the rates lets it be
+    for i in range(n):
+        noise = 0.0
+        for k in range(n):
+            noise += abs(jacobian[i, k] * inputs[1 + k])
+        given[i] = NOISE * EPSILON * noise
+    solve_in_place(factors[0], given, moved[0], n)
+    for i in range(n):
+        least[i] = abs(moved[0, i]) + NOISE * EPSILON * abs(inputs[1 + i])
+        allowed_in[i] = max(tol * scales[NOW, i], least[i])
+    before, done = np.inf, False
+    for turn in range(ITERATIONS):
+        for j in range(STAGES):
+            point[0] = inputs[0] + C[j] * h
+            for i in range(n):
+                point[1 + i] = inputs[1 + i] + Z[j, i]
+            call_address(series, RATES * number + mode, point, parameters, out)
+            for i in range(n):
+                F[j, i] = out[i * columns + 1]
+            for i in range(rows):
+                held[i, 1 + j] = out[i * columns]
+        if done:
+            break
+        for m in range(half):
+            for i in range(n):
+                value = 0.0j
+                for j in range(STAGES):
+                    value += INTO[m, j] * (F[j, i] - VALUES[m] / h * Z[j, i])
+                given[i] = value
+            solve_in_place(factors[m], given, moved[m], n)
+        size = 0.0
+        for i in range(n):
+            for j in range(STAGES):
+                change = 0.0
+                for m in range(half):
+                    change += (OUT_OF[j, m] * moved[m, i]).real
+                # the rates may not be defined there
+                if not abs(change) < np.inf:
+                    return np.inf
+                Z[j, i] += change
+                size = max(size, ratio_of(change, allowed_in[i]))
+        # rounding is where it cannot go on
+        done = size <= LEFT
+        if not done:
+            if (turn > 0 and not size <= 0.7 * before) or not size < np.inf:
+                return np.inf
+            ratio, before = size / before if turn > 0 else 0.5, size
+            done = size * ratio <= LEFT * (1.0 - ratio)
+    if not done:
+        return np.inf
+    # the polynomials, in powers of time
+    for i in range(rows):
+        row = i * columns
+        for k in range(columns):
+            poly[row + k] = 0.0
+        poly[row] = held[i, 0] if i >= n else inputs[1 + i]
+        power = 1.0
+        for k in range(STAGES):
+            power *= h
+            value = 0.0
+            for j in range(STAGES):
+                increment = Z[j, i] if i < n else held[i, 1 + j] - held[i, 0]
+                value += POWERS[k, j] * increment
+            poly[row + k + 1] = value / power
+    # the defects of the rates where they are largest, filtered by the method (Hairer and Wanner
+    # 1996, eq. IV.8.19); where the rates are stiff what is left is that of the interpolation
+    error = 0.0
+    for place in (0.0, BETWEEN):
+        if place > 0.0:
+            point[0] = inputs[0] + place * h
+            for i in range(n):
+                point[1 + i] = value_at(poly, i * columns, place * h)
+            call_address(series, RATES * number + mode, point, parameters, out)
+            for i in range(n):
+                start[i] = out[i * columns + 1]
+            for i in range(n, rows):
+                row = i * columns
+                allowed = tol * scales[NOW, i]
+                defect = value_at(poly, row, place * h) - out[row]
+                if not abs(defect) < np.inf:
+                    return np.inf
+                error = max(error, ratio_of(defect, allowed))
+        for i in range(n):
+            given[i] = start[i] - slope_at(poly, i * columns, place * h)
+        solve_in_place(factors[0], given, moved[0], n)
+        for i in range(n):
+            after = abs(inputs[1 + i] + Z[STAGES - 1, i])
+            allowed = tol * max(scales[REACHED, i], min(abs(inputs[1 + i]), after))
+            share = moved[0, i].real * (1.0 if place > 0.0 else WITHIN)
+            if not abs(share) < np.inf:
+                return np.inf
+            error = max(error, ratio_of(share, max(allowed, least[i])))
+    if not error <= 1.0:
+        return error if error < np.inf else np.inf
+    point[0] = inputs[0] + h
+    for i in range(n):
+        point[1 + i] = inputs[1 + i] + Z[STAGES - 1, i]
+    now, then = carried[1 : 1 + 2 * n], carried[1 + 2 * n :]
+    if n_fast > 0:
+        if not last > 0.0:
+            in_order(jacobian, n_fast, now, space.spectrum)
+        jacobian_at(problem, run, mode, space)
+        in_order(jacobian, n_fast, then, space.spectrum)
+        unresolved = in_doubt(now, then, n_fast, rate, h) * h
+        if not unresolved <= FOLLOWED:
+            # as an error of this order, so that the next attempt is as short as it must be
+            return (unresolved / FOLLOWED) ** (STAGES + 1) if unresolved < np.inf else np.inf
+    return error
+
+
+@part
+def accept(problem, run, mode, h, poly, right, space):
+    """Go on from a step: values and rates at its end are put into ``right``."""
+    n, point = problem.n_states, space.point
+    for i in range(run.inputs.shape[0]):
+        point[i] = run.inputs[i]
+    point[0] += h
+    for i in range(n):
+        point[1 + i] = value_at(poly, i * (problem.order + 1), h)
+    rates = RATES * (problem.n_modes + problem.n_interfaces) + mode
+    call_address(problem.series, rates, point, run.parameters, right)
+    space.phase[0] = h
+    for i in range(2 * n):
+        space.phase[1 + i] = space.phase[1 + 2 * n + i]
+
+
+@part
+def value_at(poly, row, s):
+    """A polynomial of one row."""
+    value = 0.0
+    for k in range(STAGES, -1, -1):
+        value = value * s + poly[row + k]
+    return value
+
+
+@part
+def slope_at(poly, row, s):
+    """Its derivative."""
+    value = 0.0
+    for k in range(STAGES, 0, -1):
+        value = value * s + k * poly[row + k]
+    return value
+
+
+@part
+def jacobian_at(problem, run, mode, space):
+    """The derivatives of the rates by the states at a point, column by column."""
+    n, columns, out = problem.n_states, problem.order + 1, space.out
+    directional = DIRECTIONAL * (problem.n_modes + problem.n_interfaces) + mode
+    for k in range(n):
+        for i in range(n):
+            out[i * columns + 1] = 1.0 if i == k else 0.0
+        call_address(problem.series, directional, space.point, run.parameters, out)
+        for i in range(n):
+            space.jacobian[i, k] = 2.0 * out[i * columns + 2]
+
+
+@part
+def in_order(jacobian, n, found, spectrum):
+    """Real parts of the eigenvalues, in descending order, then their moduli, NaN where unknown."""
+    if not eigenvalues_of(jacobian, n, spectrum):
+        for i in range(found.shape[0]):
+            found[i] = np.nan
+        return
+    values = spectrum.values
+    for i in range(n):
+        place = i
+        while place > 0 and found[place - 1] < values[i].real:
+            found[place], found[n + place] = found[place - 1], found[n + place - 1]
+            place -= 1
+        found[place], found[n + place] = values[i].real, abs(values[i])
+
+
+@part
+def in_doubt(now, then, n, rate, h):
+    """The largest modulus of the eigenvalues of modes that a step must follow.
+
+    Of those that do not decay at the given rate, nor by the exponent `FOLLOWED` within the step,
+    or that decay so now but will grow before rounding has erased them. The real parts in
+    their order are continuous in time.
+
+    Parameters
+    ----------
+    now, then : float64 arrays, shape (2 n,)
+        From `in_order`, at the beginning and end of the step.
+    """
+    largest = 0.0
+    for k in range(n):
+        largest = max(largest, now[n + k], then[n + k])
+    # what rounding of the others leaves unknown
+    noise = 8.0 * n * EPSILON * largest
+    followed = 0.0
+    for k in range(n):
+        modulus, real = max(now[n + k], then[n + k]), max(now[k], then[k])
+        if not modulus < np.inf:
+            return np.inf
+        if modulus <= noise or real < -rate:
+            continue
+        rise = then[k] - now[k]
+        erased = rise <= 0.0 or real * real * h >= 2.0 * ERASED * rise
+        if not (-real * h >= FOLLOWED and erased):
+            followed = max(followed, modulus)
+    return followed

@@ -1,0 +1,169 @@
+"""The sizes in which the errors of a step are measured, read off the run as it goes.
+
+In every row of a step (state, slow quantity, interface function) an error of
+rtol times a size is allowed. That size is the largest of the value itself, of a
+fixed one (atol / rtol, where the user gave atol), and of what the run has reached
+of late. Nothing in it has a unit: a run whose states or time are measured in
+others takes the same steps.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.kernels.decorators import part
+
+#: Rows of the array of sizes: at the beginning of this step, and what the run has reached.
+NOW, REACHED = 0, 1
+
+#: Rows of the rules: the fixed size, and the share of a size that is left a step later.
+FIXED, LASTING = 0, 1
+
+#: What is left of the size that a state had a step ago: half after 35 steps, so that a large
+#: transient does not spoil what follows it, and a passage through zero is no small state.
+FORGETTING = 0.98
+
+#: What is smaller has no size: its digits are lost soon after, and its reciprocal overflows.
+SMALLEST = 1e-300
+
+#: Terms of a series by which the size of a row is judged that begins at zero.
+LEADING = 4
+
+
+def rules_of(
+    fixed: NDArray[np.float64], lasting: NDArray[np.float64], n_forcing: int, n_interfaces: int
+) -> NDArray[Any]:
+    """Rules for the rows of a step, from those of its states.
+
+    Parameters
+    ----------
+    fixed : float64 array, shape (n_states,)
+        atol / rtol, 0 where none is given.
+    lasting : float64 array, shape (n_states,)
+        `FORGETTING`, or 0 where the size is the value itself or the fixed one.
+    n_forcing, n_interfaces : int
+    """
+    nothing, ones = np.zeros(n_forcing + n_interfaces), np.ones(n_interfaces)
+    # an interface function that is slid along is rounding: its size is that of the whole run
+    others = np.concatenate([np.full(n_forcing, FORGETTING), ones])
+    return np.stack([np.concatenate([fixed, nothing]), np.concatenate([lasting, others])])
+
+
+@part
+def step_length(W, n_rows, order, tol, scales):
+    """The step whose last terms are as large as the tolerance (Jorba and Zou 2005).
+
+    An error of ``tol`` times its size is allowed in every row. Three terms are
+    looked at, because series of even or odd functions lack every other one.
+    The sizes now are filled in; a row that begins at zero and has reached nothing
+    yet has the size that its series gives it within the step.
+
+    Returns
+    -------
+    float
+        Infinite where the series ends, NaN where it is not finite.
+    """
+    columns = order + 1
+    last = before = third = finite = 0.0
+    blank = False
+    for i in range(n_rows):
+        row = i * columns
+        size = max(abs(W[row]), scales[REACHED, i])
+        scales[NOW, i] = size
+        finite += 0.0 * (W[row + order] + W[row + order - 1])
+        if size > SMALLEST:
+            scale = 1.0 / size
+            last = max(last, abs(W[row + order]) * scale)
+            before = max(before, abs(W[row + order - 1]) * scale)
+            third = max(third, abs(W[row + order - 2]) * scale)
+        else:
+            blank = True
+    if finite != 0.0:
+        return np.nan
+    # logarithms of the lengths: powers with whole exponents take longer
+    allowed, length = math.log(tol), np.inf
+    if last > 0.0:
+        length = (allowed - math.log(last)) / order
+    if before > 0.0:
+        length = min(length, (allowed - math.log(before)) / (order - 1))
+    if third > 0.0:
+        length = min(length, (allowed - math.log(third)) / (order - 2))
+    length = math.exp(length)
+    if blank:
+        for i in range(n_rows):
+            if scales[NOW, i] <= SMALLEST:
+                length = min(length, own_length(W, i * columns, order, tol))
+        for i in range(n_rows):
+            if scales[NOW, i] <= SMALLEST:
+                scales[NOW, i] = within(W, i * columns, length)
+    return length
+
+
+@part
+def own_length(W, row, order, tol):
+    """The step whose last terms are the tolerance times the largest of the leading ones."""
+    length = np.inf
+    for k in range(order - 2, order + 1):
+        last = abs(W[row + k])
+        if last > 0.0:
+            longest = 0.0
+            for m in range(LEADING):
+                first = abs(W[row + m])
+                if first > 0.0:
+                    longest = max(longest, math.exp(math.log(tol * (first / last)) / (k - m)))
+            if longest > 0.0:
+                length = min(length, longest)
+    return length
+
+
+@part
+def within(W, row, h):
+    """The largest of the leading terms of a row within a step; infinite lengths count as 0."""
+    size = abs(W[row])
+    if h < np.inf:
+        power = 1.0
+        for m in range(1, LEADING):
+            power *= h
+            size = max(size, abs(W[row + m]) * power)
+    return size
+
+
+@part
+def raise_sizes(W, n_rows, order, tol, room, rules, scales):
+    """Let every size that follows the run be at least what the row's series gives it."""
+    columns = order + 1
+    length = room
+    for i in range(n_rows):
+        length = min(length, own_length(W, i * columns, order, tol))
+    for i in range(n_rows):
+        if rules[LASTING, i] > 0.0:
+            size = within(W, i * columns, length)
+            if size < np.inf:
+                scales[REACHED, i] = max(scales[REACHED, i], size)
+
+
+@part
+def remember_sizes(rules, scales):
+    """Go on from a step: what the run has reached after it."""
+    for i in range(rules.shape[1]):
+        scales[REACHED, i] = max(rules[FIXED, i], rules[LASTING, i] * scales[NOW, i])
+
+
+@part
+def flush(rules, inputs, n_states):
+    """Let a state be zero that is measured by itself alone and has no digits left."""
+    for i in range(n_states):
+        if abs(inputs[1 + i]) < SMALLEST and rules[LASTING, i] == 0.0 and rules[FIXED, i] == 0.0:
+            inputs[1 + i] = 0.0
+
+
+@part
+def ratio_of(error, allowed):
+    """An error in units of what is allowed; nothing is allowed in what is and stays zero."""
+    if error == 0.0:
+        return 0.0
+    return abs(error) / allowed if allowed > 0.0 else np.inf

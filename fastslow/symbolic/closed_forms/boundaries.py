@@ -1,0 +1,375 @@
+"""Boundary equilibria in closed form, and the Clarke path through them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import sympy as sp
+from sympy.logic.boolalg import Boolean
+
+from fastslow.model.structure import real
+from fastslow.results.base.named_mapping import Named
+from fastslow.symbolic.closed_forms.critical import Setting
+from fastslow.symbolic.closed_forms.stability import jacobian
+from fastslow.symbolic.signs.inequalities import conjunction, implied
+from fastslow.symbolic.signs.signs import Signs
+from fastslow.symbolic.solving.algebra import adjugate, determinant, longer, spread, tidy, undefined
+from fastslow.symbolic.solving.candidates import Candidates, settled
+from fastslow.symbolic.solving.location import neat
+from fastslow.symbolic.solving.solution_families import Family, families
+from fastslow.symbolic.solving.univariate import Root, roots, solved_for
+from fastslow.symbolic.solving.verification import OPEN, checked
+
+#: Equations longer than this, in parts of their tree, are solved for the first parameter only.
+LONG = 120
+
+#: Kinds of boundary equilibria by the sign of their test.
+TYPES = {1: "persistence", -1: "non-smooth fold", 0: "degenerate"}
+
+
+@dataclass(frozen=True)
+class ClarkeForm:
+    """The path q J₁ + (1 − q) J₂ between the Jacobians on both sides, in closed form.
+
+    Leine and Nijmeijer (2004); di Bernardo, Budd, Champneys, Kowalczyk (2008).
+
+    Parameters
+    ----------
+    regions : tuple of str
+        q = 1 is ``regions[0]``.
+    weight : Symbol
+        q.
+    jacobians : tuple of sympy.Matrix, each of shape (n, n)
+    determinant, trace : sympy.Expr
+        Along the path.
+    determinants : tuple of sympy.Expr
+        Of J₁ and J₂.
+    q_zero : sympy.Expr or None
+        Where the determinant vanishes along the line through J₁ and J₂; in (0, 1) exactly
+        for a non-smooth fold.
+    q_hopf : sympy.Expr or None
+        Planar: where the trace vanishes, when both ends are not known to share its sign.
+    q_complex : tuple of sympy.Expr
+        Planar: where the eigenvalues change between real and complex.
+    """
+
+    regions: tuple[str, str]
+    weight: sp.Symbol
+    jacobians: tuple[sp.ImmutableDenseMatrix, sp.ImmutableDenseMatrix]
+    determinant: sp.Expr
+    trace: sp.Expr
+    determinants: tuple[sp.Expr, sp.Expr]
+    q_zero: sp.Expr | None
+    q_hopf: sp.Expr | None
+    q_complex: tuple[sp.Expr, ...]
+
+    @property
+    def matrix(self) -> sp.ImmutableDenseMatrix:
+        """Q J₁ + (1 − q) J₂, shape (n, n)."""
+        first, second = self.jacobians
+        return sp.ImmutableDenseMatrix(
+            (self.weight * first + (1 - self.weight) * second).applyfunc(sp.expand)
+        )
+
+
+@dataclass(frozen=True)
+class BoundaryForm:
+    """An equilibrium on an interface, in closed form.
+
+    Parameters
+    ----------
+    interface : str
+    regions : tuple of str
+        The two it joins; in a Filippov model the first is the one whose rates vanish.
+    state, parameters : Named of sympy.Expr
+    equations : tuple of sympy.Expr
+        What is left to hold, = 0; empty when the closed form is complete.
+    type : str
+        ``"persistence"``, ``"non-smooth fold"``, ``"degenerate"``, or ``"depends"``.
+    test : sympy.Expr
+        Positive for persistence, negative for a non-smooth fold: det J₁ det J₂,
+        or −CᵀN⁻¹E in a Filippov model. Where long equations are left the determinants
+        are not evaluated.
+    continuous : bool
+        Whether the rates are continuous across the interface.
+    clarke : ClarkeForm or None
+        For a continuous field, unless long equations are left.
+    singular : Named
+        Region to the condition on one parameter under which its Jacobian is
+        singular here: a fold of that region meets the interface.
+    admissible : Boolean
+        When the point lies on the part of the interface between the regions.
+    possible : bool or None
+    check : str
+        How it is known that the rates and the switching function vanish on
+        substitution; empty where equations are left.
+    """
+
+    interface: str
+    regions: tuple[str, str]
+    state: Named[sp.Expr]
+    parameters: Named[sp.Expr]
+    equations: tuple[sp.Expr, ...]
+    type: str
+    test: sp.Expr
+    continuous: bool
+    clarke: ClarkeForm | None
+    singular: Named[Boolean]
+    admissible: Boolean
+    possible: bool | None
+    check: str
+
+    @property
+    def verified(self) -> bool:
+        """Whether the closed form is complete and satisfies its equations."""
+        return bool(self.check)
+
+
+def boundary_forms(
+    interface: str, function: sp.Expr, sides: tuple[Setting, Setting], continuous: bool
+) -> list[BoundaryForm]:
+    """All boundary equilibria on an interface between two regions.
+
+    Parameters
+    ----------
+    interface : str
+    function : sympy.Expr
+        h, exact coefficients.
+    sides : tuple of Setting
+        The regions where h > 0 and where h < 0.
+    continuous : bool
+        Of a continuous field one side is enough; of a Filippov field each has its own.
+    """
+    found: list[BoundaryForm] = []
+    for own, other in (sides,) if continuous else (sides, sides[::-1]):
+        for place in _places(function, own):
+            outward = function if own is sides[0] else -function
+            found.append(_form(interface, outward, own, other, continuous, place))
+    return [f for f in found if f.admissible != sp.false]
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Values of states and parameters, what must not be negative, and what is left to hold."""
+
+    values: dict[sp.Symbol, sp.Expr]
+    radicands: tuple[sp.Expr, ...]
+    left: tuple[sp.Expr, ...]
+
+
+def _places(function: sp.Expr, own: Setting) -> list[_Place]:
+    """Where the rates of a region and h vanish: values of states and of parameters.
+
+    One parameter is solved for, and more where the equations ask for it. What
+    contradicts the assumed signs is left out.
+    """
+    used = set().union(function.free_symbols, *(r.free_symbols for r in own.rates.values()))
+    best: list[_Place] = []
+    tried = [c for c in own.candidates if c in used]
+    if longer(function, LONG) or any(longer(r, LONG) for r in own.rates.values()):
+        tried = tried[:1]
+    for parameter in tried:
+        names = (*own.states, parameter.name)
+        signs = own.signs.without(parameter)
+        others = own.candidates.without(parameter)
+        result = []
+        equations = {**own.rates, parameter.name: function}
+        for family in families(equations, names, signs, others, populations=False):
+            result += _solutions(family, names, own, others)
+        result = [p for p in result if not _contradicts(p, own.signs)]
+        if result and not any(p.left for p in result):
+            return result
+        best = best or result
+    return best
+
+
+def _contradicts(place: _Place, signs: Signs) -> bool:
+    """Whether the assumed signs of parameters exclude a place."""
+    for symbol, value in place.values.items():
+        side = signs.known.get(symbol)
+        if side is not None and symbol != value and signs.sign(side * value) in (0, -1):
+            return True
+    return any(signs.nonzero(e) for e in place.left) or any(
+        signs.sign(e) == -1 for e in place.radicands
+    )
+
+
+def _solutions(
+    family: Family, names: tuple[str, ...], own: Setting, others: Candidates
+) -> list[_Place]:
+    unknown = family.unknown
+    options: list[Root | None] = list(family.roots) if family.roots is not None else [None]
+    found = []
+    for root in options:
+        inner = {unknown: root.value} if root is not None and unknown is not None else {}
+        state = family.elimination.state(inner, names)
+        left = () if root is not None else family.equations
+        under = root.radicands if root is not None else ()
+        for place, radicands, rest in settled(family.condition, others, own.signs):
+            values = {
+                real(n): neat(e.subs(place)) for n, e in zip(names, state, strict=True)
+            } | place
+            if any(undefined(e) for e in values.values()):
+                continue
+            found.append(
+                _Place(
+                    values,
+                    (*(e.subs(place) for e in under), *radicands),
+                    (*(e.subs(place) for e in left), *rest),
+                )
+            )
+    return found
+
+
+def _form(
+    interface: str,
+    outward: sp.Expr,
+    own: Setting,
+    other: Setting,
+    continuous: bool,
+    found: _Place,
+) -> BoundaryForm:
+    place, left = found.values, found.left
+    if continuous and any(longer(e, LONG) for e in left):
+        return _implicit(interface, own, other, found)
+    states = [real(n) for n in own.states]
+    names = (own.region, other.region)
+    matrices = [_at(jacobian(s.rates, s.states), place) for s in (own, other)]
+    determinants = [tidy(determinant(m)) for m in matrices]
+    if continuous and determinants[0] == 0 and determinants[1] != 0:
+        # q = 1 on the side that is not singular
+        names, matrices, determinants = names[::-1], matrices[::-1], determinants[::-1]
+    if continuous:
+        test = neat(determinants[0] * determinants[1])
+        clarke = _clarke(names, matrices, determinants, own)
+    else:
+        gradient = sp.Matrix([[tidy(outward.diff(s).subs(place)) for s in states]])
+        jump = sp.Matrix(
+            [tidy((other.rates[n] - own.rates[n]).xreplace(place)) for n in own.states]
+        )
+        inverse = adjugate(matrices[0])
+        slope = (gradient * inverse * jump)[0, 0]
+        test = sp.S.Zero if determinants[0] == 0 else neat(-slope / determinants[0])
+        clarke = None
+    sign = own.signs.sign(test)
+    inside = [tidy(e.xreplace(place)) for e in own.inside]
+    inside = [e for e in inside if e != 0 and not _among(e, left)]
+    admissible = conjunction((own.real(found.radicands), own.holds(inside)), own.signs)
+    zeros = [*own.rates.values(), outward]
+    if continuous:
+        zeros += other.rates.values()
+    return BoundaryForm(
+        interface,
+        names,
+        Named("state", {s.name: place[s] for s in states}),
+        Named("parameter", {s.name: e for s, e in place.items() if s not in states}),
+        left,
+        "depends" if sign is None else TYPES[sign],
+        test,
+        continuous,
+        clarke,
+        _singular(names, determinants, own),
+        admissible,
+        implied(admissible, own.signs),
+        OPEN if left else checked(zeros, place, own.signs),
+    )
+
+
+def _implicit(interface: str, own: Setting, other: Setting, found: _Place) -> BoundaryForm:
+    """Give a boundary equilibrium whose long equations are left, with nothing expanded."""
+    states = [real(n) for n in own.states]
+    first, second = (
+        sp.ImmutableDenseMatrix(
+            [[s.rates[n].diff(x).xreplace(found.values) for x in states] for n in s.states]
+        )
+        for s in (own, other)
+    )
+    inside = [sp.sympify(e.xreplace(found.values)) for e in own.inside]
+    left = [e for e in inside if e != 0 and not _among(e, found.left)]
+    conditions = [sp.Gt(e, 0) for e in left] + [sp.Ge(e, 0) for e in found.radicands]
+    return BoundaryForm(
+        interface,
+        (own.region, other.region),
+        Named("state", {s.name: found.values[s] for s in states}),
+        Named("parameter", {s.name: e for s, e in found.values.items() if s not in states}),
+        found.left,
+        "depends",
+        sp.Determinant(first) * sp.Determinant(second),
+        True,
+        None,
+        Named("region", {}),
+        sp.And(*conditions),
+        None,
+        OPEN,
+    )
+
+
+def _among(expression: sp.Expr, equations: tuple[sp.Expr, ...]) -> bool:
+    """Whether an expression or its negative is one of the equations, once expanded."""
+    both = (spread(expression), spread(-expression))
+    return any(spread(e) in both for e in equations)
+
+
+def _at(
+    matrix: sp.ImmutableDenseMatrix, place: Mapping[sp.Symbol, sp.Expr]
+) -> sp.ImmutableDenseMatrix:
+    here = matrix.applyfunc(lambda e: tidy(e.xreplace(place)))
+    return sp.ImmutableDenseMatrix(here)
+
+
+def _singular(names: tuple[str, str], determinants: list[sp.Expr], own: Setting) -> Named[Boolean]:
+    conditions: dict[str, Boolean] = {}
+    order = sorted(own.candidates, key=lambda c: c in own.geometry)
+    for name, value in zip(names, determinants, strict=True):
+        if value == 0:
+            conditions[name] = sp.true
+        elif value.is_number:
+            conditions[name] = sp.false
+        else:
+            solved = solved_for(value, order, own.signs)
+            conditions[name] = sp.Eq(value, 0) if solved is None else sp.Eq(solved[0], solved[1])
+    return Named("region", conditions)
+
+
+def _weight(taken: Collection[str]) -> sp.Symbol:
+    """The Clarke weight, q where the model has no q of its own.
+
+    Examples
+    --------
+    >>> _weight({"x"}), _weight({"q", "q_c"})
+    (q, q_1)
+    """
+    others = (f"q_{k}" for k in itertools.count(1))
+    return real(next(n for n in itertools.chain(("q", "q_c"), others) if n not in taken))
+
+
+def _clarke(
+    names: tuple[str, str],
+    matrices: list[sp.ImmutableDenseMatrix],
+    determinants: list[sp.Expr],
+    own: Setting,
+) -> ClarkeForm:
+    first, second = matrices
+    weight = _weight({*own.states, *(c.name for c in own.candidates)})
+    path = (weight * first + (1 - weight) * second).applyfunc(sp.expand)
+    one, two = determinants
+    # the jump of the Jacobian has rank one, so the determinant is affine in q
+    along = neat(weight * one + (1 - weight) * two)
+    trace = spread(path.trace())
+    difference = tidy(two - one)
+    q_zero = None if difference == 0 or one == 0 or two == 0 else neat(tidy(two / difference))
+    q_hopf, q_complex = None, ()
+    if first.rows == 2:
+        slope = trace.diff(weight)
+        ends = [own.signs.sign(spread(m.trace())) for m in matrices]
+        if slope != 0 and (None in ends or ends[0] != ends[1]):
+            q_hopf = neat(tidy(-trace.subs(weight, 0) / slope))
+        turning = spread(trace**2 - 4 * along)
+        if weight in turning.free_symbols:
+            closed = roots(turning, weight, own.signs) or []
+            q_complex = tuple(neat(r.value) for r in closed)
+    return ClarkeForm(
+        names, weight, (first, second), along, trace, (one, two), q_zero, q_hopf, q_complex
+    )

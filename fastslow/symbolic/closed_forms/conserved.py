@@ -1,0 +1,131 @@
+"""Conserved quantities: linear combinations of the states that no motion changes."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import sympy as sp
+
+from fastslow.model.model import Model
+from fastslow.model.structure import real
+from fastslow.results.base.named_mapping import Named
+from fastslow.symbolic.closed_forms.symmetries import STATES, constant_null_space
+from fastslow.symbolic.solving.algebra import tidy
+
+
+@dataclass(frozen=True)
+class ConservedQuantity:
+    """A linear combination of the states whose rate is zero in every region.
+
+    Where c·f = 0 for constants c, each value of c·x has equilibria of its own, so that none
+    is isolated: the total population of an epidemic, an enzyme free and bound. With its
+    value as a parameter one state can be left out.
+
+    Parameters
+    ----------
+    expression : sympy.Expr
+        c·x, in the states.
+    total : str
+        A name for its value that the model does not use.
+    eliminated : tuple of str
+        The states that all conserved quantities together give.
+    combinations : Named of sympy.Expr
+        The states that are kept.
+    totals : Named of sympy.Expr
+        Every conserved quantity of the model, by the name of its value.
+
+    Examples
+    --------
+    >>> s, i, b, g = sp.symbols("S I beta gamma")
+    >>> sis = Model({s: g * i - b * s * i, i: b * s * i - g * i}, parameters={b: 2, g: 1})
+    >>> (one,) = conserved_quantities(sis)
+    >>> one.expression, one.total, one.eliminated
+    (I + S, 'N', ('I',))
+    """
+
+    expression: sp.Expr
+    total: str
+    eliminated: tuple[str, ...]
+    combinations: Named[sp.Expr]
+    totals: Named[sp.Expr]
+
+    def __str__(self) -> str:
+        kept = ", ".join(f'"{n}": {e}' for n, e in self.combinations.items())
+        given = ", ".join(f'"{n}": {e}' for n, e in self.totals.items())
+        several = len(self.totals) > 1
+        listed = ", ".join(f"{n} = {e}" for n, e in self.totals.items())
+        head = (
+            f"conserved quantities: {listed} never change"
+            if several
+            else (f"conserved quantity: {listed} never changes")
+        )
+        parameters = "parameters" if several else "a parameter"
+        return (
+            f"{head}, so no equilibrium is isolated; fs.reduce_states(model.rates, {{{kept}}}, "
+            f"conserved={{{given}}}) is the system without {' and '.join(self.eliminated)}, with "
+            f"{' and '.join(self.totals)} as {parameters}"
+        )
+
+
+@lru_cache(maxsize=64)
+def conserved_quantities(model: Model) -> tuple[ConservedQuantity, ...]:
+    """The linear conserved quantities of a frozen model, if it has at most `STATES` states.
+
+    Parameters
+    ----------
+    model : Model
+
+    Examples
+    --------
+    >>> x, y = sp.symbols("x y")
+    >>> conserved_quantities(Model({x: y - x, y: -y}))
+    ()
+    """
+    states = [real(n) for n in model.states]
+    if not 1 < len(states) <= STATES:
+        return ()
+    rows = [[r.rates[n] for n in model.states] for r in model.regions.values()]
+    values = {real(n): v for n, v in model.parameters.items()}
+    found = constant_null_space(rows, states, values)
+    if not found:
+        return ()
+    # the last states are left out, which are products more often than what they come from
+    reduced, pivots = sp.Matrix([row[::-1] for row in found]).rref(simplify=True)
+    left_out = [states[len(states) - 1 - p] for p in pivots]
+    weights = _not_negative(
+        [[tidy(e) for e in list(reduced.row(k))[::-1]] for k in range(len(found))], values
+    )
+    expressions = [sp.Add(*(c * s for c, s in zip(row, states, strict=True))) for row in weights]
+    names = itertools.islice(_names(model, len(expressions)), len(expressions))
+    totals = Named("total", dict(zip(names, expressions, strict=True)))
+    kept = Named("state", {s.name: s for s in states if s not in left_out})
+    out = tuple(s.name for s in left_out)
+    return tuple(ConservedQuantity(e, n, out, kept, totals) for n, e in totals.items())
+
+
+def _not_negative(
+    rows: Sequence[Sequence[sp.Expr]], values: Mapping[sp.Symbol, float]
+) -> list[list[sp.Expr]]:
+    """The same with no negative weight where one other row added to it gives that."""
+    found = []
+    for k, row in enumerate(rows):
+        others = [r for j, r in enumerate(rows) if j != k]
+        forms = [list(row)]
+        forms += [[tidy(a + b) for a, b in zip(row, r, strict=True)] for r in others]
+        found.append(next((f for f in forms if _positive(f, values)), list(row)))
+    return found
+
+
+def _positive(row: Sequence[sp.Expr], values: Mapping[sp.Symbol, float]) -> bool:
+    numbers = [e.subs(values) for e in row]
+    return all(e.is_number and e >= 0 for e in numbers)
+
+
+def _names(model: Model, count: int) -> Iterator[str]:
+    taken = {*model.states, *model.parameters, *model.free, *model.interfaces}
+    several = (f"N_{k}" for k in itertools.count(1))
+    names = several if count > 1 else itertools.chain(("N", "T", "M"), several)
+    return (n for n in names if n not in taken)

@@ -1,0 +1,224 @@
+"""Sets of equilibria within discontinuities in closed form, such as a sticking band."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+from sympy.logic.boolalg import Boolean
+
+from fastslow.model.model import Model
+from fastslow.model.motions import Motion, motions_of
+from fastslow.model.structure import real
+from fastslow.results.base.named_mapping import Named
+from fastslow.symbolic.signs.signs import Signs
+
+#: Begins the note of a region's equilibrium that is the edge of a set, before the set's region.
+EDGE = "edge of the equilibrium set"
+
+
+@dataclass(frozen=True)
+class EquilibriumSetForm:
+    """All equilibria of a Filippov field along some discontinuities, in closed form.
+
+    Zero is in the convex hull of the fields around each of its points (Filippov 1988).
+
+    Parameters
+    ----------
+    region : str
+        The sliding motion, such as ``"S1|S2"``.
+    interfaces : tuple of str
+        Those that are slid along.
+    free : tuple of Symbol
+        States that vary within the set.
+    state : Named of sympy.Expr
+        Every state; a free one stands for itself.
+    conditions : tuple of Boolean
+        What bounds the set: a friction force of no more than its full value, and where
+        other interfaces do.
+    edges : tuple of Named
+        The states at the two ends of a set with one free state, where these have a
+        closed form.
+    attracting : bool or None
+        Whether the fields point at the interface: the contact sticks. None where the signs
+        that are assumed do not tell, and for several interfaces.
+    weights : tuple of sympy.Expr
+        Those of the fields, one for each interface, between −1 and 1 in the set.
+    heights : tuple of sympy.Expr
+        The functions of the interfaces.
+    """
+
+    region: str
+    interfaces: tuple[str, ...]
+    free: tuple[sp.Symbol, ...]
+    state: Named[sp.Expr]
+    conditions: tuple[Boolean, ...]
+    edges: tuple[Named[sp.Expr], ...]
+    attracting: bool | None
+    weights: tuple[sp.Expr, ...]
+    heights: tuple[sp.Expr, ...]
+
+    def on_edge(self, state: Mapping[str, sp.Expr], parameters: Mapping[str, sp.Expr]) -> bool:
+        """Whether a state is on the edge of the set, at some parameters and for all others."""
+        at = {real(n): e for n, e in state.items()}
+        given = {real(n): e for n, e in parameters.items()}
+
+        def zero(expression: sp.Expr) -> bool:
+            return bool(sp.simplify(expression.subs(at).subs(given)) == 0)
+
+        return all(map(zero, self.heights)) and any(zero(1 - s**2) for s in self.weights)
+
+
+def equilibrium_set_forms(
+    model: Model, signs: Signs, exact: Callable[[sp.Expr], sp.Expr]
+) -> tuple[EquilibriumSetForm, ...]:
+    """The sets of equilibria of all sliding motions of a frozen model.
+
+    Parameters
+    ----------
+    model : Model
+    signs : Signs
+        What is assumed of the parameters.
+    exact : callable
+        Puts rational numbers in the place of floats.
+
+    Examples
+    --------
+    >>> x, v, w = sp.symbols("x v w")
+    >>> block = Model({x: v, v: w - x - sp.sign(v) / 2}, parameters={w: 0})
+    >>> (band,) = equilibrium_set_forms(block, Signs({}), lambda e: e)
+    >>> band.conditions, [edge["x"] for edge in band.edges]
+    ((Abs(w - x) <= 1/2,), [w - 1/2, w + 1/2])
+    """
+    forms = (_form(model, motion, signs, exact) for motion in motions_of(model).sliding)
+    return tuple(form for form in forms if form is not None)
+
+
+def _form(
+    model: Model, motion: Motion, signs: Signs, exact: Callable[[sp.Expr], sp.Expr]
+) -> EquilibriumSetForm | None:
+    functions = [exact(i.function) for i in model.interfaces.values()]
+    heights = tuple(functions[j] for j in motion.slides)
+    names = model.states
+    parts = solved_along(heights, [exact(r) for r in motion.rates], names, signs.nonzero)
+    if parts is None or not parts[1]:
+        return None
+    solved, free = parts[0], parts[1]
+    others = [sp.expand(s * functions[j].subs(solved)) for j, s in enumerate(motion.signs) if s]
+    if any(h == 0 for h in others):
+        # the edge of a set within one more interface
+        return None
+    weights = tuple(sp.cancel(exact(s).subs(solved)) for s in motion.weights)
+    bounds = [_bound(weight, free, signs) for weight in weights]
+    conditions = [condition for condition, _ in bounds]
+    conditions += [sp.Gt(h, 0) for h in others if signs.sign(h) != 1]
+    attracting = None
+    if len(heights) == 1:
+        a, b = (exact(e).subs(solved) for e in motion.bounds)
+        sign = signs.sign(sp.expand(a - b))
+        attracting = None if sign is None else sign < 0
+    interfaces = list(model.interfaces)
+    return EquilibriumSetForm(
+        motion.name,
+        tuple(interfaces[j] for j in motion.slides),
+        free,
+        Named("state", {n: solved.get(real(n), real(n)) for n in names}),
+        tuple(conditions),
+        _edges(bounds[0][1], solved, free, names) if len(bounds) == len(free) == 1 else (),
+        attracting,
+        weights,
+        heights,
+    )
+
+
+def _bound(
+    weight: sp.Expr, free: Sequence[sp.Symbol], signs: Signs
+) -> tuple[Boolean, tuple[sp.Expr, sp.Expr]]:
+    """|s| ≤ 1 as |e| ≤ f, with e and f; e is monic in the first free state it is affine in."""
+    top, below = sp.fraction(sp.cancel(weight))
+    slope = next((c for s in free if (c := top.diff(s)) != 0), sp.Integer(1))
+    if slope.free_symbols & set(free):
+        slope = sp.Integer(1)
+    top, below = sp.cancel(top / slope), sp.cancel(below / slope)
+    sign = signs.sign(below)
+    below = below if sign == 1 else -below if sign == -1 else sp.Abs(below)
+    return sp.Le(sp.Abs(sp.expand(top)), sp.expand(below)), (top, below)
+
+
+def _edges(
+    bound: tuple[sp.Expr, sp.Expr],
+    solved: Mapping[sp.Symbol, sp.Expr],
+    free: Sequence[sp.Symbol],
+    names: Sequence[str],
+) -> tuple[Named[sp.Expr], ...]:
+    """The states at which |e| = f, if e is affine in the only free state."""
+    (symbol,), (top, below) = free, bound
+    slope = top.diff(symbol)
+    if slope == 0 or slope.has(symbol) or below.has(symbol):
+        return ()
+    edges = []
+    for side in (-1, 1):
+        at = {symbol: sp.expand(symbol - (top - side * below) / slope)}
+        whole = {s: sp.expand(e.subs(at)) for s, e in solved.items()} | at
+        edges.append(Named("state", {n: whole.get(real(n), real(n)) for n in names}))
+    return tuple(edges)
+
+
+def solved_along(
+    heights: Sequence[sp.Expr],
+    rates: Sequence[sp.Expr],
+    names: Sequence[str],
+    nonzero: Callable[[sp.Expr], bool] = lambda c: bool(c.is_number and c != 0),
+) -> tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Symbol, ...] | None] | None:
+    """Solve h = 0 and f = 0 for as many states as they determine.
+
+    Equations that are affine in a state are solved for it one after the other where
+    ``nonzero`` says that its coefficient does not vanish, by default where it is a number.
+
+    Returns
+    -------
+    solved : dict
+        States as functions of the free ones.
+    free : tuple of Symbol or None
+        None where an equation is left that is not solved so. None in place of both where
+        the equations contradict each other.
+
+    Examples
+    --------
+    >>> x, v, w = real("x"), real("v"), real("w")
+    >>> solved_along([v - w], [v - w, 0], ["x", "v"])
+    ({v: w}, (x,))
+    """
+    left = [sp.sympify(e) for e in (*heights, *rates)]
+    states = [real(n) for n in names]
+    solved: dict[sp.Symbol, sp.Expr] = {}
+    while True:
+        left = [e for e in map(_numerator, left) if e != 0]
+        if not left:
+            break
+        if any(not (e.free_symbols & set(states)) for e in left):
+            return None
+        # what the interfaces give comes first, then the last states: positions stay free
+        pick = next(
+            (
+                (e, s)
+                for e in left
+                for s in reversed(states)
+                if s not in solved
+                and not (c := e.diff(s)).free_symbols & set(states)
+                and nonzero(c)
+            ),
+            None,
+        )
+        if pick is None:
+            return solved, None
+        equation, symbol = pick
+        root = sp.cancel(symbol - equation / equation.diff(symbol))
+        solved = {s: sp.expand(e.subs(symbol, root)) for s, e in solved.items()} | {symbol: root}
+        left = [e.subs(symbol, root) for e in left]
+    return solved, tuple(s for s in states if s not in solved)
+
+
+def _numerator(expression: sp.Expr) -> sp.Expr:
+    return sp.expand(sp.together(expression).as_numer_denom()[0])

@@ -1,0 +1,274 @@
+"""Free directions: shifts of the states that leave every rate as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from fastslow.errors import ArgumentError
+from fastslow.model.derived import once, partition_of
+from fastslow.model.functions import numpy_function
+from fastslow.model.model import Model
+from fastslow.model.structure import real
+from fastslow.results.base.named_mapping import Named
+from fastslow.symbolic.reduction import reduce_states
+from fastslow.symbolic.solving.algebra import tidy
+
+#: States up to which free directions are looked for.
+STATES = 24
+
+#: States, at least, at which rows are evaluated; with all rows twice as many as columns.
+POINTS = 3
+
+#: Singular values below this, relative to the largest, count as zero.
+NULL = 1e-11
+
+
+@dataclass(frozen=True)
+class FreeDirection:
+    """A shift of the states under which no rate and no interface changes.
+
+    Where a shift by c leaves the rates as they are, an equilibrium is never isolated, and
+    where the shifted states drift along c there is none: a rigid-body mode. The
+    combinations that the shift does not change form a system of their own.
+
+    Parameters
+    ----------
+    shift : Named of sympy.Expr
+        State to its share of the shift.
+    combinations : Named of sympy.Expr
+        New states, those that no free direction is left in, in terms of the old ones.
+
+    Examples
+    --------
+    >>> a, b, k = sp.symbols("a b k")
+    >>> pair = Model({a: k * (b - a), b: k * (a - b)}, parameters={k: 1})
+    >>> (free,) = free_directions(pair)
+    >>> free.shift, free.combinations
+    ({a: 1, b: 1}, {u1: a - b})
+    """
+
+    shift: Named[sp.Expr]
+    combinations: Named[sp.Expr]
+
+    def __str__(self) -> str:
+        c = next(n for n in ("c", "s", "shift") if n not in self.shift)
+        moved = ", ".join(f"{n} + {sp.Symbol(c) * e}" for n, e in self.shift.items())
+        given = ", ".join(f'"{n}": {e}' for n, e in self.combinations.items())
+        return (
+            f"free direction: the shift {moved} leaves every rate as it is, so no equilibrium "
+            f"is isolated; fs.reduce_states(model.rates, {{{given}}}) is the system without it"
+        )
+
+
+@lru_cache(maxsize=64)
+def free_directions(model: Model) -> tuple[FreeDirection, ...]:
+    """The free directions of a frozen model; none are looked for past `STATES` states.
+
+    Parameters
+    ----------
+    model : Model
+
+    Examples
+    --------
+    >>> x, y = sp.symbols("x y")
+    >>> free_directions(Model({x: y - x, y: -y}))
+    ()
+    """
+    states = [real(n) for n in model.states]
+    if not 1 < len(states) <= STATES:
+        return ()
+    values = {real(n): v for n, v in model.parameters.items()}
+    shifts = constant_null_space(_slopes_of(model), states, values)
+    if not shifts:
+        return ()
+    combinations = _reduced(model, states, values)
+    if not combinations:
+        return ()
+    return tuple(
+        FreeDirection(
+            Named("state", {s.name: e for s, e in zip(states, shift, strict=True) if e != 0}),
+            combinations,
+        )
+        for shift in shifts
+    )
+
+
+@once(partition_of)
+def _slopes_of(model: Model) -> list[list[sp.Expr]]:
+    """Slopes of all rates and interface functions, by the states."""
+    functions = [r.rates[n] for r in model.regions.values() for n in model.states]
+    functions += [i.function for i in model.interfaces.values()]
+    return _slopes(functions, [real(n) for n in model.states])
+
+
+def _reduced(
+    model: Model, states: Sequence[sp.Symbol], values: Mapping[sp.Symbol, float]
+) -> Named[sp.Expr]:
+    """Combinations that no free direction changes, as often as one is left."""
+    whole: dict[sp.Symbol, sp.Expr] = {s: s for s in states}
+    rates = {s: model.rates[s.name] for s in states}
+    while True:
+        smooth = [b for e in rates.values() for b in _branches(e)]
+        shifts = constant_null_space(_slopes(smooth, list(rates)), list(rates), values)
+        if not shifts:
+            break
+        taken = {s.name for s in (*states, *rates)} | {s.name for s in values}
+        fresh = (n for k in range(1, 999) if (n := f"u{k}") not in taken)
+        new = {real(next(fresh)): e for e in _invariants(shifts, list(rates))}
+        if not new:
+            break
+        try:
+            reduced = reduce_states(rates, new)
+        except ArgumentError:
+            break
+        whole = {s: sp.expand(e.subs(whole, simultaneous=True)) for s, e in new.items()}
+        rates = {s: reduced[s.name] for s in new}
+    if len(whole) == len(states):
+        return Named("state", {})
+    return Named("state", {f"u{k}": e for k, e in enumerate(whole.values(), 1)})
+
+
+def _branches(expression: sp.Expr) -> list[sp.Expr]:
+    """Every smooth expression that a rate with Piecewise may be, and what decides it."""
+    pieces = [p for p in sp.preorder_traversal(expression) if isinstance(p, sp.Piecewise)]
+    if not pieces:
+        return [expression]
+    inner = next(p for p in pieces if not any(a.has(sp.Piecewise) for a in p.args))
+    found = [r.lhs - r.rhs for _, c in inner.args for r in c.atoms(sp.core.relational.Relational)]
+    for value, _ in inner.args:
+        found += _branches(expression.xreplace({inner: value}))
+    return found
+
+
+def _slopes(functions: Sequence[sp.Expr], states: Sequence[sp.Symbol]) -> list[list[sp.Expr]]:
+    return [[f.diff(s) for s in states] for f in functions]
+
+
+def constant_null_space(
+    rows: Sequence[Sequence[sp.Expr]],
+    states: Sequence[sp.Symbol],
+    values: Mapping[sp.Symbol, float],
+) -> list[list[sp.Expr]]:
+    """Vectors without states in them that are orthogonal to every row at every state.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of sympy.Expr
+        Each with as many entries as there are states.
+    states : sequence of Symbol
+    values : mapping
+        Parameter to its value, for a first look with numbers.
+
+    Examples
+    --------
+    >>> x, y, k = map(real, "xyk")
+    >>> constant_null_space([[k * x * y, -x * y]], [x, y], {k: 2})
+    [[1, k]]
+    """
+    distinct = _distinct(tuple(map(tuple, rows)))
+    if not distinct:
+        return []
+    numbers = _numbers(distinct, states, values)
+    _, sizes, right = np.linalg.svd(numbers)
+    rank = int(np.sum(sizes > NULL * sizes[0]))
+    null = right[rank:]
+    if not len(null):
+        return []
+    # only the columns that take part are looked at symbolically
+    moving = [k for k in range(len(states)) if np.abs(null[:, k]).max() > 1e-9]
+    few = [[sp.nsimplify(row[k], rational=True) for k in moving] for row in _few(distinct, moving)]
+    matrix = sp.Matrix([part for row in few for part in _by_kernels(row, states)])
+    found = []
+    for vector in matrix.nullspace(simplify=tidy):
+        scale = next(e for e in vector if e != 0)
+        constant = [sp.S.Zero] * len(states)
+        for k, entry in zip(moving, vector, strict=True):
+            constant[k] = tidy(entry / scale)
+        along = [tidy(sum(e * c for e, c in zip(r, constant, strict=True))) for r in distinct]
+        if not any(e.free_symbols & set(states) for e in constant) and not any(along):
+            found.append(constant)
+    return found
+
+
+@lru_cache(maxsize=64)
+def _distinct(rows: tuple[tuple[sp.Expr, ...], ...]) -> tuple[tuple[sp.Expr, ...], ...]:
+    """Every row that is not zero, once."""
+    return tuple(row for row in dict.fromkeys(rows) if any(e != 0 for e in row))
+
+
+def _by_kernels(row: Sequence[sp.Expr], states: Sequence[sp.Symbol]) -> list[list[sp.Expr]]:
+    """A row as one of coefficients for each function of the states in it.
+
+    What is constant in the states vanishes with the row where it does with all of them.
+    """
+    found: dict[sp.Expr, list[sp.Expr]] = {}
+    for k, entry in enumerate(row):
+        for term in sp.Add.make_args(sp.expand(entry, power_exp=False, log=False)):
+            inside = set(states) & term.free_symbols
+            coefficient, kernel = term.as_independent(*inside, as_Add=False)
+            if not inside:
+                coefficient, kernel = term, sp.S.One
+            line = found.setdefault(kernel, [sp.S.Zero] * len(row))
+            line[k] += coefficient
+    return list(found.values())
+
+
+def _few(slopes: Sequence[Sequence[sp.Expr]], columns: Sequence[int]) -> list[Sequence[sp.Expr]]:
+    """Rows that say something of the columns, each once, the shortest first."""
+    inside = [row for row in slopes if any(row[k] != 0 for k in columns)]
+    return sorted(inside, key=lambda row: sum(sp.count_ops(row[k]) for k in columns))[:12]
+
+
+@lru_cache(maxsize=64)
+def _function_of(
+    slopes: tuple[tuple[sp.Expr, ...], ...],
+) -> tuple[list[sp.Symbol], Callable[..., Any]]:
+    """The symbols in slopes, and the slopes as a function of these."""
+    symbols = sorted(set().union(*(e.free_symbols for r in slopes for e in r)), key=str)
+    return symbols, numpy_function(symbols, [list(r) for r in slopes])
+
+
+@cache
+def _number(point: int, place: int) -> float:
+    """A quotient of primes for every place of a point."""
+    return float(sp.prime(3 * point + 2 * place + 5)) / float(sp.prime(place + 4))
+
+
+def _numbers(
+    slopes: tuple[tuple[sp.Expr, ...], ...],
+    states: Sequence[sp.Symbol],
+    values: Mapping[sp.Symbol, float],
+) -> np.ndarray:
+    """The slopes at a few states, each row scaled to its largest entry."""
+    symbols, function = _function_of(slopes)
+    rows = []
+    for k in range(max(POINTS, -(-2 * len(states) // len(slopes)))):
+        # in the states' and free parameters' own order
+        place = [values[s] if s in values else _number(k, j) for j, s in enumerate(symbols)]
+        with np.errstate(all="ignore"):
+            # as NumPy's numbers: a division by zero is no error here
+            rows.append(np.array(function(*map(np.float64, place)), dtype=float))
+    numbers = np.vstack(rows)
+    numbers = numbers[np.isfinite(numbers).all(axis=1)]
+    size = np.abs(numbers).max(axis=1, initial=0.0)
+    return np.vstack([numbers[size > 0] / size[size > 0, None], np.zeros((1, len(states)))])
+
+
+def _invariants(shifts: Sequence[Sequence[sp.Expr]], states: Sequence[sp.Symbol]) -> list[sp.Expr]:
+    """Linear combinations that no shift changes, in the order of the states."""
+    matrix = sp.Matrix([list(s) for s in shifts])
+    reduced, pivots = matrix.rref(simplify=True)
+    found = []
+    for k, state in enumerate(states):
+        if k not in pivots:
+            rest = [reduced[row, k] * states[p] for row, p in enumerate(pivots)]
+            whole = state - sum(rest, sp.S.Zero)
+            slope = next(c for s in states if (c := whole.coeff(s)) != 0)
+            found.append(sp.expand(whole / slope))
+    return found

@@ -1,0 +1,218 @@
+"""A derivation as LaTeX."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import sympy as sp
+
+from fastslow.model.structure import real
+from fastslow.model.typesetting import latex, latex_text
+from fastslow.results.point_types import point_name
+from fastslow.symbolic.closed_forms.equilibrium_sets import EDGE
+from fastslow.symbolic.closed_forms.forms import Continuum, CriticalPoint, EquilibriumForm
+from fastslow.symbolic.closed_forms.stability import Stability
+from fastslow.symbolic.report.decimals import readable
+from fastslow.symbolic.report.naming import WIDTH, named, text
+from fastslow.symbolic.report.wording import folds, names_of
+
+if TYPE_CHECKING:
+    from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
+    from fastslow.symbolic.closed_forms.regions import RegionForms
+    from fastslow.symbolic.derivation import Derivation
+
+#: A heading and its formulas.
+Block = tuple[str, list[str]]
+
+#: What stands before a formula, the formula, and what stands behind it.
+Item = tuple[str, sp.Basic, str]
+
+
+def derivation_latex(law: Derivation) -> str:
+    """Paragraphs with displayed formulas, for a LaTeX document with amsmath."""
+    parts = []
+    for heading, formulas in _blocks(law):
+        body = " \\\\\n".join(f"  & {f}" for f in formulas)
+        parts.append(f"\\paragraph{{{heading}}}\n\\begin{{align*}}\n{body}\n\\end{{align*}}")
+    return "\n\n".join(parts) + "\n"
+
+
+def derivation_display(law: Derivation) -> str:
+    """One displayed formula, as notebooks show it."""
+    rows = []
+    for heading, formulas in _blocks(law):
+        rows.append(f"\\textbf{{{heading}}}")
+        rows += [f"\\quad {f}" for f in formulas]
+    return "$\\displaystyle \\begin{array}{l}\n" + " \\\\\n".join(rows) + "\n\\end{array}$"
+
+
+def _blocks(law: Derivation) -> list[Block]:
+    blocks: list[Block] = []
+    taken = names_of(law)
+    if law.assumptions:
+        blocks.append(("Assumptions", [_comma(law.assumptions)]))
+    for free in law.free_directions:
+        moved = [rf"{_tex(real(n))} + c \, {_tex(e)}" for n, e in free.shift.items()]
+        kept = [rf"{_tex(real(n))} = {_tex(e)}" for n, e in free.combinations.items()]
+        blocks.append(("Free direction", [r",\quad ".join(moved), r",\quad ".join(kept)]))
+    if law.conserved_quantities:
+        each = [rf"{_tex(real(q.total))} = {_tex(q.expression)}" for q in law.conserved_quantities]
+        blocks.append(("Conserved", [r",\quad ".join(each)]))
+    for region in law.regions.values():
+        blocks.append((f"Region {latex_text(region.name)}", _region(region, taken)))
+    for one in law.equilibrium_sets:
+        lines = [_tex(condition) for condition in one.conditions]
+        lines += [rf"{_tex(real(n))} = {_tex(e)}" for n, e in one.state.items() if e != real(n)]
+        for edge in one.edges:
+            values = (f"{_tex(real(n))} = {_tex(e)}" for n, e in edge.items())
+            lines.append(r"\text{edge: } " + r",\quad ".join(values))
+        blocks.append((f"Equilibrium set {latex_text(one.region)}", lines))
+    for form in law.boundary_equilibria:
+        joined = " and ".join(map(latex_text, form.regions))
+        blocks.append((f"Boundary equilibrium between {joined}", _boundary(form, taken)))
+    return blocks
+
+
+def _region(region: RegionForms, taken: set[str]) -> list[str]:
+    lines = [_comma(region.conditions)] if region.conditions else []
+    lines += [rf"\dot{{{_tex(real(n))}}} = {_tex(e)}" for n, e in region.rates.items()]
+    for form in region.equilibria:
+        lines += _equilibrium(form, taken)
+    for continuum in region.continua:
+        lines += _continuum(continuum, taken)
+    lines.append(rf"J = {_tex(region.jacobian)}")
+    lines += _stability(region.stability)
+    for point in (*region.folds, *region.branch_points, *region.cusps, *region.hopf):
+        lines += _point(point, taken)
+    if region.no_hopf:
+        lines.append(r"\text{no Hopf bifurcation}")
+    return lines
+
+
+def _equilibrium(form: EquilibriumForm, taken: set[str]) -> list[str]:
+    given = () if form.kind == "implicit" else form.parameter.items()
+    items = _values([*given, *form.state.items()])
+    items += _zeros((*(form.equations if form.kind == "implicit" else ()), *form.conditions))
+    edge = form.note.startswith(EDGE)
+    when = (sp.true, sp.true) if edge else (form.exists, form.admissible)
+    lines = _set(r"\text{equilibrium: } ", items, taken, *when)
+    if edge:
+        lines.append(rf"\text{{{form.note}}}".replace("|", r"\textbar "))
+    if form.parameter_range is not None:
+        lines.append(r"\text{admissible range: } " + _tex(form.parameter_range))
+    if form.discriminant is not None:
+        lines.append(rf"\Delta = {_tex(form.discriminant)}")
+    if form.stability.verdict != "depends":
+        lines.append(rf"\text{{{form.stability.verdict} in the region}}")
+    return lines
+
+
+def _values(values: Iterable[tuple[str, sp.Expr]]) -> list[Item]:
+    return [(f"{_tex(real(n))} = ", e, "") for n, e in values if e != real(n)]
+
+
+def _zeros(equations: Iterable[sp.Expr]) -> list[Item]:
+    return [("", e, " = 0") for e in equations]
+
+
+def _set(
+    head: str,
+    items: list[Item],
+    taken: set[str],
+    exists: sp.Basic = sp.true,
+    admissible: sp.Basic = sp.true,
+) -> list[str]:
+    """One line, or several where it is long, with names for what it repeats."""
+    plain = admissible not in (sp.true, sp.false)
+    admissible = readable(admissible)
+    formulas = [readable(e) for _, e, _ in items] + ([admissible] if plain else [])
+    size = sum(len(text(e)) for e in formulas)
+    defined: list[tuple[sp.Symbol, sp.Basic]] = []
+    if size > WIDTH:
+        formulas, defined = named(formulas, taken)
+    when = formulas[-1] if plain else admissible
+    shown = [a + _tex(e) + b for (a, _, b), e in zip(items, formulas, strict=False)]
+    lines = [head + r",\quad ".join(shown)]
+    if size > WIDTH:
+        # each value has a line of its own
+        lines = [head + shown[0], *(rf"\quad {s}" for s in shown[1:])] if shown else [head]
+    lines[-1] += _when(exists, when)
+    if defined:
+        means = r",\quad ".join(f"{_tex(s)} = {_tex(e)}" for s, e in defined)
+        lines.append(r"\quad \text{with } " + means)
+    return lines
+
+
+def _stability(stability: Stability) -> list[str]:
+    conditions = [f"{_tex(e)} > 0" for e in stability.routh_hurwitz if not e.is_positive]
+    if any(e.is_nonpositive for e in stability.routh_hurwitz):
+        verdict = r"\text{never asymptotically stable}"
+    else:
+        verdict = r"\text{stable iff } " + r",\quad ".join(conditions)
+    return [
+        rf"\operatorname{{tr}} J = {_tex(stability.trace)},\quad "
+        rf"\det J = {_tex(stability.determinant)}",
+        rf"\chi(\lambda) = {_tex(stability.characteristic_polynomial)}",
+        verdict if conditions else r"\text{asymptotically stable}",
+    ]
+
+
+def _continuum(continuum: Continuum, taken: set[str]) -> list[str]:
+    items = _values([*continuum.parameters.items(), *continuum.state.items()])
+    items += _zeros(continuum.equations) + [("", c, "") for c in continuum.conditions]
+    lines = _set(r"\text{continuum of equilibria: } ", items, taken)
+    numbers = ", ".join(_tex(e) for e in continuum.eigenvalues)
+    if numbers:
+        lines[-1] += rf",\quad \lambda \in \{{{numbers}\}}"
+    return lines
+
+
+def _point(point: CriticalPoint, taken: set[str]) -> list[str]:
+    items = _values([*point.parameters.items(), *point.state.items()]) + _zeros(point.equations)
+    if point.frequency_squared is not None:
+        items.append((r"\omega^2 = ", point.frequency_squared, ""))
+    head = rf"\text{{{point_name(point.code)}: }} "
+    return _set(head, items, taken, point.exists, point.admissible)
+
+
+def _boundary(form: BoundaryForm, taken: set[str]) -> list[str]:
+    items = _values([*form.parameters.items(), *form.state.items()]) + _zeros(form.equations)
+    lines = _set("", items, taken, sp.true, form.admissible)
+    if form.clarke is not None:
+        path = form.clarke
+        q = _tex(path.weight)
+        lines.append(
+            rf"J({q}) = {_tex(path.matrix)},\quad \det J({q}) = {_tex(path.determinant)},\quad "
+            rf"\operatorname{{tr}} J({q}) = {_tex(path.trace)}"
+        )
+        for mark, value in (("*", path.q_zero), (r"\mathrm{Hopf}", path.q_hopf)):
+            if value is not None:
+                lines.append(rf"{q}_{{{mark}}} = {_tex(value)}")
+        lines += [rf"{q}_{{\mathbb{{C}}}} = {_tex(value)}" for value in path.q_complex]
+    lines.append(rf"\text{{{form.type}}}")
+    return lines
+
+
+def _when(exists: sp.Basic, admissible: sp.Basic) -> str:
+    if exists == sp.false:
+        return r"\quad \text{(never real)}"
+    if admissible == sp.false:
+        return r"\quad \text{(virtual)}"
+    return r"\quad \text{iff } " + _tex(admissible) if admissible != sp.true else ""
+
+
+def _named(name: str) -> str:
+    return rf"\text{{{latex_text(name)}}}"
+
+
+def _comma(conditions: Iterable[sp.Basic]) -> str:
+    return r",\quad ".join(_tex(c) for c in conditions)
+
+
+def _tex(expression: sp.Basic) -> str:
+    matrix = isinstance(expression, sp.MatrixBase)
+    expression = expression.applyfunc(readable) if matrix else readable(expression)
+    if not matrix and folds(expression):
+        return r"\langle\text{a long expression}\rangle"
+    return latex(expression)

@@ -1,0 +1,164 @@
+"""One symbol out of one equation, by undoing one operation after another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import sympy as sp
+
+from fastslow.model.rational import quotient
+from fastslow.symbolic.signs.signs import Signs
+from fastslow.symbolic.solving.algebra import longer, numerator, shortest, spread, tidy
+from fastslow.symbolic.solving.univariate import Root, roots
+
+#: A longer equation, in parts of its tree, is not solved.
+PARTS = 150
+
+#: Functions that take each value once, with their inverse.
+INVERSES: dict[type, Callable[[sp.Expr], sp.Expr]] = {
+    sp.exp: sp.log,
+    sp.log: sp.exp,
+    sp.sinh: sp.asinh,
+    sp.tanh: sp.atanh,
+    sp.atan: sp.tan,
+}
+
+
+def isolate(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root] | None:
+    """All real values of a symbol that satisfy equation = 0, None where there is no short form.
+
+    A polynomial of degree one or two is solved, and an equation in which the symbol
+    stands once is undone from outside in: sums, products, powers, exponentials.
+
+    Parameters
+    ----------
+    equation : sympy.Expr
+        Irreducible.
+    symbol : Symbol
+    signs : Signs
+        Values against the known sign of the symbol are left out.
+
+    Examples
+    --------
+    >>> from fastslow.model.structure import real
+    >>> V, k, u = map(real, "Vku")
+    >>> [r.value for r in isolate(k - V**2 * u, V, Signs({k: 1, u: 1, V: 1}))]
+    [sqrt(k*u)/u]
+    >>> [r.value for r in isolate(sp.exp(-k * V) - u, V, Signs({k: 1}))]
+    [-log(u)/k]
+    """
+    if symbol not in equation.free_symbols or longer(equation, PARTS):
+        return None
+    found = _polynomial(equation, symbol, signs)
+    if found is None:
+        found = _undone(equation, symbol, signs)
+    if found is None:
+        return None
+    side = signs.known.get(symbol)
+    return [
+        r
+        for r in found
+        if (side is None or signs.sign(side * r.value) not in (0, -1))
+        and not any(signs.sign(e) == -1 for e in r.radicands)
+    ]
+
+
+def _polynomial(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root] | None:
+    slope = spread(equation).diff(symbol)
+    if symbol not in slope.free_symbols:
+        return [Root(shortest(-equation.subs(symbol, 0) / slope))]
+    if quotient(equation) is None or not equation.is_polynomial(symbol):
+        return None
+    poly = sp.Poly(equation, symbol)
+    if poly.degree() > 2 and (len(poly.monoms()) > 2 or equation.free_symbols == {symbol}):
+        return None
+    return roots(equation, symbol, signs)
+
+
+def _undone(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root] | None:
+    """Values of a symbol that stands once in an equation, or inside one repeated function."""
+    kernels = _kernels(equation, symbol)
+    if kernels is not None and len(kernels) == 1:
+        (kernel,) = kernels
+        level = sp.Dummy("level", real=True)
+        bare = numerator(equation.xreplace({kernel: level}))
+        inner = None if symbol in bare.free_symbols else _polynomial(bare, level, signs)
+        if inner is None or level not in bare.free_symbols:
+            return None
+        waiting = [(kernel, root) for root in inner]
+    elif sum(1 for node in sp.preorder_traversal(equation) if node == symbol) == 1:
+        waiting = [(equation, Root(sp.S.Zero))]
+    else:
+        return None
+    done: list[Root] = []
+    while waiting:
+        left, right = waiting.pop(0)
+        if left == symbol:
+            done.append(right)
+            continue
+        if sum(1 for node in sp.preorder_traversal(left) if node == symbol) != 1:
+            return None
+        further = _outermost(left, right, symbol, signs)
+        if further is None:
+            return None
+        waiting += further
+    return done
+
+
+def _kernels(equation: sp.Expr, symbol: sp.Symbol) -> set[sp.Expr] | None:
+    """Functions and broken powers that a symbol stands in; None where it stands outside too."""
+    found: set[sp.Expr] = set()
+    waiting: list[sp.Expr] = [equation]
+    while waiting:
+        node = waiting.pop()
+        if symbol not in node.free_symbols:
+            continue
+        if node == symbol:
+            return None
+        if node.is_Add or node.is_Mul or (node.is_Pow and node.exp.is_Integer):
+            waiting += node.args
+        else:
+            found.add(node)
+    return found
+
+
+def _outermost(
+    left: sp.Expr, right: Root, symbol: sp.Symbol, signs: Signs
+) -> list[tuple[sp.Expr, Root]] | None:
+    """Undo the outermost operation of left = right; None where that is not known."""
+
+    def now(value: sp.Expr, *conditions: sp.Expr) -> Root:
+        return Root(tidy(value), further=(*right.radicands, *conditions))
+
+    level = right.value
+    if left.is_Add:
+        rest, inner = left.as_independent(symbol, as_Add=True)
+        return [(inner, now(level - rest))]
+    if left.is_Mul:
+        rest, inner = left.as_independent(symbol, as_Add=False)
+        return [(inner, now(level / rest))]
+    if left.is_Pow and left.exp.is_Rational:
+        over, under = int(left.exp.p), int(left.exp.q)
+        value = now(level ** (1 / left.exp)).value
+        if over % 2 == 0 and under % 2:
+            both = [(left.base, now(value, level)), (left.base, now(-value, level))]
+            side = signs.sign(left.base)
+            return both if side is None else both[:1] if side > 0 else both[1:]
+        if over % 2 and under % 2:
+            # an odd root of a negative number is not what SymPy takes it for
+            side = signs.sign(level)
+            if side is None:
+                value = sp.sign(level) * sp.Abs(level) ** (1 / left.exp)
+            return [(left.base, now(side * (side * level) ** (1 / left.exp) if side else value))]
+        return [(left.base, now(value, level))]
+    if left.is_Pow and not left.exp.has(symbol) and left.exp.is_real:
+        # a power with a symbol as exponent is real for a positive base
+        return [(left.base, now(level ** (1 / left.exp), level))]
+    if type(left) in INVERSES and len(left.args) == 1:
+        conditions: tuple[sp.Expr, ...] = ()
+        if isinstance(left, sp.exp):
+            conditions = (level,)
+        if isinstance(left, sp.tanh):
+            conditions = (1 - level**2,)
+        return [(left.args[0], now(INVERSES[type(left)](level), *conditions))]
+    return None

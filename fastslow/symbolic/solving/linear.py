@@ -1,0 +1,81 @@
+"""Regions that are linear in their states: Cramer's rule within a budget, else left as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+import sympy as sp
+
+from fastslow.model.structure import real
+from fastslow.symbolic.solving.algebra import adjugate, determinant, growth, spread
+
+#: A determinant of at most so many terms leaves the system to elimination, which gives short forms.
+SPARSE = 8
+
+#: A determinant that may have more terms than this is not formed.
+DENSE = 400
+
+#: Entries in a row, on average, up to which a system is sparse.
+ENTRIES = 3
+
+NOTE = "linear system with a determinant past the budget, solved numerically"
+
+
+def cramer(
+    rates: Mapping[str, sp.Expr], states: Sequence[str]
+) -> tuple[dict[str, sp.Expr], sp.Expr] | str | None:
+    """Solve rates that are dense and linear in the states.
+
+    Parameters
+    ----------
+    rates : mapping
+        State to smooth rate.
+    states : sequence of str
+
+    Returns
+    -------
+    tuple, None or str
+        Values of the states with the determinant they were divided by; None
+        where the rates are not linear, singular, or sparse enough to eliminate;
+        a note where the determinant is past the budget.
+
+    Examples
+    --------
+    >>> x, a = real("x"), real("a")
+    >>> cramer({"x": a * x - 1}, ["x"]) is None
+    True
+    """
+    columns = [real(n) for n in states]
+    rows = [spread(rates[n]) for n in states]
+    if not all(e.is_polynomial(*columns) for e in rows):
+        return None
+    matrix = sp.Matrix([[e.diff(c) for c in columns] for e in rows])
+    if matrix.free_symbols & set(columns):
+        return None
+    terms = _terms(matrix)
+    if terms <= SPARSE:
+        return None
+    if terms > DENSE:
+        # with few entries in each row elimination finds its way
+        entries = sum(1 for e in matrix if e != 0)
+        return None if entries <= ENTRIES * matrix.rows else NOTE
+    below = determinant(matrix)
+    if below == 0:
+        return None
+    rest = sp.Matrix([e.xreplace(dict.fromkeys(columns, sp.S.Zero)) for e in rows])
+    above = adjugate(matrix) * rest
+    return {n: -spread(e) / below for n, e in zip(states, above, strict=True)}, below
+
+
+def _terms(matrix: sp.MatrixBase) -> float:
+    """Give an upper bound for the terms of a determinant, without forming it."""
+    sizes = [[0.0 if e == 0 else growth(e) for e in matrix.row(k)] for k in range(matrix.rows)]
+
+    @cache
+    def below(row: int, columns: frozenset[int]) -> float:
+        if row == len(sizes):
+            return 1.0
+        return sum(sizes[row][c] * below(row + 1, columns - {c}) for c in columns if sizes[row][c])
+
+    return below(0, frozenset(range(matrix.cols)))

@@ -1,0 +1,270 @@
+"""Where on a family of equilibria a condition vanishes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import sympy as sp
+
+from fastslow.model.rational import quotient
+from fastslow.symbolic.signs.signs import Signs
+from fastslow.symbolic.solving.algebra import (
+    generators,
+    irrational,
+    light,
+    longer,
+    numerator,
+    shortest,
+    spread,
+    tidy,
+    undefined,
+)
+from fastslow.symbolic.solving.candidates import Candidates, chosen
+from fastslow.symbolic.solving.solution_families import Family
+from fastslow.symbolic.solving.univariate import Root, factors_in, roots, solved_for
+from fastslow.symbolic.solving.verification import vanishes
+
+#: A longer condition, in parts of its tree, is left as an equation.
+PARTS = 500
+
+#: A root longer than this, in parts of its tree, is not put into a condition.
+BENT = 150
+
+#: Resultants are formed up to this degree of the eliminated unknown.
+RESULTANT = 6
+
+#: A quotient of products is given where it has so many times the operations of a sum.
+SHORTER = 0.75
+
+Place = dict[sp.Symbol, sp.Expr]
+
+
+@dataclass(frozen=True)
+class Located:
+    """Values of the unknown and of parameters, and what they leave open.
+
+    Parameters
+    ----------
+    place : dict
+        Symbol to value.
+    radicands : tuple of sympy.Expr
+        None of them negative where the point is real.
+    equations : tuple of sympy.Expr
+        Still to hold, = 0.
+    """
+
+    place: Place
+    radicands: tuple[sp.Expr, ...] = ()
+    equations: tuple[sp.Expr, ...] = ()
+
+
+def locate(
+    family: Family, condition: sp.Expr, signs: Signs, candidates: Iterable[sp.Symbol]
+) -> list[Located]:
+    """Solve condition = 0 on a family, for its unknown or for one more parameter.
+
+    Parameters
+    ----------
+    family : Family
+    condition : sympy.Expr
+        In states and parameters.
+    signs : Signs
+    candidates : Candidates or iterable of Symbol
+        Parameters to solve for, best first.
+
+    Returns
+    -------
+    list of Located
+        Empty where the condition cannot vanish.
+
+    Examples
+    --------
+    >>> from fastslow.model.structure import real
+    >>> from fastslow.symbolic.solving.solution_families import families
+    >>> x, w, q = map(real, "xwq")
+    >>> signs = Signs({q: 1})
+    >>> (cubic,) = families({"x": w + q * x - x**3}, ["x"], signs, [w, q])
+    >>> [point.place[x] for point in locate(cubic, q - 3 * x**2, signs, [w, q])]
+    [sqrt(3)*sqrt(q)/3, -sqrt(3)*sqrt(q)/3]
+    """
+    candidates = Candidates.of(candidates)
+    unknown = family.unknown
+    if unknown is None and family.elimination.unknowns:
+        return [Located({}, equations=(*family.equations, family.reduced(condition)))]
+    if family.bent:
+        return _on_bent_curve(family, condition, signs, candidates)
+    reduced = family.reduced(condition)
+    if longer(reduced, PARTS):
+        return [Located({}, equations=(*family.equations, reduced))]
+    if unknown is None:
+        return parameters_where(reduced, {}, (), signs, candidates)
+    if family.curve is not None and family.parameter is not None:
+        found = []
+        for factor in _open(reduced, [unknown, *candidates], signs):
+            found += _on_curve(family, factor, signs, candidates)
+        return found
+    if family.roots is None:
+        return [Located({}, equations=(*family.equations, reduced))]
+    result = []
+    for root in family.roots:
+        result += _at_root(family, root, reduced, signs, candidates)
+    if any(point.equations for point in result):
+        return _by_another(family, condition, signs, candidates) or result
+    return result
+
+
+def _by_another(
+    family: Family, condition: sp.Expr, signs: Signs, candidates: Candidates
+) -> list[Located]:
+    """With a parameter that stands affinely in the equation, the unknown left free."""
+    (equation,) = family.equations
+    other = solved_for(equation, candidates.without(family.unknown), signs)
+    if other is None:
+        return []
+    curve = replace(family, parameter=other[0], curve=other[1])
+    found = locate(curve, condition, signs, candidates)
+    return [] if any(point.equations for point in found) else found
+
+
+def _on_curve(
+    family: Family, factor: sp.Expr, signs: Signs, candidates: Candidates
+) -> list[Located]:
+    unknown, parameter, curve = family.unknown, family.parameter, family.curve
+    assert unknown is not None
+    assert parameter is not None
+    assert curve is not None
+    if unknown in factor.free_symbols:
+        closed = roots(factor, unknown, signs)
+        if closed is not None:
+            return [
+                Located(
+                    {unknown: r.value, parameter: neat(curve.subs(unknown, r.value))},
+                    r.radicands,
+                )
+                for r in closed
+            ]
+    other = solved_for(factor, candidates.without(parameter, unknown), signs)
+    if other is None:
+        return [Located({parameter: curve}, equations=(factor,))]
+    symbol, value, _ = other
+    return [Located({symbol: value, parameter: neat(curve.subs(symbol, value))})]
+
+
+def _on_bent_curve(
+    family: Family, condition: sp.Expr, signs: Signs, candidates: Candidates
+) -> list[Located]:
+    """On a curve given by a root: from the two equations, with the parameter eliminated.
+
+    What belongs to the other root does not fulfil the condition here and is left out.
+    """
+    unknown, parameter, curve = family.unknown, family.parameter, family.curve
+    assert unknown is not None
+    assert parameter is not None
+    assert curve is not None
+    (equation,) = family.equations
+    free = numerator(replace(family, parameter=None, curve=None).reduced(condition))
+    short = not longer(free, BENT) and not longer(curve, BENT)
+    whole = short and equation.is_polynomial(parameter) and free.is_polynomial(parameter)
+    if not whole or max(sp.degree(e, parameter) for e in (equation, free)) > RESULTANT:
+        return [Located({}, family.radicands, (equation, free))]
+    both = sp.resultant(equation, free, parameter) if parameter in free.free_symbols else free
+    found = []
+    for factor in _open(both, [unknown, *candidates], signs):
+        closed = roots(factor, unknown, signs) if unknown in factor.free_symbols else None
+        places = [({unknown: r.value}, r.radicands) for r in closed or ()]
+        if closed is None:
+            other = solved_for(factor, candidates.without(parameter, unknown), signs)
+            places = [({other[0]: other[1]}, ())] if other is not None else []
+            if other is None:
+                found.append(Located({parameter: curve}, family.radicands, (factor,)))
+        for place, radicands in places:
+            value = neat(curve.subs(place))
+            if undefined(value) or not vanishes(free.subs(place).subs(parameter, value), signs):
+                continue
+            under = tuple(neat(r.subs(place)) for r in family.radicands)
+            found.append(Located({**place, parameter: value}, (*radicands, *under)))
+    return found
+
+
+def _at_root(
+    family: Family, root: Root, reduced: sp.Expr, signs: Signs, candidates: Candidates
+) -> list[Located]:
+    unknown = family.unknown
+    assert unknown is not None
+    at = reduced.xreplace({unknown: root.value})
+    if longer(at, PARTS):
+        return [Located({unknown: root.value}, root.radicands, (at,))]
+    at = tidy(at)
+    if irrational(at):
+        (equation,) = family.equations
+        polys = equation.is_polynomial(unknown) and reduced.is_polynomial(unknown)
+        if not polys or sp.degree(reduced, unknown) > RESULTANT:
+            return [Located({unknown: root.value}, root.radicands, (at,))]
+        at = sp.resultant(equation, reduced, unknown)
+    found = parameters_where(at, {unknown: root.value}, root.radicands, signs, candidates)
+    return [
+        point
+        for point in found
+        # a root of the resultant may belong to another root of the unknown
+        if point.equations or vanishes(reduced.subs(point.place).subs(point.place), signs)
+    ]
+
+
+def parameters_where(
+    condition: sp.Expr,
+    known: Place,
+    radicands: tuple[sp.Expr, ...],
+    signs: Signs,
+    candidates: Iterable[sp.Symbol],
+) -> list[Located]:
+    """Solve a condition on parameters alone for one of them, and put it into what is known.
+
+    Examples
+    --------
+    >>> from fastslow.model.structure import real
+    >>> a, x = real("a"), real("x")
+    >>> parameters_where(a - 1, {x: a**2}, (), Signs({}), [a])[0].place
+    {x: 1, a: 1}
+    """
+    if longer(condition, PARTS):
+        return [Located(dict(known), radicands, (condition,))]
+    candidates = Candidates.of(candidates)
+    result = []
+    for factor in _open(condition, list(candidates), signs):
+        choice = chosen(factor, candidates, signs)
+        if choice is None:
+            result.append(Located(dict(known), radicands, (factor,)))
+            continue
+        for option in choice.values:
+            value = {choice.symbol: option.value}
+            place = {s: neat(e.subs(value)) for s, e in known.items()}
+            under = tuple(neat(r.subs(value)) for r in radicands)
+            result.append(Located({**place, **value}, (*under, *option.radicands)))
+    return result
+
+
+def _open(condition: sp.Expr, symbols: Sequence[sp.Symbol], signs: Signs) -> list[sp.Expr]:
+    """Factors that may vanish."""
+    return [f for f, _ in factors_in(condition, symbols) if signs.sign(f) not in (1, -1)]
+
+
+def neat(expression: sp.Expr) -> sp.Expr:
+    """Short, with radicals expanded; as it is when long.
+
+    Examples
+    --------
+    >>> a = sp.Symbol("a", positive=True)
+    >>> neat(sp.sqrt(a) * (sp.sqrt(a) + 1) - sp.sqrt(a))
+    a
+    """
+    if expression.has(sp.polys.rootoftools.ComplexRootOf):
+        return expression
+    found = quotient(expression) if irrational(expression) else None
+    if found is not None:
+        flat, whole = found.expanded(), found.factored()
+        return whole if sp.count_ops(whole) < SHORTER * sp.count_ops(flat) else flat
+    if irrational(expression) and light(expression) and not generators(expression):
+        expanded = spread(expression)
+        return min(expanded, spread(sp.together(expanded)), key=sp.count_ops)
+    return shortest(expression)

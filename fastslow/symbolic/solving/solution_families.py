@@ -1,0 +1,476 @@
+"""Families of equilibria: the equations rate = 0 split into irreducible parts and solved."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import sympy as sp
+
+from fastslow.model.structure import real
+from fastslow.results.base.named_mapping import Named
+from fastslow.symbolic.report.decimals import without_scale
+from fastslow.symbolic.report.naming import WIDTH
+from fastslow.symbolic.signs.signs import Signs
+from fastslow.symbolic.solving.algebra import (
+    factors,
+    generators,
+    growth,
+    irrational,
+    light,
+    longer,
+    numerator,
+    shortest,
+    spread,
+    tidy,
+    undefined,
+)
+from fastslow.symbolic.solving.candidates import Candidates, chosen
+from fastslow.symbolic.solving.elimination import Elimination, Nonzero, eliminate
+from fastslow.symbolic.solving.linear import cramer
+from fastslow.symbolic.solving.lowering import lower_degrees
+from fastslow.symbolic.solving.univariate import DEGREE, Root, factors_in, roots
+
+#: Terms in all coefficients together, up to which a discriminant is formed.
+COEFFICIENTS = 12
+
+#: Longer divisors, in parts of their tree, are not written out in a note.
+PARTS = 100
+
+#: Rates that may have more terms than this once expanded are left as they are.
+EXPANDED = 300
+
+#: With roots of symbols, which make every later step longer.
+EXPANDED_RADICAL = 60
+
+#: Of several equations together, which elimination makes longer.
+EXPANDED_SEVERAL = 120
+
+#: What is said of equations that are left.
+OPEN = "not solved in closed form:"
+
+#: What is said of rates past the budget.
+PAST = f"{OPEN} rates past the budget of expansion"
+
+#: More branches of one set of equations than this are not split any further.
+BRANCHES = 32
+
+
+@dataclass(frozen=True)
+class Family:
+    """One irreducible set of solutions of rate = 0, or of any equations in the states.
+
+    Parameters
+    ----------
+    elimination : Elimination
+        Irreducible remaining equations, unknowns, and every other state.
+    parameter : Symbol or None
+        The parameter that the equation was solved for.
+    curve : sympy.Expr or None
+        Its value along the family, in the unknown and the other parameters.
+    roots : tuple of Root or None
+        The unknown in closed form; None where there is no short one.
+    discriminant : sympy.Expr or None
+        Of the remaining polynomial in its unknown, from degree two on.
+    condition : tuple of sympy.Expr
+        Equations without any unknown: the family exists only where they vanish.
+    note : str
+        Why it stayed implicit, and what was divided by.
+    bent : bool
+        Whether the parameter does not stand affinely, so that the curve is one of several.
+    radicands : tuple of sympy.Expr
+        None of them negative along the curve.
+    """
+
+    elimination: Elimination
+    parameter: sp.Symbol | None = None
+    curve: sp.Expr | None = None
+    roots: tuple[Root, ...] | None = None
+    discriminant: sp.Expr | None = None
+    condition: tuple[sp.Expr, ...] = ()
+    note: str = ""
+    bent: bool = False
+    radicands: tuple[sp.Expr, ...] = ()
+
+    @property
+    def unknown(self) -> sp.Symbol | None:
+        """The one unknown of a univariate family."""
+        return self.elimination.unknowns[0] if self.elimination.is_univariate else None
+
+    @property
+    def equations(self) -> tuple[sp.Expr, ...]:
+        """What is left to hold, = 0."""
+        return self.elimination.remaining
+
+    def reduced(self, expression: sp.Expr) -> sp.Expr:
+        """Give an expression in the states as one in the unknowns, the parameter replaced."""
+        solved = {real(n): e for n, e in self.elimination.solved.items()}
+        inside = expression.xreplace(solved)
+        if self.parameter is not None and self.curve is not None:
+            inside = inside.xreplace({self.parameter: self.curve})
+        return tidy(inside)
+
+
+def families(
+    rates: Mapping[str, sp.Expr],
+    states: Sequence[str],
+    signs: Signs,
+    candidates: Iterable[sp.Symbol],
+    *,
+    populations: bool = True,
+) -> list[Family]:
+    """All families of solutions of rate = 0.
+
+    Parameters
+    ----------
+    rates : mapping
+        State to smooth rate, exact coefficients.
+    states : sequence of str
+    signs : Signs
+        Used to tell which coefficients may be divided by.
+    candidates : Candidates or iterable of Symbol
+        Parameters that a family may be solved for, best first.
+    populations : bool
+        Whether rates x g(x, …) are taken apart first. With further equations, one of which
+        may imply g = 0, that would list places of a continuum.
+
+    Returns
+    -------
+    list of Family
+
+    Examples
+    --------
+    >>> x, w = real("x"), real("w")
+    >>> [f.curve for f in families({"x": w - x**3}, ["x"], Signs({}), [w])]
+    [x**3]
+    """
+    candidates = Candidates.of(candidates)
+    unknowns = tuple(real(n) for n in states)
+    if any(_past(rates[n]) for n in states):
+        return _by_factors(rates, states, signs, candidates)
+    growths = _growth_rates(rates, states) if populations else None
+    if growths is not None:
+        return _of_populations(growths, states, signs, candidates)
+    direct = cramer(rates, states)
+    if isinstance(direct, tuple):
+        values, below = direct
+        solved = Elimination((), (), Named("solved state", values), (below,))
+        return _solved(solved, signs, candidates)
+    if direct is not None:
+        whole = Elimination(tuple(rates.values()), unknowns, Named("solved state", {}))
+        return [Family(whole, note=direct)]
+    poles = _poles(rates, states)
+    return [
+        family
+        for elimination in split(rates, states, signs)
+        if not poles or _keeps(elimination, poles)
+        for family in _solved(elimination, signs, candidates)
+    ]
+
+
+def _growth_rates(
+    rates: Mapping[str, sp.Expr], states: Sequence[str]
+) -> dict[str, list[sp.Expr]] | None:
+    """Each rate as it is, or as its own state and what this is multiplied by.
+
+    None where no rate is such a product, and past the budget of branches.
+    """
+    unknowns = tuple(real(n) for n in states)
+    choices = {}
+    for name in states:
+        found = _factors_as_written(rates[name], unknowns)
+        own = real(name)
+        rest = [f for f in found if f != own]
+        kolmogorov = own in found and len(rest) == 1 and rest[0] not in unknowns
+        choices[name] = [own, rest[0]] if kolmogorov else [rates[name]]
+    count = math.prod(map(len, choices.values()))
+    return choices if 1 < count <= BRANCHES else None
+
+
+def _of_populations(
+    growths: Mapping[str, list[sp.Expr]],
+    states: Sequence[str],
+    signs: Signs,
+    candidates: Candidates,
+) -> list[Family]:
+    """Families of rates x g(x, …): one for each choice of states that are absent."""
+    found: list[Family] = []
+    for picked in itertools.product(*growths.values()):
+        absent = {real(n): sp.S.Zero for n, e in zip(states, picked, strict=True) if e == real(n)}
+        left = {
+            n: sp.sympify(e.xreplace(absent))
+            for n, e in zip(states, picked, strict=True)
+            if real(n) not in absent
+        }
+        open_ones = {real(n) for n in left}
+        empty = [e for n, e in left.items() if len(growths[n]) > 1]
+        if any(undefined(e) for e in left.values()) or not all(
+            e.free_symbols & open_ones for e in empty
+        ):
+            continue
+        known = {s.name: e for s, e in absent.items()}
+        if not left:
+            nothing = Elimination((), (), Named("solved state", known))
+            found.append(Family(_ordered(nothing, states)))
+            continue
+        for family in families(left, list(left), signs, candidates):
+            solved = Named("solved state", {**known, **dict(family.elimination.solved)})
+            whole = replace(family.elimination, solved=solved)
+            found.append(replace(family, elimination=_ordered(whole, states)))
+    return found
+
+
+def _past(rate: sp.Expr) -> bool:
+    """Whether a rate is too long to be expanded."""
+    if generators(rate):
+        return False
+    return growth(rate) > (EXPANDED_RADICAL if irrational(rate) else EXPANDED)
+
+
+def _by_factors(
+    rates: Mapping[str, sp.Expr], states: Sequence[str], signs: Signs, candidates: Candidates
+) -> list[Family]:
+    """Families of rates past the budget, one for each choice of a factor that vanishes.
+
+    A factor that is a state alone makes the other rates shorter, so that they may be
+    within the budget; what is not stays as it is.
+    """
+    unknowns = tuple(real(n) for n in states)
+    choices = [_factors_as_written(rates[n], unknowns) for n in states]
+    if math.prod(map(len, choices)) > BRANCHES:
+        choices = [[rates[n]] for n in states]
+    found: list[Family] = []
+    for picked in itertools.product(*choices):
+        zero = {e: sp.S.Zero for e in picked if e in unknowns}
+        names = [n for n in states if real(n) not in zero]
+        left = [sp.sympify(e.xreplace(zero)) for e in picked if e not in zero]
+        if any(undefined(e) or (e.is_number and e != 0) for e in left):
+            continue
+        if len(left) != len(names):
+            zero, names, left = {}, list(states), list(picked)
+        several = len(left) > 1 and sum(map(growth, left)) > EXPANDED_SEVERAL
+        short = not several and not any(_past(e) for e in left)
+        if zero and names and short:
+            inner = families(dict(zip(names, left, strict=True)), names, signs, candidates)
+        else:
+            open_ones = tuple(map(real, names))
+            rest = Elimination(tuple(left), open_ones, Named("solved state", {}))
+            inner = [Family(rest, note=PAST if names else "")]
+        known = {s.name: e for s, e in zero.items()}
+        for family in inner:
+            solved = Named("solved state", {**known, **dict(family.elimination.solved)})
+            whole = replace(family.elimination, solved=solved)
+            found.append(replace(family, elimination=_ordered(whole, states)))
+    return found
+
+
+def _factors_as_written(rate: sp.Expr, unknowns: Sequence[sp.Symbol]) -> list[sp.Expr]:
+    """Factors of a product with an unknown in them, or the whole where there are none."""
+    bases = [f.as_base_exp() for f in sp.Mul.make_args(rate)]
+    found = [b for b, e in bases if e.is_positive and b.free_symbols & set(unknowns)]
+    poles = [b for b, e in bases if not e.is_positive and b.free_symbols & set(unknowns)]
+    return [rate] if poles or not found else list(dict.fromkeys(found))
+
+
+def _poles(rates: Mapping[str, sp.Expr], states: Sequence[str]) -> list[sp.Expr]:
+    """Denominators with states in them; where one vanishes there is no equilibrium."""
+    moving = {real(n) for n in states}
+    found = {
+        p.base
+        for rate in rates.values()
+        for p in rate.atoms(sp.Pow)
+        if p.exp.is_negative and p.base.free_symbols & moving
+    }
+    return sorted(found, key=str)
+
+
+def split(rates: Mapping[str, sp.Expr], states: Sequence[str], signs: Signs) -> list[Elimination]:
+    """Eliminate, and take reducible equations apart, until every equation is irreducible.
+
+    Examples
+    --------
+    >>> x, y, r = map(real, "xyr")
+    >>> [e.solved for e in split({"x": y - x, "y": r * x - x * y}, ["x", "y"], Signs({}))]
+    [{x: 0, y: 0}, {x: r, y: r}]
+    """
+    whole = eliminate(rates, states, nonzero=signs.nonzero)
+    done: list[Elimination] = []
+    waiting = [whole]
+    while waiting:
+        current = waiting.pop(0)
+        pieces = _pieces(current)
+        if pieces is None or len(done) + len(waiting) > BRANCHES:
+            done.append(current)
+            continue
+        again = [_again(current, equations, signs) for equations in pieces]
+        waiting = [e for e in again if not any(r.is_nonzero for r in e.remaining)] + waiting
+    return [_ordered(e, states) for e in _generic(done, signs)]
+
+
+def _ordered(elimination: Elimination, states: Sequence[str]) -> Elimination:
+    solved = {n: elimination.solved[n] for n in states if n in elimination.solved}
+    return replace(elimination, solved=Named("solved state", solved))
+
+
+def _pieces(current: Elimination) -> list[tuple[sp.Expr, ...]] | None:
+    for row, equation in enumerate(current.remaining):
+        found = [f for f, _ in factors_in(equation, current.unknowns)]
+        if not found:
+            continue
+        rest = (current.remaining[:row], current.remaining[row + 1 :])
+        if len(found) > 1:
+            return [(*rest[0], f, *rest[1]) for f in found]
+        multiple = tidy(numerator(equation) / found[0])
+        if multiple.free_symbols & set(current.unknowns):
+            return [(*rest[0], found[0], *rest[1])]
+    if min(len(current.remaining), len(current.unknowns)) < 2:
+        return None
+    lowered = lower_degrees(current.remaining, current.unknowns, rounds=1)
+    return None if lowered == [current.remaining] else lowered
+
+
+def _again(current: Elimination, equations: tuple[sp.Expr, ...], signs: Signs) -> Elimination:
+    return _joined(current, equations, signs.nonzero)
+
+
+def _joined(current: Elimination, equations: Sequence[sp.Expr], nonzero: Nonzero) -> Elimination:
+    """Eliminate further among equations in the unknowns of an elimination."""
+    names = [u.name for u in current.unknowns]
+    padded = [*equations, *[sp.Integer(0)] * (len(names) - len(equations))]
+    extra = padded[len(names) :]
+    further = eliminate(
+        dict(zip(names, padded, strict=False)),
+        names,
+        nonzero=nonzero,
+    )
+    place = {real(n): e for n, e in further.solved.items()}
+    solved = {n: spread(e.xreplace(place)) for n, e in current.solved.items()}
+    left = tuple(e for e in (tidy(x.xreplace(place)) for x in extra) if e != 0)
+    return Elimination(
+        (*further.remaining, *left),
+        further.unknowns,
+        Named("solved state", {**solved, **dict(further.solved)}),
+        (*current.divisors, *further.divisors),
+    )
+
+
+def _generic(found: list[Elimination], signs: Signs) -> list[Elimination]:
+    """Where several polynomial equations are left, divide by coefficients with states in them."""
+    result: list[Elimination] = []
+    for current in found:
+        several = len(current.remaining) > 1 and len(current.unknowns) > 1
+        if not several:
+            result.append(current)
+            continue
+        further = _joined(current, current.remaining, lambda e: e != 0)
+        if len(further.unknowns) == len(current.unknowns):
+            result.append(current)
+            continue
+        pieces = _pieces(further)
+        again = [further] if pieces is None else [_again(further, p, signs) for p in pieces]
+        result += [e for e in again if _keeps(e, e.divisors[len(current.divisors) :])]
+    return result
+
+
+def _keeps(elimination: Elimination, divided: Sequence[sp.Expr]) -> bool:
+    """Whether no divisor vanishes all along the family, which would make it spurious."""
+    place = {real(n): e for n, e in elimination.solved.items()}
+    left = [tidy(d.xreplace(place)) for d in divided]
+    if elimination.is_univariate:
+        (equation,), unknowns = elimination.remaining, elimination.unknowns
+        both = [e for e in left if equation.is_polynomial(*unknowns) and light(e) and e != 0]
+        above = [numerator(e) for e in both if light(equation)]
+        left += [sp.rem(e, equation, *unknowns) for e in above if e.is_polynomial(*unknowns)]
+    return all(e != 0 and not undefined(e) for e in left)
+
+
+def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> list[Family]:
+    unknowns = elimination.unknowns
+    free = [e for e in elimination.remaining if not e.free_symbols & set(unknowns)]
+    bound = [e for e in elimination.remaining if e.free_symbols & set(unknowns)]
+    slim = Elimination(tuple(bound), unknowns, elimination.solved, elimination.divisors)
+    note = ""
+    divided = list(dict.fromkeys(f for d in elimination.divisors for f in _open(d, signs)))
+    if divided:
+        note = "found where " + ", ".join(f"{_short(d)} ≠ 0" for d in divided)
+    if not slim.is_univariate:
+        if bound:
+            many = f"{OPEN} {len(bound)} equations are left"
+            note = _and(note, "1 equation is left" if len(bound) == 1 else many)
+        return [Family(slim, condition=tuple(free), note=note)]
+    (equation,), (unknown,) = slim.remaining, unknowns
+    closed = roots(equation, unknown, signs)
+    if closed is not None and sp.degree(equation, unknown) == 1:
+        return [_linear(slim, closed[0].value, free, note, signs)]
+    choice = chosen(equation, candidates.without(unknown), signs)
+    bent = choice is not None and choice.slope is None
+    if choice is not None and (not choice.values or (bent and closed is not None)):
+        # the unknown has a closed form; a root of the parameter would only be longer
+        choice = None
+    parameter = choice.symbol if choice is not None else None
+    curve = choice.values[0].value if choice is not None else None
+    slope = choice.slope if choice is not None else None
+    if slope is not None and not signs.nonzero(slope) and slope.free_symbols & {unknown}:
+        note = _and(note, f"the curve holds where {_short(slope)} ≠ 0")
+    discriminant = None
+    if equation.is_polynomial(unknown):
+        poly = sp.Poly(equation, unknown)
+        size = sum(growth(spread(c)) for c in poly.all_coeffs())
+        if poly.degree() == 2 or (2 < poly.degree() <= 5 and size <= COEFFICIENTS):
+            discriminant = shortest(sp.discriminant(poly))
+        if closed is None and curve is None:
+            long = "past the budget" if poly.degree() > DEGREE else "no short radicals"
+            note = _and(note, f"{OPEN} degree {poly.degree()} in {unknown}, {long}")
+    elif curve is None:
+        note = _and(note, f"{OPEN} not a polynomial in {unknown}")
+    whole = Family(
+        slim,
+        parameter,
+        curve,
+        tuple(closed) if closed is not None else None,
+        discriminant,
+        tuple(free),
+        note,
+    )
+    if choice is None or choice.slope is not None:
+        return [whole]
+    return [
+        replace(whole, curve=value.value, bent=True, radicands=value.radicands)
+        for value in choice.values
+    ]
+
+
+def _linear(
+    slim: Elimination, value: sp.Expr, free: list[sp.Expr], note: str, signs: Signs
+) -> Family:
+    """Give a family whose last unknown has one value, except where its slope vanishes."""
+    (equation,), (unknown,) = slim.remaining, slim.unknowns
+    slope = spread(equation).diff(unknown)
+    solved = {n: tidy(e.subs(unknown, value)) for n, e in slim.solved.items()}
+    whole = Elimination(
+        (), (), Named("solved state", {**solved, unknown.name: value}), slim.divisors
+    )
+    for factor in _open(slope, signs):
+        note = _and(note, f"found where {_short(factor)} ≠ 0")
+    return Family(whole, condition=tuple(free), note=note)
+
+
+def _open(divisor: sp.Expr, signs: Signs) -> list[sp.Expr]:
+    """Factors of a divisor that may vanish, without their numbers."""
+    if signs.nonzero(divisor):
+        return []
+    if longer(divisor, PARTS):
+        return [divisor]
+    return [f for f, power in factors(divisor)[1] if power > 0 and not signs.nonzero(f)]
+
+
+def _short(expression: sp.Expr) -> str:
+    expression = without_scale(expression)
+    long = longer(expression, PARTS) or len(str(expression)) > WIDTH // 2
+    return "(a long expression)" if long else str(expression)
+
+
+def _and(first: str, second: str) -> str:
+    return f"{first}; {second}" if first else second
