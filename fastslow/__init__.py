@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     )
     from fastslow.exporters.sources import export
     from fastslow.interactive.explorers import explore
-    from fastslow.interactive.pointers import inspect
+    from fastslow.interactive.pointers import pick
     from fastslow.model.model import Model
     from fastslow.passage.delays.delay_laws import predict_delay
     from fastslow.passage.delays.hopf_delays import hopf_exit
@@ -50,11 +50,11 @@ if TYPE_CHECKING:
     from fastslow.results.points import Equilibrium, SpecialPoint
     from fastslow.results.trajectory.ensemble import Ensemble
     from fastslow.results.trajectory.lyapunov import LyapunovExponent
-    from fastslow.results.trajectory.periodicity import SteadyState
+    from fastslow.results.trajectory.periodicity import Periodicity
     from fastslow.results.trajectory.regimes import Regimes, RegimeSet
     from fastslow.results.trajectory.section import Section
     from fastslow.results.trajectory.spectrum import Spectrum
-    from fastslow.results.trajectory.sweep import Sweep
+    from fastslow.results.trajectory.sweep import BifurcationSweep
     from fastslow.results.trajectory.trajectory import Trajectory
     from fastslow.simulation.lyapunov import lyapunov_exponent
     from fastslow.simulation.many import simulate_many
@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     from fastslow.sweeps.refinement import refined_map
     from fastslow.symbolic.derivation import Derivation, derive
     from fastslow.symbolic.reduction import reduce_states
-    from fastslow.symbolic.scaling import disagreements, nondimensionalise
+    from fastslow.symbolic.scaling import compare_scalings, nondimensionalise
 
 __version__ = "0.1.0"
 
@@ -97,8 +97,8 @@ _HOME = {
     "SlowLoad": "results.overlay.slow_loads",
     "SpecialPoint": "results.points",
     "Spectrum": "results.trajectory.spectrum",
-    "SteadyState": "results.trajectory.periodicity",
-    "Sweep": "results.trajectory.sweep",
+    "Periodicity": "results.trajectory.periodicity",
+    "BifurcationSweep": "results.trajectory.sweep",
     "Trajectory": "results.trajectory.trajectory",
     "UnknownNameError": "errors",
     "bifurcation_sweep": "simulation.sweep",
@@ -107,12 +107,12 @@ _HOME = {
     "continue_points": "diagrams.curves.point_curves",
     "delay_scaling": "passage.delays.scaling_runs",
     "derive": "symbolic.derivation",
-    "disagreements": "symbolic.scaling",
+    "compare_scalings": "symbolic.scaling",
     "equilibria": "diagrams.solve.solving",
     "explore": "interactive.explorers",
     "export": "exporters.sources",
     "hopf_exit": "passage.delays.hopf_delays",
-    "inspect": "interactive.pointers",
+    "pick": "interactive.pointers",
     "load": "results.io.files",
     "lyapunov_exponent": "simulation.lyapunov",
     "nondimensionalise": "symbolic.scaling",
@@ -134,6 +134,7 @@ _HOME = {
 
 __all__ = [
     "ArgumentError",
+    "BifurcationSweep",
     "Branch",
     "Continuation",
     "DelayScaling",
@@ -152,6 +153,7 @@ __all__ = [
     "ModelError",
     "OutOfRangeError",
     "Overlay",
+    "Periodicity",
     "PointBranch",
     "PointCurves",
     "RefinedMap",
@@ -161,27 +163,25 @@ __all__ = [
     "SlowLoad",
     "SpecialPoint",
     "Spectrum",
-    "SteadyState",
-    "Sweep",
     "Trajectory",
     "UnknownNameError",
     "__version__",
     "bifurcation_sweep",
     "classify_regime",
+    "compare_scalings",
     "continue_equilibria",
     "continue_points",
     "delay_scaling",
     "derive",
-    "disagreements",
     "equilibria",
     "explore",
     "export",
     "hopf_exit",
-    "inspect",
     "load",
     "lyapunov_exponent",
     "nondimensionalise",
     "overlay",
+    "pick",
     "plot",
     "precompile",
     "predict_delay",

@@ -32,7 +32,7 @@ from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.points import Equilibrium
-from fastslow.results.trajectory.state_at import Moment
+from fastslow.results.trajectory.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -50,7 +50,7 @@ class Pick:
 
     Parameters
     ----------
-    point : Equilibrium, SpecialPoint, Crossing, Transition or Moment
+    point : Equilibrium, SpecialPoint, Crossing, Transition or StatePoint
     ax : Axes
     x, y : float
         Where it is drawn.
@@ -127,7 +127,7 @@ def curves_of(drawing: Any, result: Diagram | Trajectory | Overlay) -> tuple[Cur
     )
 
 
-def pick(curves: Iterable[Curve], ax: Axes, x: float, y: float) -> Pick | None:
+def nearest_pick(curves: Iterable[Curve], ax: Axes, x: float, y: float) -> Pick | None:
     """The drawn point nearest to a place on the screen.
 
     Parameters
@@ -260,7 +260,7 @@ def _at_crossings(ax: Axes, at: Array, run: Trajectory) -> Curve:
 def _on_run(run: Trajectory) -> Callable[[int, float], tuple[Any, str]]:
     """The moment at a place along a trajectory: of its series where it kept them."""
 
-    def found(row: int, part: float) -> tuple[Moment, str]:
+    def found(row: int, part: float) -> tuple[StatePoint, str]:
         times = run.t
         time = float(times[row] if part == 0 else (1 - part) * times[row] + part * times[row + 1])
         return run.at(t=time)[0], f"run.at(t={time!r})[0]"

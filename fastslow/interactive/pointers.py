@@ -12,7 +12,7 @@ from matplotlib.text import Annotation
 
 from fastslow.arguments import function, takes
 from fastslow.errors import MissingPackageError
-from fastslow.interactive.picking import Curve, Pick, curves_of, pick
+from fastslow.interactive.picking import Curve, Pick, curves_of, nearest_pick
 from fastslow.plot.layout.style import BLACK, GREY, SMALL, printed
 from fastslow.plot.layout.typesetting import paragraph
 from fastslow.results.branch.diagram import Diagram
@@ -21,7 +21,7 @@ from fastslow.results.trajectory.trajectory import Trajectory
 
 
 @takes(on_click=function)
-def inspect(
+def pick(
     drawing: Any,
     result: Diagram | Trajectory | Overlay,
     *,
@@ -60,7 +60,7 @@ def inspect(
     >>> gear = fs.systems.harmonic_gear(A=-0.6).frozen()
     >>> diagram = fs.continue_equilibria(gear, "w", over=(-0.5, 0.5))
     >>> drawing = fs.plot.diagram(diagram)
-    >>> pointer = fs.inspect(drawing, diagram)
+    >>> pointer = fs.pick(drawing, diagram)
     >>> place = drawing.ax.transData.transform((diagram.folds[0]["w"], diagram.folds[0]["x"]))
     >>> click = MouseEvent("button_press_event", drawing.figure.canvas, *place, button=1)
     >>> drawing.figure.canvas.callbacks.process(click.name, click)
@@ -153,7 +153,7 @@ class Pointer:
     def _found(self, event: Event) -> Pick | None:
         assert isinstance(event, MouseEvent)
         ax = event.inaxes
-        return pick(self.curves, ax, event.x, event.y) if isinstance(ax, Axes) else None
+        return nearest_pick(self.curves, ax, event.x, event.y) if isinstance(ax, Axes) else None
 
     def _hide(self) -> None:
         if self._box is not None and self._box.axes is not None:

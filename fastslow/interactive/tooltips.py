@@ -22,7 +22,7 @@ def text_of(point: Any, parameter: str = "") -> str:
 
     Parameters
     ----------
-    point : Equilibrium, SpecialPoint, Crossing, Transition or Moment
+    point : Equilibrium, SpecialPoint, Crossing, Transition or StatePoint
     parameter : str
         What the diagram is over.
 

@@ -43,7 +43,7 @@ class Model:
 
     Models cannot be changed, and are equal, with one hash, when their content is:
     equations, parameter values, interfaces, regions and periods, with their names and in
-    the same order. Names of regions that are empty at these values (``vanished``) count.
+    the same order. Names of regions that are empty at these values (``empty_regions``) count.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ class Model:
         return self._from(self.structure, values)
 
     @takes(name=formula)
-    def freed(self, name: object) -> Model:
+    def with_free(self, name: object) -> Model:
         """The model with one parameter's value taken away, to vary it.
 
         Regions that are empty at the old value but not at every value are among
@@ -245,7 +245,7 @@ class Model:
         --------
         >>> x, D = sp.symbols("x D")
         >>> model = Model({x: -sp.Max(x - D, -x - D, 0)}, parameters={D: 1})
-        >>> len(model.regions), len(model.freed("D").regions)
+        >>> len(model.regions), len(model.with_free("D").regions)
         (3, 6)
         """
         key = normalised(str(name))
@@ -297,7 +297,7 @@ class Model:
         return self._from(*self.structure.frozen(path, self.parameters))
 
     @takes(name=formula)
-    def ramped(self, name: object, rate: float, start: float = 0.0) -> Model:
+    def with_ramp(self, name: object, rate: float, start: float = 0.0) -> Model:
         """The model with one parameter drifting at a constant rate: start + rate·t.
 
         Both numbers become parameters, named after it, so that a range of rates
@@ -324,13 +324,13 @@ class Model:
         --------
         >>> x, w, t = sp.symbols("x w t")
         >>> fast = Model({x: w - x}, forcing={w: sp.sin(t)}).frozen()
-        >>> print(fast.ramped(w, 0.5, start=-1).forcing["w"])
+        >>> print(fast.with_ramp(w, 0.5, start=-1).forcing["w"])
         t*w_rate + w_start
         """
         key = normalised(str(name))
         if key in (*self.forcing, *self.slow_states):
             raise ModelError(f"'{key}' already varies in time; ramp it in model.frozen() instead")
-        freed = self.freed(key)
+        freed = self.with_free(key)
         first, speed = f"{key}_start", f"{key}_rate"
         numbers = {
             first: finite_number(f"parameter {first}", start),
@@ -366,14 +366,14 @@ class Model:
         return _period(self.structure, known)
 
     @property
-    def vanished(self) -> tuple[str, ...]:
+    def empty_regions(self) -> tuple[str, ...]:
         """Names of regions seen at other parameter values that are empty at these.
 
         Examples
         --------
         >>> x, D = sp.symbols("x D")
         >>> model = Model({x: -sp.Max(x - D, -x - D, 0)}, parameters={D: 1})
-        >>> model.vanished, model.with_parameters(D=0).vanished
+        >>> model.empty_regions, model.with_parameters(D=0).empty_regions
         ((), ('S2',))
         """
         seen = {name for _, name in self.structure.names}
@@ -492,8 +492,8 @@ class Model:
         for region in self.regions.values():
             rates = ", ".join(f"{state}' = {rate}" for state, rate in region.rates.items())
             lines.append(f"  {region}:  {rates}" if len(self.regions) > 1 else f"  {rates}")
-        if self.vanished:
-            lines.append(f"  empty at these parameter values: {', '.join(self.vanished)}")
+        if self.empty_regions:
+            lines.append(f"  empty at these parameter values: {', '.join(self.empty_regions)}")
         lines += [f"  {name} = {law}" for name, law in self.forcing.items()]
         lines += [f"  {name} modulo {p}" for name, p in self.structure.periodic.items()]
         if self.parameters:

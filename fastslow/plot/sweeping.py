@@ -16,7 +16,7 @@ from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.legends import explained
 from fastslow.plot.layout.style import BLACK, BLUE, GREY, VERMILION, axes_for, widen
 from fastslow.plot.layout.typesetting import typeset
-from fastslow.results.trajectory.sweep import Sweep, SweepPass
+from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
 
 #: More points than this are stored as pixels, in files of vectors too.
 MANY = 20_000
@@ -53,7 +53,7 @@ class SweepDrawing(Drawing):
 
 
 @takes(
-    sweep=instance(Sweep),
+    sweep=instance(BifurcationSweep),
     ax=instance(Axes),
     width=figure_width,
     label=flag,
@@ -62,7 +62,7 @@ class SweepDrawing(Drawing):
     style=line_style,
 )
 def sweep(
-    sweep: Sweep,
+    sweep: BifurcationSweep,
     *,
     ax: Axes | None = None,
     width: str | float = "column",
@@ -75,7 +75,7 @@ def sweep(
 
     Parameters
     ----------
-    sweep : Sweep
+    sweep : BifurcationSweep
     ax : Axes, optional
         Axes to draw into; new ones otherwise.
     width : str or float

@@ -186,29 +186,29 @@ class Equilibria(ImmutableSequence, tuple[Equilibrium, ...]):
 
     Attributes
     ----------
-    coverage : str
+    completeness : str
         ``"complete"`` when the tuple is proved to hold all of them, else ``"found"``.
     sets : tuple of EquilibriumSet
         Sets of equilibria within discontinuities (a block that sticks by dry friction);
         their corners are in the tuple, with ``continuum=True``.
     """
 
-    coverage: str
+    completeness: str
     sets: tuple[EquilibriumSet, ...]
 
     def __new__(
         cls,
         items: Iterable[Equilibrium] = (),
-        coverage: str = "found",
+        completeness: str = "found",
         sets: Sequence[EquilibriumSet] = (),
     ) -> Equilibria:
         made = super().__new__(cls, items)
-        made.coverage = coverage
+        made.completeness = completeness
         made.sets = tuple(sets)
         return made
 
     def __getnewargs__(self) -> tuple[Any, ...]:
-        return tuple(self), self.coverage, self.sets
+        return tuple(self), self.completeness, self.sets
 
 
 @dataclass(frozen=True, eq=False)

@@ -487,4 +487,4 @@ def _recurrence(
         period=period,
         integration=replace(integration, max_steps=WATCHED),
     )
-    return run.steady(tol=1e-5).outcome
+    return run.periodicity(tol=1e-5).outcome

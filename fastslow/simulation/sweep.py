@@ -26,7 +26,7 @@ from fastslow.arguments import (
 from fastslow.errors import ArgumentError, FastSlowError, unknown_name
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome, with_notes
-from fastslow.results.trajectory.sweep import Sweep, SweepPass
+from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import initial_state
 from fastslow.simulation.one import simulate
@@ -72,7 +72,7 @@ def bifurcation_sweep(
     back: bool = True,
     integration: Integration = DEFAULT,
     progress: bool = False,
-) -> Sweep:
+) -> BifurcationSweep:
     """Bifurcation diagram by simulation: what is left after the transient, value by value.
 
     Every run begins in the state in which the last one ended, so that a stable
@@ -114,7 +114,7 @@ def bifurcation_sweep(
 
     Returns
     -------
-    Sweep
+    BifurcationSweep
         A value whose run fails has an outcome that says why, and no points; the
         next value goes on from the last state that did not fail.
 
@@ -168,7 +168,9 @@ def bifurcation_sweep(
     others = {n: v for n, v in model.parameters.items() if n != settings.parameter}
     runs = resolve(integration, model, implicit=True).recorded()
     kept = {"settle": settings.settle, "keep": settings.keep, **runs}
-    return Sweep(settings.parameter, name, what, rule, tuple(passes), others, model.equations, kept)
+    return BifurcationSweep(
+        settings.parameter, name, what, rule, tuple(passes), others, model.equations, kept
+    )
 
 
 @dataclass(frozen=True)

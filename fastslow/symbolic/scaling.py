@@ -343,7 +343,7 @@ def _matched(
 
 
 @takes(one=mapping, other=mapping)
-def disagreements(one: Mapping[str, Any], other: Mapping[str, Any]) -> Named[sp.Expr]:
+def compare_scalings(one: Mapping[str, Any], other: Mapping[str, Any]) -> Named[sp.Expr]:
     """Ratios, other to one, of the entries of two scalings that differ.
 
     Parameters
@@ -364,7 +364,7 @@ def disagreements(one: Mapping[str, Any], other: Mapping[str, Any]) -> Named[sp.
     Examples
     --------
     >>> k, J = sp.symbols("k J", positive=True)
-    >>> disagreements({"A": J * k, "B": J}, {"A": J * k**2, "B": J})
+    >>> compare_scalings({"A": J * k, "B": J}, {"A": J * k**2, "B": J})
     {A: k}
     """
     found = {}

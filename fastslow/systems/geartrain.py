@@ -19,7 +19,7 @@ from fastslow.results.base.named_mapping import Named
 from fastslow.symbolic.reduction import reduce_states
 from fastslow.symbolic.scaling import (
     Identification,
-    disagreements,
+    compare_scalings,
     identify,
     nondimensionalise,
     scale_symbol,
@@ -304,8 +304,8 @@ def gear_scaling() -> GearScaling:
         right.values,
         Named("parameter", printed),
         wrong.values,
-        disagreements(followed, printed),
-        not disagreements(printed, slipped),
+        compare_scalings(followed, printed),
+        not compare_scalings(printed, slipped),
         right.agrees,
     )
 

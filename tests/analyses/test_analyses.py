@@ -210,7 +210,7 @@ def test_the_smallest_load_amplitude_never_unloads():
     lowest = [float(case.run["w"].min()) for case in cases]
     assert lowest[0] == pytest.approx(0.00834, abs=1e-4)
     assert max(lowest[1:]) < -9
-    assert cases[0].run.word[-1] == "S1"
+    assert cases[0].run.itinerary[-1] == "S1"
     assert cases[0].run.crossings[-1].time < 5
     sizes = [float(np.ptp(case.run["x"][case.run.t > 1000])) for case in cases]
     assert sizes == sorted(sizes)

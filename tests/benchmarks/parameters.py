@@ -50,7 +50,7 @@ def _sweeps(gear: fs.Model) -> Iterator[Line]:
     values = np.linspace(1.0, 3.0, 40)
     settle, keep = 60, 16
 
-    def sweep() -> fs.Sweep:
+    def sweep() -> fs.BifurcationSweep:
         return fs.bifurcation_sweep(fast, "C", values, [0, 0], settle=settle, keep=keep, back=False)
 
     models = [fast.with_parameters(C=value) for value in values]

@@ -230,7 +230,7 @@ def results():
         "sweep": fs.bifurcation_sweep(gear, "C", [3.4, 3.5], [0, 0], settle=0, keep=1),
         "section": run.section(interface="x - D"),
         "spectrum": run.spectrum("x"),
-        "steady": run.steady(),
+        "steady": run.periodicity(),
         "contacts": run.contacts(),
         "map": fs.refined_map(lambda a, b: a * b < 1, {"a": (0, 2), "b": (0, 2)}, levels=3),
         "load": fs.slow_load_criterion(gear, {"D": [0.5, 0.6], "C": 2.5}),

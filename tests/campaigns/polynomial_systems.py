@@ -204,14 +204,14 @@ def compare(system: System, counts: Counts) -> None:
     spent = time.process_time() - started
     counts.seconds += spent
     counts.worst = max(counts.worst, spent)
-    complete = diagram.coverage == "complete"
+    complete = diagram.completeness == "complete"
     counts.claimed += complete
     for value, truth in truths.items():
         listed = fs.equilibria(model, p=value)
         inside = truth[diagram.window.contains(truth)] if len(truth) else truth
         drawn = diagram.at(p=value)
         for points, wanted, sure in (
-            (listed, truth, listed.coverage == "complete"),
+            (listed, truth, listed.completeness == "complete"),
             (drawn, inside, complete),
         ):
             states = np.array([e.state for e in points]).reshape(-1, system.n)
@@ -232,7 +232,7 @@ def compare(system: System, counts: Counts) -> None:
                     f"({'complete' if sure else 'found'}); {system}"
                 )
         counts.lists += 1
-        counts.lists_claimed += listed.coverage == "complete"
+        counts.lists_claimed += listed.completeness == "complete"
 
 
 @dataclass(frozen=True)

@@ -37,9 +37,9 @@ def test_the_period_is_part_of_the_model():
     assert r"\theta \bmod 2 \pi" in model.to_latex()
     for other in (
         model.with_parameters(a=1),
-        model.freed("p"),
-        model.ramped("p", 0.1),
-        model.ramped("p", 0.1).frozen(),
+        model.with_free("p"),
+        model.with_ramp("p", 0.1),
+        model.with_ramp("p", 0.1).frozen(),
     ):
         assert other.periodic == model.periodic
 
@@ -300,7 +300,7 @@ def test_a_section_at_an_angle(rotating):
 
 def test_a_rotation_repeats(rotating):
     """After one turn: the period solves the energy balance; here against the section."""
-    steady = rotating.steady()
+    steady = rotating.periodicity()
     assert steady.outcome.code == "periodic"
     assert steady.multiple == 1
     times = rotating.section("theta", level=0.0).times

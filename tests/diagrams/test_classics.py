@@ -47,7 +47,7 @@ def test_reactor_with_two_hopf_points(reactor):
 
 def test_reactor_at_a_value_is_found_by_search(reactor):
     found = fs.equilibria(reactor, p1=0.1)
-    assert found.coverage == "found"
+    assert found.completeness == "found"
     assert [e["u1"] for e in found] == pytest.approx([0.21174286, 0.45304503, 0.82357777], abs=1e-8)
 
 
@@ -109,7 +109,7 @@ def test_a_tiny_loop_is_found_because_its_critical_values_are_known():
     """A circle of radius 10⁻³ in a range of length 4."""
     loop = (p - sp.Rational(1, 3)) ** 2 + x**2 - sp.Rational(1, 10**6)
     diagram = fs.continue_equilibria(fs.Model({x: loop}, parameters={p: 0}), "p", (-2, 2))
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     assert [b.closed for b in diagram.branches] == [True]
     assert sorted(f["p"] for f in diagram.folds) == pytest.approx(
         [1 / 3 - 1e-3, 1 / 3 + 1e-3], abs=1e-14
@@ -117,13 +117,13 @@ def test_a_tiny_loop_is_found_because_its_critical_values_are_known():
 
 
 def test_coverage_is_claimed_only_where_it_is_proved(reactor):
-    assert fs.continue_equilibria(reactor, p1, (0, 0.2)).coverage == "found"
+    assert fs.continue_equilibria(reactor, p1, (0, 0.2)).completeness == "found"
     cut = fs.continue_equilibria(
         fs.Model({x: p - x}, parameters={p: 0}), p, (0, 1), continuation=fs.Continuation(points=10)
     )
-    assert cut.coverage == "found"
+    assert cut.completeness == "found"
     cusp = fs.Model({x: p + q * x - x**3}, parameters={p: 0, q: 1})
-    assert fs.continue_equilibria(cusp, "p", (-1, 1)).coverage == "complete"
+    assert fs.continue_equilibria(cusp, "p", (-1, 1)).completeness == "complete"
 
 
 def test_non_smooth_fold_turns_the_branch_back():
@@ -212,7 +212,7 @@ def test_switching_at_branch_points_alone_finds_the_other_branches(monkeypatch):
 
     def at_zero(*given, **settings):
         found = solve(*given, **settings)
-        return Equilibria([e for e in found if abs(e["x"]) < 1e-8], found.coverage)
+        return Equilibria([e for e in found if abs(e["x"]) < 1e-8], found.completeness)
 
     monkeypatch.setattr(starts, "solve_at", at_zero)
     model = fs.Model({x: x * (1 - p**2 - x**2)}, parameters={p: 0})

@@ -32,7 +32,7 @@ def short(cusp):
 
 def test_a_whole_diagram_says_nothing(whole):
     assert whole.outcome
-    assert whole.coverage == "complete"
+    assert whole.completeness == "complete"
     assert "too many" not in repr(whole)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -45,7 +45,7 @@ def test_a_diagram_cut_short_says_so(short):
     assert short.outcome.code == "cut short"
     count = sum(any(not o.success for o in b.outcomes) for b in short.branches)
     assert f"{count} of {len(short)} branches ended unsuccessfully" in str(short.outcome)
-    assert short.coverage == "found"
+    assert short.completeness == "found"
     assert str(short.outcome) in repr(short)
     assert "too many points at p =" in repr(short)
     assert str(short.outcome).split(" (")[0] in short._repr_html_()

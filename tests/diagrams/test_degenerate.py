@@ -69,7 +69,7 @@ def test_floats_of_any_size_in_equations_with_an_interface(unit, level):
     a, b = x / sp.Float(unit), p / sp.Float(level)
     rate = sp.Float(unit) * (b + a - a**3 + sp.Abs(a - sp.Rational(1, 5)) / 4)
     diagram = fs.continue_equilibria(fs.Model({x: rate}, parameters={p: 0}), "p", (-level, level))
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     # slopes 1 ± 1/4 − 3a²
     folds = sorted(f["x"] / unit for f in diagram.folds)
     assert folds == pytest.approx([-0.5, np.sqrt(5 / 12)], rel=1e-12)
@@ -80,7 +80,7 @@ def test_floats_of_any_size_in_equations_with_an_interface(unit, level):
 @pytest.mark.parametrize(("rate", "value"), [(p, 0), ((3 * p - 1) * (x**2 + 1), 1 / 3)])
 def test_a_continuum_that_is_no_branch_is_said(rate, value):
     diagram = fs.continue_equilibria(fs.Model({x: rate}, parameters={p: 0}), "p", (-1, 1.2))
-    assert diagram.coverage == "found"
+    assert diagram.completeness == "found"
     assert diagram.outcome.code == "continuum"
     assert f"p = {value:.6g}" in diagram.outcome.message
 
@@ -96,7 +96,7 @@ def test_a_vertical_branch_is_reached_from_a_branch_point():
     assert np.abs(vertical.parameter).max() < 1e-14
     assert np.ptp(vertical["x"]) > 1
     assert vertical.outcome.code == "too many points"
-    assert diagram.coverage == "found"
+    assert diagram.completeness == "found"
 
 
 def test_a_line_of_double_roots_is_one_branch():
@@ -133,7 +133,7 @@ def test_interfaces_that_coincide_are_crossed_together():
     # a dead zone of no width: x³ + A x = w, one smooth curve with its folds at x = ±√(−A/3)
     gear = fs.systems.harmonic_gear(D=0.0, A=-0.6)
     diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 2))
-    assert (diagram.coverage, len(diagram.branches)) == ("complete", 1)
+    assert (diagram.completeness, len(diagram.branches)) == ("complete", 1)
     height = 0.4 * np.sqrt(0.2)
     assert sorted(f["w"] for f in diagram.folds) == pytest.approx([-height, height], abs=1e-15)
     (corner,) = diagram.boundary_equilibria
@@ -190,7 +190,7 @@ def test_a_fold_much_smaller_than_the_range_is_not_stepped_over(oregonator, shar
     diagram = fs.continue_equilibria(
         oregonator.with_parameters(q=share), "z", over=(low, 0.6), window={"x": (share, 2)}
     )
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     assert len(diagram) == 1
     found = sorted((fold["x"], fold["z"]) for fold in diagram.folds)
     assert np.array(found) == pytest.approx(np.array(sorted(heights.items())), rel=1e-9)

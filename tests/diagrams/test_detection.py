@@ -33,7 +33,7 @@ def line(model, over, name="p"):
 
 def trivial_line(model, low, high, state=0.0, name="p", rows=101):
     """Special points of a branch whose state is constant: its rows need no tracing."""
-    field = FrozenField(model.freed(name), name)
+    field = FrozenField(model.with_free(name), name)
     u, tangents = np.zeros((rows, field.n + 1)), np.zeros((rows, field.n + 1))
     u[:, :-1] = state
     u[:, -1] = np.linspace(low, high, rows)

@@ -32,7 +32,7 @@ def ends(points):
 
 def test_the_sticking_band_of_a_block_is_listed_once():
     found = fs.equilibria(block().frozen(), w=0.3)
-    assert found.coverage == "complete"
+    assert found.completeness == "complete"
     (band,) = found.sets
     assert band["x"] == pytest.approx((-0.2, 0.8), abs=1e-14)
     assert band["v"] == (0.0, 0.0)
@@ -46,7 +46,7 @@ def test_the_sticking_band_of_a_block_is_listed_once():
 
 def test_the_band_of_a_block_is_in_its_diagram_with_its_edges():
     diagram = fs.continue_equilibria(block().frozen(), "w", over=(-1, 1))
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     assert len(diagram) == 0
     (band,) = diagram.bands
     assert band.range == (-1.0, 1.0)
@@ -80,7 +80,7 @@ def test_a_softening_spring_has_up_to_three_bands(force):
     wanted = sorted(r.real for line in roots for r in line if abs(r.imag) < 1e-9)
     assert len(found.sets) == 3
     assert ends(found) == pytest.approx(wanted, abs=1e-12)
-    assert found.coverage == "complete"
+    assert found.completeness == "complete"
     # the middle one is a set of equilibria all the same: friction holds the block anywhere
     diagram = fs.continue_equilibria(model, "w", over=(-0.8, 0.8))
     edge = 2 / math.sqrt(27) + 0.2
@@ -93,7 +93,7 @@ def test_a_softening_spring_has_up_to_three_bands(force):
 def test_a_softening_pendulum_says_that_its_bands_were_searched_for():
     model = fs.Model({x: v, v: -sp.sin(x) - sp.sign(v) / 5}, parameters={})
     found = fs.equilibria(model)
-    assert found.coverage == "found"
+    assert found.completeness == "found"
     half = math.asin(0.2)
     near = [one for one in found.sets if abs(one["x"][0]) < 1]
     assert near[0]["x"] == pytest.approx((-half, half), abs=1e-12)
@@ -215,7 +215,7 @@ def test_two_hinges_with_dry_friction_have_a_set_that_is_searched_for():
         u: -sp.sin(y) - 0.2 * sp.sign(u),
     }
     found = fs.equilibria(fs.Model(rates, parameters={w: -0.1}))
-    assert found.coverage == "found"
+    assert found.completeness == "found"
     (near,) = (s for s in found.sets if max(np.abs(s.lower).max(), np.abs(s.upper).max()) < 1)
     assert not near.exact
     assert near["y"] == pytest.approx((-math.asin(0.2), math.asin(0.2)), abs=1e-9)
@@ -273,7 +273,7 @@ def test_a_set_of_two_dimensions_whose_states_are_no_functions_of_the_weights():
     """|x³ + x y| ≤ 1/2, |y + y³ − x y| ≤ 1/3: at x = 0 the first weight has no slope."""
     rates = {x: v, v: -(x**3) - x * y - sp.sign(v) / 2, y: u, u: -y - y**3 + x * y - sp.sign(u) / 3}
     found = fs.equilibria(fs.Model(rates))
-    assert found.coverage == "found"
+    assert found.completeness == "found"
     (one,) = found.sets
     assert one.dimension == 2
     line = np.linspace(-2, 2, 2001)
@@ -306,7 +306,7 @@ def test_a_set_that_ends_just_within_the_bounds_of_the_search_has_its_ranges():
 def test_products_of_signs_are_said_not_to_be_complete():
     """The origin is at rest, but no sliding motion is derived there."""
     rates = {x: -sp.sign(x) * (2 + sp.sign(y)), y: -sp.sign(y)}
-    assert fs.equilibria(fs.Model(rates)).coverage == "found"
+    assert fs.equilibria(fs.Model(rates)).completeness == "found"
     forced = {x: w - sp.sign(x) * (2 + sp.sign(y)), y: -sp.sign(y)}
     diagram = fs.continue_equilibria(fs.Model(forced, parameters={w: 0}), "w", over=(-0.5, 0.5))
-    assert diagram.coverage == "found"
+    assert diagram.completeness == "found"

@@ -147,7 +147,7 @@ def test_a_two_fold_ends_both_branches():
 def test_the_eigenvalue_beside_a_two_fold():
     """f₁ = (−y, 1), f₂ = (y − p, −2): y = −p with eigenvalue 1/(3p), infinite at p = 0."""
     diagram = fs.continue_equilibria(switched(x, (-y, 1), (y - p, -2)), p, (-1, 1))
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     for branch in diagram.branches:
         assert np.abs(branch["y"] + branch["p"]).max() < 1e-15
         inner = np.abs(branch["p"]) > 1e-6
@@ -197,7 +197,7 @@ def test_a_corner_of_the_sliding_field():
 def test_two_discontinuities_at_once_end_the_branch_in_words():
     model = fs.Model({x: -sp.sign(x) - x / 2, y: p - y - sp.sign(y) / 2 + x}, parameters={p: 0})
     diagram = fs.continue_equilibria(model, p, (-2, 2))
-    assert diagram.coverage == "found"
+    assert diagram.completeness == "found"
     outcomes = [o for b in diagram.branches for o in b.outcomes if not o.success]
     assert [o.code for o in outcomes] == ["discontinuous interface"] * 2
     assert all("two discontinuities meet" in o.message for o in outcomes)
@@ -265,7 +265,7 @@ def test_decimal_numbers_are_read_as_they_are_written(seed):
         return fs.continue_equilibria(fs.Model(rates, parameters={p: -0.1}), p, (-1, 0.5))
 
     decimal, exact = diagram(float), diagram(lambda v: sp.Rational(str(v)))
-    assert decimal.coverage == exact.coverage
+    assert decimal.completeness == exact.completeness
     assert [q.label for q in decimal.special] == [q.label for q in exact.special]
     for one, other in zip(decimal.special, exact.special, strict=True):
         assert one["p"] == pytest.approx(other["p"], rel=1e-12, abs=1e-12)

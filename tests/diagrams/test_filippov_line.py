@@ -18,7 +18,7 @@ def test_a_line_that_sticks_at_its_switch():
     diagram = fs.continue_equilibria(
         fs.Model({x: p - x - sp.sign(x)}, parameters={p: 0}), p, (-2, 2)
     )
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     (branch,) = diagram.branches
     assert regions(branch) == ["S2", "S1|S2", "S1"]
     assert [b.label for b in branch.special] == ["EP1", "BE1", "BE2", "EP2"]
@@ -55,7 +55,7 @@ def test_a_line_that_escapes_from_its_switch():
     assert found[1].eigenvalues.real.tolist() == [np.inf]
     again = fs.equilibria(model, p=0.25)
     assert sorted(e["x"] for e in again) == [-0.75, 0, 1.25]
-    assert again.coverage == "complete"
+    assert again.completeness == "complete"
 
 
 def test_virtual_pseudo_equilibria_are_listed_once():
@@ -94,7 +94,7 @@ def test_a_staircase_of_two_discontinuities():
     assert regions(branch) == ["S3", "S2|S3", "S2", "S1|S2", "S1"]
     assert [b["p"] for b in branch.special("BE")] == pytest.approx([-3, -1, 1, 3], abs=1e-14)
     assert {b.subtype for b in branch.special("BE")} == {"persistence"}
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
 
 
 def test_a_discontinuous_and_a_continuous_interface_in_line():
@@ -126,7 +126,7 @@ def test_a_closed_branch_of_an_arc_and_a_sliding_segment():
     (branch,) = diagram.branches
     assert branch.closed
     assert branch.outcome.code == "closed loop"
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     assert sorted(b["p"] for b in branch.special("BE")) == pytest.approx(
         [-np.sqrt(3), np.sqrt(3)], rel=1e-14
     )

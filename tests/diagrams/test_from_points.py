@@ -28,7 +28,7 @@ def test_one_branch_of_two(pitchfork):
     (branch,) = diagram
     np.testing.assert_allclose(branch["x"] ** 2, branch["p"], atol=1e-14)
     assert branch["x"][[0, -1]].tolist() in ([-1, 1], [1, -1])
-    assert diagram.coverage == "found"
+    assert diagram.completeness == "found"
     assert diagram.outcome.code == "from points"
     assert "only branches through the 1 given point were traced" in repr(diagram)
 

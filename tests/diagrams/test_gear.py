@@ -195,6 +195,6 @@ def test_a_continuum_on_a_branch_is_not_solved_for(monkeypatch):
     monkeypatch.setattr(starts, "solve_at", solved)
     gear = fs.systems.harmonic_gear(D=0.2345).frozen()
     diagram = fs.continue_equilibria(gear, "w", over=(-2, 6))
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     assert 0.0 not in values
     assert len(values) == len(set(values)) == 4

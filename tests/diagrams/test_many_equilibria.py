@@ -35,7 +35,7 @@ def test_every_equilibrium_of_a_chain_of_masses_is_found(masses, coupling, count
     """Weakly coupled each mass is in one of its three places, whatever the others do."""
     found = fs.equilibria(chain(masses, coupling))
     assert len(found) == count
-    assert found.coverage == "found"
+    assert found.completeness == "found"
     if masses == 10:
         assert shooting(masses, coupling) == count
     states = np.array([e.state for e in found])

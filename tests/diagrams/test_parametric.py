@@ -50,7 +50,7 @@ def fields(name, count, seed):
         if name == "gear":
             # the dead zone has a width
             values["b"] = abs(values["b"]) + 0.1
-        yield FrozenField(model.with_parameters(values).freed("w"), "w")
+        yield FrozenField(model.with_parameters(values).with_free("w"), "w")
 
 
 def known(found, states, unit):
@@ -105,7 +105,7 @@ def test_results_do_not_depend_on_what_was_computed_before():
         ).frozen()
         for field, expected in reversed(list(zip(forwards, first, strict=True))):
             values = {f"{n}_{name[0]}": value for n, value in field.model.parameters.items()}
-            here = FrozenField(model.with_parameters(values).freed("w"), "w")
+            here = FrozenField(model.with_parameters(values).with_free("w"), "w")
             assert states(here) == expected
 
 
@@ -123,13 +123,13 @@ def test_a_choice_that_no_longer_holds_is_made_again():
             X, Y = e.state
             assert abs((p["a"] - p["b"]) * Y + X - 0.7) < 1e-12
             assert abs(p["k"] * X - Y + X**3) < 1e-12
-        assert fs.equilibria(here, w=0.7).coverage == "complete"
+        assert fs.equilibria(here, w=0.7).completeness == "complete"
 
 
 def test_sliding_is_eliminated_too():
     rates, parameters = MODELS["relay"]
     model = fs.Model(rates, forcing={w: sp.sin(t)}, parameters=parameters).frozen()
-    equations = region_equations(FrozenField(model.freed("w"), "w"))
+    equations = region_equations(FrozenField(model.with_free("w"), "w"))
     sliding = [e for e in equations if isinstance(e, SlidingEquations)]
     assert sliding
     assert all(e.general is not None for e in sliding)

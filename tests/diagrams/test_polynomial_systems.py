@@ -86,7 +86,7 @@ def test_a_planar_diagram_with_an_isola_is_complete():
     rates = {x: 10000 * (x**2 + (p - sp.Rational(3, 10)) ** 2) - 1 + x * (y**2 - 1 - x)}
     model = fs.Model({**rates, y: y**2 - 1 - x}, parameters={p: 0})
     diagram = fs.continue_equilibria(model, "p", (-1, 1))
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     assert len(diagram.branches) == 2
     assert all(branch.closed for branch in diagram.branches)
 
@@ -134,7 +134,7 @@ def test_planar_diagrams_with_poles_are_complete_and_have_each_branch_once(rates
     scales = (sp.Rational(1, 10**5), 10**5) if first.has(sp.Abs) else (1, 1)
     model = fs.Model({x: scales[0] * first, y: scales[1] * second}, parameters={p: 0})
     diagram = fs.continue_equilibria(model, "p", (-2, 2))
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     assert not diagram.unexplained
     for value in (-1.6180339, -0.4142135, 0.3183098, 1.259921):
         listed = np.array([e.state for e in fs.equilibria(model, p=value)])

@@ -26,7 +26,7 @@ def test_visible_invisible_and_degenerate():
     """x' = y ± y³ beside x = 0: ẍ = y'(1 ± 3y²) at y = 0; y' = 1 above, y' = x below."""
     model = switched(x, (y + y**3, 1 + x), (y - 1, x))
     found = fs.tangencies(model)
-    assert found.coverage == "complete"
+    assert found.completeness == "complete"
     first, second = found
     assert (first.region, first.interface, first.visible, first.two_fold) == (
         "S1",
@@ -65,7 +65,7 @@ def test_a_circle_as_interface():
     """A uniform flow x' = 1 touches the circle x² + y² = 1 at its poles, bending outward."""
     circle = x**2 + y**2 - 1
     found = fs.tangencies(switched(circle, (1, 0), (1, 1)))
-    assert found.coverage == "complete"
+    assert found.completeness == "complete"
     outer = [t for t in found if t.region == "S1"]
     assert [t.state.tolist() for t in outer] == [[0, -1], [0, 1]]
     assert all(t.visible and t.second_derivative == 2 for t in outer)
@@ -77,16 +77,16 @@ def test_a_circle_as_interface():
 def test_an_equation_that_is_no_polynomial():
     """x' = exp(y) − 2 is tangent to x = 0 at y = log 2."""
     found = fs.tangencies(switched(x, (sp.exp(y) - 2, 1), (1, 1)))
-    assert found.coverage == "found"
+    assert found.completeness == "found"
     assert [t["y"] for t in found] == pytest.approx([np.log(2)], abs=1e-15)
     assert found[0].second_derivative == pytest.approx(2, rel=1e-14)
 
 
-@pytest.mark.parametrize(("degree", "coverage"), [(5, "complete"), (61, "found")])
-def test_a_polynomial_of_a_high_degree_is_searched(degree, coverage):
+@pytest.mark.parametrize(("degree", "completeness"), [(5, "complete"), (61, "found")])
+def test_a_polynomial_of_a_high_degree_is_searched(degree, completeness):
     """yⁿ − y + 1/7 has three real roots for odd n."""
     found = fs.tangencies(switched(x, (y**degree - y + sp.Rational(1, 7), 1), (1, 0)))
-    assert found.coverage == coverage
+    assert found.completeness == completeness
     roots = np.roots([1, *[0] * (degree - 2), -1, 1 / 7])
     real = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
     assert [t["y"] for t in found] == pytest.approx(real, abs=1e-12)

@@ -109,7 +109,7 @@ def test_a_start_exactly_on_an_interface():
 def test_equilibria_of_a_model_without_parameters():
     found = fs.equilibria(fs.Model({x: 1 - x**2}))
     assert [(e["x"], e.stable) for e in found] == [(-1.0, False), (1.0, True)]
-    assert found.coverage == "complete"
+    assert found.completeness == "complete"
 
 
 def test_a_double_root_is_one_equilibrium():
@@ -125,7 +125,7 @@ def test_too_many_branches_are_said():
         model, p, (-0.5, 0.5), continuation=fs.Continuation(branches=5)
     )
     assert len(diagram.branches) == 5
-    assert diagram.coverage == "found"
+    assert diagram.completeness == "found"
     assert diagram.outcome.code == "too many branches"
     assert "Continuation(branches" in repr(diagram)
 

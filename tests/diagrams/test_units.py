@@ -33,12 +33,12 @@ def read(system, units):
 
     for part in PLACES:
         found = fs.equilibria(model, {system.parameter: low + part * (high - low)})
-        words.append(found.coverage)
+        words.append(found.completeness)
         for e in found:
             words.append((e.region, e.stability, e.type, e.admissible, e.continuum))
             numbers.append(place(e))
     diagram = fs.continue_equilibria(model, system.parameter, (low, high))
-    words.append(diagram.coverage)
+    words.append(diagram.completeness)
     for branch in diagram.branches:
         words.append([o.code for o in branch.outcomes])
         for p in branch.special:
@@ -103,7 +103,7 @@ def test_natural_units_follow_a_change_of_units():
         units = drawn(system, int(generator.integers(1000)))
         found = []
         for factors in ({}, units):
-            model = system.measured(factors).freed(system.parameter)
+            model = system.measured(factors).with_free(system.parameter)
             names = (*model.states, system.parameter)
             functions = [i.function for i in model.interfaces.values()]
             found.append(natural_units(names, model.regions.values(), functions, model.values))
@@ -222,7 +222,7 @@ def test_normal_forms_in_other_units(system):
         ).special()
         for u in ({}, units)
     )
-    field = FrozenField(model.freed(system.parameter), system.parameter)
+    field = FrozenField(model.with_free(system.parameter), system.parameter)
     for one, other in zip(first, second, strict=True):
         if one.code not in ("LP", "HB"):
             continue

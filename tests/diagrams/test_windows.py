@@ -40,7 +40,7 @@ def test_a_quadratic_whose_root_goes_through_infinity():
     diagram = traced({x: p * x**2 - x + TENTH})
     assert codes(diagram) == [[END, LEFT], [END, END], [LEFT, END]]
     assert rows(diagram) < 600
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     assert "x in [" in repr(diagram)
     for branch, side in zip(diagram, (1, -1, 1), strict=True):
         root = np.sqrt(1 - 0.4 * branch["p"])
@@ -111,7 +111,7 @@ def test_random_cubics_with_poles(seed):
     table = numbers(seed)
     rate = sum(int(c) * x ** (3 - i) * p ** (2 - j) for (i, j), c in np.ndenumerate(table))
     diagram = traced({x: rate})
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     assert any(LEFT in ends for ends in codes(diagram))
     assert rows(diagram) < 400 * len(diagram)
     low, high = diagram.window["x"]
@@ -127,7 +127,7 @@ def test_what_comes_back_is_traced():
     tiny = sp.Rational(1, 10**9)
     first, second = (p - sp.Rational(1, 4)) ** 2 + tiny, (p + sp.Rational(1, 4)) ** 2 + tiny
     diagram = traced({x: first * second * x - second - first})
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     assert sorted(codes(diagram)) == [[END, LEFT], [LEFT, END], [LEFT, LEFT]]
     assert diagram.at(p=0.0)[0]["x"] == pytest.approx(2 / (1 / 16 + 1e-9), rel=1e-12)
 
@@ -142,7 +142,7 @@ def test_a_window_cuts_a_fold():
     np.testing.assert_allclose(branch["p"][[0, -1]], [-0.25, -0.0625], atol=1e-15)
     assert codes(diagram) == [[LEFT, LEFT]]
     assert all(branch.outcomes)
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     assert len(diagram.folds) == 1
     assert "x in [-0.5, 0.25]" in repr(diagram)
 
@@ -159,7 +159,7 @@ def test_an_edge_tangent_to_the_branch(edge, count):
     """x = −p² touches 0 and does not cross it; an edge just below cuts it in two."""
     diagram = traced({x: x + p**2}, window={x: (None, edge)})
     assert len(diagram) == count
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     if count == 2:
         ends = sorted([diagram[0]["p"][-1], diagram[1]["p"][0]])
         np.testing.assert_allclose(ends, [-1e-3, 1e-3], rtol=1e-9)
@@ -176,7 +176,7 @@ def test_a_window_between_all_starts_of_a_transcendental_model():
     """Of sinh² x = −p the part 0.52 ≤ x ≤ 0.55 lies between any values tried."""
     diagram = traced({x: p + sp.sinh(x) ** 2, y: x - y}, window={x: (0.52, 0.55)})
     (branch,) = diagram
-    assert diagram.coverage == "found"
+    assert diagram.completeness == "found"
     np.testing.assert_allclose(
         np.sort(branch["p"][[0, -1]]), [-(np.sinh(0.55) ** 2), -(np.sinh(0.52) ** 2)], rtol=1e-12
     )
@@ -185,7 +185,7 @@ def test_a_window_between_all_starts_of_a_transcendental_model():
 def test_a_window_that_excludes_all():
     diagram = traced({x: p + x**2}, window={x: (5, 6)})
     assert len(diagram) == 0
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     assert diagram.window["x"] == (5, 6)
 
 

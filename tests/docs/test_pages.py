@@ -90,7 +90,7 @@ def test_the_tutorial(tmp_path, monkeypatch, capsys):
 
     assert list(names["gear"].regions) == ["S1", "S2", "S3"]
     assert [str(form.admissible) for form in names["law"].folds].count("A < -D**2") == 2
-    assert names["diagram"].coverage == "complete"
+    assert names["diagram"].completeness == "complete"
     assert [p.subtype for p in names["diagram"].boundary_equilibria] == ["degenerate"] * 2
     assert len(names["run"].crossings) == 41
     assert names["run"].regime == "bilateral"

@@ -69,11 +69,11 @@ def test_articles():
     with pytest.raises(fs.ArgumentError, match="expected a Diagram, received an Overlay"):
         fs.plot.diagram(results()["lay"], x="p", y="x")
     with pytest.raises(fs.ArgumentError, match="cannot pick in an Overlay of an Overlay"):
-        fs.inspect(results()["lay"], results()["lay"])
+        fs.pick(results()["lay"], results()["lay"])
 
 
 def test_a_sweep_of_a_ramp_at_rest_needs_a_period():
-    ramp = fs.Model({x: w - x}, forcing={w: sp.sin(t)}).frozen().ramped("w", 0.0)
+    ramp = fs.Model({x: w - x}, forcing={w: sp.sin(t)}).frozen().with_ramp("w", 0.0)
     message = "nothing in this model has a common period at w_start = 1; .* as period="
     with pytest.raises(fs.ArgumentError, match=message) as caught:
         fs.bifurcation_sweep(ramp, "w_start", [1.0, 2.0], [0.0])

@@ -144,8 +144,8 @@ BY_FUNCTION = {
         ({"k": "1"}, BadModel, "parameter k: expected a finite number, received '1'"),
         ({}, BadModel, "rate of x: unknown symbol 'k'"),
     ],
-    "Model.ramped.rate": [(NAN, BadModel, "parameter C_rate: expected a finite number")],
-    "Model.ramped.start": [("0", BadModel, "parameter C_start: expected a finite number")],
+    "Model.with_ramp.rate": [(NAN, BadModel, "parameter C_rate: expected a finite number")],
+    "Model.with_ramp.start": [("0", BadModel, "parameter C_start: expected a finite number")],
     "Model.rates": [
         *MAPPING,
         ({}, BadModel, "at least one state"),
@@ -197,7 +197,7 @@ BY_FUNCTION = {
     "RefinedMap.boundary.one": LABEL,
     "RefinedMap.boundary.other": LABEL,
     "Spectrum.peaks.n": COUNT,
-    "Sweep.hysteresis.tol": [(-1, Wrong, "tol = -1; expected a number from 0 to 1")],
+    "BifurcationSweep.hysteresis.tol": [(-1, Wrong, "tol = -1; expected a number from 0 to 1")],
     "Trajectory.hits.interface": [
         ("x - E", Unknown, "did you mean 'x - D'?"),
         (2.5, Unknown, "2.5"),
@@ -213,7 +213,7 @@ BY_FUNCTION = {
         (2, Wrong, "samples = 2; expected a whole number from 8"),
     ],
     "Trajectory.regimes.tol": POSITIVE,
-    "Trajectory.steady.tol": POSITIVE,
+    "Trajectory.periodicity.tol": POSITIVE,
     "bifurcation_sweep.level": NUMBER,
     "bifurcation_sweep.phase": [*NUMBER, (2, Wrong, "phase = 2; expected a part of the period")],
     "bifurcation_sweep.settle": COUNT,
@@ -259,8 +259,8 @@ BY_FUNCTION = {
         ("12", Wrong, "rates: expected numbers, received '12'"),
     ],
     "delay_scaling.start": [*NUMBER, (5, Wrong, "start = 5; expected a value")],
-    "disagreements.one": [*MAPPING, ({"B": 1}, Unknown, "unknown entry 'B'")],
-    "disagreements.other": MAPPING,
+    "compare_scalings.one": [*MAPPING, ({"B": 1}, Unknown, "unknown entry 'B'")],
+    "compare_scalings.other": MAPPING,
     "equilibria.named": [
         ({"p": NAN}, BadModel, "parameter p: expected a finite number, received nan"),
         ({"P": 1.0}, Unknown, "unknown parameter 'P'; did you mean 'p'?"),
@@ -370,7 +370,7 @@ BY_FUNCTION["explore.periods"] = [(2, Wrong, "expected t=(start, end) or periods
 BY_FUNCTION["explore.t"] = [row for row in BY_PARAMETER["t"] if row[0] is not None]
 BY_FUNCTION["explore.start"] = BY_PARAMETER["state"]
 BY_FUNCTION["explore.state"] = [*SYMBOL, ("u", Unknown, "unknown state 'u'")]
-BY_FUNCTION["inspect.result"] = [
+BY_FUNCTION["pick.result"] = [
     (None, Wrong, "cannot pick in a DiagramDrawing of a NoneType; expected the drawing")
 ]
 

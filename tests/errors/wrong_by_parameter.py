@@ -188,7 +188,7 @@ BY_PARAMETER = {
         ({"linewidth": "x"}, Wrong, "linewidth = 'x'"),
         ({"linewidth": NAN}, Wrong, "linewidth = nan; expected a finite number"),
     ],
-    "sweep": a("Sweep"),
+    "sweep": a("BifurcationSweep"),
     "t": [
         ((1, 0), Wrong, "t = (1, 0); expected finite times, start < end"),
         ((0, 0), Wrong, "t = (0, 0); expected finite times, start < end"),

@@ -105,7 +105,7 @@ def test_equations_as_text():
         lambda text: fs.Model({"x": "sin(x)"}, periodic={"x": text}),
         lambda text: fs.Model({"x": "w - x"}, forcing={"w": "t"}).frozen({"w": text}),
         lambda text: fs.reduce_states({"x": text}, {"u": "x"}),
-        lambda text: fs.disagreements({"A": text}, {"A": "k"}),
+        lambda text: fs.compare_scalings({"A": text}, {"A": "k"}),
     ],
 )
 def test_text_is_never_run(call, tmp_path, monkeypatch):

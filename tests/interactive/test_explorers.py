@@ -235,7 +235,7 @@ def test_a_live_figure_leaves_the_backend_of_pyplot():
 
 def test_exploring_imports_no_widgets_and_no_pyplot():
     code = (
-        "import sys, fastslow as fs; fs.explore, fs.inspect; "
+        "import sys, fastslow as fs; fs.explore, fs.pick; "
         "print(sorted({'ipywidgets', 'ipympl', 'matplotlib.pyplot'} & set(sys.modules)))"
     )
     done = subprocess.run(

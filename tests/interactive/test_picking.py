@@ -35,7 +35,7 @@ def given(lay, call):
 def test_a_click_beside_a_branch_gives_the_equilibrium_there(lay, mouse):
     drawing = drawn(lay.diagram)
     picks = []
-    pointer = fs.inspect(drawing, lay.diagram, on_click=picks.append)
+    pointer = fs.pick(drawing, lay.diagram, on_click=picks.append)
     # on the stable branch in S1, between rows: x³ − D x² − 0.6 x + 0.6 D = w
     (near,) = lay.diagram.at(w=0.3217, stable=True)
     mouse("button_press_event", drawing.ax, 0.3217, near["x"])
@@ -51,22 +51,22 @@ def test_a_click_beside_a_branch_gives_the_equilibrium_there(lay, mouse):
 
 def test_a_click_in_axes_of_expressions_and_functions(lay, mouse):
     drawing = drawn(lay.diagram, lambda columns: columns["x"] ** 2)
-    pointer = fs.inspect(drawing, lay.diagram)
+    pointer = fs.pick(drawing, lay.diagram)
     (near,) = lay.diagram.at(w=0.3217, stable=True)
     mouse("button_press_event", drawing.ax, 0.3217, near["x"] ** 2)
     assert pointer.selected.point["x"] == pytest.approx(near["x"], abs=2e-3)
     motion = fs.plot.phase_portrait(lay.run, "x + v", "x*v")
-    pointer = fs.inspect(motion, lay.run)
+    pointer = fs.pick(motion, lay.run)
     state = lay.run(10.0)
     mouse("button_press_event", motion.ax, state.sum(), state.prod())
     assert pointer.selected.point.state == pytest.approx(state, abs=5e-3)
     with pytest.raises(fs.ArgumentError, match="in the plane"):
-        fs.inspect(fs.plot.phase_portrait(lay.run, z="t"), lay.run)
+        fs.pick(fs.plot.phase_portrait(lay.run, z="t"), lay.run)
 
 
 def test_a_marker_goes_before_the_line_it_lies_on(lay, mouse):
     drawing = drawn(lay.diagram)
-    pointer = fs.inspect(drawing, lay.diagram)
+    pointer = fs.pick(drawing, lay.diagram)
     fold = lay.diagram.folds[0]
     mouse("button_press_event", drawing.ax, fold["w"], fold["x"])
     assert pointer.selected.point is fold
@@ -79,7 +79,7 @@ def test_hover_shows_a_box_and_takes_it_away(lay, mouse):
     drawing = drawn(lay.diagram)
     drawing.figure.canvas.draw()
     clean = np.array(drawing.figure.canvas.buffer_rgba())
-    pointer = fs.inspect(drawing, lay.diagram)
+    pointer = fs.pick(drawing, lay.diagram)
     drawing.figure.canvas.draw()
     (at,) = lay.diagram.at(w=0.3, stable=True)
     mouse("motion_notify_event", drawing.ax, 0.3, at["x"])
@@ -97,14 +97,14 @@ def test_hover_shows_a_box_and_takes_it_away(lay, mouse):
 
 def test_far_from_everything_nothing_is_meant(lay, mouse):
     drawing = drawn(lay.diagram)
-    pointer = fs.inspect(drawing, lay.diagram)
+    pointer = fs.pick(drawing, lay.diagram)
     mouse("button_press_event", drawing.ax, -0.4, 0.9)
     mouse("button_press_event", drawing.ax, 0.0, 0.0, button=3)
     assert pointer.selected is None
 
 
 def test_every_part_of_a_panel_answers(lay, panel, mouse):
-    pointer = fs.inspect(panel, lay)
+    pointer = fs.pick(panel, lay)
     run = lay.run
     time = 0.37 * run.span[1]
     mouse("button_press_event", panel.time_series.ax, time, run(time)[0])
@@ -131,7 +131,7 @@ def test_every_part_of_a_panel_answers(lay, panel, mouse):
 
 
 def test_crossings_are_given_back(lay, panel, mouse):
-    pointer = fs.inspect(panel, lay)
+    pointer = fs.pick(panel, lay)
     crossing = run_crossing = lay.run.crossings[0]
     mouse("button_press_event", panel.phase_portrait.ax, *crossing.state)
     found = pointer.selected.point
@@ -144,7 +144,7 @@ def test_crossings_are_given_back(lay, panel, mouse):
 def test_a_run_without_series_is_read_between_its_samples(folded, mouse):
     run = fs.simulate(folded, [0, 0], periods=1, dense=False, samples=400)
     drawing = fs.plot.time_series(run, "v", crossings=False)
-    pointer = fs.inspect(drawing, run)
+    pointer = fs.pick(drawing, run)
     mouse("button_press_event", drawing.ax, run.t[200], run["v"][200])
     moment = pointer.selected.point
     expected = [np.interp(moment.time, run.t, run[name]) for name in run.states]
@@ -157,7 +157,7 @@ def test_a_diagram_from_a_file_answers(lay, tmp_path, mouse):
     lay.diagram.save(tmp_path / "gear.npz")
     loaded = fs.load(tmp_path / "gear.npz")
     drawing = drawn(loaded, "x - 0.1")
-    pointer = fs.inspect(drawing, loaded)
+    pointer = fs.pick(drawing, loaded)
     (at,) = lay.diagram.at(w=0.3, stable=True)
     mouse("button_press_event", drawing.ax, 0.3, at["x"] - 0.1)
     found = pointer.selected.point
@@ -167,7 +167,7 @@ def test_a_diagram_from_a_file_answers(lay, tmp_path, mouse):
 
 def test_what_does_not_belong_together_is_refused(lay):
     with pytest.raises(fs.ArgumentError, match="DiagramDrawing of a Trajectory"):
-        fs.inspect(fs.plot.diagram(lay.diagram), lay.run)
+        fs.pick(fs.plot.diagram(lay.diagram), lay.run)
 
 
 def test_pseudo_equilibria_have_their_infinite_eigenvalue_in_words():

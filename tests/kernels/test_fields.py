@@ -57,8 +57,8 @@ def test_zeros_of_a_large_field_are_written_in_every_region():
 
 def test_new_parameter_values_compile_nothing(gear):
     fast = gear.frozen()
-    one = compile_field(fast.freed("w"), "w")
-    other = compile_field(fast.with_parameters(D=0.4, A=3).freed("w"), "w")
+    one = compile_field(fast.with_free("w"), "w")
+    other = compile_field(fast.with_parameters(D=0.4, A=3).with_free("w"), "w")
     assert one.address == other.address
 
 

@@ -39,8 +39,8 @@ def test_models_with_the_same_content_are_equal():
     assert one.frozen() == other.frozen()
     assert one.with_parameters(k=3) == other.with_parameters(k=3)
     assert one.with_parameters(k=3).with_parameters(k=2) == one
-    assert one.freed("k") == other.freed("k")
-    assert one.frozen().ramped("w", 0.1) == other.frozen().ramped("w", 0.1)
+    assert one.with_free("k") == other.with_free("k")
+    assert one.frozen().with_ramp("w", 0.1) == other.frozen().with_ramp("w", 0.1)
     assert one != "a model"
 
 
@@ -72,8 +72,8 @@ def test_a_period_and_a_vanished_region_belong_to_the_content():
     # a region that is empty at these values keeps its name for others
     seen = fs.Model({x: -sp.Max(x - D, -x - D, 0)}, parameters={D: 1}).with_parameters(D=0)
     never = fs.Model({x: -sp.Max(x - D, -x - D, 0)}, parameters={D: 0})
-    assert seen.vanished
-    assert not never.vanished
+    assert seen.empty_regions
+    assert not never.empty_regions
     assert seen != never
 
 
@@ -93,7 +93,7 @@ def test_a_copied_model_is_the_same(copied):
         assert again == model
         assert hash(again) == hash(model)
         assert repr(again) == repr(model)
-        assert again.vanished == model.vanished
+        assert again.empty_regions == model.empty_regions
         assert again.with_parameters(D=0.5) == model.with_parameters(D=0.5)
 
 
@@ -149,7 +149,7 @@ def test_regions_vanish_and_come_back_at_every_value():
     for value in (1, 0, 0.5, 0, 1, 1e-300, 0):
         now = model.with_parameters(D=value)
         assert len(now.regions) == (2 if value == 0 else 3)
-        assert now.vanished == (("S2",) if value == 0 else ())
+        assert now.empty_regions == (("S2",) if value == 0 else ())
         fresh = fs.Model({x: -sp.Max(x - D, -x - D, 0)}, parameters={D: value})
         assert [r.rates for r in now.regions.values()] == [r.rates for r in fresh.regions.values()]
     # the sign of a factor of parameters decides what a condition means

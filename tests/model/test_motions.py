@@ -25,7 +25,7 @@ def test_an_interface_crossed_at_one_speed_has_no_sliding_motion_anywhere():
     assert compile_series(model, 16).modes == ("S1", "S2")
     assert [mode.name for mode in modes_of(model)] == ["S1", "S2"]
     run = fs.simulate(model, [-1.0, 0.0], t=(0, 2))
-    assert run.word == run.modes[::-1] == ("S2", "S1")
+    assert run.itinerary == run.modes[::-1] == ("S2", "S1")
 
 
 def test_a_continuous_model_slides_nowhere():

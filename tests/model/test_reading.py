@@ -154,12 +154,12 @@ def test_regions_follow_the_parameters_and_keep_their_names():
 
 def test_a_region_that_vanishes_is_noticed_and_comes_back():
     model = Model({x: v, v: -dead_zone(x, D)}, parameters={D: 0.5})
-    assert model.vanished == ()
+    assert model.empty_regions == ()
     shut = model.with_parameters(D=0)
-    assert (list(shut.regions), shut.vanished) == (["S1", "S3"], ("S2",))
+    assert (list(shut.regions), shut.empty_regions) == (["S1", "S3"], ("S2",))
     assert "empty at these parameter values: S2" in repr(shut)
     again = shut.with_parameters(D=1)
-    assert (list(again.regions), again.vanished) == (["S1", "S2", "S3"], ())
+    assert (list(again.regions), again.empty_regions) == (["S1", "S2", "S3"], ())
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ def test_runs_agree_with_the_independent_passages(folded):
         1e-4: (-0.094100921486102, -0.094657783243077),
     }
     for eps, loads in known.items():
-        ramp = fast.ramped("w", -eps, start=0.2)
+        ramp = fast.with_ramp("w", -eps, start=0.2)
         run = fs.simulate(
             ramp, [0.9427182380145632, 0], t=(0, 0.42 / eps), integration=fs.Integration(rtol=1e-13)
         )

@@ -17,7 +17,7 @@ def passage(system, units):
     factor, time = units.get(PARAMETER, 1.0), units.get(TIME, 1.0)
     model = system.measured().with_parameters(units)
     diagram = fs.continue_equilibria(model, system.parameter, system.range(units))
-    ramp = model.ramped(system.parameter, rate * time / factor, low / factor)
+    ramp = model.with_ramp(system.parameter, rate * time / factor, low / factor)
     (start,) = fs.equilibria(model, {system.parameter: low / factor})
     fine = fs.Integration(rtol=1e-11)
     span = (0, (high - low) / rate / time)
@@ -26,7 +26,7 @@ def passage(system, units):
     words = [(t.kind, t.from_sheet, t.to_sheet) for t in overlay.transitions]
     delays = [t.delay * factor for t in overlay.transitions if np.isfinite(t.delay)]
     delays += [t.law.delay * factor for t in overlay.transitions if t.law is not None]
-    return (run.word, words), [*delays, *overlay.shares().values()]
+    return (run.itinerary, words), [*delays, *overlay.shares().values()]
 
 
 @pytest.mark.parametrize("name", RAMPS)

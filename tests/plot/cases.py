@@ -13,7 +13,7 @@ from fastslow.results.branch.branch import Branch
 from fastslow.results.overlay.delay_scaling import DelayScaling
 from fastslow.results.overlay.delays import FoldDelay
 from fastslow.results.points import SpecialPoint
-from fastslow.results.trajectory.sweep import Sweep, SweepPass
+from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
 
 END = Outcome("end of range", "reached the end of the range.", True)
 
@@ -232,7 +232,7 @@ def swept():
                 (END,) * len(values),
             )
         )
-    return Sweep("r", "x", "stroboscopic", "…", tuple(passes))
+    return BifurcationSweep("r", "x", "stroboscopic", "…", tuple(passes))
 
 
 def cusp():

@@ -8,7 +8,7 @@ import fastslow as fs
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.trajectory.section import Section
 from fastslow.results.trajectory.spectrum import Spectrum
-from fastslow.results.trajectory.sweep import Sweep, SweepPass
+from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
 
 FINE = Outcome("end of time", "reached the end.", True)
 LOST = Outcome("blow-up", "the state grew.", False)
@@ -30,7 +30,7 @@ def one_pass(direction):
 
 @pytest.fixture
 def swept():
-    return Sweep("Omega", "x", "extremes", "…", (one_pass(1), one_pass(-1)))
+    return BifurcationSweep("Omega", "x", "extremes", "…", (one_pass(1), one_pass(-1)))
 
 
 def test_both_passes_differ_in_more_than_colour(swept):
@@ -51,7 +51,9 @@ def test_both_passes_differ_in_more_than_colour(swept):
 
 def test_one_pass_into_given_axes():
     ax = Figure().add_subplot()
-    drawn = fs.plot.sweep(Sweep("c", "y", "section", "…", (one_pass(-1),)), ax=ax, color="red")
+    drawn = fs.plot.sweep(
+        BifurcationSweep("c", "y", "section", "…", (one_pass(-1),)), ax=ax, color="red"
+    )
     assert drawn.ax is ax
     assert drawn.up is None
     assert drawn.down.get_color() == "red"

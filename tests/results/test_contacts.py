@@ -109,7 +109,7 @@ def test_rest_and_small_motion(falling):
     assert regime(still, [0.2, 0], t=(0, 9), period=3) == "free"
     # at a corner without load it counts to the region that the run names
     for corner in (0.5, -0.5):
-        (name,) = fs.simulate(still, [corner, 0], t=(0, 9)).word
+        (name,) = fs.simulate(still, [corner, 0], t=(0, 9)).itinerary
         expected = {"S1": "meshed upper", "S2": "free", "S3": "meshed lower"}[name]
         assert regime(still, [corner, 0], t=(0, 9), period=3) == expected
 
@@ -143,7 +143,7 @@ def test_sliding_rests_against_its_side():
         parameters={D: 0.25, k: 40, B: 0.5, C: 0.2, omega: 0.1},
     )
     resting = fs.simulate(stops, [0], periods=2)
-    assert resting.word == ("S2", "S1|S2")
+    assert resting.itinerary == ("S2", "S1|S2")
     assert regime(stops, [0], periods=2) == "meshed upper"
     assert regime(stops.with_parameters(B=-0.5), [0], periods=2) == "meshed lower"
     # swung from stop to stop, never into them

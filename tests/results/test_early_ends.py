@@ -20,7 +20,7 @@ def cut():
 
 def test_texts_of_results_say_that_the_run_ended_early(cut):
     assert not cut.outcome
-    for result in (cut.steady(), cut.section("v"), cut.stroboscopic(), cut.spectrum("x")):
+    for result in (cut.periodicity(), cut.section("v"), cut.stroboscopic(), cut.spectrum("x")):
         assert "ended early" in repr(result)
     assert cut.section("v").ended == cut.spectrum("x").ended == "too many steps"
 
@@ -55,7 +55,7 @@ def test_a_passage_near_a_fold_of_periodic_solutions_is_no_period():
     pair = fs.systems.gear_pair().with_parameters(Omega=0.7080315)
     fine = fs.Integration(rtol=1e-11)
     run = fs.simulate(pair, [0.70999929, 0.01880563], periods=400, integration=fine)
-    steady = run.steady()
+    steady = run.periodicity()
     assert steady.multiple is None
     assert steady.outcome.code == "drifting"
     assert not steady.outcome
@@ -70,7 +70,7 @@ def test_what_is_left_to_the_periodic_solution(damping):
     """
     model = fs.Model({x: v, v: sp.sin(t) - x - damping * v})
     run = fs.simulate(model, [0, 0], periods=int(5 / damping))
-    steady = run.steady()
+    steady = run.periodicity()
     assert steady.multiple == 1
     exact = np.array([-1 / damping, 0.0])
     apart = np.abs(steady.section.table[:2, -1] - exact).max() * damping / 2

@@ -54,7 +54,7 @@ def results(gear):
         "sweep": sweep,
         "section": run.section(interface="x - D"),
         "spectrum": run.spectrum("x"),
-        "steady": run.steady(),
+        "steady": run.periodicity(),
         "contacts": run.contacts(),
         "map": fs.refined_map(lambda a, b: a * b < 1, {"a": (0, 2), "b": (0, 2)}, levels=3),
         "load": fs.slow_load_criterion(gear, {"D": [0.5, 0.6], "C": 2.5}),
@@ -406,7 +406,7 @@ def test_newer_and_wrong_contents(tmp_path):
     path = tmp_path / "x.npz"
     newer = {"format": files.FORMAT + 1, "library": "9.9"}
     read(archive(path, tree=newer), r"was written by fastslow 9\.9 in format 3; .* upgrade it")
-    read(archive(path, tree={"format": 1}), r"in format 1; this is .* reads format 2$")
+    read(archive(path, tree={"format": 1}), r"in format 1; this is .* reads format 3$")
     read(archive(path, text="{"), "not written by fastslow")
     read(archive(path, text="[]"), "not written by fastslow")
     outcome = {"class": "Outcome", "fields": {"code": "a", "message": "b", "success": True}}

@@ -8,7 +8,7 @@ import pytest
 import fastslow as fs
 from fastslow.results.overlay.transitions import Phase, StableSheet, Transition
 from fastslow.results.points import SpecialPoint
-from fastslow.results.trajectory.state_at import Moment
+from fastslow.results.trajectory.state_at import StatePoint
 
 
 def special(code):
@@ -19,7 +19,7 @@ def special(code):
 
 
 def moment(time, value):
-    return Moment(time, ("x",), np.ones(1), {"w": value}, parameter="w")
+    return StatePoint(time, ("x",), np.ones(1), {"w": value}, parameter="w")
 
 
 def transition(code, kind, **more):

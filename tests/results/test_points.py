@@ -58,8 +58,8 @@ def test_unknown_name_of_a_point():
 
 
 def test_a_list_says_how_sure_it_is():
-    assert Equilibria([], "complete").coverage == "complete"
-    assert Equilibria().coverage == "found"
+    assert Equilibria([], "complete").completeness == "complete"
+    assert Equilibria().completeness == "found"
 
 
 def test_clarke_path_of_the_corner_of_the_gear():

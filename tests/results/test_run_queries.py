@@ -198,8 +198,8 @@ def test_parts_joined_are_the_whole(forced, cuts):
     assert crossed == {c.time for c in forced.crossings}
     assert parts[-1].outcome == forced.outcome
     assert parts[0].outcome.code == "cut"
-    for name, whole in forced.residence.items():
-        joined = sum(p.residence[name] * (p.span[1] - p.span[0]) for p in parts)
+    for name, whole in forced.time_fractions.items():
+        joined = sum(p.time_fractions[name] * (p.span[1] - p.span[0]) for p in parts)
         assert joined == pytest.approx(whole * forced.span[1], abs=1e-9)
 
 
@@ -222,7 +222,7 @@ def test_stays_in_a_region(forced):
         (s.start, s.end) for s in forced.segments if s.region == "S2"
     ]
     for stay in stays:
-        assert stay.word == ("S2",)
+        assert stay.itinerary == ("S2",)
         # those that begin and end it
         inner = {forced.span[0], forced.span[1]}
         assert {c.time for c in stay.crossings} == set(stay.span) - inner
@@ -267,7 +267,7 @@ def test_one_sample(swing):
     one = swing[5:6]
     assert (len(one), one.span[0]) == (1, one.span[1])
     assert one(one.span[0]) == pytest.approx(swing[5].state)
-    assert one.word == (swing[5].region,)
+    assert one.itinerary == (swing[5].region,)
     assert times_of(one.at(x=one["x"][0])) == times_of(one.at(t=one.span[0])) == [one.span[0]]
     assert one.nearest(x=3).time == one.span[0]
     assert list(one.to_dict()["region"]) == [swing[5].region]

@@ -120,13 +120,13 @@ def test_contacts_period_by_period(rattling):
     assert contacts.hits.tolist() == [[10, 10], [0, 0]]
     assert contacts.per_period.shape == (10, 2, 2)
     assert (contacts.per_period[:, 0] == 1).all()
-    assert sum(contacts.residence.values()) == pytest.approx(1.0, abs=1e-12)
+    assert sum(contacts.time_fractions.values()) == pytest.approx(1.0, abs=1e-12)
     apart = rattling.section(interface="x - D", since=end - 10 * length)
     first = apart.times[apart.directions < 0][:9]
     last = apart.times[apart.directions > 0][-9:]
     share = (last - first).mean() / length
     assert 0 < share < 1
-    assert contacts.residence["S2"] == pytest.approx(share, abs=1e-6)
+    assert contacts.time_fractions["S2"] == pytest.approx(share, abs=1e-6)
     assert rattling.hits("x - D", direction=1, since=end - 3 * length) == 3
     half = rattling.hits("x - D", until=end / 2) + rattling.hits("x - D", since=end / 2)
     assert half == rattling.hits("x - D")
@@ -157,17 +157,17 @@ def test_lines_between_the_bins_are_interpolated(cycle):
 
 
 def test_settled_on_the_forcing(meshed):
-    settled = meshed.steady()
+    settled = meshed.periodicity()
     assert settled.multiple == 1
     assert settled.period == pytest.approx(meshed.period, rel=1e-12)
     # the transient has fallen to the tolerance by then, and not much earlier
     slowest = math.log(1e-6) / -0.05
     assert 0.5 * slowest < settled.since < 1.5 * slowest
-    assert meshed.steady(tol=1e-15).multiple is None
+    assert meshed.periodicity(tol=1e-15).multiple is None
 
 
 def test_settled_on_a_cycle(cycle):
-    settled = cycle.steady()
+    settled = cycle.periodicity()
     assert settled.multiple == 1
     assert settled.period == pytest.approx(VAN_DER_POL, abs=1e-6)
     assert settled.outcome.code == "periodic"
@@ -175,11 +175,13 @@ def test_settled_on_a_cycle(cycle):
 
 def test_too_short_and_at_rest(cycle):
     model = fs.systems.van_der_pol().frozen().with_parameters(w=0)
-    short = fs.simulate(model, [2, 0], t=(0, 5), integration=fs.Integration(rtol=1e-13)).steady()
+    short = fs.simulate(
+        model, [2, 0], t=(0, 5), integration=fs.Integration(rtol=1e-13)
+    ).periodicity()
     assert short.outcome.code == "too short"
     rest = fs.simulate(
         model.with_parameters(w=2), [2, 0.1], t=(0, 200), integration=fs.Integration(rtol=1e-13)
-    ).steady()
+    ).periodicity()
     assert rest.outcome.code == "equilibrium"
     assert rest.multiple is None
 
@@ -188,8 +190,8 @@ def test_a_run_without_a_step():
     x = sp.Symbol("x")
     stuck = fs.simulate(fs.Model({x: -sp.log(x)}), [-1], t=(0, 1))
     assert not len(stuck.section("x"))
-    assert stuck.contacts().residence == {"S1": 0.0}
-    for question in (stuck.steady, lambda: stuck.stroboscopic(1.0)):
+    assert stuck.contacts().time_fractions == {"S1": 0.0}
+    for question in (stuck.periodicity, lambda: stuck.stroboscopic(1.0)):
         with pytest.raises(fs.ArgumentError, match="made no step"):
             question()
     with pytest.raises(fs.ArgumentError, match="leaves nothing of the run"):
@@ -246,5 +248,5 @@ def test_wrong_questions(cycle, meshed):
     with pytest.raises(fs.ArgumentError, match="dense=True"):
         light.section("x")
     with pytest.raises(fs.ArgumentError, match="dense=True"):
-        light.steady()
+        light.periodicity()
     assert light.section(interface="x - D").names == ("x", "v")

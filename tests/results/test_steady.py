@@ -28,10 +28,10 @@ def swung(offset, periods):
 
 def test_one_repeat_is_not_enough():
     """Two states a period apart may agree by chance; three do not."""
-    short = swung(0.0, 1).steady(period=2 * math.pi)
+    short = swung(0.0, 1).periodicity(period=2 * math.pi)
     assert short.multiple is None
     assert short.outcome.code == "too short"
-    whole = swung(0.0, 2).steady(period=2 * math.pi)
+    whole = swung(0.0, 2).periodicity(period=2 * math.pi)
     assert whole.multiple == 1
     assert whole.since == 0.0
 
@@ -39,7 +39,7 @@ def test_one_repeat_is_not_enough():
 @pytest.mark.parametrize("tol", [1e-2, 1e-3, 1e-5])
 def test_from_the_first_repeat_on(tol):
     """The change from k to k + 1 is 0.4 exp(−πk/5) (1 − exp(−π/5)), parts of the range."""
-    steady = swung(0.4, 40).steady(period=2 * math.pi, tol=tol)
+    steady = swung(0.4, 40).periodicity(period=2 * math.pi, tol=tol)
     first = math.ceil(math.log(tol * RANGE / (0.4 * (1 - SHRINKS))) / math.log(SHRINKS))
     assert steady.since == pytest.approx(2 * math.pi * first, rel=1e-12)
     assert steady.multiple == 1

@@ -56,7 +56,7 @@ def test_segments_cover_the_run(run):
         assert one.end == other.start
         assert one.region != other.region
     assert len(run.segments) == len(run.crossings) + 1
-    assert run.word == tuple(s.region for s in run.segments)
+    assert run.itinerary == tuple(s.region for s in run.segments)
     for crossing, segment in zip(run.crossings, run.segments[1:], strict=True):
         assert crossing.time == segment.start
         assert crossing.to_region == segment.region
@@ -82,7 +82,7 @@ def test_pickle(run):
     assert len(run.t) > len(run.crossings)  # fills what is computed once
     again = pickle.loads(pickle.dumps(run))
     assert np.array_equal(again.t, run.t)
-    assert again.word == run.word
+    assert again.itinerary == run.itinerary
     assert again.outcome == run.outcome
     assert [c.time for c in again.crossings] == [c.time for c in run.crossings]
 
@@ -104,8 +104,8 @@ def test_without_dense_output():
 
 
 def test_contact_statistics(run):
-    assert sum(run.residence.values()) == pytest.approx(1.0, abs=1e-12)
-    assert set(run.residence) == {"S1", "S2", "S3"}
+    assert sum(run.time_fractions.values()) == pytest.approx(1.0, abs=1e-12)
+    assert set(run.time_fractions) == {"S1", "S2", "S3"}
     both = run.hits("x - D") + run.hits("x + D")
     assert both == len(run.crossings)
     assert run.hits("x - D", direction=1) + run.hits("x - D", direction=-1) == run.hits("x - D")

@@ -190,7 +190,7 @@ def test_sliding_and_its_exit():
     above = sp.Piecewise((-sp.besselj(0, x), y > 0), (2, True))
     model = Model({x: sp.Piecewise((1, y > 0), (3, True)), y: above})
     run = simulate(model, [0, 0], t=(0, 3), integration=Integration(rtol=1e-12))
-    assert run.word == ("S1|S2", "S1")
+    assert run.itinerary == ("S1|S2", "S1")
     leave = run.crossings[0]
     with mpmath.workdps(20):
         zero = mpmath.besseljzero(0, 1)

@@ -30,7 +30,7 @@ def unloaded(gear):
 def test_start_on_an_interface(unloaded, state, word):
     run = simulate(unloaded, state, t=(0, 5))
     assert run.outcome
-    assert run.word == word
+    assert run.itinerary == word
     assert len(run.crossings) == len(word) - 1
 
 
@@ -48,7 +48,7 @@ def test_tiny_drift_from_a_corner(gear, load):
     run = simulate(
         gear.with_parameters(B=load, C=0), [0.25, 0], t=(0, 20), integration=Integration(rtol=1e-13)
     )
-    assert run.word[0] == ("S1" if load > 0 else "S2")
+    assert run.itinerary[0] == ("S1" if load > 0 else "S2")
     if load < 0:
         # x = D + w (t - 1 + exp(-t)) in the gap
         expected = 0.25 + load * (20 - 1 + math.exp(-20))
@@ -60,7 +60,7 @@ def test_a_start_on_an_interface_counts_to_the_side_that_it_drifts_to(drift):
     """However slowly: far below the rounding of x = 1."""
     model = Model({x: drift}, interfaces={"one": x - 1})
     run = simulate(model, [1], t=(0, 1))
-    assert run.word == simulate(model, [2 if drift > 0 else 0], t=(0, 1)).word
+    assert run.itinerary == simulate(model, [2 if drift > 0 else 0], t=(0, 1)).itinerary
     assert not run.crossings
 
 
@@ -77,7 +77,7 @@ def test_a_corner_left_when_the_load_changes_sign(gear):
     model = gear.with_parameters(B=0, C=-1e-3)
     run = simulate(model, [0.25, 0], t=(0, 300))
     assert run.outcome
-    assert run.word == ("S2",)
+    assert run.itinerary == ("S2",)
 
 
 def test_accumulating_crossings_end_the_run():
@@ -165,7 +165,7 @@ def test_sliding_into_a_second_interface_slides_on_both():
     field = {x: -sp.sign(x), y: -sp.sign(y)}
     run = simulate(Model(field), [1, 2], t=(0, 5))
     assert run.outcome
-    assert run.word == ("S1", "S1|S3", "S1|S4")
+    assert run.itinerary == ("S1", "S1|S3", "S1|S4")
     assert run(1.5) == pytest.approx([0.0, 0.5], abs=1e-12)
     assert run(5.0).tolist() == [0.0, 0.0]
 
@@ -173,7 +173,7 @@ def test_sliding_into_a_second_interface_slides_on_both():
 def test_a_start_that_every_side_attracts_to_a_corner():
     run = simulate(Model({x: -sp.sign(x), y: -sp.sign(y)}), [0, 0], t=(0, 5))
     assert run.outcome
-    assert run.word == ("S1|S4",)
+    assert run.itinerary == ("S1|S4",)
     assert run(5.0).tolist() == [0.0, 0.0]
 
 

@@ -258,7 +258,7 @@ def test_a_run_is_the_same_in_other_units(case):
         )
         assert len(other.steps) == len(run.steps)
         assert other.end[1:] / numbers == pytest.approx(run.end[1:], rel=1e-7)
-        assert other.word == run.word
+        assert other.itinerary == run.itinerary
 
 
 S, E, sick, beta, sigma, gamma = sp.symbols("S E sick beta sigma gamma")

@@ -19,7 +19,7 @@ def test_dry_friction_comes_to_rest(friction):
     assert [c.time for c in run.crossings] == pytest.approx(
         [math.pi, 2 * math.pi, 3 * math.pi], abs=1e-12
     )
-    assert run.word == ("S2", "S1", "S2", "S1|S2")
+    assert run.itinerary == ("S2", "S1", "S2", "S1|S2")
     assert run(30.0) == pytest.approx([-0.2, 0.0], abs=1e-12)
     assert run(30.0)[1] == 0.0
 
@@ -27,7 +27,7 @@ def test_dry_friction_comes_to_rest(friction):
 def test_sticking_ends_when_the_force_exceeds_friction(friction):
     model = friction.with_parameters(a=2.0, mu=0.8)
     run = simulate(model, [0, 0], t=(0, 2), integration=Integration(rtol=1e-13))
-    assert run.word == ("S1|S2", "S1")
+    assert run.itinerary == ("S1|S2", "S1")
     assert run.crossings[0].time == pytest.approx(math.asin(0.4), abs=1e-12)
     assert run.crossings[0].from_region == "S1|S2"
 
@@ -48,7 +48,7 @@ def test_sliding_field_and_its_exit():
     # slides on y = 0 with x' = 1 while -1 < x < 1, leaves upwards at x = 1
     field = {x: 1, y: sp.Piecewise((x - 1, y > 0), (1 + 0 * x, True))}
     run = simulate(Model(field), [0, -0.5], t=(0, 3), integration=Integration(rtol=1e-12))
-    assert run.word == ("S2", "S1|S2", "S1")
+    assert run.itinerary == ("S2", "S1|S2", "S1")
     assert [c.time for c in run.crossings] == pytest.approx([0.5, 1.0], abs=1e-12)
     sliding = np.linspace(0.5, 1.0, 7)
     assert np.abs(run(sliding)[1]).max() == 0.0
@@ -62,7 +62,7 @@ def test_sliding_on_a_curve_stays_on_it():
     spin = sp.Piecewise((1, r2 - 1 > 0), (4, True))
     model = Model({x: side * x - spin * y, y: side * y + spin * x})
     run = simulate(model, [0.5, 0], t=(0, 10), integration=Integration(rtol=1e-12))
-    assert run.word == ("S2", "S1|S2")
+    assert run.itinerary == ("S2", "S1|S2")
     begin = run.crossings[0].time
     assert begin == pytest.approx(math.log(2) / 2, abs=1e-11)
     z = run([begin, begin + 5.0])
@@ -77,7 +77,7 @@ def test_sliding_on_a_curve_stays_on_it():
 def test_crossing_a_discontinuity_without_sliding():
     model = Model({x: sp.Piecewise((1, x > 0), (2, True))})
     run = simulate(model, [-1], t=(0, 2))
-    assert run.word == ("S2", "S1")
+    assert run.itinerary == ("S2", "S1")
     assert run(2.0) == pytest.approx([1.5], abs=1e-12)
 
 
@@ -113,5 +113,5 @@ def test_where_sliding_ends_one_way_goes_on(tol):
                 integration=Integration(rtol=tol),
             )
             assert run.outcome
-            assert run.word == ("S1|S2", "S1")
+            assert run.itinerary == ("S1|S2", "S1")
             assert run.crossings[-1].state[0] == pytest.approx(math.pi / 2, abs=10 * tol)

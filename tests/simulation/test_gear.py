@@ -99,7 +99,7 @@ def test_slow_passage_through_the_gap(speed):
     run = simulate(
         model, [0.9427182380145632, 0], t=(0, 0.42 / speed), integration=Integration(rtol=1e-13)
     )
-    assert run.word[:3] == ("S1", "S2", "S3")
+    assert run.itinerary[:3] == ("S1", "S2", "S3")
     loads = [0.2 - speed * c.time for c in run.crossings[:2]]
     assert loads == pytest.approx(PASSAGES[speed], abs=2e-13)
 

@@ -31,7 +31,7 @@ def test_free_flight_between_two_springs(linear, k1, k3, gap, speed):
     times = [c.time for c in run.crossings]
     assert len(times) == 11
     assert times == pytest.approx(expected[:11], rel=1e-10)
-    assert run.word == (("S1", "S2", "S3", "S2") * 3)
+    assert run.itinerary == (("S1", "S2", "S3", "S2") * 3)
     speeds = np.array([abs(c.state[1]) for c in run.crossings])
     assert np.abs(speeds / speed - 1).max() < 1e-10
 
@@ -107,7 +107,7 @@ def test_grazing_is_a_touch():
     x, y = sp.symbols("x y")
     model = Model({x: 1, y: 2 * x}, interfaces={"floor": y})
     run = simulate(model, [-1, 1], t=(0, 2))
-    assert run.word == ("S1",)
+    assert run.itinerary == ("S1",)
     assert all(c.direction == 0 and c.tangential for c in run.crossings)
     assert run(2.0) == pytest.approx([1, 1], abs=1e-12)
     near = simulate(model, [-1, 1 + 1e-12], t=(0, 2))

@@ -41,7 +41,7 @@ def test_two_dry_oscillators_follow_their_closed_forms():
     for first, second in starts:
         run = fs.simulate(oscillators(), [first, 0, second, 0], t=(0, 40), integration=integration)
         assert run.outcome
-        assert run.word[-1] == "S1|S4"
+        assert run.itinerary[-1] == "S1|S4"
         root = math.sqrt(2)
         assert np.abs(run(t)[0] - swings(first, 1.0, 0.3, t)).max() < 1e-10
         assert np.abs(run(t)[2] - swings(second, root, 0.15, t)).max() < 1e-10
@@ -75,7 +75,7 @@ def test_sticking_blocks_leave_one_after_the_other_when_friction_is_used_up():
     # uncoupled, both stick at V until the springs pull with the full friction
     apart = belt().with_parameters(k=0, b=0.4)
     run = fs.simulate(apart, [0, 0.1, 0, 0.1], t=(0, 4.5), integration=integration)
-    assert run.word == ("S1|S4", "S2|S4", "S4")
+    assert run.itinerary == ("S1|S4", "S2|S4", "S4")
     assert [c.time for c in run.crossings] == pytest.approx([2.0, 4.0], abs=1e-12)
     # from x = b/2 with speed V it slips about that place
     root = math.sqrt(2)
@@ -98,7 +98,7 @@ def test_coupled_blocks_on_a_belt_against_smooth_friction():
     state = [-0.2, 0.3, -0.1, 0.1]
     run = fs.simulate(belt(), state, t=(0, 6), integration=integration)
     assert run.outcome
-    assert "S1|S4" in run.word
+    assert "S1|S4" in run.itinerary
 
     def smooth(y, sign):
         pull = 0.5 * (y[0] - y[2])
@@ -141,8 +141,8 @@ def test_a_relay_with_two_switches_against_smooth_ones():
         t=(0, 3),
         integration=integration,
     )
-    assert run.word[-1] == "S1|S4"
-    assert len(run.word) == 3
+    assert run.itinerary[-1] == "S1|S4"
+    assert len(run.itinerary) == 3
 
     def smooth(y, sign):
         return base + jumps @ sign(y[:2]) - np.array([0, 0, y[2]])
@@ -170,7 +170,7 @@ def test_a_double_pendulum_with_dry_joints_against_smooth_friction():
     state = [1.2, 0.4, 0.0, 0.6]
     run = fs.simulate(pendulum, state, t=(0, 30), integration=integration)
     assert run.outcome
-    assert run.word[-1] == "S1|S4"
+    assert run.itinerary[-1] == "S1|S4"
     # zero but for products of roundings in the series between projections (4e-34 measured)
     assert np.abs(run(30.0)[2:]).max() < 1e-30
     # while one joint sticks it turns with nothing between
@@ -240,7 +240,7 @@ def test_the_next_derivative_decides_where_friction_is_just_used_up():
     t = sp.Symbol("t")
     rates = {v1: 1 + t - sp.sign(v1), v2: 1 - t - sp.sign(v2)}
     run = fs.simulate(fs.Model(rates), [0, 0], t=(0, 1), integration=integration)
-    assert run.word == ("S1|S2",)
+    assert run.itinerary == ("S1|S2",)
     assert run(1.0) == pytest.approx([0.5, 0.0], abs=1e-13)
 
 
@@ -262,5 +262,5 @@ def test_interfaces_at_an_angle_are_both_kept_to_rounding():
     rates = {x1: sp.sin(z) / 2 - sp.sign(x1), x2: sp.cos(3 * z) - 3 * sp.sign(h), z: 1}
     run = fs.simulate(fs.Model(rates), [0.4, -1.0, 0], t=(0, 20))
     assert run.outcome
-    assert run.word[-1] == "S1|S4"
+    assert run.itinerary[-1] == "S1|S4"
     assert np.abs(run(np.linspace(15, 20, 31))[:2]).max() == 0.0

@@ -36,7 +36,7 @@ def test_van_der_pol_with_slow_forcing():
     )
     assert np.abs(run(times) - reference.y).max() < 1e-9
     assert run.regime is None
-    assert run.word == ("S1",)
+    assert run.itinerary == ("S1",)
 
 
 def test_period_of_van_der_pol():

@@ -237,7 +237,7 @@ def test_what_needs_equations_says_so():
     ):
         with pytest.raises(fs.ArgumentError, match=f"expected a Model, received a Stored.*{what}"):
             call()
-    for name in ("frozen", "ramped", "rates", "to_latex"):
+    for name in ("frozen", "with_ramp", "rates", "to_latex"):
         with pytest.raises(AttributeError, match=f"a stored model has no {name}: .*{what}"):
             getattr(stored, name)
     with pytest.raises(AttributeError, match="no attribute 'frozn'"):

@@ -97,14 +97,14 @@ def test_period_doubling(roessler):
     assert (apart[values > DOUBLING + 0.02] > 0.1).all()
     # the multiplier is −0.978 here, so it takes its time
     run = fs.simulate(roessler.with_parameters(c=2.8), drawn.up.ends[1], t=(0, 6000))
-    before = run.steady()
+    before = run.periodicity()
     assert before.multiple == 1
     assert before.period == pytest.approx(5.76792059, abs=1e-5)
 
 
 def test_doubled_orbit_closes_in_scipy_too(roessler):
     run = fs.simulate(roessler.with_parameters(c=3.5), [1, 1, 0], t=(0, 900))
-    settled = run.steady()
+    settled = run.periodicity()
     assert settled.multiple == 2
     begin = settled.section.table[:3, -1]
     other = solve_ivp(
@@ -118,7 +118,7 @@ def test_doubled_orbit_closes_in_scipy_too(roessler):
     )
     assert other.y[:, -1] == pytest.approx(begin, abs=1e-6)
     assert np.abs(other.sol(settled.period / 2) - begin).max() > 0.1
-    chaos = fs.simulate(roessler.with_parameters(c=5.7), [1, 1, 0], t=(0, 900)).steady()
+    chaos = fs.simulate(roessler.with_parameters(c=5.7), [1, 1, 0], t=(0, 900)).periodicity()
     assert chaos.outcome.code == "not periodic"
     assert chaos.multiple is None
 

@@ -261,11 +261,11 @@ def test_comparing():
     found = refined_map(disc, SQUARE, levels=5)
     same = found.compare(disc)
     assert same.share == 1
-    assert same.disagreements == {}
+    assert same.compare_scalings == {}
     other = found.compare(lambda x, y: disc(x, y, radius=0.6))
     # points stand for a ring of area π (0.5 − 0.36) in a square of area 4
     assert 1 - other.share == pytest.approx(np.pi * 0.14 / 4, rel=0.05)
-    ((pair, points),) = other.disagreements.items()
+    ((pair, points),) = other.compare_scalings.items()
     assert pair == (True, False)
     radii = np.hypot(points[:, 0] - 0.1, points[:, 1] + 0.05)
     assert radii.min() >= 0.6

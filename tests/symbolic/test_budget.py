@@ -101,6 +101,6 @@ def test_both_kinds_of_daisies_together_are_closed_once_degrees_are_lowered():
     state = {real(n): e.subs(real("L"), light) for n, e in both.elimination.solved.items()}
     assert all(e.subs(state).subs(real("L"), light) == 0 for e in rates.values())
     equilibria = fs.equilibria(model, L=float(light))
-    assert equilibria.coverage == "complete"
+    assert equilibria.completeness == "complete"
     (point,) = [e for e in equilibria if e.region == "S8" and min(e.state) > 1e-6]
     assert point.state == pytest.approx([float(v) for v in state.values()], rel=1e-12)

@@ -204,7 +204,7 @@ def test_nested_maxima_keep_their_form(numbers):
 def test_a_diagram_of_nested_maxima():
     world = field_models.daisyworld(numbers=True)
     diagram = fs.continue_equilibria(world, "L", over=(0.9, 1.1))
-    assert diagram.coverage == "complete"
+    assert diagram.completeness == "complete"
     (both,) = [p for p in diagram.at(L=1.0, stable=True) if p.state[0] > 1e-3 and p.state[1] > 1e-3]
     place = {real("L"): 1.0, real("a_w"): both.state[0], real("a_b"): both.state[1]}
     rates = world.rates.values()

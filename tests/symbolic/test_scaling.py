@@ -8,7 +8,7 @@ from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.symbolic.reduction import reduce_states
-from fastslow.symbolic.scaling import disagreements, identify, nondimensionalise
+from fastslow.symbolic.scaling import compare_scalings, identify, nondimensionalise
 from fastslow.systems import harmonic_gear, harmonic_gear_twist
 from fastslow.systems.geartrain import gear_scaling
 
@@ -99,7 +99,7 @@ def test_another_choice_of_scales_is_told_apart():
     result = identify(scaled, target, {"x": "y"})
     assert not result.agrees
     assert result.contradictions == (1,)
-    assert dict(disagreements(scaled.scales, {"x": real("K") / 2})) == {"x": sp.Rational(1, 2)}
+    assert dict(compare_scalings(scaled.scales, {"x": real("K") / 2})) == {"x": sp.Rational(1, 2)}
 
 
 def test_van_der_pol_scaling():

@@ -375,7 +375,7 @@ def _model(point: SpecialPoint, names: tuple[str, str]) -> Model:
         if name not in known:
             raise unknown_name("parameter", name, known)
     whole = model.with_parameters({n: point.parameters[n] for n in known if n in point.parameters})
-    return whole.freed(names[0]).freed(names[1])
+    return whole.with_free(names[0]).with_free(names[1])
 
 
 def _region_of(field: FrozenField, point: SpecialPoint, code: str) -> int:

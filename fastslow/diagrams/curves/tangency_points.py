@@ -47,7 +47,7 @@ def tangencies(
 
     In the plane they are isolated. With n > 2 states they form surfaces of n − 2
     dimensions; as many states must be given values. Where both equations are
-    polynomials all solutions are found and the list's ``coverage`` is
+    polynomials all solutions are found and the list's ``completeness`` is
     ``"complete"``; else Newton's method from many starts, and it is ``"found"``.
     An interface that a field is tangent to everywhere has no such points.
 

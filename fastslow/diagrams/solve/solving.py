@@ -41,7 +41,7 @@ def equilibria(
     """All equilibria of a frozen model at given values of its slow quantities.
 
     Where a region's equations reduce to one polynomial all its roots are
-    found, and the list's ``coverage`` is ``"complete"``; elsewhere Newton's
+    found, and the list's ``completeness`` is ``"complete"``; elsewhere Newton's
     method from many starts, and it is ``"found"``. A continuum (the gap of a
     backlash at zero load) is given by its ends, with ``continuum=True``.
 
@@ -104,7 +104,7 @@ def equilibria(
     # sets may exist at this value of every parameter alone
     found = solve_at(field, value, virtual, FrozenField(given, IDLE))
     inside = [one for one in found.sets if asked.meets(one.lower, one.upper)]
-    return Equilibria(within(field, asked, found), found.coverage, inside)
+    return Equilibria(within(field, asked, found), found.completeness, inside)
 
 
 def solve_at(

@@ -95,7 +95,7 @@ class Starts:
     def _solve(self, value: float, bounds: Mapping[str, float] | None) -> None:
         """Solve for the equilibria at a value, all or those within bounds."""
         solved = solve_at(self._field, value, virtual=True, with_sets=False, bounds=bounds)
-        sure = solved.coverage == "complete"
+        sure = solved.completeness == "complete"
         if bounds is None or sure:
             self._sure[value] = sure
             # no branch runs through what is in a set of equilibria

@@ -304,7 +304,7 @@ def _too_many(continuation: Continuation) -> Outcome:
 @lru_cache(maxsize=64)
 def _field(model: Model | StoredModel, name: str) -> FrozenField:
     """The field of a model, made once."""
-    return FrozenField(model.freed(name), name)
+    return FrozenField(model.with_free(name), name)
 
 
 @lru_cache(maxsize=64)

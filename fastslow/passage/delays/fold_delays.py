@@ -317,7 +317,7 @@ def _gone(site: Site, drift: Drift, state: Array, slow: float, level: Level) -> 
         Time that it takes to leading order.
     level : (int, float) or "turn"
     """
-    model = site.field.model.ramped(site.field.parameter, 0.0, float(site.u[-1]))
+    model = site.field.model.with_ramp(site.field.parameter, 0.0, float(site.u[-1]))
     speed = LocalDrift(site, drift)
     for longer in LONGER:
         span = (0.0, (1.0 + longer) * slow)

@@ -150,7 +150,7 @@ def _frozen(model: Model) -> Model:
 
 @lru_cache(maxsize=64)
 def _field(model: Model, name: str, values: tuple[tuple[str, float], ...]) -> FrozenField:
-    return FrozenField(model.with_parameters(dict(values)).freed(name), name)
+    return FrozenField(model.with_parameters(dict(values)).with_free(name), name)
 
 
 def frozen_field(model: Model, parameter: str, values: Mapping[str, float]) -> FrozenField:

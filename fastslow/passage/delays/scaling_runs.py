@@ -134,7 +134,7 @@ def delay_scaling(
         )
     laws = [first]
     laws += [_law(site, direction * e, level) for e in eps[1:]]
-    ramp = site.field.model.ramped(name, direction * eps[0])
+    ramp = site.field.model.with_ramp(name, direction * eps[0])
     before = _starts(site, laws, start)
     delays, outcomes = [], []
     for law, (value, state) in zip(

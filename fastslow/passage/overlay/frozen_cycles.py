@@ -168,7 +168,7 @@ def _cycle(
     for _ in range(EXTENSIONS + 1):
         try:
             run = simulate(frozen, state, t=(0.0, length))
-            settled = run.steady()
+            settled = run.periodicity()
         except FastSlowError:
             return None
         if settled.outcome.code not in ("too short", "drifting", "not periodic"):

@@ -31,7 +31,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import MEASURED, Overlay
 from fastslow.results.overlay.transitions import Phase, Transition
-from fastslow.results.trajectory.state_at import Moment
+from fastslow.results.trajectory.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -320,7 +320,7 @@ def _distances(
     return distance, lag, relaxation
 
 
-def _turning(p: Passage) -> tuple[Moment, ...]:
+def _turning(p: Passage) -> tuple[StatePoint, ...]:
     slow, time = p.m.slow, p.m.time
     reach = float(np.ptp(slow))
     if len(slow) < 3 or reach <= 1e-9 * float(np.abs(slow).max()):

@@ -19,7 +19,7 @@ from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.transitions import OSCILLATING, StableSheet, Transition
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.crossings import Crossing, regions_at
-from fastslow.results.trajectory.state_at import Moment
+from fastslow.results.trajectory.state_at import StatePoint
 
 Array = NDArray[np.float64]
 
@@ -65,11 +65,11 @@ class Passage:
     followed: NDArray[np.intp]
     drift: Array
 
-    def moment(self, time: float) -> Moment:
+    def moment(self, time: float) -> StatePoint:
         """The slow quantity and the state at a time."""
         value, state = self.slow.at(np.array([time]))
         run, name = self.slow.run, self.slow.name
-        return Moment(
+        return StatePoint(
             float(time),
             self.slow.states,
             state[0].copy(),
@@ -112,7 +112,7 @@ class Passage:
             guess = zero_between(times[rows], value[rows], start, stop)
         return stop
 
-    def left(self, stay: Stay, rival: int | None) -> Moment:
+    def left(self, stay: Stay, rival: int | None) -> StatePoint:
         """Where a stay ends."""
         time, course = self.m.time, self.m.courses[stay.course]
         if stay.stop >= len(time):
@@ -131,7 +131,7 @@ class Passage:
 
         return self.moment(self.first(float(time[stay.stop - 1]), float(time[stay.stop]), away))
 
-    def landed(self, stay: Stay, not_before: float) -> Moment:
+    def landed(self, stay: Stay, not_before: float) -> StatePoint:
         """Where a stay begins."""
         time, course = self.m.time, self.m.courses[stay.course]
 
@@ -148,7 +148,7 @@ class Passage:
         return self._landings[stay, since]
 
     @cached_property
-    def _landings(self) -> dict[tuple[Stay, float], Moment]:
+    def _landings(self) -> dict[tuple[Stay, float], StatePoint]:
         return {}
 
     def passing(self, point: SpecialPoint, until: float) -> float | None:
@@ -170,7 +170,7 @@ class Passage:
     def _passings(self) -> dict[tuple[float, int], float]:
         return {}
 
-    def two_thirds(self, old: Stay, new: Stay) -> Moment | None:
+    def two_thirds(self, old: Stay, new: Stay) -> StatePoint | None:
         """Where two thirds of the way from one course to another are done."""
         # near sheets are come to before
         rows = slice(old.stop, new.stop)
@@ -204,7 +204,9 @@ class Passage:
                 found.append((int(np.argmax(beyond > 0)), point))
         return min(found, key=lambda f: f[0])[1] if found else None
 
-    def extreme_past(self, sheet: StableSheet, point: SpecialPoint, until: float) -> Moment | None:
+    def extreme_past(
+        self, sheet: StableSheet, point: SpecialPoint, until: float
+    ) -> StatePoint | None:
         """Where the slow quantity turns round past the end of a sheet, if before a time."""
         where, outward = point[self.diagram.parameter], self.outward(sheet, point)
         stop = int(np.searchsorted(self.m.time, until, side="right"))
@@ -536,7 +538,7 @@ def _touch(p: Passage, excursion: Excursion) -> Crossing | None:
 
 def _across(
     p: Passage, left: StableSheet, entered: StableSheet | None, time: float
-) -> tuple[Moment, Moment] | None:
+) -> tuple[StatePoint, StatePoint] | None:
     """Where a trajectory leaves the one side of a gap and reaches the other."""
     if entered is None:
         return None

@@ -55,7 +55,7 @@ class Diagram(Table, Result):
         The values of all other parameters.
     branches : tuple of Branch
         Every branch found.
-    coverage : str
+    completeness : str
         ``"complete"`` when every branch in the range is proved found, else ``"found"``.
     interfaces, regions : tuple of str
         Names, in the model's order.
@@ -99,7 +99,7 @@ class Diagram(Table, Result):
     over: tuple[float, float]
     parameters: Mapping[str, float]
     branches: tuple[Branch, ...]
-    coverage: str
+    completeness: str
     interfaces: tuple[str, ...]
     regions: tuple[str, ...]
     interface_values: Mapping[str, tuple[str, float]]
@@ -360,7 +360,7 @@ class Diagram(Table, Result):
         low, high = self.over
         lines = [
             f"Diagram of {', '.join(self.states)} over {self.parameter} in [{low:g}, {high:g}]"
-            f"{self._within} ({self.coverage})"
+            f"{self._within} ({self.completeness})"
         ]
         if self.outcome.code != SEARCHED.code:
             lines.append(f"   {self.outcome}")

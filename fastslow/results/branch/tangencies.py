@@ -65,16 +65,16 @@ class Tangencies(ImmutableSequence, tuple[Tangency, ...]):
 
     Attributes
     ----------
-    coverage : str
+    completeness : str
         ``"complete"`` when the tuple is proved to hold all of them, else ``"found"``.
     """
 
-    coverage: str
+    completeness: str
 
-    def __new__(cls, items: Iterable[Tangency] = (), coverage: str = "found") -> Tangencies:
+    def __new__(cls, items: Iterable[Tangency] = (), completeness: str = "found") -> Tangencies:
         made = super().__new__(cls, items)
-        made.coverage = coverage
+        made.completeness = completeness
         return made
 
     def __getnewargs__(self) -> tuple[Any, ...]:
-        return tuple(self), self.coverage
+        return tuple(self), self.completeness

@@ -74,7 +74,7 @@ def read_auto(
     Returns
     -------
     Diagram
-        With ``coverage`` "found", and the one region S1 of a smooth model.
+        With ``completeness`` "found", and the one region S1 of a smooth model.
 
     Raises
     ------

@@ -149,7 +149,7 @@ def _sequence(value: Any, items: list[Any], path: str) -> Any:
     if _SEQUENCES.get(name) is not type(value):
         raise ArgumentError(f"{path or 'this'} is a {name}, which no file can keep")
     if isinstance(value, Equilibria | Tangencies):
-        return {name: items, "coverage": value.coverage}
+        return {name: items, "completeness": value.completeness}
     return {name: items}
 
 
@@ -251,10 +251,10 @@ def _built(node: dict[str, Any], arrays: Arrays) -> Any:
     for name, build in _SEQUENCES.items():
         if name in node:
             items = [decoded(value, arrays) for value in node[name]]
-            if "coverage" not in node:
+            if "completeness" not in node:
                 return build(items)
             sets = [decoded(node["sets"], arrays)] if "sets" in node else []
-            return build(items, node["coverage"], *sets)
+            return build(items, node["completeness"], *sets)
     raise BrokenError(f"it holds something unknown ({', '.join(node)})")
 
 

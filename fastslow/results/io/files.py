@@ -22,7 +22,7 @@ from fastslow.results.io.encoding import Arrays, BrokenError, decoded, encoded
 from fastslow.results.io.npz_netcdf import read_archive, read_netcdf, write_archive, write_netcdf
 
 #: Version of the layout described here; a file of another one is not read.
-FORMAT = 2
+FORMAT = 3
 
 WRITERS = {".npz": write_archive, ".nc": write_netcdf}
 

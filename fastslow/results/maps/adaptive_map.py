@@ -295,7 +295,7 @@ class MapComparison(Result):
         return float(self.areas[self.agree].sum() / self.areas.sum())
 
     @property
-    def disagreements(self) -> Mapping[tuple[Any, Any], Floats]:
+    def compare_scalings(self) -> Mapping[tuple[Any, Any], Floats]:
         """Points by what was found and what was predicted instead, each of shape (any, 2)."""
         pairs = list(zip(self.found, self.predicted, strict=True))
         differing = dict.fromkeys(p for p, same in zip(pairs, self.agree, strict=True) if not same)
@@ -309,7 +309,7 @@ class MapComparison(Result):
             f"MapComparison: agreement on {self.share:.4%} of the area, at "
             f"{int(self.agree.sum())} of {count} points"
         ]
-        for (found, predicted), points in self.disagreements.items():
+        for (found, predicted), points in self.compare_scalings.items():
             lines.append(f"  {len(points)} found {found}, predicted {predicted}")
         return "\n".join(lines)
 

@@ -26,7 +26,7 @@ from fastslow.results.overlay.transitions import (
     Transitions,
 )
 from fastslow.results.trajectory.crossings import regions_at
-from fastslow.results.trajectory.state_at import Moment, in_blocks, sample
+from fastslow.results.trajectory.state_at import StatePoint, in_blocks, sample
 from fastslow.results.trajectory.trajectory import Trajectory
 
 #: The usual outcome of an overlay.
@@ -83,7 +83,7 @@ class Overlay(Table, Result):
         Every leaving of a sheet and end of an oscillation, in time.
     bursting : Bursting or None
         What the rhythm is called; None without one.
-    turning : tuple of Moment
+    turning : tuple of StatePoint
         Where the slow quantity turns back.
     outcome : Outcome
         Whether the diagram covers the run.
@@ -107,7 +107,7 @@ class Overlay(Table, Result):
     phases: tuple[Phase, ...]
     transitions: tuple[Transition, ...]
     bursting: Bursting | None
-    turning: tuple[Moment, ...]
+    turning: tuple[StatePoint, ...]
     outcome: Outcome = MEASURED
     band: NDArray[np.intp] | None = None
 
@@ -117,7 +117,7 @@ class Overlay(Table, Result):
     def __len__(self) -> int:
         return len(self.time)
 
-    def __iter__(self) -> Iterator[Moment]:
+    def __iter__(self) -> Iterator[StatePoint]:
         return chain.from_iterable(queries.measured(self, block) for block in in_blocks(self.run))
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
@@ -166,10 +166,10 @@ class Overlay(Table, Result):
     @overload
     def __getitem__(self, key: slice) -> Overlay: ...
     @overload
-    def __getitem__(self, key: int) -> Moment: ...
+    def __getitem__(self, key: int) -> StatePoint: ...
     @overload
     def __getitem__(self, key: str) -> NDArray[np.float64]: ...
-    def __getitem__(self, key: object) -> Overlay | Moment | NDArray[np.float64]:
+    def __getitem__(self, key: object) -> Overlay | StatePoint | NDArray[np.float64]:
         """A column or expression, shape (N,); the moment of a sample; the overlay of some samples.
 
         Columns are states, slow quantities, t, distance and lag. Parameters may
@@ -208,7 +208,7 @@ class Overlay(Table, Result):
         sheet: str | None = None,
         direction: int | None = None,
         **value: float,
-    ) -> list[Moment]:
+    ) -> list[StatePoint]:
         """The moments at one value of a column, with the sheet followed then.
 
         As `Trajectory.at`; the parameter of a path is read between samples.
@@ -226,7 +226,7 @@ class Overlay(Table, Result):
 
         Returns
         -------
-        list of Moment
+        list of StatePoint
             In order of time.
 
         Raises
@@ -285,7 +285,7 @@ class Overlay(Table, Result):
         """
         return queries.parts_of(self, sheet, region, kind, between)
 
-    def nearest(self, **values: float) -> Moment:
+    def nearest(self, **values: float) -> StatePoint:
         """The moment nearest to some values of columns, with the sheet followed then.
 
         As `Trajectory.nearest`; the parameter of a path is read between samples.
@@ -297,7 +297,7 @@ class Overlay(Table, Result):
 
         Returns
         -------
-        Moment
+        StatePoint
 
         Raises
         ------

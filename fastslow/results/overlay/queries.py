@@ -28,7 +28,7 @@ from fastslow.results.trajectory.nearest import (
     units_of,
 )
 from fastslow.results.trajectory.slicing import rows_asked, samples_of
-from fastslow.results.trajectory.state_at import Moment, moments_at
+from fastslow.results.trajectory.state_at import StatePoint, moments_at
 
 if TYPE_CHECKING:
     from fastslow.results.overlay.overlay import Overlay
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def measured(lay: Overlay, moments: list[Moment]) -> list[Moment]:
+def measured(lay: Overlay, moments: list[StatePoint]) -> list[StatePoint]:
     """Moments of the run as those of the overlay: the sheet followed then, and its distance."""
     times = np.array([moment.time for moment in moments])
     row = np.clip(np.searchsorted(lay.time, times, side="right") - 1, 0, len(lay) - 1)
@@ -84,7 +84,7 @@ def moments_of(
     direction: int | None,
     sheet: str | None,
     region: str | None,
-) -> list[Moment]:
+) -> list[StatePoint]:
     """See `Overlay.at`."""
     name, level = one_value(value, columns_of(lay))
     if name in (*lay.run.columns, "t"):
@@ -104,7 +104,7 @@ def known_sheet(lay: Overlay, sheet: str | None) -> None:
         raise unknown_name("sheet", sheet, labels)
 
 
-def nearest_on(lay: Overlay, values: Mapping[str, float]) -> Moment:
+def nearest_on(lay: Overlay, values: Mapping[str, float]) -> StatePoint:
     """See `Overlay.nearest`."""
     checked_values(values, columns_of(lay))
     if set(values) <= {*lay.run.columns, "t"}:

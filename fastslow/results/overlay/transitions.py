@@ -11,7 +11,7 @@ from fastslow.arguments import word
 from fastslow.results.base.immutable import Immutable, ImmutableSequence
 from fastslow.results.overlay.delays import Delay, GapTransit
 from fastslow.results.points import SpecialPoint
-from fastslow.results.trajectory.state_at import Moment
+from fastslow.results.trajectory.state_at import StatePoint
 
 #: Stands for a sheet where the fast motion follows none.
 OSCILLATING = "oscillating"
@@ -94,10 +94,10 @@ class Transition(Immutable):
         ``"jump"``, ``"Hopf"``, ``"branch point"``, ``"crossing"``, ``"gap crossing"``, ``"steep"``,
         ``"rate-induced"``, ``"grazing"``, ``"end of oscillation"``, ``"excursion"``,
         ``"loss of tracking"`` or ``"unclassified"``.
-    leave : Moment
+    leave : StatePoint
         Where the old sheet is farther away than the radius of the overlay; across a gap
         the crossing of its first interface.
-    land : Moment or None
+    land : StatePoint or None
         Where the new sheet is nearer than that for good; across a gap the first crossing of
         its other interface; None where the run ends before.
     slope : float
@@ -123,8 +123,8 @@ class Transition(Immutable):
     special: SpecialPoint | None
     delay: float
     kind: str
-    leave: Moment
-    land: Moment | None = None
+    leave: StatePoint
+    land: StatePoint | None = None
     slope: float = float("nan")
     steepness: float = float("nan")
     note: str = ""

@@ -266,7 +266,7 @@ class StoredModel(Result):
             traits = replace(traits, rising=self.validity.rising_at(values))
         return replace(self, parameters=values, traits=traits)
 
-    def freed(self, name: object) -> StoredModel:
+    def with_free(self, name: object) -> StoredModel:
         """The model without the value of a slow quantity that was frozen.
 
         Raises
@@ -365,7 +365,9 @@ class StoredModel(Result):
 
 
 #: What a `Model` can do by its equations alone.
-_OF_MODELS = frozenset(("continuous", "frozen", "path", "ramped", "rates", "to_latex", "vanished"))
+_OF_MODELS = frozenset(
+    ("continuous", "frozen", "path", "with_ramp", "rates", "to_latex", "empty_regions")
+)
 
 
 def finite_number(what: str, value: object) -> float:

@@ -29,7 +29,7 @@ class Contacts(Result):
         The part of the run: ``until`` is its end unless given.
     hits : ndarray of int, shape (n_interfaces, 2)
         Crossings upwards and downwards.
-    residence : mapping
+    time_fractions : mapping
         Region (or sliding motion) to the part of the time spent in it.
     period : float or None
         Length of a period; None for a run without one.
@@ -44,7 +44,7 @@ class Contacts(Result):
     >>> contacts = run.contacts(period=4)
     >>> contacts.per_period.tolist()
     [[[1, 1]], [[1, 1]]]
-    >>> {name: round(share, 9) for name, share in contacts.residence.items()}
+    >>> {name: round(share, 9) for name, share in contacts.time_fractions.items()}
     {'S1': 0.5, 'S2': 0.5}
     """
 
@@ -52,7 +52,7 @@ class Contacts(Result):
     since: float
     until: float
     hits: NDArray[np.int64]
-    residence: Mapping[str, float]
+    time_fractions: Mapping[str, float]
     period: float | None
     per_period: NDArray[np.int64]
 
@@ -67,7 +67,7 @@ def count_hits(
     return int({1: up, -1: down, None: up + down}[direction])
 
 
-def residence_in(run: Trajectory, window: tuple[float, float]) -> dict[str, float]:
+def time_fractions_in(run: Trajectory, window: tuple[float, float]) -> dict[str, float]:
     """The part of a window spent in every region (and in every sliding motion)."""
     begin, end = window
     total = end - begin
@@ -94,7 +94,7 @@ def contacts_of(run: Trajectory, period: float | None, window: tuple[float, floa
         begin,
         end,
         _counts(run, window),
-        residence_in(run, window),
+        time_fractions_in(run, window),
         length,
         per_period,
     )

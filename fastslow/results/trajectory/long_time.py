@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 
 from fastslow.arguments import among, finite, formula, positive, takes, text, whole
 from fastslow.results.trajectory.extrema import extremes_of
-from fastslow.results.trajectory.periodicity import SteadyState, steady_state
+from fastslow.results.trajectory.periodicity import Periodicity, periodicity_of
 from fastslow.results.trajectory.section import (
     Section,
     poincare_section,
@@ -145,7 +145,9 @@ class Recurrence:
         return spectrum_of(self._run, name, since, window, samples)
 
     @takes(period=positive, tol=positive, most=whole(1, 10**6))
-    def steady(self, period: float | None = None, tol: float = 1e-6, most: int = 16) -> SteadyState:
+    def periodicity(
+        self, period: float | None = None, tol: float = 1e-6, most: int = 16
+    ) -> Periodicity:
         """After how many periods the states repeat, and from which time on.
 
         Without forcing, the returns to a Poincaré section take the place of
@@ -162,10 +164,10 @@ class Recurrence:
 
         Returns
         -------
-        SteadyState
+        Periodicity
             Also where nothing repeats: ``multiple`` is then None, and ``outcome`` says why.
         """
-        return steady_state(self._run, period, tol, most)
+        return periodicity_of(self._run, period, tol, most)
 
     @takes(since=finite, until=finite)
     def extremes(

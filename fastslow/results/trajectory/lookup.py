@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.trajectory.extrema import extremes_of
-from fastslow.results.trajectory.state_at import Moment, check_readable, is_dense, moments_at
+from fastslow.results.trajectory.state_at import StatePoint, check_readable, is_dense, moments_at
 from fastslow.results.trajectory.step_polynomials import StepPolynomials, along_steps
 from fastslow.results.trajectory.step_roots import CLOSE, Zero, find_zeros
 
@@ -45,7 +45,7 @@ def one_value(values: Mapping[str, float], valid: Sequence[str]) -> tuple[str, f
     return name, finite(name, value)
 
 
-def moments_on(run: Trajectory, name: str, level: float, direction: int | None) -> list[Moment]:
+def moments_on(run: Trajectory, name: str, level: float, direction: int | None) -> list[StatePoint]:
     """The moments at which a column has a value, in order of time; see `Trajectory.at`."""
     check_readable(run)
     if name == "t":
@@ -81,7 +81,7 @@ def _with_ends(zeros: list[Zero], quantity: StepPolynomials) -> list[Zero]:
 
 def between_samples(
     run: Trajectory, name: str, values: Array, level: float, direction: int | None
-) -> list[Moment]:
+) -> list[StatePoint]:
     """The same on straight lines between values at the samples, and so interpolated."""
     low, high = float(values.min()), float(values.max())
     if not low <= level <= high:
@@ -102,7 +102,7 @@ def between_samples(
 
 def _moments(
     run: Trajectory, zeros: list[Zero], starts: Array, lengths: Array, direction: int | None
-) -> list[Moment]:
+) -> list[StatePoint]:
     """The moments of zeros along steps; of a stretch its two ends."""
     places: list[float] = []
     resting: list[bool] = []
@@ -122,7 +122,7 @@ def _moments(
     ]
 
 
-def in_region(run: Trajectory, found: list[Moment], region: str | None) -> list[Moment]:
+def in_region(run: Trajectory, found: list[StatePoint], region: str | None) -> list[StatePoint]:
     """Those of a region, or of sliding between two.
 
     Raises

@@ -15,7 +15,7 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.angles import copies, periods_of
 from fastslow.results.branch.nearest import along_line
 from fastslow.results.trajectory.dense import refined_table
-from fastslow.results.trajectory.state_at import Moment, check_readable, is_dense, moments_at
+from fastslow.results.trajectory.state_at import StatePoint, check_readable, is_dense, moments_at
 from fastslow.results.trajectory.step_polynomials import StepPolynomials, along_steps
 from fastslow.results.trajectory.step_roots import find_zeros
 
@@ -74,7 +74,7 @@ def nearest_target(table: Array, target: Array, scale: Array, periods: Array) ->
     return found[int(np.argmin([d.min(initial=np.inf) for d in distances]))]
 
 
-def nearest_moment(run: Trajectory, values: Mapping[str, float]) -> Moment:
+def nearest_moment(run: Trajectory, values: Mapping[str, float]) -> StatePoint:
     """The nearest moment of a trajectory; see `Trajectory.nearest`."""
     checked_values(values, (*run.columns, "t"))
     check_readable(run)

@@ -34,7 +34,7 @@ NEARLY = 100.0
 
 
 @dataclass(frozen=True, eq=False)
-class SteadyState(Result):
+class Periodicity(Result):
     """What a run settles on.
 
     Parameters
@@ -65,8 +65,8 @@ class SteadyState(Result):
     >>> import sympy as sp, fastslow as fs
     >>> x, v, t = sp.symbols("x v t")
     >>> run = fs.simulate(fs.Model({x: v, v: sp.sin(t) - x - v}), [-1, 0], periods=20)
-    >>> run.steady()
-    SteadyState: repeats after 1 period, 6.28318531, from t = 0 on.
+    >>> run.periodicity()
+    Periodicity: repeats after 1 period, 6.28318531, from t = 0 on.
     """
 
     multiple: int | None
@@ -78,11 +78,11 @@ class SteadyState(Result):
     left: float = float("nan")
 
     def __repr__(self) -> str:
-        return f"SteadyState: {self.outcome}"
+        return f"Periodicity: {self.outcome}"
 
 
-def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -> SteadyState:
-    """Look for a period; see `Trajectory.steady`."""
+def periodicity_of(run: Trajectory, period: float | None, tol: float, most: int) -> Periodicity:
+    """Look for a period; see `Trajectory.periodicity`."""
     if not tol > 0:
         raise ArgumentError(f"tol = {tol!r}; expected a positive number")
     if most < 1:
@@ -111,7 +111,7 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
             section = Section("", run.states, np.empty(0), np.empty((len(run.states), 0)), _NONE)
             text = "the run settles on an equilibrium." + stopped_early(run)
             still = Outcome("equilibrium", text, True)
-            return SteadyState(None, None, late, float(ranges.max()), section, still)
+            return Periodicity(None, None, late, float(ranges.max()), section, still)
         widest = int(np.argmax(ranges))
         mean = _mean(run, widest, late)
         name = run.states[widest]
@@ -142,13 +142,13 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
                 )
                 drifting = Outcome("drifting", text, False)
                 worst = float(agreeing.max())
-                return SteadyState(None, None, None, worst, section, drifting, left)
+                return Periodicity(None, None, None, worst, section, drifting, left)
             text = f"repeats after {_some(multiple, unit)}"
             text += f", {length:.9g}, from t = {section.times[first]:.6g} on."
             if left > tol:
                 text = f"{text[:-1]}; the changes shrink, {left:.2g} of the range is left."
             text += stopped_early(run)
-            return SteadyState(
+            return Periodicity(
                 multiple,
                 length,
                 float(section.times[first]),
@@ -160,13 +160,13 @@ def steady_state(run: Trajectory, period: float | None, tol: float, most: int) -
     if len(section) < 3:
         text = f"only {_some(len(section), unit)} within the run; simulate for longer."
         text += stopped_early(run)
-        return SteadyState(None, None, None, smallest, section, Outcome("too short", text, False))
+        return Periodicity(None, None, None, smallest, section, Outcome("too short", text, False))
     text = (
         f"no repeat within {tol:g} after up to {most} {unit}: quasi-periodic, chaotic, or not "
         "yet settled; simulate for longer, or raise most= or tol=."
     )
     text += stopped_early(run)
-    return SteadyState(None, None, None, smallest, section, Outcome("not periodic", text, False))
+    return Periodicity(None, None, None, smallest, section, Outcome("not periodic", text, False))
 
 
 _NONE = np.empty(0, dtype=np.int64)

@@ -8,7 +8,7 @@ from fastslow.arguments import among, takes, text
 from fastslow.results.trajectory.lookup import in_region, moments_on, one_value
 from fastslow.results.trajectory.nearest import nearest_moment
 from fastslow.results.trajectory.slicing import parts_of
-from fastslow.results.trajectory.state_at import Moment
+from fastslow.results.trajectory.state_at import StatePoint
 
 if TYPE_CHECKING:
     from fastslow.results.trajectory.trajectory import Trajectory
@@ -24,7 +24,7 @@ class Queries:
     @takes(region=text, direction=among(-1, 0, 1, None))
     def at(
         self, *, region: str | None = None, direction: int | None = None, **value: float
-    ) -> list[Moment]:
+    ) -> list[StatePoint]:
         """The moments at one value of a column, one per passage; of a time, the one then.
 
         Every root of every step's series is found, to rounding; a touch counts
@@ -44,7 +44,7 @@ class Queries:
 
         Returns
         -------
-        list of Moment
+        list of StatePoint
             In order of time.
 
         Raises
@@ -62,10 +62,10 @@ class Queries:
         >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 6), integration=fine)
         >>> for moment in run.at(x=0.5):  # at π/3 and 5π/3
         ...     print(moment)
-        Moment(t = 1.04719755: x = 0.5, v = -0.866025; in S1)
-        Moment(t = 5.23598776: x = 0.5, v = 0.866025; in S1)
+        StatePoint(t = 1.04719755: x = 0.5, v = -0.866025; in S1)
+        StatePoint(t = 5.23598776: x = 0.5, v = 0.866025; in S1)
         >>> run.at(t=3.2)
-        [Moment(t = 3.2: x = -0.998295, v = 0.0583741; in S1)]
+        [StatePoint(t = 3.2: x = -0.998295, v = 0.0583741; in S1)]
         >>> [part.span for part in run.select(between=(1, 2))]
         [(1.0, 2.0)]
         """
@@ -101,7 +101,7 @@ class Queries:
         """
         return parts_of(self._run, region, between)
 
-    def nearest(self, **values: float) -> Moment:
+    def nearest(self, **values: float) -> StatePoint:
         """The moment nearest to some values of columns.
 
         Distances are measured in units of each column's range. The moment is
@@ -114,7 +114,7 @@ class Queries:
 
         Returns
         -------
-        Moment
+        StatePoint
 
         Raises
         ------

@@ -24,7 +24,7 @@ BLOCK = 1024
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Moment(_Point):
+class StatePoint(_Point):
     """A trajectory at one time; of an overlay also what it follows then.
 
     ``moment["x"]`` is a state, slow quantity or parameter by name, ``moment["t"]`` the time.
@@ -87,7 +87,7 @@ class Moment(_Point):
         slow = "".join(f", {name} = {value:.6g}" for name, value in self.slow.items())
         more = f", on {self.sheet}" if self.sheet else ""
         more += "; interpolated" if self.interpolated else ""
-        return f"Moment(t = {self.time:.9g}: {self._values()}{slow}; in {self.region}{more})"
+        return f"StatePoint(t = {self.time:.9g}: {self._values()}{slow}; in {self.region}{more})"
 
 
 def is_dense(run: Trajectory) -> bool:
@@ -103,7 +103,7 @@ def check_readable(run: Trajectory) -> None:
         )
 
 
-def moments_at(run: Trajectory, times: Array) -> list[Moment]:
+def moments_at(run: Trajectory, times: Array) -> list[StatePoint]:
     """The moments at times inside the run, in the order given."""
     if is_dense(run):
         columns, between = columns_at(run, times), np.zeros(len(times), dtype=bool)
@@ -120,18 +120,18 @@ def moments_at(run: Trajectory, times: Array) -> list[Moment]:
     return _built(run, times, columns, between)
 
 
-def sample(run: Trajectory, row: int) -> Moment:
+def sample(run: Trajectory, row: int) -> StatePoint:
     """The moment of a sample."""
     (found,) = _samples(run, row, row + 1)
     return found
 
 
-def in_blocks(run: Trajectory) -> Iterator[list[Moment]]:
+def in_blocks(run: Trajectory) -> Iterator[list[StatePoint]]:
     """The moments of all samples, many at once."""
     return (_samples(run, row, row + BLOCK) for row in range(0, len(run), BLOCK))
 
 
-def _samples(run: Trajectory, start: int, stop: int) -> list[Moment]:
+def _samples(run: Trajectory, start: int, stop: int) -> list[StatePoint]:
     times = run.t[start:stop]
     columns = run.sampled_columns[:, start:stop]
     return _built(run, times, columns, np.zeros(len(times), dtype=bool))
@@ -139,13 +139,13 @@ def _samples(run: Trajectory, start: int, stop: int) -> list[Moment]:
 
 def _built(
     run: Trajectory, times: Array, columns: Array, interpolated: NDArray[np.bool_]
-) -> list[Moment]:
+) -> list[StatePoint]:
     """Moments from columns, shape (n or n + n_forcing, N)."""
     n, regions = len(run.states), regions_at(run, times).tolist()
     states = np.ascontiguousarray(columns[:n].T)
     slow = columns[n:].T.tolist()
     return [
-        Moment(
+        StatePoint(
             time,
             run.states,
             states[k],

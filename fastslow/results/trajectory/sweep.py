@@ -64,7 +64,7 @@ class SweepPass(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sweep(Table, Result):
+class BifurcationSweep(Table, Result):
     """A bifurcation diagram by simulation.
 
     Parameters

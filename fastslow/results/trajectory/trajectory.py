@@ -22,7 +22,7 @@ from fastslow.results.trajectory.contacts import (
     Contacts,
     contacts_of,
     count_hits,
-    residence_in,
+    time_fractions_in,
 )
 from fastslow.results.trajectory.crossings import (
     Crossings,
@@ -37,7 +37,7 @@ from fastslow.results.trajectory.queries import Queries
 from fastslow.results.trajectory.regimes import SAME, Regimes, regimes_of
 from fastslow.results.trajectory.section import window_of
 from fastslow.results.trajectory.slicing import samples_of
-from fastslow.results.trajectory.state_at import Moment, in_blocks, is_dense, sample
+from fastslow.results.trajectory.state_at import StatePoint, in_blocks, is_dense, sample
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -99,7 +99,7 @@ class Trajectory(Queries, Recurrence, Table, Result):
     >>> run = fs.simulate(fs.Model({x: v, v: -sp.sign(x)}), [0.5, 0.0], t=(0, 3))
     >>> run.crossings
     (Crossing(t = 1, x downwards, S1 → S2),)
-    >>> run.word
+    >>> run.itinerary
     ('S1', 'S2')
     >>> run(3.0).round(12)
     array([0., 1.])
@@ -152,16 +152,16 @@ class Trajectory(Queries, Recurrence, Table, Result):
     def __len__(self) -> int:
         return len(self.t)
 
-    def __iter__(self) -> Iterator[Moment]:
+    def __iter__(self) -> Iterator[StatePoint]:
         return chain.from_iterable(in_blocks(self))
 
     @overload
     def __getitem__(self, key: slice) -> Trajectory: ...
     @overload
-    def __getitem__(self, key: int) -> Moment: ...
+    def __getitem__(self, key: int) -> StatePoint: ...
     @overload
     def __getitem__(self, key: str) -> NDArray[np.float64]: ...
-    def __getitem__(self, key: object) -> Trajectory | Moment | NDArray[np.float64]:
+    def __getitem__(self, key: object) -> Trajectory | StatePoint | NDArray[np.float64]:
         """A column or expression at the times ``t``, shape (N,); a moment; the run of some samples.
 
         Raises
@@ -239,7 +239,7 @@ class Trajectory(Queries, Recurrence, Table, Result):
         return segments_of(self)
 
     @property
-    def word(self) -> tuple[str, ...]:
+    def itinerary(self) -> tuple[str, ...]:
         """The regions in the order they were gone through."""
         return tuple(segment.region for segment in self.segments)
 
@@ -295,9 +295,9 @@ class Trajectory(Queries, Recurrence, Table, Result):
         return regimes_of(self, period, since, until, tol)
 
     @property
-    def residence(self) -> dict[str, float]:
+    def time_fractions(self) -> dict[str, float]:
         """The part of the run spent in every region (and in every sliding motion)."""
-        return residence_in(self, self.span)
+        return time_fractions_in(self, self.span)
 
     @takes(direction=among(-1, 1, None), since=finite, until=finite)
     def hits(
