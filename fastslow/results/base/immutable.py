@@ -128,7 +128,7 @@ class Immutable(ReadOnly):
 
     @classmethod
     def of_fixed(cls, shared: Mapping[str, Any], **own: Any) -> Self:
-        """One whose fields, all of them given, are `fixed` already: none is looked at again."""
+        """Return an instance whose fields, all of them given, are read-only already."""
         made = object.__new__(cls)
         made.__dict__.update(shared, **own)
         return made
