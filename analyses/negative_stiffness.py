@@ -65,7 +65,9 @@ def fold_load(A: Floats) -> Floats:
 def relaxation() -> fs.RefinedMap:
     """Where a load without a mean carries the gear from side to side."""
     model = case().setting.model
-    return fs.regime_map(model, OVER, [1.0, 0.0], cells=(8, 8), levels=2, tol=5e-4, periods=3)
+    return fs.regime_map(
+        model, OVER, [1.0, 0.0], cells=(8, 8), levels=2, resolution=5e-4, periods=3
+    )
 
 
 def onset_at(A: float) -> float:

@@ -122,7 +122,7 @@ def simulated(plane: Plane) -> fs.RefinedMap:
         parameters={"C": "B*ratio"},
         cells=plane.cells,
         levels=LEVELS,
-        tol=2e-4,
+        resolution=2e-4,
         periods=2,
     )
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
         OutOfRangeError,
         UnknownNameError,
     )
-    from fastslow.exporters.sources import export
+    from fastslow.exporters.formats import export
     from fastslow.interactive.explorers import explore
     from fastslow.interactive.pointers import pick
     from fastslow.model.model import Model
@@ -110,7 +110,7 @@ _HOME = {
     "compare_scalings": "symbolic.scaling",
     "equilibria": "diagrams.solve.solving",
     "explore": "interactive.explorers",
-    "export": "exporters.sources",
+    "export": "exporters.formats",
     "hopf_exit": "passage.delays.hopf_delays",
     "pick": "interactive.pointers",
     "load": "results.io.files",

@@ -29,7 +29,7 @@ _BY_PLACE = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_
 _REAL = "iufO"
 
 
-def takes(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def validated(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Check arguments before a function is entered.
 
     An argument whose default is None may be None.
@@ -42,7 +42,7 @@ def takes(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
     Examples
     --------
-    >>> @takes(eps=positive)
+    >>> @validated(eps=positive)
     ... def step(eps=None):
     ...     return eps
     >>> step(eps=-1)
@@ -96,7 +96,7 @@ def takes(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
 def settings(cls: type[R]) -> type[R]:
     """A dataclass whose arguments, where they do not fit, are answered like those of a function."""
-    cls.__init__ = takes()(cls.__init__)  # type: ignore[method-assign]
+    cls.__init__ = validated()(cls.__init__)  # type: ignore[method-assign]
     return cls
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import sympy as sp
 
-from fastslow.arguments import instance, takes
+from fastslow.arguments import instance, validated
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import FileError
@@ -18,7 +18,7 @@ from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
 
 
-@takes(models=instance(Model))
+@validated(models=instance(Model))
 def precompile(*models: Model) -> Path:
     """Compile what simulation and continuation need, and keep it on disk.
 

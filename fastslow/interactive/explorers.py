@@ -11,7 +11,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from fastslow.arguments import formula, instance, interval, mapping, takes
+from fastslow.arguments import formula, instance, interval, mapping, validated
 from fastslow.errors import MissingPackageError, unknown_name
 from fastslow.interactive.picking import Pick
 from fastslow.interactive.pictures import Picture, own_figure
@@ -22,7 +22,7 @@ from fastslow.model.model import Model
 from fastslow.simulation.settings import DEFAULT, Integration, integration_settings
 
 
-@takes(
+@validated(
     model=instance(Model),
     parameter=formula,
     over=interval,

@@ -10,7 +10,7 @@ from matplotlib.backend_bases import Event, FigureCanvasBase, MouseEvent
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 
-from fastslow.arguments import function, takes
+from fastslow.arguments import function, validated
 from fastslow.errors import MissingPackageError
 from fastslow.interactive.picking import Curve, Pick, curves_of, nearest_pick
 from fastslow.plot.layout.style import BLACK, GREY, SMALL, printed
@@ -20,7 +20,7 @@ from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.trajectory.trajectory import Trajectory
 
 
-@takes(on_click=function)
+@validated(on_click=function)
 def pick(
     drawing: Any,
     result: Diagram | Trajectory | Overlay,

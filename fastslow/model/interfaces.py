@@ -8,7 +8,7 @@ from random import Random
 import mpmath
 import sympy as sp
 
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 
 
 @dataclass(frozen=True)
@@ -44,21 +44,21 @@ class Region:
     ----------
     name : str
         S1, S2, … or as named by the user.
-    signs : Named of int
+    signs : NamedMapping of int
         +1 or −1 for every interface.
     conditions : tuple of sympy.Rel
         The strict inequalities that describe the region.
-    rates : Named of sympy.Expr
+    rates : NamedMapping of sympy.Expr
         Rate of each state and slow state, without any Piecewise.
-    forcing : Named of sympy.Expr
+    forcing : NamedMapping of sympy.Expr
         Law of each slow quantity, without any Piecewise.
     """
 
     name: str
-    signs: Named[int]
+    signs: NamedMapping[int]
     conditions: tuple[sp.Rel, ...]
-    rates: Named[sp.Expr]
-    forcing: Named[sp.Expr]
+    rates: NamedMapping[sp.Expr]
+    forcing: NamedMapping[sp.Expr]
 
     def __str__(self) -> str:
         where = ", ".join(str(c) for c in self.conditions) or "everywhere"

@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from fastslow.arguments import formula, mapping, takes
+from fastslow.arguments import formula, mapping, validated
 from fastslow.errors import ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.model.angles import read_periods
@@ -25,7 +25,7 @@ from fastslow.model.structure import (
     real,
     shared,
 )
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.model import StoredModel, Traits, finite_number
 from fastslow.results.stored.operations import Operations
 
@@ -70,13 +70,13 @@ class Model:
     Attributes
     ----------
     states, slow_states : tuple of str
-    rates, forcing : Named of sympy.Expr
-    parameters : Named of float
+    rates, forcing : NamedMapping of sympy.Expr
+    parameters : NamedMapping of float
     free : tuple of str
         Parameters without a value: the slow quantities of a frozen model.
-    interfaces : Named of Interface
-    regions : Named of Region
-    periodic : Named of float
+    interfaces : NamedMapping of Interface
+    regions : NamedMapping of Region
+    periodic : NamedMapping of float
 
     Raises
     ------
@@ -99,17 +99,17 @@ class Model:
 
     states: tuple[str, ...]
     slow_states: tuple[str, ...]
-    rates: Named[sp.Expr]
-    forcing: Named[sp.Expr]
-    parameters: Named[float]
+    rates: NamedMapping[sp.Expr]
+    forcing: NamedMapping[sp.Expr]
+    parameters: NamedMapping[float]
     free: tuple[str, ...]
-    interfaces: Named[Interface]
-    regions: Named[Region]
-    periodic: Named[float]
+    interfaces: NamedMapping[Interface]
+    regions: NamedMapping[Region]
+    periodic: NamedMapping[float]
     structure: Structure = field(repr=False)
     partition: Partition = field(repr=False)
 
-    @takes(
+    @validated(
         rates=mapping,
         forcing=mapping,
         parameters=mapping,
@@ -139,7 +139,7 @@ class Model:
             rates, forcing or {}, slow or {}, tuple(values), interfaces or {}, (), regions or {}
         )
         periods = read_periods(structure, values, periodic or {})
-        periodic_states = Named("periodic state", periods)
+        periodic_states = NamedMapping("periodic state", periods)
         self._fill(shared(replace(structure, periodic=periodic_states)), values)
 
     def _fill(self, structure: Structure, values: Mapping[str, float]) -> None:
@@ -150,7 +150,7 @@ class Model:
             "slow_states": structure.slow_states,
             "rates": structure.rates,
             "forcing": structure.forcing,
-            "parameters": Named("parameter", values),
+            "parameters": NamedMapping("parameter", values),
             "free": structure.free,
             "interfaces": partition.interfaces,
             "regions": partition.regions,
@@ -192,7 +192,7 @@ class Model:
         model._fill(structure, values)
         return model
 
-    @takes(changes=mapping)
+    @validated(changes=mapping)
     def with_parameters(self, changes: Written | None = None, /, **named: float) -> Model:
         """The same model at other parameter values; region names are kept.
 
@@ -225,7 +225,7 @@ class Model:
             values[name] = finite_number(f"parameter {key}", value)
         return self._from(self.structure, values)
 
-    @takes(name=formula)
+    @validated(name=formula)
     def with_free(self, name: object) -> Model:
         """The model with one parameter's value taken away, to vary it.
 
@@ -257,7 +257,7 @@ class Model:
         values = {n: v for n, v in self.parameters.items() if n != key}
         return self._from(replace(self.structure, free=free), values)
 
-    @takes(slow=mapping)
+    @validated(slow=mapping)
     def frozen(self, slow: Written | None = None) -> Model:
         """The fast subsystem: every slow quantity becomes a parameter without a value.
 
@@ -296,7 +296,7 @@ class Model:
             path[name] = read_expression(f"path of {key}", law, (*self.parameters, *self.free))
         return self._from(*self.structure.frozen(path, self.parameters))
 
-    @takes(name=formula)
+    @validated(name=formula)
     def with_ramp(self, name: object, rate: float, start: float = 0.0) -> Model:
         """The model with one parameter drifting at a constant rate: start + rate·t.
 
@@ -348,7 +348,7 @@ class Model:
         law = real(first) + real(speed) * TIME
         structure = replace(
             freed.structure,
-            forcing=Named("slow quantity", {**freed.structure.forcing, key: law}),
+            forcing=NamedMapping("slow quantity", {**freed.structure.forcing, key: law}),
             free=tuple(n for n in freed.free if n != key),
         )
         return self._from(structure, {**freed.parameters, **numbers})
@@ -380,7 +380,7 @@ class Model:
         return tuple(name for name in sorted(seen) if name not in self.regions)
 
     @property
-    def path(self) -> Named[sp.Expr]:
+    def path(self) -> NamedMapping[sp.Expr]:
         """Of a model frozen along a path: slow quantities as functions of the path's parameters.
 
         Examples
@@ -397,7 +397,7 @@ class Model:
         return {real(name): value for name, value in self.parameters.items()}
 
     @cached_property
-    def continuous(self) -> Named[bool]:
+    def continuous(self) -> NamedMapping[bool]:
         """Whether the rates are continuous across each interface, decided symbolically.
 
         Examples
@@ -407,7 +407,7 @@ class Model:
         ({x: True}, {x: False})
         """
         whole = self.structure.continuous
-        return Named(
+        return NamedMapping(
             "interface", {name: whole or self._continuous(name) for name in self.interfaces}
         )
 

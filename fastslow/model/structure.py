@@ -31,7 +31,7 @@ from fastslow.model.reading import (
     switching_expressions,
     with_piecewise,
 )
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.sign_patterns import Pattern, possible_patterns, scaled_row
 
 TIME = sp.Symbol("t", real=True)
@@ -82,13 +82,13 @@ class Partition:
     ----------
     structure : Structure
         With the names of these regions.
-    interfaces : Named of Interface
-    regions : Named of Region
+    interfaces : NamedMapping of Interface
+    regions : NamedMapping of Region
     """
 
     structure: Structure
-    interfaces: Named[Interface]
-    regions: Named[Region]
+    interfaces: NamedMapping[Interface]
+    regions: NamedMapping[Region]
 
     @cached_property
     def _hash(self) -> int:
@@ -117,15 +117,15 @@ class Structure:
 
     states: tuple[str, ...]
     slow_states: tuple[str, ...]
-    rates: Named[sp.Expr]
-    forcing: Named[sp.Expr]
+    rates: NamedMapping[sp.Expr]
+    forcing: NamedMapping[sp.Expr]
     free: tuple[str, ...]
     interfaces: tuple[Interface, ...]
     given: frozenset[str]
-    conditions: Named[Boolean]
+    conditions: NamedMapping[Boolean]
     names: tuple[tuple[Cell, str], ...] = ()
-    path: Named[sp.Expr] = field(default_factory=partial(Named, "slow quantity"))
-    periodic: Named[sp.Expr] = field(default_factory=partial(Named, "periodic state"))
+    path: NamedMapping[sp.Expr] = field(default_factory=partial(NamedMapping, "slow quantity"))
+    periodic: NamedMapping[sp.Expr] = field(default_factory=partial(NamedMapping, "periodic state"))
     continuous: bool = False
 
     @cached_property
@@ -159,9 +159,9 @@ class Structure:
         return fields_alone(self)
 
     @cached_property
-    def lengths(self) -> Named[float]:
+    def lengths(self) -> NamedMapping[float]:
         """The periods as numbers."""
-        return Named("periodic state", {n: float(p) for n, p in self.periodic.items()})
+        return NamedMapping("periodic state", {n: float(p) for n, p in self.periodic.items()})
 
     @cached_property
     def moving(self) -> tuple[sp.Symbol, ...]:
@@ -242,10 +242,10 @@ class Structure:
         regions = tuple(
             Region(
                 name,
-                Named("interface", zip((i.name for i in interfaces), pattern, strict=True)),
+                NamedMapping("interface", zip((i.name for i in interfaces), pattern, strict=True)),
                 tuple(_inequality(i, s) for i, s in zip(interfaces, pattern, strict=True)),
-                Named("state", {n: cells[pattern][n] for n in self.rates}),
-                Named("slow quantity", {n: cells[pattern][n] for n in self.forcing}),
+                NamedMapping("state", {n: cells[pattern][n] for n in self.rates}),
+                NamedMapping("slow quantity", {n: cells[pattern][n] for n in self.forcing}),
             )
             for pattern, name in named.items()
         )
@@ -254,8 +254,8 @@ class Structure:
         return _shared_partition(
             Partition(
                 self if names == self.names else shared(replace(self, names=names)),
-                Named("interface", {i.name: i for i in interfaces}),
-                Named("region", {r.name: r for r in regions}),
+                NamedMapping("interface", {i.name: i for i in interfaces}),
+                NamedMapping("region", {r.name: r for r in regions}),
             )
         )
 
@@ -347,10 +347,10 @@ class Structure:
         structure = replace(
             self,
             slow_states=(),
-            rates=Named("state", rates),
-            forcing=Named("slow quantity"),
+            rates=NamedMapping("state", rates),
+            forcing=NamedMapping("slow quantity"),
             free=free,
-            path=Named("slow quantity", {**self.path, **path}),
+            path=NamedMapping("slow quantity", {**self.path, **path}),
             interfaces=tuple(i for i in interfaces if i.function.free_symbols & set(moving))
             if path
             else interfaces,
@@ -490,12 +490,12 @@ def read_structure(
     return Structure(
         tuple(groups["state"]),
         tuple(groups["slow state"]),
-        Named("state", equations),
-        Named("slow quantity", laws),
+        NamedMapping("state", equations),
+        NamedMapping("slow quantity", laws),
         free,
         tuple(found),
         frozenset(listed),
-        Named("region", conditions),
+        NamedMapping("region", conditions),
         continuous=all(
             continuous(read_expression(f"rate of {n}", e, known))
             for n, e in {**rates, **slow}.items()

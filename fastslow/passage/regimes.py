@@ -16,8 +16,8 @@ from fastslow.arguments import (
     instance,
     mapping,
     positive,
-    takes,
     text,
+    validated,
 )
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import evaluated, names_in
@@ -59,7 +59,7 @@ FINEST = 32
 DISCARDED = 0.25
 
 
-@takes(
+@validated(
     model=instance(Model),
     period=positive,
     periods=positive,
@@ -371,12 +371,12 @@ def _measured(
     return decided
 
 
-@takes(
+@validated(
     model=instance(Model),
     over=mapping,
     parameters=either(function, mapping),
     integration=integration_settings,
-    tol=positive,
+    resolution=positive,
     gap=text,
     period=positive,
     periods=positive,
@@ -392,7 +392,7 @@ def regime_map(
     cells: tuple[int, int] = (8, 8),
     levels: int = 5,
     guard: int = 1,
-    tol: float | None = None,
+    resolution: float | None = None,
     periods: float = 3,
     longest: float = LONGER[1],
     period: float | None = None,
@@ -423,7 +423,7 @@ def regime_map(
         What the axes mean: parameter to an expression in the names of the axes
         and the other parameters, ``{"C": "B*ratio"}``; or a function of two
         arrays that returns the values of parameters.
-    cells, levels, guard, tol
+    cells, levels, guard, resolution
         As in `refined_map`; all new points of a level are simulated together.
     periods, longest : float
         Length of every run in periods of the forcing: at first, and beyond which no run is
@@ -485,7 +485,13 @@ def regime_map(
         return words
 
     found = refined_map(
-        labels, over, cells=cells, levels=levels, guard=guard, tol=tol, progress=progress
+        labels,
+        over,
+        cells=cells,
+        levels=levels,
+        guard=guard,
+        resolution=resolution,
+        progress=progress,
     )
     if found.labels == (NO_GAP,):
         raise ArgumentError(

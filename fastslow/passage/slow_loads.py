@@ -9,7 +9,16 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import finite_numbers, flag, instance, mapping, numbers, shown, takes, text
+from fastslow.arguments import (
+    finite_numbers,
+    flag,
+    instance,
+    mapping,
+    numbers,
+    shown,
+    text,
+    validated,
+)
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
@@ -21,7 +30,7 @@ from fastslow.simulation.arguments import gap_regions
 Floats = NDArray[np.float64]
 
 
-@takes(exact=flag)
+@validated(exact=flag)
 def slow_load_gap(
     B: ArrayLike,
     C: ArrayLike,
@@ -145,7 +154,7 @@ def _exact(B: Floats, C: Floats, omega: Floats, c: Floats, k: Floats) -> Floats:
     return np.where(leaves, widest, 0.0)
 
 
-@takes(model=instance(Model), parameters=mapping, exact=flag, gap=text)
+@validated(model=instance(Model), parameters=mapping, exact=flag, gap=text)
 def slow_load_criterion(
     model: Model,
     parameters: Mapping[Any, ArrayLike] | None = None,

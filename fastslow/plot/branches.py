@@ -12,7 +12,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.arguments import flag, instance, takes
+from fastslow.arguments import flag, instance, validated
 from fastslow.plot.arguments import axis_quantity, figure_width, line_colour, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.equilibrium_sets import draw_sets
@@ -73,7 +73,7 @@ class DiagramDrawing(Drawing):
         return [*(shown[kind] for kind in LINES if kind in shown), *named, *self.markers]
 
 
-@takes(
+@validated(
     diagram=instance(Diagram),
     y=axis_quantity,
     z=axis_quantity,

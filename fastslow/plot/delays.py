@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, instance, takes
+from fastslow.arguments import flag, instance, validated
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
@@ -59,7 +59,7 @@ class DelayDrawing(Drawing):
     legend: Legend | None
 
 
-@takes(
+@validated(
     scaling=instance(DelayScaling),
     ax=instance(Axes),
     width=figure_width,

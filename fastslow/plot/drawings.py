@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from fastslow.arguments import path, takes, within
+from fastslow.arguments import path, validated, within
 from fastslow.plot.layout.style import SHOWN, printed, root, save
 from fastslow.results.base.immutable import fixed
 
@@ -66,7 +66,7 @@ class Drawing:
                 found.setdefault(str(artist.get_label()), []).extend(curves)
         return {kind: fixed(kind, curves) for kind, curves in found.items()}
 
-    @takes(path=path, dpi=within(10.0, 10_000.0))
+    @validated(path=path, dpi=within(10.0, 10_000.0))
     def save(self, path: str | Path, dpi: float = 300) -> Path:
         """Write the figure, in the format of the suffix, with text kept as text.
 

@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, instance, takes
+from fastslow.arguments import flag, instance, validated
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
@@ -66,7 +66,7 @@ class EigenvalueDrawing(Drawing):
     legend: Legend | None
 
 
-@takes(
+@validated(
     source=instance(Overlay, Branch),
     ax=instance(Axes),
     width=figure_width,
@@ -152,7 +152,7 @@ def eigenvalue_path(
     return EigenvalueDrawing(ax, tuple(paths), tuple(jumps), markers, labels, bar, shown)
 
 
-@takes(
+@validated(
     point=instance(SpecialPoint),
     ax=instance(Axes),
     width=figure_width,

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation, Text
 from numpy.typing import ArrayLike
 
-from fastslow.arguments import flag, instance, mapping, takes
+from fastslow.arguments import flag, instance, mapping, validated
 from fastslow.plot.areas import draw_areas, samples
 from fastslow.plot.arguments import figure_width, line_style, lines_in_plane, points_in_plane
 from fastslow.plot.drawings import Drawing
@@ -60,7 +60,7 @@ class MapDrawing(Drawing):
     points: tuple[Line2D, ...] = ()
 
 
-@takes(
+@validated(
     result=instance(RefinedMap),
     ax=instance(Axes),
     width=figure_width,

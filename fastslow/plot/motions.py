@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.text import Annotation, Text
 
-from fastslow.arguments import flag, instance, items, takes, whole
+from fastslow.arguments import flag, instance, items, validated, whole
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import (
     axis_quantity,
@@ -89,7 +89,7 @@ class MotionDrawing(Drawing):
         return [*self.lines[::-1], *([] if self.crossings is None else [self.crossings])]
 
 
-@takes(
+@validated(
     run=instance(Trajectory),
     y=axis_quantity,
     ax=instance(Axes),
@@ -185,7 +185,7 @@ def time_series(
     return _explained(drawn, own, label, legend, top)
 
 
-@takes(
+@validated(
     run=instance(Trajectory),
     x=axis_quantity,
     y=axis_quantity,

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.patches import Patch
 
-from fastslow.arguments import flag, formula, instance, items, takes, text
+from fastslow.arguments import flag, formula, instance, items, text, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
@@ -50,7 +50,7 @@ class PanelDrawing(Drawing):
         return f"PanelDrawing({self.time_series}, {self.phase_portrait}, {self.overlay})"
 
 
-@takes(
+@validated(
     lay=instance(Overlay),
     state=formula,
     ax=items(instance(Axes)),

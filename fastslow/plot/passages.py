@@ -12,7 +12,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.arguments import flag, instance, takes
+from fastslow.arguments import flag, instance, validated
 from fastslow.plot.arguments import axis_quantity, figure_width, line_colour, line_style
 from fastslow.plot.branches import DiagramDrawing, draw_branches
 from fastslow.plot.drawings import Drawing
@@ -86,7 +86,7 @@ class OverlayDrawing(Drawing):
         return [*self.diagram.handles, *self.lines[::-1], *extra, *self.transitions]
 
 
-@takes(
+@validated(
     lay=instance(Overlay),
     y=axis_quantity,
     z=axis_quantity,

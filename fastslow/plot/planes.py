@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, instance, takes
+from fastslow.arguments import flag, instance, validated
 from fastslow.errors import ArgumentError
 from fastslow.plot.areas import draw_areas, samples
 from fastslow.plot.arguments import axis_quantity, figure_width, line_style
@@ -70,7 +70,7 @@ class PlaneDrawing(Drawing):
     fills: dict[Any, PolyCollection] = field(default_factory=dict)
 
 
-@takes(
+@validated(
     curves=instance(PointBranch),
     x=axis_quantity,
     y=axis_quantity,

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
-from fastslow.arguments import flag, instance, positive, takes
+from fastslow.arguments import flag, instance, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import axis_quantity, figure_width, line_style
 from fastslow.plot.drawings import Drawing
@@ -47,7 +47,7 @@ class SectionDrawing(Drawing):
     legend: Legend | None
 
 
-@takes(
+@validated(
     section=instance(Section),
     x=axis_quantity,
     y=axis_quantity,

@@ -11,7 +11,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.arguments import flag, instance, interval, takes, whole
+from fastslow.arguments import flag, instance, interval, validated, whole
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import figure_width, line_colour, line_style
 from fastslow.plot.drawings import Drawing
@@ -53,7 +53,7 @@ class SpectrumDrawing(Drawing):
     legend: Legend | None = None
 
 
-@takes(
+@validated(
     spectrum=instance(Spectrum),
     ax=instance(Axes),
     width=figure_width,

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
-from fastslow.arguments import flag, instance, positive, takes
+from fastslow.arguments import flag, instance, positive, validated
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.legends import explained
@@ -52,7 +52,7 @@ class SweepDrawing(Drawing):
     legend: Legend | None
 
 
-@takes(
+@validated(
     sweep=instance(BifurcationSweep),
     ax=instance(Axes),
     width=figure_width,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite, instance, positive, takes, whole
+from fastslow.arguments import finite, instance, positive, validated, whole
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
@@ -57,7 +57,7 @@ OFF = 0.381966
 RANGING = 256
 
 
-@takes(
+@validated(
     model=instance(Model),
     start=finite,
     period=positive,

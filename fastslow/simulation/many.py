@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import finite, flag, instance, mapping, takes, text, whole
+from fastslow.arguments import finite, flag, instance, mapping, text, validated, whole
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.simd.steps import CompiledSteps, compile_steps
 from fastslow.kernels.taylor.series import CompiledSeries, compile_series
 from fastslow.model.model import Model
 from fastslow.results.angles import periods_of as turns_of
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.trajectory.ensemble import Ensemble
 from fastslow.results.trajectory.regimes import (
     ERRORS,
@@ -62,7 +62,7 @@ Floats = NDArray[np.float64]
 _CHUNK = 512
 
 
-@takes(
+@validated(
     model=instance(Model),
     parameters=mapping,
     start=finite,
@@ -226,7 +226,7 @@ def simulate_many(
         tuple(model.forcing),
         interfaces,
         modes,
-        Named("parameter", swept),
+        NamedMapping("parameter", swept),
         starts,
         spans,
         since,

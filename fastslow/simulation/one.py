@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite, flag, positive, takes, text
+from fastslow.arguments import finite, flag, positive, text, validated
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.taylor.series import KEPT, CompiledSeries, compile_series
 from fastslow.results.base.immutable import fixed, read_only
@@ -57,7 +57,7 @@ from fastslow.simulation.stepper.workspace import (
 _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
 
 
-@takes(
+@validated(
     model=simulated,
     start=finite,
     period=positive,

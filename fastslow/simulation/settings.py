@@ -18,7 +18,7 @@ from fastslow.arguments import (
     whole,
 )
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 
 #: Where a run ends that nothing else ends.
 MOST = 1_000_000
@@ -179,7 +179,7 @@ def _absolute(name: str, value: Any) -> Any:
     """One absolute tolerance, or one for each of several states."""
     if isinstance(value, Mapping):
         checked = {str(k): _nonnegative(f"{name} of {k}", v) for k, v in value.items()}
-        return Named("state", checked)
+        return NamedMapping("state", checked)
     if real_number(value) is not None or isinstance(value, str | bool):
         return _nonnegative(name, value)
     return items(_nonnegative)(name, value)

@@ -19,8 +19,8 @@ from fastslow.arguments import (
     formula,
     instance,
     positive,
-    takes,
     text,
+    validated,
     whole,
 )
 from fastslow.errors import ArgumentError, FastSlowError, unknown_name
@@ -38,7 +38,7 @@ What = Literal["stroboscopic", "extremes", "section"]
 KINDS = ("stroboscopic", "extremes", "section")
 
 
-@takes(
+@validated(
     model=instance(Model),
     parameter=formula,
     column=formula,

@@ -17,7 +17,7 @@ from fastslow.arguments import (
     mapping,
     positive,
     refusal,
-    takes,
+    validated,
     whole,
 )
 from fastslow.errors import ArgumentError, raised_by_handler
@@ -30,7 +30,7 @@ Cell = tuple[int, int, int]
 Function = Callable[[Floats, Floats], Sequence[Any] | NDArray[Any]]
 
 
-@takes(function=function, over=mapping, tol=positive, progress=flag)
+@validated(function=function, over=mapping, resolution=positive, progress=flag)
 def refined_map(
     function: Function,
     over: Mapping[Any, tuple[float, float]],
@@ -38,7 +38,7 @@ def refined_map(
     cells: tuple[int, int] = (8, 8),
     levels: int = 6,
     guard: int = 1,
-    tol: float | None = None,
+    resolution: float | None = None,
     progress: bool = False,
 ) -> RefinedMap:
     """Find where in a plane of two parameters which outcome occurs.
@@ -65,7 +65,7 @@ def refined_map(
     guard : int
         How many rings of neighbours are halved with a cell; 0 halves only cells
         that differ, and may lose the thin tip of a tongue.
-    tol : float, optional
+    resolution : float, optional
         Narrow each point of a boundary by bisection along its cell's side to this
         part of the axis.
     progress : bool
@@ -86,7 +86,8 @@ def refined_map(
 
     Examples
     --------
-    >>> half = refined_map(lambda x, y: x > y, {"x": (0, 1), "y": (0, 1)}, levels=3, tol=1e-9)
+    >>> over = {"x": (0, 1), "y": (0, 1)}
+    >>> half = refined_map(lambda x, y: x > y, over, levels=3, resolution=1e-9)
     >>> half
     RefinedMap over x from 0 to 1 and y from 0 to 1
       False: 50.78% of the area
@@ -106,7 +107,7 @@ def refined_map(
     with _bar(progress) as bar:
         points = _Points(function, ranges, shape, bar.update)
         tiling = _Tiling(points, shape, size, guard)
-        places, brackets = _narrowed(points, tiling.leaves, tol)
+        places, brackets = _narrowed(points, tiling.leaves, resolution)
     corners = sorted(points.known)
     labels, codes = _coded([points.known[p] for p in corners])
     return RefinedMap(
@@ -311,7 +312,7 @@ class _Tiling:
 
 
 def _narrowed(
-    points: _Points, leaves: Mapping[Position, int], tol: float | None
+    points: _Points, leaves: Mapping[Position, int], resolution: float | None
 ) -> tuple[NDArray[np.int64], Floats]:
     """Sides of finest cells whose ends differ, and where along them the label changes."""
     known = points.known
@@ -325,9 +326,9 @@ def _narrowed(
     brackets = np.tile([0.0, 1.0], (len(table), 1))
     along = np.eye(2)[table[:, 2]]
     first = [known[i, j] for i, j in table[:, :2].tolist()]
-    while tol is not None and len(table):
+    while resolution is not None and len(table):
         middle = brackets.mean(axis=1)
-        wide = (brackets[:, 1] - brackets[:, 0]) / points.shape[table[:, 2]] > tol
+        wide = (brackets[:, 1] - brackets[:, 0]) / points.shape[table[:, 2]] > resolution
         wide &= (middle > brackets[:, 0]) & (middle < brackets[:, 1])
         rows = np.flatnonzero(wide)
         if not len(rows):

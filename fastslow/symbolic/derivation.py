@@ -9,11 +9,11 @@ from typing import Any
 import sympy as sp
 from sympy.core.relational import Relational
 
-from fastslow.arguments import formula, instance, takes
+from fastslow.arguments import formula, instance, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.closed_forms.boundaries import BoundaryForm, boundary_forms
 from fastslow.symbolic.closed_forms.conserved import ConservedQuantity, conserved_quantities
 from fastslow.symbolic.closed_forms.critical import Setting
@@ -43,7 +43,7 @@ class Derivation:
         The frozen slow quantities.
     assumptions : tuple of relations
         Signs of parameters that were assumed, such as D > 0.
-    regions : Named of RegionForms
+    regions : NamedMapping of RegionForms
         Also reached as ``law["S1"]``.
     boundary_equilibria : tuple of BoundaryForm
         By interface.
@@ -58,7 +58,7 @@ class Derivation:
     states: tuple[str, ...]
     free: tuple[str, ...]
     assumptions: tuple[Relational, ...]
-    regions: Named[RegionForms]
+    regions: NamedMapping[RegionForms]
     boundary_equilibria: tuple[BoundaryForm, ...]
     equilibrium_sets: tuple[EquilibriumSetForm, ...] = ()
     free_directions: tuple[FreeDirection, ...] = ()
@@ -116,7 +116,7 @@ class Derivation:
         return summary(self)
 
 
-@takes(model=instance(Model), parameter=formula)
+@validated(model=instance(Model), parameter=formula)
 def derive(model: Model, assume: Any = None, *, parameter: Any = None) -> Derivation:
     """Derive equilibria, stability, folds and boundary equilibria in closed form.
 
@@ -182,7 +182,7 @@ def derive(model: Model, assume: Any = None, *, parameter: Any = None) -> Deriva
     regions = {
         name: _with_edges(derive_region(setting, found), sets) for name, setting in settings.items()
     }
-    named = Named("region", regions)
+    named = NamedMapping("region", regions)
     return Derivation(
         model.states,
         model.free,
@@ -196,7 +196,9 @@ def derive(model: Model, assume: Any = None, *, parameter: Any = None) -> Deriva
 
 
 def _edge(
-    sets: Sequence[EquilibriumSetForm], state: Named[sp.Expr], parameters: Named[sp.Expr]
+    sets: Sequence[EquilibriumSetForm],
+    state: NamedMapping[sp.Expr],
+    parameters: NamedMapping[sp.Expr],
 ) -> EquilibriumSetForm | None:
     """The set on whose edge a state is, if there is one."""
     return next((one for one in sets if one.on_edge(state, parameters)), None)
@@ -249,7 +251,7 @@ def _settings(
         settings[name] = Setting(
             name,
             model.states,
-            Named("state", {s: _exact(region.rates[s]) for s in model.states}),
+            NamedMapping("state", {s: _exact(region.rates[s]) for s in model.states}),
             inside,
             signs,
             candidates,

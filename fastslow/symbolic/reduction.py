@@ -7,20 +7,20 @@ from typing import Any
 
 import sympy as sp
 
-from fastslow.arguments import mapping, takes
+from fastslow.arguments import mapping, validated
 from fastslow.errors import ArgumentError
 from fastslow.model.structure import read_expression, real, sympified
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.solving.algebra import tidy
 
 
-@takes(rates=mapping, combinations=mapping, conserved=mapping)
+@validated(rates=mapping, combinations=mapping, conserved=mapping)
 def reduce_states(
     rates: Mapping[Any, Any],
     combinations: Mapping[Any, Any],
     *,
     conserved: Mapping[Any, Any] | None = None,
-) -> Named[sp.Expr]:
+) -> NamedMapping[sp.Expr]:
     """Rates of linear combinations of states, where these need no other state.
 
     Parameters
@@ -35,7 +35,7 @@ def reduce_states(
 
     Returns
     -------
-    Named of sympy.Expr
+    NamedMapping of sympy.Expr
         Rate of each new state in new states and parameters.
 
     Raises
@@ -92,7 +92,7 @@ def reduce_states(
                 "add a combination that gives it"
             )
         reduced[symbol.name] = rate.xreplace(back)
-    return Named("state", reduced)
+    return NamedMapping("state", reduced)
 
 
 def _real(expression: Any) -> sp.Expr:

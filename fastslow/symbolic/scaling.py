@@ -8,11 +8,11 @@ from typing import Any
 
 import sympy as sp
 
-from fastslow.arguments import formula, instance, items, mapping, refusal, takes, text
+from fastslow.arguments import formula, instance, items, mapping, refusal, text, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real, sympified
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.solving.algebra import light, spread
 from fastslow.symbolic.solving.verification import vanishes
 
@@ -30,24 +30,24 @@ class Scaling:
     ----------
     time : sympy.Expr
         The scale of time.
-    scales : Named of sympy.Expr
+    scales : NamedMapping of sympy.Expr
         Of every state and slow quantity.
-    regions : Named
+    regions : NamedMapping
         Region name to the smooth rates of the scaled states in scaled time.
-    interfaces : Named of sympy.Expr
+    interfaces : NamedMapping of sympy.Expr
         Each switching function in scaled quantities, divided by its own scale.
-    forcing : Named of sympy.Expr
+    forcing : NamedMapping of sympy.Expr
         Law of each scaled slow quantity in scaled time.
     """
 
     time: sp.Expr
-    scales: Named[sp.Expr]
-    regions: Named[Named[sp.Expr]]
-    interfaces: Named[sp.Expr]
-    forcing: Named[sp.Expr]
+    scales: NamedMapping[sp.Expr]
+    regions: NamedMapping[NamedMapping[sp.Expr]]
+    interfaces: NamedMapping[sp.Expr]
+    forcing: NamedMapping[sp.Expr]
 
 
-@takes(model=instance(Model), region=text, replace=mapping)
+@validated(model=instance(Model), region=text, replace=mapping)
 def nondimensionalise(
     model: Model,
     ones: Iterable[tuple[Any, Any]],
@@ -129,22 +129,22 @@ def nondimensionalise(
     clock = {TIME: values[scale["t"]] * TIME}
     return Scaling(
         values[scale["t"]].xreplace(back),
-        Named("quantity", {n: e.xreplace(back) for n, e in lengths.items()}),
-        Named(
+        NamedMapping("quantity", {n: e.xreplace(back) for n, e in lengths.items()}),
+        NamedMapping(
             "region",
             {
-                r.name: Named("state", {n: finish(scaled(n, e)) for n, e in r.rates.items()})
+                r.name: NamedMapping("state", {n: finish(scaled(n, e)) for n, e in r.rates.items()})
                 for r in model.regions.values()
             },
         ),
-        Named(
+        NamedMapping(
             "interface",
             {
                 n: finish(_unit(i.function.xreplace(positive).subs(place), names.values()))
                 for n, i in model.interfaces.items()
             },
         ),
-        Named(
+        NamedMapping(
             "slow quantity",
             {
                 n: finish(law.xreplace(positive).subs(clock, simultaneous=True) / lengths[n])
@@ -219,13 +219,13 @@ class Identification:
 
     Parameters
     ----------
-    values : Named of sympy.Expr
+    values : NamedMapping of sympy.Expr
         Parameter of the target to its expression in those of the scaled model.
     contradictions : tuple of sympy.Expr
         What would have to vanish besides; empty where the two agree.
     """
 
-    values: Named[sp.Expr]
+    values: NamedMapping[sp.Expr]
     contradictions: tuple[sp.Expr, ...]
 
     @property
@@ -286,7 +286,7 @@ def identify(
         gaps += _law_gaps(law, mine)
     values, left = _matched(gaps, list(inner.values()))
     return Identification(
-        Named("parameter", {s.name: values[d] for s, d in inner.items() if d in values}),
+        NamedMapping("parameter", {s.name: values[d] for s, d in inner.items() if d in values}),
         tuple(left),
     )
 
@@ -342,8 +342,8 @@ def _matched(
         left = [sp.expand(g.subs(unknown, value)) for g in left]
 
 
-@takes(one=mapping, other=mapping)
-def compare_scalings(one: Mapping[str, Any], other: Mapping[str, Any]) -> Named[sp.Expr]:
+@validated(one=mapping, other=mapping)
+def compare_scalings(one: Mapping[str, Any], other: Mapping[str, Any]) -> NamedMapping[sp.Expr]:
     """Ratios, other to one, of the entries of two scalings that differ.
 
     Parameters
@@ -353,7 +353,7 @@ def compare_scalings(one: Mapping[str, Any], other: Mapping[str, Any]) -> Named[
 
     Returns
     -------
-    Named of sympy.Expr
+    NamedMapping of sympy.Expr
         Empty where both agree identically.
 
     Raises
@@ -374,4 +374,4 @@ def compare_scalings(one: Mapping[str, Any], other: Mapping[str, Any]) -> Named[
         mine, yours = sympified(f"entry {name}", value), sympified(f"entry {name}", other[name])
         if not vanishes(mine - yours):
             found[name] = sp.powsimp(sp.cancel(yours / mine))
-    return Named("entry", found)
+    return NamedMapping("entry", found)

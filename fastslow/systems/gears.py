@@ -8,7 +8,7 @@ from typing import Literal
 
 import sympy as sp
 
-from fastslow.arguments import finite, positive, takes, word
+from fastslow.arguments import finite, positive, validated, word
 from fastslow.model.model import Model
 
 Scaling = Literal["consistent", "printed"]
@@ -94,7 +94,7 @@ class GearScales:
     angle: float
 
 
-@takes(
+@validated(
     scaling=word("scaling", SCALINGS),
     J_i=positive,
     J_o=positive,
@@ -156,7 +156,7 @@ def gear_scales(
     )
 
 
-@takes(
+@validated(
     scaling=word("scaling", SCALINGS),
     J_i=positive,
     J_o=positive,

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from fastslow.arguments import finite, positive, takes
+from fastslow.arguments import finite, positive, validated
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.reduction import reduce_states
 from fastslow.symbolic.scaling import (
     Identification,
@@ -43,7 +43,7 @@ PHYSICAL = {
 }
 
 
-@takes(**PHYSICAL)
+@validated(**PHYSICAL)
 def harmonic_gear_two_inertias(
     *,
     J_i: float = 6.8e-4,
@@ -131,7 +131,7 @@ def harmonic_gear_two_inertias(
     )
 
 
-@takes(**PHYSICAL)
+@validated(**PHYSICAL)
 def harmonic_gear_twist(
     *,
     J_i: float = 6.8e-4,
@@ -226,13 +226,13 @@ class GearScaling:
         Acceleration of the relative twist, derived from the two inertias (2).
     reduced : bool
         Whether that is equation (5) divided by J_eq = N² J_i J_o/(N² J_i + J_o).
-    consistent : Named of sympy.Expr
+    consistent : NamedMapping of sympy.Expr
         A, B, C, D, omega as they follow from equation (5).
-    printed : Named of sympy.Expr
+    printed : NamedMapping of sympy.Expr
         A, B, C as the paper prints them.
-    slip : Named of sympy.Expr
+    slip : NamedMapping of sympy.Expr
         A, B, C, D, omega when the factor θ_s in f_h(θ) = θ_s f(x) is left out.
-    ratios : Named of sympy.Expr
+    ratios : NamedMapping of sympy.Expr
         Printed to consistent, for those that differ.
     reproduced : bool
         Whether the slip gives exactly the printed A, B and C.
@@ -242,10 +242,10 @@ class GearScaling:
 
     equation: sp.Expr
     reduced: bool
-    consistent: Named[sp.Expr]
-    printed: Named[sp.Expr]
-    slip: Named[sp.Expr]
-    ratios: Named[sp.Expr]
+    consistent: NamedMapping[sp.Expr]
+    printed: NamedMapping[sp.Expr]
+    slip: NamedMapping[sp.Expr]
+    ratios: NamedMapping[sp.Expr]
     reproduced: bool
     agrees: bool
 
@@ -302,7 +302,7 @@ def gear_scaling() -> GearScaling:
         equation,
         _same(equation, stated),
         right.values,
-        Named("parameter", printed),
+        NamedMapping("parameter", printed),
         wrong.values,
         compare_scalings(followed, printed),
         not compare_scalings(printed, slipped),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fastslow import arguments
-from fastslow.arguments import takes
+from fastslow.arguments import validated
 from fastslow.errors import ArgumentError, OutOfRangeError, UnknownNameError, unknown_name
 
 LET_THROUGH = [
@@ -137,13 +137,13 @@ def all_as_floats(name, values):
     return {key: arguments.finite(f"{name}[{key}]", value) for key, value in values.items()}
 
 
-@takes(eps=arguments.positive, rows=arguments.whole(0), others=all_as_floats)
+@validated(eps=arguments.positive, rows=arguments.whole(0), others=all_as_floats)
 def asked(eps, size=2, *, rows=None, **others):
     """An example."""
     return eps, size, rows, others
 
 
-@takes(several=arguments.positive, rows=arguments.whole(0))
+@validated(several=arguments.positive, rows=arguments.whole(0))
 def listed(*several, rows=None):
     return several, rows
 

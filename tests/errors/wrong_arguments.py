@@ -197,7 +197,9 @@ BY_FUNCTION = {
     "RefinedMap.boundary.one": LABEL,
     "RefinedMap.boundary.other": LABEL,
     "Spectrum.peaks.n": COUNT,
-    "BifurcationSweep.hysteresis.tol": [(-1, Wrong, "tol = -1; expected a number from 0 to 1")],
+    "BifurcationSweep.hysteresis.resolution": [
+        (-1, Wrong, "resolution = -1; expected a number from 0 to 1")
+    ],
     "Trajectory.hits.interface": [
         ("x - E", Unknown, "did you mean 'x - D'?"),
         (2.5, Unknown, "2.5"),
@@ -304,7 +306,7 @@ BY_FUNCTION = {
         (100, Wrong, "levels = 100; expected a whole number from 0 to 60"),
     ],
     "refined_map.over": PLANE,
-    "refined_map.tol": POSITIVE,
+    "refined_map.resolution": POSITIVE,
     "regime_map.over": PLANE,
     "regime_map.parameters": [
         (3, Wrong, "parameters = 3; expected a mapping"),
@@ -318,7 +320,7 @@ BY_FUNCTION = {
     "regime_map.longest": POSITIVE,
     "regime_map.state": BY_PARAMETER["states"],
     "regime_map.periods": POSITIVE,
-    "regime_map.tol": POSITIVE,
+    "regime_map.resolution": POSITIVE,
     "simulate_many.parameters": [
         *MAPPING,
         ({"omga": 1.0}, Unknown, "unknown parameter 'omga'; did you mean 'omega'?"),

@@ -41,7 +41,7 @@ def test_the_criterion_beside_it(slow, found):
     assert exact.share == 1
     assert 0.99 < expanded.share < 1
     # the expansion gives too narrow a gap at this frequency
-    assert set(expanded.compare_scalings) == {("bilateral", "unilateral upper")}
+    assert set(expanded.disagreements) == {("bilateral", "unilateral upper")}
 
 
 def test_the_criterion_is_for_slow_loads(gear):
@@ -53,9 +53,9 @@ def test_the_criterion_is_for_slow_loads(gear):
     )
     assert beside.share == pytest.approx(0.8, abs=0.04)
     # the criterion knows nothing of chaos, which is the most of what it misses
-    missed = {found for found, _ in beside.compare_scalings}
+    missed = {found for found, _ in beside.disagreements}
     assert {"chaotic", "bilateral"} <= missed
-    wrong = np.concatenate(list(beside.compare_scalings.values()))
+    wrong = np.concatenate(list(beside.disagreements.values()))
     assert wrong[:, 0].min() > 0.3
 
 
@@ -69,7 +69,7 @@ def test_the_boundary_in_the_width(slow):
         parameters=lambda width, ratio: {"D": width, "C": 2.372 * ratio},
         cells=(2, 2),
         levels=1,
-        tol=1e-9,
+        resolution=1e-9,
         periods=2,
         integration=fs.Integration(rtol=1e-11),
     )

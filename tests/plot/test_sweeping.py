@@ -62,7 +62,7 @@ def test_one_pass_into_given_axes():
 def test_hysteresis_is_read_off_the_points(swept):
     # the passes have the same points at neither value, and none at the failed one
     assert swept.hysteresis().tolist() == [[1.0, 2.0]]
-    assert swept.hysteresis(tol=1.0).shape == (0, 2)
+    assert swept.hysteresis(resolution=1.0).shape == (0, 2)
 
 
 def test_section_by_direction():

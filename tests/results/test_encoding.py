@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays_of
 
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.io.encoding import decoded, encoded
 from fastslow.results.io.npz_netcdf import read_archive, read_netcdf, write_archive, write_netcdf
@@ -35,7 +35,7 @@ trees = st.recursive(
         st.lists(inner, max_size=3),
         st.lists(inner, max_size=3).map(tuple),
         st.dictionaries(texts, inner, max_size=3),
-        st.dictionaries(texts, inner, max_size=3).map(lambda d: Named("parameter", d)),
+        st.dictionaries(texts, inner, max_size=3).map(lambda d: NamedMapping("parameter", d)),
         st.lists(inner, max_size=2).map(lambda items: Equilibria(items, "complete")),
         st.lists(inner, max_size=2).map(SpecialPoints),
         st.builds(Outcome, texts, texts, st.booleans()),

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import fastslow as fs
 from fastslow.results.branch import lookup
-from fastslow.results.branch.lookup import pieces_of
+from fastslow.results.branch.lookup import monotone_runs
 from fastslow.results.points import SpecialPoints
 
 FOLD = 1 / np.sqrt(3)
@@ -164,7 +164,7 @@ def plain(parameter, where):
 def test_values_are_found_as_by_looking_at_every_row(steps, where, half):
     parameter = np.cumsum([0.0, *steps])
     value = where + 0.5 * half
-    level, passed = pieces_of(parameter).around(value, 1e-12)
+    level, passed = monotone_runs(parameter).around(value, 1e-12)
     assert (level, sorted(passed)) == plain(parameter, value)
 
 
@@ -183,13 +183,13 @@ def test_a_value_costs_a_search_on_the_pieces_that_hold_it(cubic, monkeypatch):
             return search(*args, **more)
 
     monkeypatch.setattr(lookup, "np", Counting())
-    assert len(branch.pieces.first) == 3
-    known = branch.pieces
+    assert len(branch.monotone_runs.first) == 3
+    known = branch.monotone_runs
     assert len(branch.at(p=0.2)) == 3
     assert len(searches) == 6
     assert len(branch.at(p=1.8)) == 1
     assert len(searches) == 8
-    assert branch.pieces is known
+    assert branch.monotone_runs is known
 
 
 def test_rows_of_a_branch(branch):

@@ -52,7 +52,7 @@ def test_disc(levels):
 
 
 def test_points_of_a_boundary_are_narrowed():
-    found = refined_map(disc, SQUARE, levels=3, tol=1e-12)
+    found = refined_map(disc, SQUARE, levels=3, resolution=1e-12)
     (line,) = found.boundary(False, True)
     radii = np.hypot(line.points[:, 0] - 0.1, line.points[:, 1] + 0.05)
     # the slope at which a side meets the circle only shrinks the distance
@@ -135,7 +135,7 @@ def test_three_labels_meet_in_a_point():
     def sectors(x, y):
         return np.floor(np.arctan2(y - 0.013, x + 0.021) % (2 * np.pi) / (2 * np.pi / 3))
 
-    found = refined_map(sectors, SQUARE, levels=6, tol=1e-6)
+    found = refined_map(sectors, SQUARE, levels=6, resolution=1e-6)
     assert found.labels == (0, 1, 2)
     ends = []
     for pair in ((0, 1), (1, 2), (0, 2)):
@@ -261,11 +261,11 @@ def test_comparing():
     found = refined_map(disc, SQUARE, levels=5)
     same = found.compare(disc)
     assert same.share == 1
-    assert same.compare_scalings == {}
+    assert same.disagreements == {}
     other = found.compare(lambda x, y: disc(x, y, radius=0.6))
     # points stand for a ring of area π (0.5 − 0.36) in a square of area 4
     assert 1 - other.share == pytest.approx(np.pi * 0.14 / 4, rel=0.05)
-    ((pair, points),) = other.compare_scalings.items()
+    ((pair, points),) = other.disagreements.items()
     assert pair == (True, False)
     radii = np.hypot(points[:, 0] - 0.1, points[:, 1] + 0.05)
     assert radii.min() >= 0.6
@@ -293,7 +293,7 @@ def test_progress(capsys):
         ({"levels": -1}, "levels = -1"),
         ({"levels": 40}, "levels = 40; expected fewer"),
         ({"guard": 0.5}, "guard = 0.5"),
-        ({"tol": 0}, "tol = 0; expected a positive number"),
+        ({"resolution": 0}, "resolution = 0; expected a positive number"),
         ({"function": lambda x, y: x}, "0.125 is no label of a map"),
         (
             {"function": lambda x, y: [k % 2 or False for k, _ in enumerate(x)], "levels": 0},

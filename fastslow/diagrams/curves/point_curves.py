@@ -17,8 +17,8 @@ from fastslow.arguments import (
     interval,
     items,
     mapping,
-    takes,
     text,
+    validated,
 )
 from fastslow.continuation import curves
 from fastslow.continuation.curves import Frame
@@ -76,7 +76,7 @@ def continue_points(
     window: Mapping[Any, tuple[float | None, float | None]] | None = None,
     marks: Mapping[Any, Sequence[float]] | None = None,
 ) -> PointCurves: ...
-@takes(
+@validated(
     point=instance(SpecialPoint, Diagram),
     parameters=items(formula),
     over=mapping,

@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.arguments import instance, mapping, takes
+from fastslow.arguments import instance, mapping, validated
 from fastslow.continuation.location import newton
 from fastslow.continuation.ordering import in_order
 from fastslow.diagrams.field import require_frozen
@@ -39,7 +39,7 @@ SMALL = 1e-9
 MOVED = 1e-3
 
 
-@takes(model=instance(Model), values=mapping)
+@validated(model=instance(Model), values=mapping)
 def tangencies(
     model: Model, values: Mapping[Any, float] | None = None, /, **named: float
 ) -> Tangencies:

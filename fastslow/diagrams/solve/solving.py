@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, instance, mapping, takes
+from fastslow.arguments import flag, instance, mapping, validated
 from fastslow.diagrams.field import IDLE, FrozenField, require_frozen
 from fastslow.diagrams.points.correcting import point_at
 from fastslow.diagrams.solve.equations import among, region_equations
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 FAR = 1e3
 
 
-@takes(model=instance(Model), values=mapping, virtual=flag, window=mapping)
+@validated(model=instance(Model), values=mapping, virtual=flag, window=mapping)
 def equilibria(
     model: Model,
     values: Mapping[Any, float] | None = None,

@@ -19,7 +19,7 @@ from fastslow.arguments import (
     interval,
     items,
     mapping,
-    takes,
+    validated,
 )
 from fastslow.continuation.loops import loop, writeable
 from fastslow.continuation.settings import Continuation
@@ -62,7 +62,7 @@ ADMISSIBLE = Outcome(
 )
 
 
-@takes(
+@validated(
     model=simulated,
     parameter=formula,
     over=interval,

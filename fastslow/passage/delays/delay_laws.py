@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from fastslow.arguments import finite, formula, instance, positive, takes
+from fastslow.arguments import finite, formula, instance, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.passage.delays.boundary_delays import boundary_delay, gap_transit
@@ -28,7 +28,7 @@ from fastslow.results.point_types import POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint
 
 
-@takes(
+@validated(
     point=instance(SpecialPoint),
     rate=rate_argument,
     level=level_argument,

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fastslow.arguments import finite, instance, positive, takes
+from fastslow.arguments import finite, instance, positive, validated
 from fastslow.passage.delays.buffer_points import buffer_of
 from fastslow.passage.delays.critical_modes import CriticalMode, critical_mode
 from fastslow.passage.delays.entry_exits import MEMORY, entry_exit, places
@@ -17,7 +17,7 @@ from fastslow.results.overlay.delays import HopfExit
 from fastslow.results.points import SpecialPoint
 
 
-@takes(
+@validated(
     diagram=instance(Diagram),
     point=instance(SpecialPoint),
     entry=finite,

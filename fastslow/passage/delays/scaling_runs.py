@@ -17,7 +17,7 @@ from fastslow.arguments import (
     instance,
     mapping,
     numbers,
-    takes,
+    validated,
 )
 from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import ArgumentError, FastSlowError
@@ -55,7 +55,7 @@ AGAIN = 1e-7
 REACH = 4.0
 
 
-@takes(
+@validated(
     model=instance(Model),
     point=instance(SpecialPoint),
     level=mapping,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite, formula, instance, takes
+from fastslow.arguments import finite, formula, instance, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.passage.overlay.agreement import require_one_model
 from fastslow.passage.overlay.attracting_branches import courses_of
@@ -56,7 +56,7 @@ LONG = 2.0
 STILL = 1e-3
 
 
-@takes(diagram=instance(Diagram), run=instance(Trajectory), radius=finite, observed=formula)
+@validated(diagram=instance(Diagram), run=instance(Trajectory), radius=finite, observed=formula)
 def overlay(
     diagram: Diagram, run: Trajectory, *, radius: float = 0.1, observed: object = None
 ) -> Overlay:

@@ -18,7 +18,7 @@ import numpy as np
 
 from fastslow.arguments import like
 from fastslow.results.base.equality import content_hash, equal
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 
 #: What cannot be changed anyway.
 PLAIN = frozenset({float, int, bool, str, type(None)})
@@ -51,13 +51,13 @@ def fixed(name: str, value: Any) -> Any:
         items = [item if type(item) in PLAIN else fixed(name, item) for item in value]
         same = kind is tuple and all(map(is_, items, value))
         return value if same else tuple(items)
-    if kind is Named:
+    if kind is NamedMapping:
         kept = {k: v if type(v) in PLAIN else fixed(k, v) for k, v in value.items()}
         same = all(kept[key] is item for key, item in value.items())
-        return value if same else Named(value.kind, kept)
+        return value if same else NamedMapping(value.kind, kept)
     if isinstance(value, Mapping):
         kept = {k: v if type(v) in PLAIN else fixed(str(k), v) for k, v in value.items()}
-        return Named(name.replace("_", " ").removesuffix("s"), kept)
+        return NamedMapping(name.replace("_", " ").removesuffix("s"), kept)
     return value
 
 

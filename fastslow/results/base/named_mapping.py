@@ -12,7 +12,7 @@ from fastslow.results.base.equality import content_hash, equal
 V = TypeVar("V")
 
 
-class Named(Mapping[str, V], Generic[V]):
+class NamedMapping(Mapping[str, V], Generic[V]):
     """An ordered, immutable mapping from names to values.
 
     A key may be a name or anything that prints as one (a SymPy symbol); identifiers
@@ -28,7 +28,7 @@ class Named(Mapping[str, V], Generic[V]):
 
     Examples
     --------
-    >>> values = Named("parameter", {"A": 1.0, "omega": 0.1})
+    >>> values = NamedMapping("parameter", {"A": 1.0, "omega": 0.1})
     >>> values["A"]
     1.0
     >>> values["omga"]  # doctest: +ELLIPSIS
@@ -53,11 +53,11 @@ class Named(Mapping[str, V], Generic[V]):
     def __delattr__(self, name: str) -> None:
         raise AttributeError(f"cannot delete '{name}': a mapping of names cannot be changed")
 
-    def __copy__(self) -> Named[V]:
+    def __copy__(self) -> NamedMapping[V]:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Named, (self.kind, self._items)
+        return NamedMapping, (self.kind, self._items)
 
     def __getitem__(self, key: object) -> V:
         try:
@@ -105,4 +105,4 @@ class Named(Mapping[str, V], Generic[V]):
 
 
 # the slots themselves, past __setattr__
-_set_kind, _set_items = (vars(Named)[name].__set__ for name in ("kind", "_items"))
+_set_kind, _set_items = (vars(NamedMapping)[name].__set__ for name in ("kind", "_items"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from fastslow.arguments import path, takes
+from fastslow.arguments import path, validated
 from fastslow.results.base.immutable import Immutable
 
 #: Metadata of a field that lives only in this process, such as a model: dropped when kept.
@@ -17,7 +17,7 @@ STORED = {"live": True, "stored": True}
 class Saved:
     """What can be kept in a file."""
 
-    @takes(path=path)
+    @validated(path=path)
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write this to a file that `fastslow.load` reads back bit for bit.
 

@@ -10,7 +10,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, formula, position, takes, text
+from fastslow.arguments import flag, formula, position, text, validated
 from fastslow.errors import unknown_name
 from fastslow.formulas.columns import by_value, column
 from fastslow.results.base.outcome import Outcome
@@ -18,7 +18,14 @@ from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import Table, numbered
 from fastslow.results.branch import slicing, stability_intervals
 from fastslow.results.branch.intersections import intersections
-from fastslow.results.branch.lookup import Pieces, asked, chosen, passages, pieces_of, stored
+from fastslow.results.branch.lookup import (
+    MonotoneRuns,
+    filter_equilibria,
+    monotone_runs,
+    passages,
+    stored,
+    validate_value,
+)
 from fastslow.results.branch.nearest import nearest_of
 from fastslow.results.branch.point_columns import labels_at
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
@@ -180,9 +187,9 @@ class Branch(Table, Result):
         return lambda: self.state[:, k]
 
     @cached_property
-    def pieces(self) -> Pieces:
+    def monotone_runs(self) -> MonotoneRuns:
         """Runs of rows over which the parameter does not turn."""
-        return pieces_of(self.parameter)
+        return monotone_runs(self.parameter)
 
     @cached_property
     def regions(self) -> tuple[str, ...]:
@@ -193,9 +200,9 @@ class Branch(Table, Result):
     @property
     def range(self) -> tuple[float, float]:
         """Smallest and largest value of the parameter."""
-        return float(self.pieces.low.min()), float(self.pieces.high.max())
+        return float(self.monotone_runs.low.min()), float(self.monotone_runs.high.max())
 
-    @takes(stable=flag, region=text)
+    @validated(stable=flag, region=text)
     def at(
         self, *, stable: bool | None = None, region: str | None = None, **value: float
     ) -> list[Equilibrium]:
@@ -220,11 +227,11 @@ class Branch(Table, Result):
         ArgumentError
             If the branch does not reach the value.
         """
-        where = asked(self.parameter_name, self.range, "branch", value)
+        where = validate_value(self.parameter_name, self.range, "branch", value)
         found = passages(self, where, self.parameters, self.corrector)
-        return chosen(found, stable, region, self.regions)
+        return filter_equilibria(found, stable, region, self.regions)
 
-    @takes(stable=flag, region=text, code=text)
+    @validated(stable=flag, region=text, code=text)
     def select(
         self,
         *,
@@ -298,7 +305,7 @@ class Branch(Table, Result):
         """
         return nearest_of([self], self.parameters, values, self.corrector)
 
-    @takes(x=formula, y=formula)
+    @validated(x=formula, y=formula)
     def intersections(self, other: Branch, x: str, y: str) -> NDArray[np.float64]:
         """Where two branches meet in the plane of two columns, shape (k, 2).
 

@@ -11,7 +11,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, position, takes, text, whole
+from fastslow.arguments import flag, position, text, validated, whole
 from fastslow.errors import ArgumentError, IncompleteWarning, unknown_name
 from fastslow.formulas.columns import by_value, column
 from fastslow.results.base.outcome import CUT_SHORT, Outcome
@@ -20,7 +20,7 @@ from fastslow.results.base.table import Table
 from fastslow.results.branch import stability_intervals
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.equilibrium_sets import EquilibriumBand
-from fastslow.results.branch.lookup import asked, chosen, passages
+from fastslow.results.branch.lookup import filter_equilibria, passages, validate_value
 from fastslow.results.branch.nearest import nearest_of
 from fastslow.results.branch.slicing import limits_of
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
@@ -208,7 +208,7 @@ class Diagram(Table, Result):
     def boundary_equilibria(self) -> SpecialPoints:
         return self.special("BE")
 
-    @takes(stable=flag, region=text)
+    @validated(stable=flag, region=text)
     def at(
         self, *, stable: bool | None = None, region: str | None = None, **value: float
     ) -> list[Equilibrium]:
@@ -240,7 +240,7 @@ class Diagram(Table, Result):
         ArgumentError
             If the value is outside the range of the diagram.
         """
-        where = asked(self.parameter, self.over, "diagram", value)
+        where = validate_value(self.parameter, self.over, "diagram", value)
         self._warn("at()")
         found = [
             point
@@ -249,7 +249,7 @@ class Diagram(Table, Result):
         ]
         sets = (band.set_at(where) for band in self.bands)
         found += [corner for one in sets if one is not None for corner in one.equilibria]
-        return chosen(found, stable, region, self._known_regions)
+        return filter_equilibria(found, stable, region, self._known_regions)
 
     @property
     def _known_regions(self) -> tuple[str, ...]:
@@ -257,7 +257,7 @@ class Diagram(Table, Result):
         sliding = (*(r for b in self.branches for r in b.regions), *(b.region for b in self.bands))
         return tuple(dict.fromkeys([*self.regions, *sliding]))
 
-    @takes(stable=flag, region=text, code=text)
+    @validated(stable=flag, region=text, code=text)
     def select(
         self,
         *,
@@ -307,7 +307,7 @@ class Diagram(Table, Result):
         kept = tuple(band for band in cut if band is not None)
         return replace(self, branches=branches, over=over, bands=kept)
 
-    @takes(at_least=whole(1))
+    @validated(at_least=whole(1))
     def bistable(self, at_least: int = 2) -> NDArray[np.float64]:
         """Intervals of the parameter with two (or more) stable equilibria, shape (k, 2).
 

@@ -34,7 +34,7 @@ MOVED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces(Immutable):
+class MonotoneRuns(Immutable):
     """Runs of rows over which the parameter does not turn; each begins where the last ends.
 
     Parameters
@@ -75,12 +75,12 @@ class Pieces(Immutable):
         return level, passed
 
 
-def pieces_of(parameter: Array) -> Pieces:
-    """Split at the rows where the parameter turns.
+def monotone_runs(parameter: Array) -> MonotoneRuns:
+    """Split a branch at the extrema of its parameter.
 
     Examples
     --------
-    >>> pieces = pieces_of(np.array([0.0, 1.0, 1.0, 2.0, 1.0, 0.0]))
+    >>> pieces = monotone_runs(np.array([0.0, 1.0, 1.0, 2.0, 1.0, 0.0]))
     >>> pieces.first.tolist(), pieces.last.tolist()
     ([0, 3], [3, 5])
     >>> pieces.around(0.5, 0.0)
@@ -99,7 +99,7 @@ def pieces_of(parameter: Array) -> Pieces:
     first = np.append(0, turns)
     last = np.append(turns, len(parameter) - 1)
     ends = parameter[first], parameter[last]
-    return Pieces(
+    return MonotoneRuns(
         first, last, np.minimum(*ends), np.maximum(*ends), np.stack([parameter, -parameter])
     )
 
@@ -109,7 +109,7 @@ def passages(
 ) -> list[Equilibrium]:
     """The equilibria of a branch at a parameter value, in order along it."""
     near = AT * float(np.abs(branch.parameter).max(initial=0.0))
-    level, passed = branch.pieces.around(where, near)
+    level, passed = branch.monotone_runs.around(where, near)
     runs = [(begin, begin, end) for begin, end in level]
     if branch.closed and len(runs) > 1 and runs[0][1] == 0 and runs[-1][2] == len(branch) - 1:
         # the first row is the last one again: both runs are one
@@ -198,7 +198,7 @@ def read_off(
     )
 
 
-def asked(
+def validate_value(
     parameter: str, over: tuple[float, float], what: str, value: Mapping[str, float]
 ) -> float:
     """The value asked for, of the right parameter and inside the range.
@@ -222,7 +222,7 @@ def asked(
     return where
 
 
-def chosen(
+def filter_equilibria(
     found: list[Equilibrium], stable: bool | None, region: str | None, regions: tuple[str, ...]
 ) -> list[Equilibrium]:
     """Those that are stable (or not), and those of a region."""

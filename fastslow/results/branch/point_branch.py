@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite, formula, takes
+from fastslow.arguments import finite, formula, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import column
 from fastslow.results.base.immutable import ImmutableSequence
@@ -173,7 +173,7 @@ class PointBranch(Table, Result):
             raise unknown_name("parameter of the curve", name, self.parameter_names)
         return points_at(self, name, finite(name, given))
 
-    @takes(x=formula, y=formula)
+    @validated(x=formula, y=formula)
     def intersections(
         self, other: PointBranch, x: object = None, y: object = None
     ) -> NDArray[np.float64]:

@@ -66,7 +66,7 @@ def multistable(branches: Sequence[Branch], at_least: int) -> Array:
 
 def _unturned(branch: Branch, first: int, last: int) -> list[tuple[int, int]]:
     """The parts of a run of rows along which the parameter does not turn."""
-    pieces = branch.pieces
+    pieces = branch.monotone_runs
     begin, end = np.maximum(pieces.first, first), np.minimum(pieces.last, last)
     real = end > begin
     return list(zip(begin[real].tolist(), end[real].tolist(), strict=True))

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import mapping, path, refusal, takes, text
+from fastslow.arguments import mapping, path, refusal, text, validated
 from fastslow.errors import FileError, unknown_name
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.branch import Branch
@@ -37,7 +37,7 @@ EQUILIBRIA = (1, 11)
 REGION = "S1"
 
 
-@takes(path=path, solutions=path, diagnostics=path, names=mapping, parameter=text)
+@validated(path=path, solutions=path, diagnostics=path, names=mapping, parameter=text)
 def read_auto(
     path: str | os.PathLike[str],
     solutions: str | os.PathLike[str] | None = None,

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, raised_by_handler
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.branch.tangencies import Tangencies
 from fastslow.results.points import Equilibria, SpecialPoints
 from fastslow.results.stored.model import StoredModel
@@ -158,7 +158,7 @@ def _mapping(value: Mapping[Any, Any], path: str, arrays: dict[str, Array]) -> A
         if type(key) is not str:
             raise ArgumentError(f"{path} has the key {key!r}; files keep names only")
     entries = [[key, encoded(v, f"{path}/{_safe(key)}", arrays)] for key, v in value.items()]
-    if isinstance(value, Named):
+    if isinstance(value, NamedMapping):
         return {"named": value.kind, "entries": entries}
     return {"mapping": entries}
 
@@ -247,7 +247,7 @@ def _built(node: dict[str, Any], arrays: Arrays) -> Any:
         return {key: decoded(value, arrays) for key, value in node["mapping"]}
     if "named" in node:
         pairs = [(key, decoded(value, arrays)) for key, value in node["entries"]]
-        return Named(node["named"], pairs)
+        return NamedMapping(node["named"], pairs)
     for name, build in _SEQUENCES.items():
         if name in node:
             items = [decoded(value, arrays) for value in node[name]]

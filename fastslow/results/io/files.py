@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
-from fastslow.arguments import path, takes
+from fastslow.arguments import path, validated
 from fastslow.disk import read_file, reason, write_file
 from fastslow.errors import (
     ArgumentError,
@@ -57,7 +57,7 @@ def write(result: object, path: str | os.PathLike[str]) -> None:
     write_file(target, content)
 
 
-@takes(path=path)
+@validated(path=path)
 def load(path: str | os.PathLike[str]) -> Any:
     """Read a result that was saved.
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import function, items, numbers, shown, takes
+from fastslow.arguments import function, items, numbers, shown, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
@@ -193,7 +193,7 @@ class RefinedMap(Result):
         found = self._worded(self._codes_at(place.reshape(-1, 2))).reshape(place.shape[:-1])
         return found if found.ndim else found.item()
 
-    @takes(predict=function)
+    @validated(predict=function)
     def compare(self, predict: Callable[[Floats, Floats], Sequence[Any]]) -> MapComparison:
         """Set what a function predicts beside what was found, at every point evaluated.
 
@@ -295,7 +295,7 @@ class MapComparison(Result):
         return float(self.areas[self.agree].sum() / self.areas.sum())
 
     @property
-    def compare_scalings(self) -> Mapping[tuple[Any, Any], Floats]:
+    def disagreements(self) -> Mapping[tuple[Any, Any], Floats]:
         """Points by what was found and what was predicted instead, each of shape (any, 2)."""
         pairs = list(zip(self.found, self.predicted, strict=True))
         differing = dict.fromkeys(p for p, same in zip(pairs, self.agree, strict=True) if not same)
@@ -309,7 +309,7 @@ class MapComparison(Result):
             f"MapComparison: agreement on {self.share:.4%} of the area, at "
             f"{int(self.agree.sum())} of {count} points"
         ]
-        for (found, predicted), points in self.compare_scalings.items():
+        for (found, predicted), points in self.disagreements.items():
             lines.append(f"  {len(points)} found {found}, predicted {predicted}")
         return "\n".join(lines)
 

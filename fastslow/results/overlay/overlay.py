@@ -10,7 +10,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import among, position, takes, text
+from fastslow.arguments import among, position, text, validated
 from fastslow.formulas.columns import by_value, evaluated
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
@@ -200,7 +200,7 @@ class Overlay(Table, Result):
         }
         return np.broadcast_to(evaluated(key, known, by_value("t", key)), self.time.shape)
 
-    @takes(region=text, sheet=text, direction=among(-1, 0, 1, None))
+    @validated(region=text, sheet=text, direction=among(-1, 0, 1, None))
     def at(
         self,
         *,
@@ -249,7 +249,7 @@ class Overlay(Table, Result):
         """
         return queries.moments_of(self, value, direction, sheet, region)
 
-    @takes(region=text, sheet=text, kind=text)
+    @validated(region=text, sheet=text, kind=text)
     def select(
         self,
         *,

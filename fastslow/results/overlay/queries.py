@@ -28,7 +28,7 @@ from fastslow.results.trajectory.nearest import (
     units_of,
 )
 from fastslow.results.trajectory.slicing import rows_asked, samples_of
-from fastslow.results.trajectory.state_at import StatePoint, moments_at
+from fastslow.results.trajectory.state_at import StatePoint, state_points_at
 
 if TYPE_CHECKING:
     from fastslow.results.overlay.overlay import Overlay
@@ -113,7 +113,9 @@ def nearest_on(lay: Overlay, values: Mapping[str, float]) -> StatePoint:
     scale = units_of(table)
     target = np.array([float(value) for value in values.values()])
     time, _ = nearest_time(lay.time, table / scale, target / scale)
-    moment = replace(moments_at(lay.run, np.array([time]))[0], interpolated=time not in lay.time)
+    moment = replace(
+        state_points_at(lay.run, np.array([time]))[0], interpolated=time not in lay.time
+    )
     return measured(lay, [moment])[0]
 
 

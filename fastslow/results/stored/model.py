@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import mapping, real_number, shown, takes
+from fastslow.arguments import mapping, real_number, shown, validated
 from fastslow.errors import ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.results.base.equality import content_hash
@@ -232,7 +232,7 @@ class StoredModel(Result):
         now = self.validity
         return now.period_at(self.parameters) if now.changed(self.parameters) else now.period
 
-    @takes(changes=mapping)
+    @validated(changes=mapping)
     def with_parameters(
         self, changes: Mapping[Any, Any] | None = None, /, **named: float
     ) -> StoredModel:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import among, takes
+from fastslow.arguments import among, validated
 from fastslow.errors import unknown_name
 from fastslow.results.base.immutable import Immutable, ImmutableSequence
 
@@ -75,7 +75,7 @@ class Crossings(ImmutableSequence, tuple[Crossing, ...]):
     def __getnewargs__(self) -> tuple[Any, ...]:
         return tuple(self), self.interfaces
 
-    @takes(direction=among(-1, 0, 1, None))
+    @validated(direction=among(-1, 0, 1, None))
     def __call__(self, interface: object = None, *, direction: int | None = None) -> Crossings:
         """Those of an interface, upwards (+1), downwards (−1) or only touching (0).
 

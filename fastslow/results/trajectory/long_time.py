@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
-from fastslow.arguments import among, finite, formula, positive, takes, text, whole
+from fastslow.arguments import among, finite, formula, positive, text, validated, whole
 from fastslow.results.trajectory.extrema import extremes_of
 from fastslow.results.trajectory.periodicity import Periodicity, periodicity_of
 from fastslow.results.trajectory.section import (
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from fastslow.results.trajectory.trajectory import Trajectory
 
 
-class Recurrence:
+class LongTime:
     """The questions to a `Trajectory` about how it repeats."""
 
     @property
     def _run(self) -> Trajectory:
         return cast("Trajectory", self)
 
-    @takes(period=positive, phase=finite, since=finite)
+    @validated(period=positive, phase=finite, since=finite)
     def stroboscopic(
         self,
         period: float | None = None,
@@ -59,7 +59,7 @@ class Recurrence:
         """
         return stroboscopic_section(self._run, period, phase, since)
 
-    @takes(
+    @validated(
         expression=formula,
         level=finite,
         direction=among(-1, 0, 1, None),
@@ -114,7 +114,7 @@ class Recurrence:
         window = window_of(self._run, since, until)
         return poincare_section(self._run, expression, level, direction, interface, window)
 
-    @takes(since=finite, window=text, samples=whole(8, 2**24))
+    @validated(since=finite, window=text, samples=whole(8, 2**24))
     def spectrum(
         self,
         name: object,
@@ -144,7 +144,7 @@ class Recurrence:
         """
         return spectrum_of(self._run, name, since, window, samples)
 
-    @takes(period=positive, tol=positive, most=whole(1, 10**6))
+    @validated(period=positive, tol=positive, most=whole(1, 10**6))
     def periodicity(
         self, period: float | None = None, tol: float = 1e-6, most: int = 16
     ) -> Periodicity:
@@ -169,7 +169,7 @@ class Recurrence:
         """
         return periodicity_of(self._run, period, tol, most)
 
-    @takes(since=finite, until=finite)
+    @validated(since=finite, until=finite)
     def extremes(
         self, name: object, since: float | None = None, until: float | None = None
     ) -> tuple[float, float]:

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.trajectory.extrema import extremes_of
-from fastslow.results.trajectory.state_at import StatePoint, check_readable, is_dense, moments_at
+from fastslow.results.trajectory.state_at import (
+    StatePoint,
+    check_readable,
+    is_dense,
+    state_points_at,
+)
 from fastslow.results.trajectory.step_polynomials import StepPolynomials, along_steps
 from fastslow.results.trajectory.step_roots import CLOSE, Zero, find_zeros
 
@@ -52,7 +57,7 @@ def moments_on(run: Trajectory, name: str, level: float, direction: int | None) 
         low, high = run.span if is_dense(run) else (float(run.t[0]), float(run.t[-1]))
         if not low <= level <= high:
             raise outside(name, level, (low, high))
-        found = moments_at(run, np.array([level]))
+        found = state_points_at(run, np.array([level]))
         return found if direction in (None, 1) else []
     if not is_dense(run):
         values = run[name]
@@ -87,7 +92,7 @@ def between_samples(
     if not low <= level <= high:
         raise outside(name, level, (low, high))
     if len(values) == 1:
-        return moments_at(run, run.t) if direction in (None, 0) else []
+        return state_points_at(run, run.t) if direction in (None, 0) else []
     rise = np.diff(values)
     lines = StepPolynomials(
         np.column_stack([values[:-1] - level, rise]), np.abs(values[:-1]) + np.abs(rise)
@@ -115,7 +120,7 @@ def _moments(
     step = np.minimum(where.astype(np.intp), len(starts) - 1)
     times = starts[step] + (where - step) * lengths[step]
     low, high = run.span
-    found = moments_at(run, np.clip(times, low, high))
+    found = state_points_at(run, np.clip(times, low, high))
     return [
         replace(moment, resting=True) if rests else moment
         for moment, rests in zip(found, resting, strict=True)

@@ -15,7 +15,12 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.angles import copies, periods_of
 from fastslow.results.branch.nearest import along_line
 from fastslow.results.trajectory.dense import refined_table
-from fastslow.results.trajectory.state_at import StatePoint, check_readable, is_dense, moments_at
+from fastslow.results.trajectory.state_at import (
+    StatePoint,
+    check_readable,
+    is_dense,
+    state_points_at,
+)
 from fastslow.results.trajectory.step_polynomials import StepPolynomials, along_steps
 from fastslow.results.trajectory.step_roots import find_zeros
 
@@ -97,7 +102,7 @@ def nearest_moment(run: Trajectory, values: Mapping[str, float]) -> StatePoint:
         # of those nearest by straight lines, in that order, each step once
         _, order = np.unique(steps, return_index=True)
         time = _along_series(run, steps[np.sort(order)[:STEPS]], list(values), target, scale)
-    return moments_at(run, np.array([time]))[0]
+    return state_points_at(run, np.array([time]))[0]
 
 
 def _along_series(

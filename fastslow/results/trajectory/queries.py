@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
-from fastslow.arguments import among, takes, text
+from fastslow.arguments import among, text, validated
 from fastslow.results.trajectory.lookup import in_region, moments_on, one_value
 from fastslow.results.trajectory.nearest import nearest_moment
 from fastslow.results.trajectory.slicing import parts_of
@@ -21,7 +21,7 @@ class Queries:
     def _run(self) -> Trajectory:
         return cast("Trajectory", self)
 
-    @takes(region=text, direction=among(-1, 0, 1, None))
+    @validated(region=text, direction=among(-1, 0, 1, None))
     def at(
         self, *, region: str | None = None, direction: int | None = None, **value: float
     ) -> list[StatePoint]:
@@ -72,7 +72,7 @@ class Queries:
         name, level = one_value(value, (*self._run.columns, "t"))
         return in_region(self._run, moments_on(self._run, name, level, direction), region)
 
-    @takes(region=text)
+    @validated(region=text)
     def select(
         self, *, region: str | None = None, between: tuple[float, float] | None = None
     ) -> tuple[Trajectory, ...]:

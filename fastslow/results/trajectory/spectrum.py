@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import takes, whole, within
+from fastslow.arguments import validated, whole, within
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.outcome import early_end
 from fastslow.results.base.result import Result
@@ -104,7 +104,7 @@ class Spectrum(Table, Result):
         """Angular frequencies, shape (N,)."""
         return 2.0 * np.pi * self.frequency
 
-    @takes(n=whole(0), least=within(0.0, 1.0))
+    @validated(n=whole(0), least=within(0.0, 1.0))
     def peaks(self, n: int = 5, least: float = 1e-6) -> tuple[Peak, ...]:
         """The largest lines beside the mean, largest first.
 

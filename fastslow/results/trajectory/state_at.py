@@ -103,7 +103,7 @@ def check_readable(run: Trajectory) -> None:
         )
 
 
-def moments_at(run: Trajectory, times: Array) -> list[StatePoint]:
+def state_points_at(run: Trajectory, times: Array) -> list[StatePoint]:
     """The moments at times inside the run, in the order given."""
     if is_dense(run):
         columns, between = columns_at(run, times), np.zeros(len(times), dtype=bool)

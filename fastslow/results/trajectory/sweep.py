@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import takes, within
+from fastslow.arguments import validated, within
 from fastslow.errors import ArgumentError
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
@@ -144,8 +144,8 @@ class BifurcationSweep(Table, Result):
             if not outcome
         )
 
-    @takes(tol=within(0.0, 1.0))
-    def hysteresis(self, tol: float = 1e-3) -> Array:
+    @validated(resolution=within(0.0, 1.0))
+    def hysteresis(self, resolution: float = 1e-3) -> Array:
         """Intervals of the parameter over which the two passes differ.
 
         At each value the points of one pass are compared with the nearest of
@@ -153,7 +153,7 @@ class BifurcationSweep(Table, Result):
 
         Parameters
         ----------
-        tol : float
+        resolution : float
             Largest difference that does not count, as a part of the range of all points.
 
         Returns
@@ -172,7 +172,7 @@ class BifurcationSweep(Table, Result):
         up, down = self.up, self.down
         if up is None or down is None:
             raise ArgumentError("hysteresis needs both passes; sweep with back=True")
-        allowed = tol * (float(np.ptp(self.x)) if len(self.x) else 0.0)
+        allowed = resolution * (float(np.ptp(self.x)) if len(self.x) else 0.0)
         intervals: list[list[float]] = []
         inside = False
         for value in self.values:

@@ -11,7 +11,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import among, finite, numbers, position, positive, takes
+from fastslow.arguments import among, finite, numbers, position, positive, validated
 from fastslow.formulas.columns import by_value, column
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import STORED, Result
@@ -32,7 +32,7 @@ from fastslow.results.trajectory.crossings import (
     segments_of,
 )
 from fastslow.results.trajectory.dense import columns_at, refined_table
-from fastslow.results.trajectory.long_time import Recurrence
+from fastslow.results.trajectory.long_time import LongTime
 from fastslow.results.trajectory.queries import Queries
 from fastslow.results.trajectory.regimes import SAME, Regimes, regimes_of
 from fastslow.results.trajectory.section import window_of
@@ -41,7 +41,7 @@ from fastslow.results.trajectory.state_at import StatePoint, in_blocks, is_dense
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Queries, Recurrence, Table, Result):
+class Trajectory(Queries, LongTime, Table, Result):
     """A solution in time.
 
     ``run["x"]`` is a column and ``run["x**2 + v"]`` an expression at the samples ``run.t``;
@@ -186,7 +186,7 @@ class Trajectory(Queries, Recurrence, Table, Result):
         values = self._table[1]
         return values[row] if row < len(values) else self._all_sampled[row]
 
-    @takes(times=numbers)
+    @validated(times=numbers)
     def __call__(self, times: ArrayLike) -> NDArray[np.float64]:
         """States at any times of the run, shape (n, N); (n,) for a scalar time.
 
@@ -197,7 +197,7 @@ class Trajectory(Queries, Recurrence, Table, Result):
         """
         return columns_at(self, times, slice(len(self.states)))
 
-    @takes(times=numbers)
+    @validated(times=numbers)
     def dense_columns(self, times: ArrayLike) -> NDArray[np.float64]:
         """All columns at any times of the run, shape (n + n_forcing, N).
 
@@ -261,7 +261,7 @@ class Trajectory(Queries, Recurrence, Table, Result):
         known = self.gap is not None and self.period is not None
         return regimes_of(self, None, None, None, SAME) if known else None
 
-    @takes(period=positive, since=finite, until=finite, tol=positive)
+    @validated(period=positive, since=finite, until=finite, tol=positive)
     def regimes(
         self,
         period: float | None = None,
@@ -299,7 +299,7 @@ class Trajectory(Queries, Recurrence, Table, Result):
         """The part of the run spent in every region (and in every sliding motion)."""
         return time_fractions_in(self, self.span)
 
-    @takes(direction=among(-1, 1, None), since=finite, until=finite)
+    @validated(direction=among(-1, 1, None), since=finite, until=finite)
     def hits(
         self,
         interface: object,
@@ -326,7 +326,7 @@ class Trajectory(Queries, Recurrence, Table, Result):
         """
         return count_hits(self, interface, direction, window_of(self, since, until))
 
-    @takes(since=finite, until=finite, period=positive)
+    @validated(since=finite, until=finite, period=positive)
     def contacts(
         self,
         since: float | None = None,

@@ -10,7 +10,7 @@ import sympy as sp
 from sympy.logic.boolalg import Boolean
 
 from fastslow.model.structure import real
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.closed_forms.critical import Setting
 from fastslow.symbolic.closed_forms.stability import jacobian
 from fastslow.symbolic.signs.inequalities import conjunction, implied
@@ -83,7 +83,7 @@ class BoundaryForm:
     interface : str
     regions : tuple of str
         The two it joins; in a Filippov model the first is the one whose rates vanish.
-    state, parameters : Named of sympy.Expr
+    state, parameters : NamedMapping of sympy.Expr
     equations : tuple of sympy.Expr
         What is left to hold, = 0; empty when the closed form is complete.
     type : str
@@ -96,7 +96,7 @@ class BoundaryForm:
         Whether the rates are continuous across the interface.
     clarke : ClarkeForm or None
         For a continuous field, unless long equations are left.
-    singular : Named
+    singular : NamedMapping
         Region to the condition on one parameter under which its Jacobian is
         singular here: a fold of that region meets the interface.
     admissible : Boolean
@@ -109,14 +109,14 @@ class BoundaryForm:
 
     interface: str
     regions: tuple[str, str]
-    state: Named[sp.Expr]
-    parameters: Named[sp.Expr]
+    state: NamedMapping[sp.Expr]
+    parameters: NamedMapping[sp.Expr]
     equations: tuple[sp.Expr, ...]
     type: str
     test: sp.Expr
     continuous: bool
     clarke: ClarkeForm | None
-    singular: Named[Boolean]
+    singular: NamedMapping[Boolean]
     admissible: Boolean
     possible: bool | None
     check: str
@@ -263,8 +263,8 @@ def _form(
     return BoundaryForm(
         interface,
         names,
-        Named("state", {s.name: place[s] for s in states}),
-        Named("parameter", {s.name: e for s, e in place.items() if s not in states}),
+        NamedMapping("state", {s.name: place[s] for s in states}),
+        NamedMapping("parameter", {s.name: e for s, e in place.items() if s not in states}),
         left,
         "depends" if sign is None else TYPES[sign],
         test,
@@ -292,14 +292,14 @@ def _implicit(interface: str, own: Setting, other: Setting, found: _Place) -> Bo
     return BoundaryForm(
         interface,
         (own.region, other.region),
-        Named("state", {s.name: found.values[s] for s in states}),
-        Named("parameter", {s.name: e for s, e in found.values.items() if s not in states}),
+        NamedMapping("state", {s.name: found.values[s] for s in states}),
+        NamedMapping("parameter", {s.name: e for s, e in found.values.items() if s not in states}),
         found.left,
         "depends",
         sp.Determinant(first) * sp.Determinant(second),
         True,
         None,
-        Named("region", {}),
+        NamedMapping("region", {}),
         sp.And(*conditions),
         None,
         OPEN,
@@ -319,7 +319,9 @@ def _at(
     return sp.ImmutableDenseMatrix(here)
 
 
-def _singular(names: tuple[str, str], determinants: list[sp.Expr], own: Setting) -> Named[Boolean]:
+def _singular(
+    names: tuple[str, str], determinants: list[sp.Expr], own: Setting
+) -> NamedMapping[Boolean]:
     conditions: dict[str, Boolean] = {}
     order = sorted(own.candidates, key=lambda c: c in own.geometry)
     for name, value in zip(names, determinants, strict=True):
@@ -330,7 +332,7 @@ def _singular(names: tuple[str, str], determinants: list[sp.Expr], own: Setting)
         else:
             solved = solved_for(value, order, own.signs)
             conditions[name] = sp.Eq(value, 0) if solved is None else sp.Eq(solved[0], solved[1])
-    return Named("region", conditions)
+    return NamedMapping("region", conditions)
 
 
 def _weight(taken: Collection[str]) -> sp.Symbol:

@@ -11,7 +11,7 @@ import sympy as sp
 
 from fastslow.model.model import Model
 from fastslow.model.structure import real
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.closed_forms.symmetries import STATES, constant_null_space
 from fastslow.symbolic.solving.algebra import tidy
 
@@ -32,9 +32,9 @@ class ConservedQuantity:
         A name for its value that the model does not use.
     eliminated : tuple of str
         The states that all conserved quantities together give.
-    combinations : Named of sympy.Expr
+    combinations : NamedMapping of sympy.Expr
         The states that are kept.
-    totals : Named of sympy.Expr
+    totals : NamedMapping of sympy.Expr
         Every conserved quantity of the model, by the name of its value.
 
     Examples
@@ -49,8 +49,8 @@ class ConservedQuantity:
     expression: sp.Expr
     total: str
     eliminated: tuple[str, ...]
-    combinations: Named[sp.Expr]
-    totals: Named[sp.Expr]
+    combinations: NamedMapping[sp.Expr]
+    totals: NamedMapping[sp.Expr]
 
     def __str__(self) -> str:
         kept = ", ".join(f'"{n}": {e}' for n, e in self.combinations.items())
@@ -100,8 +100,8 @@ def conserved_quantities(model: Model) -> tuple[ConservedQuantity, ...]:
     )
     expressions = [sp.Add(*(c * s for c, s in zip(row, states, strict=True))) for row in weights]
     names = itertools.islice(_names(model, len(expressions)), len(expressions))
-    totals = Named("total", dict(zip(names, expressions, strict=True)))
-    kept = Named("state", {s.name: s for s in states if s not in left_out})
+    totals = NamedMapping("total", dict(zip(names, expressions, strict=True)))
+    kept = NamedMapping("state", {s.name: s for s in states if s not in left_out})
     out = tuple(s.name for s in left_out)
     return tuple(ConservedQuantity(e, n, out, kept, totals) for n, e in totals.items())
 

@@ -10,7 +10,7 @@ from sympy.logic.boolalg import Boolean
 from sympy.polys.rootoftools import ComplexRootOf
 
 from fastslow.model.structure import real
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.closed_forms.forms import CriticalPoint
 from fastslow.symbolic.closed_forms.stability import HopfTest, Stability
 from fastslow.symbolic.signs.inequalities import conjunction, general, implied, nonnegative
@@ -30,7 +30,7 @@ class Setting:
     ----------
     region : str
     states : tuple of str
-    rates : Named of sympy.Expr
+    rates : NamedMapping of sympy.Expr
         Smooth, with exact coefficients.
     inside : tuple of sympy.Expr
         Positive in the region.
@@ -45,7 +45,7 @@ class Setting:
 
     region: str
     states: tuple[str, ...]
-    rates: Named[sp.Expr]
+    rates: NamedMapping[sp.Expr]
     inside: tuple[sp.Expr, ...]
     signs: Signs
     candidates: Candidates
@@ -65,10 +65,12 @@ class Setting:
         )
 
 
-def state_at(family: Family, setting: Setting, place: dict[sp.Symbol, sp.Expr]) -> Named[sp.Expr]:
+def state_at(
+    family: Family, setting: Setting, place: dict[sp.Symbol, sp.Expr]
+) -> NamedMapping[sp.Expr]:
     """Give the state vector of a family where some of its symbols have closed forms."""
     values = family.elimination.state({}, setting.states)
-    return Named(
+    return NamedMapping(
         "state", {n: neat(_put(e, place)) for n, e in zip(setting.states, values, strict=True)}
     )
 
@@ -249,7 +251,7 @@ def critical_point(
         code,
         setting.region,
         state,
-        Named("parameter", {s.name: e for s, e in parameters.items()}),
+        NamedMapping("parameter", {s.name: e for s, e in parameters.items()}),
         located.equations,
         exists,
         admissible,

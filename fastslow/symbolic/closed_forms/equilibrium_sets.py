@@ -11,7 +11,7 @@ from sympy.logic.boolalg import Boolean
 from fastslow.model.model import Model
 from fastslow.model.motions import Motion, motions_of
 from fastslow.model.structure import real
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.signs.signs import Signs
 
 #: Begins the note of a region's equilibrium that is the edge of a set, before the set's region.
@@ -32,12 +32,12 @@ class EquilibriumSetForm:
         Those that are slid along.
     free : tuple of Symbol
         States that vary within the set.
-    state : Named of sympy.Expr
+    state : NamedMapping of sympy.Expr
         Every state; a free one stands for itself.
     conditions : tuple of Boolean
         What bounds the set: a friction force of no more than its full value, and where
         other interfaces do.
-    edges : tuple of Named
+    edges : tuple of NamedMapping
         The states at the two ends of a set with one free state, where these have a
         closed form.
     attracting : bool or None
@@ -52,9 +52,9 @@ class EquilibriumSetForm:
     region: str
     interfaces: tuple[str, ...]
     free: tuple[sp.Symbol, ...]
-    state: Named[sp.Expr]
+    state: NamedMapping[sp.Expr]
     conditions: tuple[Boolean, ...]
-    edges: tuple[Named[sp.Expr], ...]
+    edges: tuple[NamedMapping[sp.Expr], ...]
     attracting: bool | None
     weights: tuple[sp.Expr, ...]
     heights: tuple[sp.Expr, ...]
@@ -123,7 +123,7 @@ def _form(
         motion.name,
         tuple(interfaces[j] for j in motion.slides),
         free,
-        Named("state", {n: solved.get(real(n), real(n)) for n in names}),
+        NamedMapping("state", {n: solved.get(real(n), real(n)) for n in names}),
         tuple(conditions),
         _edges(bounds[0][1], solved, free, names) if len(bounds) == len(free) == 1 else (),
         attracting,
@@ -151,7 +151,7 @@ def _edges(
     solved: Mapping[sp.Symbol, sp.Expr],
     free: Sequence[sp.Symbol],
     names: Sequence[str],
-) -> tuple[Named[sp.Expr], ...]:
+) -> tuple[NamedMapping[sp.Expr], ...]:
     """The states at which |e| = f, if e is affine in the only free state."""
     (symbol,), (top, below) = free, bound
     slope = top.diff(symbol)
@@ -161,7 +161,7 @@ def _edges(
     for side in (-1, 1):
         at = {symbol: sp.expand(symbol - (top - side * below) / slope)}
         whole = {s: sp.expand(e.subs(at)) for s, e in solved.items()} | at
-        edges.append(Named("state", {n: whole.get(real(n), real(n)) for n in names}))
+        edges.append(NamedMapping("state", {n: whole.get(real(n), real(n)) for n in names}))
     return tuple(edges)
 
 

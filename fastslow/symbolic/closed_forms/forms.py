@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.closed_forms.stability import Stability
 
 
@@ -21,13 +21,13 @@ class EquilibriumForm:
     kind : str
         ``"explicit"``: the state in parameters; ``"curve"``: a parameter in
         terms of one unknown state; ``"implicit"``: equations are left.
-    state : Named of sympy.Expr
+    state : NamedMapping of sympy.Expr
         Every state; one that is an unknown stands for itself.
     unknowns : tuple of Symbol
         The unknown states that the rest is expressed by.
     equations : tuple of sympy.Expr
         What the unknowns satisfy, = 0.
-    parameter : Named of sympy.Expr
+    parameter : NamedMapping of sympy.Expr
         The parameter solved for and its value along the family; may be empty.
     exists, admissible : Boolean
         When it is real, and when it is real and lies in its region.
@@ -48,10 +48,10 @@ class EquilibriumForm:
 
     region: str
     kind: str
-    state: Named[sp.Expr]
+    state: NamedMapping[sp.Expr]
     unknowns: tuple[sp.Symbol, ...]
     equations: tuple[sp.Expr, ...]
-    parameter: Named[sp.Expr]
+    parameter: NamedMapping[sp.Expr]
     exists: Boolean
     admissible: Boolean
     possible: bool | None
@@ -77,8 +77,8 @@ class Continuum:
     region : str
     free : tuple of Symbol
         States that take any value.
-    state : Named of sympy.Expr
-    parameters : Named of sympy.Expr
+    state : NamedMapping of sympy.Expr
+    parameters : NamedMapping of sympy.Expr
         Parameter values at which it exists; empty where it exists for all.
     equations : tuple of sympy.Expr
         What else must vanish.
@@ -93,8 +93,8 @@ class Continuum:
 
     region: str
     free: tuple[sp.Symbol, ...]
-    state: Named[sp.Expr]
-    parameters: Named[sp.Expr]
+    state: NamedMapping[sp.Expr]
+    parameters: NamedMapping[sp.Expr]
     equations: tuple[sp.Expr, ...]
     conditions: tuple[Boolean, ...]
     eigenvalues: tuple[sp.Expr, ...]
@@ -115,9 +115,9 @@ class CriticalPoint:
     code : str
         LP, BP, CP or HB.
     region : str
-    state : Named of sympy.Expr
+    state : NamedMapping of sympy.Expr
         A state that could not be solved for stands for itself.
-    parameters : Named of sympy.Expr
+    parameters : NamedMapping of sympy.Expr
         The parameters solved for.
     equations : tuple of sympy.Expr
         What is left to hold, = 0; empty when the closed form is complete.
@@ -136,8 +136,8 @@ class CriticalPoint:
 
     code: str
     region: str
-    state: Named[sp.Expr]
-    parameters: Named[sp.Expr]
+    state: NamedMapping[sp.Expr]
+    parameters: NamedMapping[sp.Expr]
     equations: tuple[sp.Expr, ...]
     exists: Boolean
     admissible: Boolean

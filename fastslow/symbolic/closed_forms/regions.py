@@ -9,7 +9,7 @@ import sympy as sp
 from sympy.logic.boolalg import Boolean
 
 from fastslow.model.structure import real
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.point_types import point_name
 from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
 from fastslow.symbolic.closed_forms.critical import (
@@ -63,7 +63,7 @@ class RegionForms:
     conditions : tuple of Boolean
         The inequalities that describe the region; those that follow from the
         others under the assumptions are left out.
-    rates : Named of sympy.Expr
+    rates : NamedMapping of sympy.Expr
     equations : tuple of sympy.Expr
         The eliminated equations, family by family, = 0.
     equilibria : tuple of EquilibriumForm
@@ -82,7 +82,7 @@ class RegionForms:
 
     name: str
     conditions: tuple[Boolean, ...]
-    rates: Named[sp.Expr]
+    rates: NamedMapping[sp.Expr]
     equations: tuple[sp.Expr, ...]
     equilibria: tuple[EquilibriumForm, ...]
     continua: tuple[Continuum, ...]
@@ -332,7 +332,9 @@ def _form(family: Family, root: Root | None, inner: Stability, setting: Setting)
         state,
         () if explicit else family.elimination.unknowns,
         () if explicit else family.equations,
-        Named("parameter", {s.name: e for s, e in curve.items() if e is not None and not explicit}),
+        NamedMapping(
+            "parameter", {s.name: e for s, e in curve.items() if e is not None and not explicit}
+        ),
         exists,
         admissible,
         possible,
@@ -415,7 +417,7 @@ def _continuum(
         setting.region,
         family.elimination.unknowns,
         state,
-        Named("parameter", {s.name: e for s, e in place.items()}),
+        NamedMapping("parameter", {s.name: e for s, e in place.items()}),
         (*left, *equations),
         tuple(c for c in (*conditions, setting.real(radicands)) if c != sp.true),
         tuple(eigenvalues),

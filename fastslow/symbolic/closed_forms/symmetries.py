@@ -15,7 +15,7 @@ from fastslow.model.derived import once, partition_of
 from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.structure import real
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.reduction import reduce_states
 from fastslow.symbolic.solving.algebra import tidy
 
@@ -39,9 +39,9 @@ class FreeDirection:
 
     Parameters
     ----------
-    shift : Named of sympy.Expr
+    shift : NamedMapping of sympy.Expr
         State to its share of the shift.
-    combinations : Named of sympy.Expr
+    combinations : NamedMapping of sympy.Expr
         New states, those that no free direction is left in, in terms of the old ones.
 
     Examples
@@ -53,8 +53,8 @@ class FreeDirection:
     ({a: 1, b: 1}, {u1: a - b})
     """
 
-    shift: Named[sp.Expr]
-    combinations: Named[sp.Expr]
+    shift: NamedMapping[sp.Expr]
+    combinations: NamedMapping[sp.Expr]
 
     def __str__(self) -> str:
         c = next(n for n in ("c", "s", "shift") if n not in self.shift)
@@ -92,7 +92,9 @@ def free_directions(model: Model) -> tuple[FreeDirection, ...]:
         return ()
     return tuple(
         FreeDirection(
-            Named("state", {s.name: e for s, e in zip(states, shift, strict=True) if e != 0}),
+            NamedMapping(
+                "state", {s.name: e for s, e in zip(states, shift, strict=True) if e != 0}
+            ),
             combinations,
         )
         for shift in shifts
@@ -109,7 +111,7 @@ def _slopes_of(model: Model) -> list[list[sp.Expr]]:
 
 def _reduced(
     model: Model, states: Sequence[sp.Symbol], values: Mapping[sp.Symbol, float]
-) -> Named[sp.Expr]:
+) -> NamedMapping[sp.Expr]:
     """Combinations that no free direction changes, as often as one is left."""
     whole: dict[sp.Symbol, sp.Expr] = {s: s for s in states}
     rates = {s: model.rates[s.name] for s in states}
@@ -130,8 +132,8 @@ def _reduced(
         whole = {s: sp.expand(e.subs(whole, simultaneous=True)) for s, e in new.items()}
         rates = {s: reduced[s.name] for s in new}
     if len(whole) == len(states):
-        return Named("state", {})
-    return Named("state", {f"u{k}": e for k, e in enumerate(whole.values(), 1)})
+        return NamedMapping("state", {})
+    return NamedMapping("state", {f"u{k}": e for k, e in enumerate(whole.values(), 1)})
 
 
 def _branches(expression: sp.Expr) -> list[sp.Expr]:

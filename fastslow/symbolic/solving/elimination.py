@@ -9,7 +9,7 @@ import sympy as sp
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.structure import real
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.solving.algebra import (
     generators,
     growth,
@@ -50,7 +50,7 @@ class Elimination:
         unknown is a condition on the parameters.
     unknowns : tuple of sympy.Symbol
         States that were not solved for, in the order of the state vector.
-    solved : Named of sympy.Expr
+    solved : NamedMapping of sympy.Expr
         Every other state in terms of unknowns and parameters.
     divisors : tuple of sympy.Expr
         What was divided by, taken to be nonzero.
@@ -65,7 +65,7 @@ class Elimination:
 
     remaining: tuple[sp.Expr, ...]
     unknowns: tuple[sp.Symbol, ...]
-    solved: Named[sp.Expr]
+    solved: NamedMapping[sp.Expr]
     divisors: tuple[sp.Expr, ...] = ()
 
     @property
@@ -93,7 +93,7 @@ class Elimination:
         return Elimination(
             tuple(e for e in remaining if e != 0),
             self.unknowns,
-            Named(self.solved.kind, solved),
+            NamedMapping(self.solved.kind, solved),
             tuple(d.subs(values) for d in self.divisors if d.free_symbols - set(values)),
         )
 
@@ -152,7 +152,7 @@ def eliminate(
     return Elimination(
         tuple(e for e in best.equations if e != 0),
         tuple(s for s in symbols if s not in solved),
-        Named("solved state", {s.name: solved[s] for s in symbols if s in solved}),
+        NamedMapping("solved state", {s.name: solved[s] for s in symbols if s in solved}),
         tuple(dict.fromkeys(d for d in best.divisors if not d.is_number)),
     )
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from fastslow.model.structure import real
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.report.decimals import without_scale
 from fastslow.symbolic.report.naming import WIDTH
 from fastslow.symbolic.signs.signs import Signs
@@ -156,10 +156,10 @@ def families(
     direct = cramer(rates, states)
     if isinstance(direct, tuple):
         values, below = direct
-        solved = Elimination((), (), Named("solved state", values), (below,))
+        solved = Elimination((), (), NamedMapping("solved state", values), (below,))
         return _solved(solved, signs, candidates)
     if direct is not None:
-        whole = Elimination(tuple(rates.values()), unknowns, Named("solved state", {}))
+        whole = Elimination(tuple(rates.values()), unknowns, NamedMapping("solved state", {}))
         return [Family(whole, note=direct)]
     poles = _poles(rates, states)
     return [
@@ -212,11 +212,11 @@ def _of_populations(
             continue
         known = {s.name: e for s, e in absent.items()}
         if not left:
-            nothing = Elimination((), (), Named("solved state", known))
+            nothing = Elimination((), (), NamedMapping("solved state", known))
             found.append(Family(_ordered(nothing, states)))
             continue
         for family in families(left, list(left), signs, candidates):
-            solved = Named("solved state", {**known, **dict(family.elimination.solved)})
+            solved = NamedMapping("solved state", {**known, **dict(family.elimination.solved)})
             whole = replace(family.elimination, solved=solved)
             found.append(replace(family, elimination=_ordered(whole, states)))
     return found
@@ -256,11 +256,11 @@ def _by_factors(
             inner = families(dict(zip(names, left, strict=True)), names, signs, candidates)
         else:
             open_ones = tuple(map(real, names))
-            rest = Elimination(tuple(left), open_ones, Named("solved state", {}))
+            rest = Elimination(tuple(left), open_ones, NamedMapping("solved state", {}))
             inner = [Family(rest, note=PAST if names else "")]
         known = {s.name: e for s, e in zero.items()}
         for family in inner:
-            solved = Named("solved state", {**known, **dict(family.elimination.solved)})
+            solved = NamedMapping("solved state", {**known, **dict(family.elimination.solved)})
             whole = replace(family.elimination, solved=solved)
             found.append(replace(family, elimination=_ordered(whole, states)))
     return found
@@ -311,7 +311,7 @@ def split(rates: Mapping[str, sp.Expr], states: Sequence[str], signs: Signs) -> 
 
 def _ordered(elimination: Elimination, states: Sequence[str]) -> Elimination:
     solved = {n: elimination.solved[n] for n in states if n in elimination.solved}
-    return replace(elimination, solved=Named("solved state", solved))
+    return replace(elimination, solved=NamedMapping("solved state", solved))
 
 
 def _pieces(current: Elimination) -> list[tuple[sp.Expr, ...]] | None:
@@ -351,7 +351,7 @@ def _joined(current: Elimination, equations: Sequence[sp.Expr], nonzero: Nonzero
     return Elimination(
         (*further.remaining, *left),
         further.unknowns,
-        Named("solved state", {**solved, **dict(further.solved)}),
+        NamedMapping("solved state", {**solved, **dict(further.solved)}),
         (*current.divisors, *further.divisors),
     )
 
@@ -450,7 +450,7 @@ def _linear(
     slope = spread(equation).diff(unknown)
     solved = {n: tidy(e.subs(unknown, value)) for n, e in slim.solved.items()}
     whole = Elimination(
-        (), (), Named("solved state", {**solved, unknown.name: value}), slim.divisors
+        (), (), NamedMapping("solved state", {**solved, unknown.name: value}), slim.divisors
     )
     for factor in _open(slope, signs):
         note = _and(note, f"found where {_short(factor)} ≠ 0")

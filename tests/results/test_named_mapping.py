@@ -7,12 +7,12 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.errors import unknown_name
-from fastslow.results.base.named_mapping import Named
+from fastslow.results.base.named_mapping import NamedMapping
 
 
 @pytest.fixture
 def values():
-    return Named("parameter", {"A": 1.0, "omega": 0.1})
+    return NamedMapping("parameter", {"A": 1.0, "omega": 0.1})
 
 
 def test_symbols_are_names(values):
@@ -27,7 +27,7 @@ def test_it_is_a_mapping(values):
     assert values == {"A": 1.0, "omega": 0.1}
     assert len(values) == 2
     assert values.get("none") is None
-    assert hash(values) == hash(Named("other", values))
+    assert hash(values) == hash(NamedMapping("other", values))
     assert repr(values) == "{A: 1.0, omega: 0.1}"
     assert pickle.loads(pickle.dumps(values)) == values
 

@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 
 from fastslow.errors import ArgumentError, UnknownNameError
-from fastslow.exporters.sources import export
+from fastslow.exporters.formats import export
 from fastslow.model.model import Model
 from tests.symbolic.symbolic_models import auto_ab, gear, lorenz
 

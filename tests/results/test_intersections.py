@@ -56,7 +56,7 @@ def test_curves_that_do_not_meet(branch):
 
 
 @given(seed=st.integers(0, 10**6), sizes=st.tuples(st.integers(2, 20), st.integers(2, 20)))
-def test_meetings_are_found_as_by_trying_every_pair(seed, sizes):
+def test_intersections_are_found_as_by_trying_every_pair(seed, sizes):
     random = np.random.default_rng(seed)
     one, other = (random.normal(size=(n, 2)).cumsum(axis=0) for n in sizes)
     i, j = (k.reshape(-1) for k in np.indices((sizes[0] - 1, sizes[1] - 1)))

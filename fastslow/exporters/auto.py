@@ -1,0 +1,102 @@
+"""AUTO-07p equations files and constants files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import sympy as sp
+
+from fastslow.errors import ArgumentError
+from fastslow.exporters.common import comment_text, region_values, supported
+from fastslow.model.model import Model
+from fastslow.model.structure import real
+from fastslow.symbolic.closed_forms.stability import jacobian
+
+#: Indices of PAR reserved by AUTO-07p: the period and related quantities.
+AUTO_RESERVED = range(10, 15)
+
+
+def to_auto(
+    model: Model,
+    region: str,
+    *,
+    values: Mapping[Any, float] | None = None,
+    start: Mapping[Any, float] | None = None,
+) -> dict[str, str]:
+    """Write AUTO-07p equations (.f90) with derivatives, and constants (c.), for one region.
+
+    Parameters and errors as for `export`. PAR(1), the continuation parameter of the
+    constants file, is the first slow quantity, or the first parameter if there is none.
+    """
+    moving = [*model.forcing, *model.slow_states]
+    if moving:
+        raise ArgumentError(
+            f"AUTO-07p continues autonomous systems, but {', '.join(moving)} depend on time; "
+            "export(model.frozen(), 'auto')"
+        )
+    smooth, parameters, initial = region_values(model, region, values, start)
+    parameters = {**{n: parameters[n] for n in model.free}, **parameters}
+    places = [k for k in range(1, 37) if k not in AUTO_RESERVED][: len(parameters)]
+    if len(places) < len(parameters):
+        raise ArgumentError(f"AUTO-07p accepts at most 31 parameters, received {len(parameters)}")
+    index = dict(zip(parameters, places, strict=True))
+    place = {real(n): sp.Symbol(f"U({k + 1})", real=True) for k, n in enumerate(model.states)}
+    place |= {real(n): sp.Symbol(f"PAR({k})", real=True) for n, k in index.items()}
+
+    def assign(target: str, expression: sp.Expr) -> str:
+        written = supported(expression).xreplace(place)
+        code = sp.fcode(written, assign_to=target, standard=95, source_format="free")
+        return "\n".join("  " + line for line in code.splitlines())
+
+    size = len(model.states)
+    matrix = jacobian(smooth.rates, model.states)
+    body = [assign(f"F({k + 1})", smooth.rates[n]) for k, n in enumerate(model.states)]
+    body.append("  IF (IJAC == 0) RETURN")
+    body += [
+        assign(f"DFDU({i + 1},{j + 1})", matrix[i, j]) for i in range(size) for j in range(size)
+    ]
+    body.append("  IF (IJAC == 1) RETURN")
+    body += [
+        assign(f"DFDP({i + 1},{k})", smooth.rates[n].diff(real(p)))
+        for i, n in enumerate(model.states)
+        for p, k in index.items()
+    ]
+    declared = "  DOUBLE PRECISION, INTENT(IN) :: U(NDIM), PAR(*)"
+    text = [
+        f"! {comment_text(', '.join(model.states))}, region {comment_text(region)}",
+        "SUBROUTINE FUNC(NDIM,U,ICP,PAR,IJAC,F,DFDU,DFDP)",
+        "  IMPLICIT NONE",
+        "  INTEGER, INTENT(IN) :: NDIM, ICP(*), IJAC",
+        declared,
+        "  DOUBLE PRECISION, INTENT(OUT) :: F(NDIM)",
+        "  DOUBLE PRECISION, INTENT(INOUT) :: DFDU(NDIM,NDIM), DFDP(NDIM,*)",
+        *body,
+        "END SUBROUTINE FUNC",
+        "SUBROUTINE STPNT(NDIM,U,PAR,T)",
+        "  IMPLICIT NONE",
+        "  INTEGER, INTENT(IN) :: NDIM",
+        "  DOUBLE PRECISION, INTENT(INOUT) :: U(NDIM), PAR(*)",
+        "  DOUBLE PRECISION, INTENT(IN) :: T",
+        *(f"  PAR({index[n]}) = {_double(v)} ! {comment_text(n)}" for n, v in parameters.items()),
+        *(
+            f"  U({k + 1}) = {_double(v)} ! {comment_text(n)}"
+            for k, (n, v) in enumerate(initial.items())
+        ),
+        "END SUBROUTINE STPNT",
+        *(f"SUBROUTINE {name}\nEND SUBROUTINE {name}" for name in ("BCND", "ICND", "FOPT", "PVLS")),
+    ]
+    constants = [
+        f"parnames = {{{', '.join(f'{k}: {n!r}' for n, k in index.items())}}}",
+        f"unames = {{{', '.join(f'{k + 1}: {n!r}' for k, n in enumerate(model.states))}}}",
+        f"NDIM = {size}, IPS = 1, ILP = 1, ISP = 2, ISW = 1, JAC = 1",
+        "ICP = [1], NTST = 15, NCOL = 4, IAD = 3, MXBF = 5, IID = 2, ITMX = 8, ITNW = 5, NWTN = 3",
+        "DS = 0.01, DSMIN = 1e-06, DSMAX = 0.1, IADS = 1, NPR = 100, NMX = 1000",
+        "EPSL = 1e-08, EPSU = 1e-08, EPSS = 1e-06, RL0 = -10.0, RL1 = 10.0",
+        f"NPAR = {max(36, *places)}" if places else "NPAR = 36",
+    ]
+    return {f"{region}.f90": "\n".join(text) + "\n", f"c.{region}": "\n".join(constants) + "\n"}
+
+
+def _double(value: float) -> str:
+    return repr(float(value)).replace("e", "d") if "e" in repr(float(value)) else f"{value!r}d0"

@@ -1,0 +1,90 @@
+"""Parameter values, supported functions and identifiers, for every export format."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import sympy as sp
+
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.interfaces import Region
+from fastslow.model.model import Model
+from fastslow.model.structure import TIME
+from fastslow.results.stored.model import finite_number
+
+#: Functions that exist in every target program.
+FUNCTIONS = (
+    sp.exp,
+    sp.log,
+    sp.sin,
+    sp.cos,
+    sp.tan,
+    sp.asin,
+    sp.acos,
+    sp.atan,
+    sp.sinh,
+    sp.cosh,
+    sp.tanh,
+)
+
+
+def region_values(
+    model: Model,
+    region: str,
+    values: Mapping[Any, float] | None,
+    start: Mapping[Any, float] | None,
+) -> tuple[Region, dict[str, float], dict[str, float]]:
+    """Return the region, all parameter values and the initial state."""
+    parameters = dict.fromkeys(model.free, 0.0) | dict(model.parameters)
+    initial = dict.fromkeys((*model.states, *model.slow_states), 0.0)
+    for given, known, kind in ((values, parameters, "parameter"), (start, initial, "state")):
+        for name, value in (given or {}).items():
+            if str(name) not in known:
+                raise unknown_name(kind, name, known)
+            known[str(name)] = finite_number(f"{kind} {name}", value)
+    return model.regions[region], parameters, initial
+
+
+def supported(expression: sp.Expr) -> sp.Expr:
+    """Return the expression if every target program has all its functions.
+
+    Raises
+    ------
+    ArgumentError
+        For any other function.
+    """
+    wrong = [f for f in expression.atoms(sp.Function) if not isinstance(f, FUNCTIONS)]
+    if wrong:
+        names = ", ".join(sorted({f.func.__name__ for f in wrong}))
+        raise ArgumentError(
+            f"cannot export {names}; expected {', '.join(f.__name__ for f in FUNCTIONS)}"
+        )
+    return expression
+
+
+def comment_text(text: str) -> str:
+    """One line without quotes, safe within a comment or a docstring."""
+    line = "".join(c if c.isprintable() else " " for c in text)
+    return line.replace("\\", "/").replace('"', "'")
+
+
+def identifiers(
+    wanted: Iterable[str],
+    taken: Callable[[str], bool],
+    fold: Callable[[str], str],
+    length: int = 60,
+) -> dict[str, str]:
+    """Assign an identifier to each name, distinct after folding and not reserved in the target."""
+    result: dict[str, str] = {}
+    used: set[str] = {TIME.name, "state", "parameters", "numpy"}
+    for name in wanted:
+        plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
+        plain = plain if plain[0].isalpha() else f"p{plain}"
+        safe, count = plain[:length], 1
+        while fold(safe) in used or taken(fold(safe)):
+            count += 1
+            safe = f"{plain[: length - 3]}_{count}"
+        used.add(fold(safe))
+        result[name] = safe
+    return result

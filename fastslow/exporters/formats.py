@@ -1,0 +1,94 @@
+"""Export of a model to AUTO-07p, XPPAUT or NumPy, one smooth vector field per file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from fastslow.arguments import instance, mapping, path, text, validated
+from fastslow.disk import reason, write_text
+from fastslow.errors import FileError, unknown_name
+from fastslow.exporters.auto import to_auto
+from fastslow.exporters.numpy_source import to_numpy
+from fastslow.exporters.xpp import to_xpp
+from fastslow.model.model import Model
+from fastslow.results.base.named_mapping import NamedMapping
+
+
+@validated(
+    model=instance(Model), format=text, path=path, region=text, values=mapping, start=mapping
+)
+def export(
+    model: Model,
+    format: str,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    region: str | None = None,
+    values: Mapping[Any, float] | None = None,
+    start: Mapping[Any, float] | None = None,
+) -> NamedMapping[str]:
+    """Export the smooth vector field of each region as source code for another program.
+
+    Parameters
+    ----------
+    model : Model
+        A frozen model for AUTO-07p.
+    format : str
+        ``"auto"`` (Fortran equations and a constants file), ``"xpp"`` (an .ode
+        file) or ``"numpy"`` (a Python module).
+    path : path, optional
+        Folder to write to; without it nothing is written.
+    region : str, optional
+        A single region; all regions by default.
+    values : mapping, optional
+        Values of frozen slow quantities, 0 by default.
+    start : mapping, optional
+        Initial state, 0 by default; for AUTO-07p it must be an equilibrium.
+
+    Returns
+    -------
+    NamedMapping of str
+        The content of each file, by file name.
+
+    Raises
+    ------
+    UnknownNameError
+        For an unknown format, region, state or slow quantity.
+    ArgumentError
+        If the format cannot represent the model.
+
+    Examples
+    --------
+    >>> x, k = sp.symbols("x k")
+    >>> decay = Model({x: -k * x}, parameters={k: 2})
+    >>> print(export(decay, "xpp")["S1.ode"])
+    # x, region S1
+    par k=2.0
+    x'=-k*x
+    init x=0.0
+    @ total=100
+    done
+    <BLANKLINE>
+    """
+    writers: dict[str, Callable[..., dict[str, str]]] = {
+        "auto": to_auto,
+        "xpp": to_xpp,
+        "numpy": to_numpy,
+    }
+    if format not in writers:
+        raise unknown_name("export format", format, writers)
+    names = [region] if region is not None else list(model.regions)
+    files: dict[str, str] = {}
+    for name in names:
+        files.update(writers[format](model, name, values=values, start=start))
+    if path is not None:
+        folder = Path(path)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FileError(f"{folder} cannot be written: {reason(error)}") from error
+        for name, text in files.items():
+            write_text(folder / name, text)
+    return NamedMapping("file", files)

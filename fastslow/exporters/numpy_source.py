@@ -1,0 +1,69 @@
+"""Python modules with NumPy functions for the rates of one region."""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Mapping
+from typing import Any
+
+import sympy as sp
+from sympy.printing.numpy import NumPyPrinter
+
+from fastslow.exporters.common import comment_text, identifiers, region_values, supported
+from fastslow.model.model import Model
+from fastslow.model.structure import real
+from fastslow.symbolic.closed_forms.stability import jacobian
+
+
+def to_numpy(
+    model: Model,
+    region: str,
+    *,
+    values: Mapping[Any, float] | None = None,
+    start: Mapping[Any, float] | None = None,
+) -> dict[str, str]:
+    """Write a Python module with rates, Jacobian and interface functions of one region.
+
+    Parameters and errors as for `export`. The module defines ``STATES``,
+    ``START``, ``PARAMETERS``, ``rates(t, state, parameters)`` of shape (n,),
+    ``jacobian`` of shape (n, n) and ``interfaces`` of shape (m,), whose signs
+    in the region are ``SIGNS``.
+    """
+    smooth, parameters, initial = region_values(model, region, values, start)
+    names = [*model.states, *model.slow_states]
+    inside = identifiers([*names, *parameters, *smooth.forcing], keyword.iskeyword, lambda n: n)
+    place = {real(n): sp.Symbol(safe, real=True) for n, safe in inside.items()}
+    printer = NumPyPrinter({"fully_qualified_modules": True})
+
+    def code(expression: sp.Expr) -> str:
+        return str(printer.doprint(supported(expression).xreplace(place)))
+
+    unpack = [f"    {inside[n]} = parameters[{n!r}]" for n in parameters]
+    unpack += [f"    {inside[n]} = state[{k}]" for k, n in enumerate(names)]
+    unpack += [f"    {inside[n]} = {code(law)}" for n, law in smooth.forcing.items()]
+    rows = [f"            {code(smooth.rates[n])}," for n in names]
+    matrix = jacobian(smooth.rates, names)
+    entries = [f"            [{', '.join(map(code, matrix.row(k)))}]," for k in range(len(names))]
+    functions = [f"            {code(i.function)}," for i in model.interfaces.values()]
+    blocks = [
+        f'"""{comment_text(", ".join(names))}, region {comment_text(region)}."""',
+        "import numpy",
+        f"STATES = {tuple(names)!r}\nSTART = {tuple(initial.values())!r}\n"
+        f"PARAMETERS = {parameters!r}\nSIGNS = {dict(smooth.signs)!r}",
+        *(
+            _function(name, doc, unpack, body)
+            for name, doc, body in (
+                ("rates", "Rates, shape (n,).", rows),
+                ("jacobian", "Derivatives of the rates, shape (n, n).", entries),
+                ("interfaces", "Interface functions, shape (m,).", functions),
+            )
+        ),
+    ]
+    text = "\n\n".join(blocks[:3]) + "\n\n\n" + "\n\n\n".join(blocks[3:]) + "\n"
+    return {f"{region}.py": text}
+
+
+def _function(name: str, doc: str, unpack: list[str], rows: list[str]) -> str:
+    head = [f"def {name}(t, state, parameters=PARAMETERS):", f'    """{doc}"""', *unpack]
+    body = ["    return numpy.array(", "        [", *rows, "        ],"]
+    return "\n".join([*head, *body, "        dtype=float,", "    )"])
