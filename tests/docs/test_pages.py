@@ -89,19 +89,19 @@ def test_the_tutorial(tmp_path, monkeypatch, capsys):
     printed = capsys.readouterr().out
 
     assert list(names["gear"].regions) == ["S1", "S2", "S3"]
-    assert [str(form.admissible) for form in names["law"].folds].count("A < -D**2") == 2
+    assert [str(form.admissible) for form in names["derivation"].folds].count("A < -D**2") == 2
     assert names["diagram"].completeness == "complete"
     assert [p.subtype for p in names["diagram"].boundary_equilibria] == ["degenerate"] * 2
     assert len(names["run"].crossings) == 41
     assert names["run"].regime == "bilateral"
-    assert {t.kind for t in names["lay"].transitions} == {"gap crossing"}
+    assert {t.kind for t in names["overlay"].transitions} == {"gap crossing"}
     assert "the diagram has no fold" in printed
     assert len(names["soft_diagram"].folds) == 2
     (bistable,) = names["soft_diagram"].bistable()
     assert bistable == pytest.approx([-0.0894402097712473, 0.0894402097712473], abs=1e-12)
-    assert names["soft_lay"].bursting.name.startswith("relaxation oscillation")
-    assert {t.kind for t in names["soft_lay"].transitions} == {"jump"}
-    assert names["again"].delays == pytest.approx(names["soft_lay"].delays, rel=1e-12)
+    assert names["soft_overlay"].bursting.name.startswith("relaxation oscillation")
+    assert {t.kind for t in names["soft_overlay"].transitions} == {"jump"}
+    assert names["again"].delays == pytest.approx(names["soft_overlay"].delays, rel=1e-12)
 
     box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+)", (tmp_path / "overlay.pdf").read_bytes())
     assert float(box[1]) * 25.4 / 72 == pytest.approx(85, abs=0.01)
