@@ -51,6 +51,13 @@ def test_the_gallery_shows_every_figure_of_the_claims_and_its_script():
         assert (ROOT / script).is_file()
 
 
+def test_every_file_of_the_architecture_page_exists():
+    text = (DOCS / "architecture.md").read_text("utf-8")
+    paths = set(re.findall(r"`((?:fastslow|tests|docs)/[\w./-]*)`", text))
+    assert len(paths) > 100
+    assert sorted(path for path in paths if not (ROOT / path).exists()) == []
+
+
 def test_the_readme_links_to_pages():
     links = re.findall(r"\]\((docs/[^)]*)\)", (ROOT / "README.md").read_text("utf-8"))
     assert "docs/tutorial.md" in links
