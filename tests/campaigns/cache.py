@@ -15,9 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tests.compiled.forks import prepare, run, use
-
 from fastslow.kernels.cache import store
+from tests.kernels.forks import prepare, run, use
 
 NUMBERS = [1, 2, 3, 4]
 

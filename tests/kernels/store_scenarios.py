@@ -1,6 +1,6 @@
 """What becomes of compiled code in many circumstances, each in a process of its own.
 
-Run as ``python -m tests.compiled.store_scenarios``: prints what each scenario found, as JSON.
+Run as ``python -m tests.kernels.store_scenarios``: prints what each scenario found, as JSON.
 """
 
 import json
@@ -13,10 +13,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from tests.compiled.forks import Child, counted, prepare, run, use
-
 from fastslow.kernels import model_code
 from fastslow.kernels.cache import store
+from tests.kernels.forks import Child, counted, prepare, run, use
 
 STRANGER, NOBODY = 65534, 54321  # the second is in no table of users
 

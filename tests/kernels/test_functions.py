@@ -4,11 +4,11 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
-from tests.compiled.test_recurrences import call
 
 from fastslow.kernels.taylor.series import compile_series
 from fastslow.model.known_functions import IN_MPMATH, OPEN, without_recurrence
 from fastslow.model.model import Model
+from tests.kernels.test_recurrences import call
 
 t, x, a = sp.symbols("t x a", real=True)
 HALF = sp.Rational(1, 2)

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 def found():
     """What the scenarios found."""
     done = subprocess.run(
-        [sys.executable, "-m", "tests.compiled.store_scenarios"],
+        [sys.executable, "-m", "tests.kernels.store_scenarios"],
         cwd=ROOT,
         capture_output=True,
         text=True,

@@ -5,6 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import fastslow as fs
+from fastslow.plot.layout import style
 
 
 @pytest.fixture
@@ -31,7 +32,7 @@ def test_a_panel_is_drawn_once_and_that_into_the_file(gear_lay, drawn_axes, tmp_
 @pytest.mark.parametrize("suffix", ["pdf", "svg", "png", "eps"])
 def test_a_file_is_laid_out_as_matplotlib_lays_it_out(gear_lay, tmp_path, suffix):
     ours, theirs = (fs.plot.panel(gear_lay).figure for _ in range(2))
-    fs.plot.style.save(ours, tmp_path / f"a.{suffix}", dpi=100)
+    style.save(ours, tmp_path / f"a.{suffix}", dpi=100)
     theirs.savefig(tmp_path / f"b.{suffix}", dpi=100)
     for one, other in zip(ours.axes, theirs.axes, strict=True):
         assert one.get_position().extents.tolist() == other.get_position().extents.tolist()
@@ -40,7 +41,7 @@ def test_a_file_is_laid_out_as_matplotlib_lays_it_out(gear_lay, tmp_path, suffix
 def test_the_figure_stays_as_it_was(gear_lay, tmp_path):
     figure = fs.plot.panel(gear_lay).figure
     before = figure.get_layout_engine(), figure.canvas, figure.dpi
-    fs.plot.style.save(figure, tmp_path / "a.pdf")
+    style.save(figure, tmp_path / "a.pdf")
     assert (figure.get_layout_engine(), figure.canvas, figure.dpi) == before
 
 
@@ -49,7 +50,7 @@ def test_a_figure_that_cannot_be_drawn_stays_as_it_was(tmp_path):
     figure.add_subplot().xaxis.set_major_formatter(lambda value, place: f"{1 / 0}")
     before = figure.get_layout_engine(), figure.canvas, figure.dpi
     with pytest.raises(ZeroDivisionError):
-        fs.plot.style.save(figure, tmp_path / "a.pdf")
+        style.save(figure, tmp_path / "a.pdf")
     assert (figure.get_layout_engine(), figure.canvas, figure.dpi) == before
 
 

@@ -14,6 +14,7 @@ import xarray
 
 import fastslow as fs
 from fastslow.continuation.loops import writeable
+from fastslow.diagrams.trace import tracing
 from fastslow.results.base.immutable import fixed
 from fastslow.results.base.result import Saved
 from tests.errors.subjects import results
@@ -276,7 +277,7 @@ def test_what_a_run_puts_together_is_fixed_already(given):
 
 def test_loops_take_copies_of_read_only_and_strided_arrays():
     diagram = results()["diagram"]
-    branch, field = diagram[0], fs.diagrams.tracing._field(results()["fast"], "p")
+    branch, field = diagram[0], tracing._field(results()["fast"], "p")
     field.at(0, branch.points), field.at(0, branch.points[0])
     field.survey(0, branch.points, branch.tangent, np.ones(2))
     fs.overlay(diagram, results()["run"])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import fastslow as fs
 from fastslow.results.base.outcome import Outcome
-from fastslow.results.branch.intersections import _met, _overlapping
+from fastslow.results.branch.curve_intersections import _met, _overlapping
 from fastslow.results.points import SpecialPoints
 
 END = Outcome("end of range", "reached the end of the range.", True)

@@ -9,6 +9,7 @@ import sympy as sp
 import fastslow as fs
 from fastslow.continuation import loops
 from fastslow.simulation import pauses
+from fastslow.simulation.one import _Memory
 
 x, v, y, w, t = sp.symbols("x v y w t")
 
@@ -60,8 +61,8 @@ def test_a_run_that_pauses_after_every_step_is_the_same(system, pausing, monkeyp
     one = fs.simulate(model, start, t=span, samples=50)
     pausing()
     # tables that are soon full
-    monkeypatch.setattr(one, "_LEAST", 1)
-    monkeypatch.setattr(one, "_memory", one._Memory())
+    monkeypatch.setattr("fastslow.simulation.one._LEAST", 1)
+    monkeypatch.setattr("fastslow.simulation.one._memory", _Memory())
     other = fs.simulate(model, start, t=span, samples=50)
     assert one.outcome == other.outcome
     assert one.method == other.method

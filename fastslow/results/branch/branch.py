@@ -17,7 +17,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import Table, numbered
 from fastslow.results.branch import slicing, stability_intervals
-from fastslow.results.branch.intersections import intersections
+from fastslow.results.branch.curve_intersections import intersections
 from fastslow.results.branch.lookup import (
     MonotoneRuns,
     filter_equilibria,

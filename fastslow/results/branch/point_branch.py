@@ -17,7 +17,7 @@ from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import Table, numbered
-from fastslow.results.branch.intersections import intersections
+from fastslow.results.branch.curve_intersections import intersections
 from fastslow.results.branch.point_columns import labels_at
 from fastslow.results.branch.point_lookup import points_at
 from fastslow.results.io.html import points_html

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.results.branch.intersections import step_slopes
+from fastslow.results.branch.curve_intersections import step_slopes
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 if TYPE_CHECKING:
