@@ -20,7 +20,10 @@ from fastslow.kernels.native import translate
 from fastslow.kernels.signals import between_passes, deferring_signals
 
 #: Where everything is that code is made by.
-_MAKERS = "from fastslow.kernels import model_code, special\nfrom fastslow.kernels.simd import lane_steps\n"
+_MAKERS = """\
+from fastslow.kernels import model_code, special
+from fastslow.kernels.simd import lane_steps
+"""
 
 _addresses: dict[str, int] = {}
 _lock = threading.RLock()
