@@ -34,7 +34,7 @@ from analyses.passages import OMEGA
 from analyses.regime_maps import critical_ratio
 from fastslow.passage.regimes import regimes_at
 from fastslow.plot.areas import FILLS
-from fastslow.plot.layout.style import FULL, MM, SMALL, TEXT, VERMILION, dressed, new_figure
+from fastslow.plot.layout.style import FULL, MM, SMALL, TEXT, VERMILION, new_figure, styled_axes
 from fastslow.results.maps.adaptive_map import MapComparison
 from fastslow.systems.gears import SCALINGS
 
@@ -186,7 +186,7 @@ def _dress(ax: Axes, plane: CaseMap) -> None:
 def draw(plane: CaseMap, into: Output) -> None:
     """Draw a plane under both scalings, with the cases and the criterion."""
     sheet = new_figure(FULL, 78 * MM)
-    axes = [dressed(ax) for ax in sheet.subplots(1, 2)]
+    axes = [styled_axes(ax) for ax in sheet.subplots(1, 2)]
     unnamed: dict[Any, PolyCollection] = {}
     for ax, letter, scaling in zip(axes, "ab", SCALINGS, strict=True):
         found = simulated(plane, scaling)

@@ -10,7 +10,7 @@ import numpy as np
 import fastslow as fs
 from analyses.output import Output
 from analyses.passages import OMEGA, PERIODS, Case, Setting, laid
-from fastslow.plot.layout.style import FULL, MM, SMALL, TEXT, dressed, new_figure
+from fastslow.plot.layout.style import FULL, MM, SMALL, TEXT, new_figure, styled_axes
 from fastslow.systems.gears import Scaling, gear_scales
 
 #: Gap of figure 5; the source leaves it out.
@@ -101,7 +101,7 @@ def draw(figure: str, scaling: str, into: Output) -> None:
     grid = sheet.subplots(3, 3, gridspec_kw={**edges, **ratios})
     overlays = []
     for column, case in enumerate(laid_cases(figure, scaling)):
-        axes = [dressed(ax) for ax in grid[:, column]]
+        axes = [styled_axes(ax) for ax in grid[:, column]]
         values = case.diagram.interface_values
         axes[0].set_title(f"{case.setting.title}\n{case.run.regime}", fontsize=TEXT)
         look: dict[str, Any] = {"crossings": False, "interfaces": values, "legend": False}

@@ -29,9 +29,9 @@ from fastslow.plot.layout.style import (
     SMALL,
     TEXT,
     VERMILION,
-    dressed,
     new_figure,
     point_colour,
+    styled_axes,
 )
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.systems.gears import SCALINGS, gear_scales
@@ -199,7 +199,7 @@ def draw_equilibria(into: Output) -> None:
     grid = sheet.subplots(2, 3)
     for row, scaling in enumerate(SCALINGS):
         for column, figure in enumerate(FIGURES):
-            ax = dressed(grid[row, column])
+            ax = styled_axes(grid[row, column])
             _draw_cases(ax, figure, scaling)
             letter = "abcdef"[3 * row + column]
             ax.set_title(f"({letter}) Fig. {3 + column}, {scaling}", loc="left", fontsize=TEXT)
@@ -220,7 +220,7 @@ def draw_equilibria(into: Output) -> None:
 def draw_eigenvalues(into: Output) -> None:
     """Draw the eigenvalues along two curves: that of the source, and one with nodes."""
     sheet = new_figure(FULL, 62 * MM)
-    axes = [dressed(ax) for ax in sheet.subplots(1, 2)]
+    axes = [styled_axes(ax) for ax in sheet.subplots(1, 2)]
     for ax, letter, diagram, title in (
         (axes[0], "a", laid_cases("gap_width", "consistent")[1].diagram, "$A = 41.67$"),
         (axes[1], "b", soft_diagram(), f"$A = {SOFT}$"),

@@ -17,7 +17,7 @@ import fastslow as fs
 from analyses.cases import FASTEST, WIDTHS, gear
 from analyses.output import Output
 from analyses.regime_maps import critical_ratio
-from fastslow.plot.layout.style import FULL, MM, TEXT, dressed, new_figure
+from fastslow.plot.layout.style import FULL, MM, TEXT, new_figure, styled_axes
 from fastslow.systems.gears import SCALINGS
 
 Floats = NDArray[np.float64]
@@ -86,7 +86,7 @@ def distance(scaling: str) -> float:
 def draw(into: Output) -> None:
     """Draw the region under both scalings."""
     sheet = new_figure(FULL, 70 * MM)
-    axes = [dressed(ax) for ax in sheet.subplots(1, 2)]
+    axes = [styled_axes(ax) for ax in sheet.subplots(1, 2)]
     for ax, letter, scaling in zip(axes, "ab", SCALINGS, strict=True):
         omega = np.linspace(*FREQUENCIES, 100)
         curves = {

@@ -20,7 +20,7 @@ from analyses.claims import Claim, Finding
 from analyses.output import Output
 from analyses.passages import OMEGA, Case, Setting, draw, laid
 from analyses.physical_route import within
-from fastslow.plot.layout.style import FULL, MM, SMALL, TEXT, dressed, new_figure
+from fastslow.plot.layout.style import FULL, MM, SMALL, TEXT, new_figure, styled_axes
 from fastslow.systems.gears import SCALINGS
 
 Floats = NDArray[np.float64]
@@ -140,7 +140,7 @@ def claims() -> tuple[Claim, ...]:
 def draw_plane(into: Output) -> None:
     """Draw the folds over load and stiffness, and where relaxation oscillations begin."""
     sheet = new_figure(FULL, 72 * MM)
-    left, right = (dressed(ax) for ax in sheet.subplots(1, 2))
+    left, right = (styled_axes(ax) for ax in sheet.subplots(1, 2))
     fs.plot.parameter_plane(*fold_curves(), ax=left, legend=False)
     left.annotate(
         "three equilibria", (0.5, 0.3), xycoords="axes fraction", fontsize=SMALL, ha="center"

@@ -30,8 +30,8 @@ from fastslow.plot.layout.style import (
     SMALL,
     TEXT,
     VERMILION,
-    dressed,
     new_figure,
+    styled_axes,
 )
 from fastslow.systems.gears import SCALINGS, gear_scales
 from fastslow.systems.geartrain import gear_scaling
@@ -309,7 +309,7 @@ def main(into: Output) -> Route:
     """Draw the motion in four models and return it."""
     found = route()
     sheet = new_figure(FULL, 60 * MM)
-    left, middle, right = (dressed(ax) for ax in sheet.subplots(1, 3))
+    left, middle, right = (styled_axes(ax) for ax in sheet.subplots(1, 3))
     left.plot(found.time, found.load_side, color=BLUE, linewidth=1.2)
     left.set_ylabel(r"$\theta_\mathrm{o}$ (rad)")
     left.annotate(

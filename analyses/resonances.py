@@ -22,7 +22,7 @@ from analyses.gap_region import STATED
 from analyses.output import Output
 from fastslow.passage.regimes import regimes_at
 from fastslow.plot.areas import FILLS
-from fastslow.plot.layout.style import FULL, GREY, MM, SMALL, TEXT, dressed, new_figure
+from fastslow.plot.layout.style import FULL, GREY, MM, SMALL, TEXT, new_figure, styled_axes
 
 Floats = NDArray[np.float64]
 
@@ -121,7 +121,7 @@ def longest(scaling: str, start: str = "rest") -> tuple[float, float]:
 def draw(into: Output) -> None:
     """Draw the plane under the consistent scaling, and the three widths under the printed one."""
     sheet = new_figure(FULL, 78 * MM)
-    left, right = (dressed(ax) for ax in sheet.subplots(1, 2, width_ratios=(1.35, 1)))
+    left, right = (styled_axes(ax) for ax in sheet.subplots(1, 2, width_ratios=(1.35, 1)))
     fills = {**FILLS, "unilateral": FILLS["unilateral upper"], "free": "#BDBDBD"}
     plane = refined()
     own = {word: fills[word] for word in plane.labels}

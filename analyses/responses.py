@@ -37,8 +37,8 @@ from fastslow.plot.layout.style import (
     SMALL,
     TEXT,
     VERMILION,
-    dressed,
     new_figure,
+    styled_axes,
 )
 from fastslow.systems.gears import SCALINGS
 
@@ -173,7 +173,7 @@ def main(into: Output) -> None:
     ticks = {"D": (0.03, 0.1, 0.3, 1), "k1": (300, 1000, 3000, 10000), "T_am": (15, 50, 100, 300)}
     for column, name in enumerate(SWEEPS):
         for row, (what, law) in enumerate((("transit", "transit_law"), ("twist", "twist_law"))):
-            ax = dressed(grid[row, column])
+            ax = styled_axes(grid[row, column])
             for scaling, (colour, marker) in looks.items():
                 found = response(name, scaling)
                 ax.plot(found.values, getattr(found, law), color=colour, linewidth=1.0)

@@ -37,8 +37,8 @@ from fastslow.plot.layout.style import (
     SMALL,
     TEXT,
     VERMILION,
-    dressed,
     new_figure,
+    styled_axes,
 )
 from fastslow.systems.gears import SCALINGS
 
@@ -361,7 +361,7 @@ def claims() -> tuple[Claim, ...]:
 def draw_frequencies(into: Output) -> None:
     """Draw the frequency in contact over the load, with what the runs show."""
     sheet = new_figure(FULL, 66 * MM)
-    axes = [dressed(ax) for ax in sheet.subplots(1, 2)]
+    axes = [styled_axes(ax) for ax in sheet.subplots(1, 2)]
     for ax, letter, scaling in zip(axes, "ab", SCALINGS, strict=True):
         top = 2.0 * overtaking_load(scaling)
         loads = np.geomspace(0.7 * min(v.load for v in vibrations(scaling)), top, 160)

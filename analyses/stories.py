@@ -30,8 +30,8 @@ from fastslow.plot.layout.style import (
     SMALL,
     TEXT,
     VERMILION,
-    dressed,
     new_figure,
+    styled_axes,
 )
 from fastslow.results.overlay.delays import GapTransit
 from fastslow.systems.gears import SCALINGS
@@ -236,7 +236,7 @@ def draw_passages(into: Output) -> None:
     grid = sheet.subplots(2, 3)
     for row, scaling in enumerate(SCALINGS):
         for column, figure in enumerate(FIGURES):
-            ax = dressed(grid[row, column])
+            ax = styled_axes(grid[row, column])
             _draw_panel(ax, figure, scaling)
             letter = "abcdef"[3 * row + column]
             ax.set_title(f"({letter}) Fig. {3 + column}, {scaling}", loc="left", fontsize=TEXT)

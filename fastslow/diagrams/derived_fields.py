@@ -154,7 +154,7 @@ _NAMES = {f"arc{n}": f"a{n}" for n in ("sin", "cos", "tan", "sinh", "cosh", "tan
 _NAMES |= {"arctan2": "atan2"}
 
 
-class _Named(ast.NodeTransformer):
+class _CanonicalNames(ast.NodeTransformer):
     """Source that SymPy has written for NumPy, as arithmetic in canonical names."""
 
     def __init__(self, arguments: Sequence[str]) -> None:
@@ -179,7 +179,7 @@ def _stored_derivatives(
     """The source that SymPy has made of derivatives, operation by operation the same."""
     (function,) = ast.parse(inspect.getsource(values)).body
     assert isinstance(function, ast.FunctionDef)
-    naming = _Named([a.arg for a in function.args.args])
+    naming = _CanonicalNames([a.arg for a in function.args.args])
     shared: list[tuple[str, str]] = []
     texts: tuple[str, ...] = ()
     for statement in function.body:

@@ -53,7 +53,7 @@ VERTICAL = 1e-10
 ITERATIONS = 40
 
 #: A component of a state below this many times its rounding error counts as zero.
-NOISE = 100.0
+ROUNDING_ERRORS = 100.0
 
 
 def require_frozen(model: Model | StoredModel, instead: str) -> None:
@@ -282,7 +282,7 @@ class FrozenField:
 
     @cached_property
     def _layout(self) -> tuple[int, int, int, int, int, Callable[..., Array]]:
-        """How `at` cuts up the output of the compiled function, and its evaluation at a point."""
+        """Layout of the compiled output, as `evaluate` reads it, and its evaluation at a point."""
         n, m, columns = self.n, self.compiled.m, self.n + self.compiled.k
         first = n + n * columns
         return n, m, columns, first, first + m, loop("value_at")
@@ -291,7 +291,7 @@ class FrozenField:
         """The rates of a region in SymPy, in the order of the states."""
         return list(self.modes[region].rates)
 
-    def at(self, region: int, points: ArrayLike) -> tuple[Array, Array, Array, Array]:
+    def evaluate(self, region: int, points: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """F (…, n), [F_x F_p] (…, n, n + k), h (…, m) and ∇h (…, m, n + k) at points u."""
         u = writeable(np.asarray(points, dtype=float))
         n, m, columns, first, second, one = self._layout
@@ -317,9 +317,9 @@ class FrozenField:
             out[:, second:].reshape(*lead, m, columns),
         )
 
-    def curve(self, region: int, u: Array) -> tuple[Array, Array]:
+    def residual_and_jacobian(self, region: int, u: Array) -> tuple[Array, Array]:
         """F and its Jacobian at one point."""
-        value, slopes, _, _ = self.at(region, u)
+        value, slopes, _, _ = self.evaluate(region, u)
         return value, slopes
 
     def eigenvalues(self, region: int, points: ArrayLike) -> NDArray[np.complex128]:
@@ -332,7 +332,7 @@ class FrozenField:
 
     def finite_eigenvalues(self, region: int, points: ArrayLike) -> NDArray[np.complex128]:
         """As `eigenvalues` without the infinite one, shape (…, n) or (…, n − 1)."""
-        _, slopes, _, gradients = self.at(region, points)
+        _, slopes, _, gradients = self.evaluate(region, points)
         jacobian, sides = slopes[..., : self.n], self.modes[region].sides
         if sides is not None:
             normal = gradients[..., sides.interface, : self.n, None]
@@ -429,11 +429,13 @@ class FrozenField:
         def condition(u: Array) -> tuple[float, Array]:
             if row < 0:
                 return float((u - point) @ normal), normal
-            _, _, h, slopes = self.at(region, u)
+            _, _, h, slopes = self.evaluate(region, u)
             return float(h[row]), slopes[row]
 
         # least-norm steps where the equations are singular
-        return with_condition(lambda u: self.curve(region, u), condition, start, scale)
+        return with_condition(
+            lambda u: self.residual_and_jacobian(region, u), condition, start, scale
+        )
 
     def solved(
         self, region: int, starts: Array, scales: Array, natural: Array, limits: Limits
@@ -474,7 +476,7 @@ class FrozenField:
         for number, mode in enumerate(self.modes):
             if mode.sides is None or {mode.sides.above, mode.sides.below} != {region, beyond}:
                 continue
-            _, _, h, slopes = self.at(number, point)
+            _, _, h, slopes = self.evaluate(number, point)
             size = np.abs(slopes) @ np.maximum(np.abs(point), unit)
             # the drift of the region itself vanishes: the other one decides
             other = -1 if mode.sides.above == region else -2
@@ -496,7 +498,7 @@ class FrozenField:
         ``unit`` of the states and the parameter says what a component that is zero
         but for rounding is compared with; the natural ones where it is not given.
         """
-        _, _, h, slopes = self.at(region, u)
+        _, _, h, slopes = self.evaluate(region, u)
         size = np.abs(slopes) @ np.maximum(np.abs(u), self.units if unit is None else unit)
         return bool(np.all(self.signs[region] * h >= -CLOSURE * size))
 
@@ -525,7 +527,7 @@ class FrozenField:
         points = _points(self.n + self.compiled.k) * self.units
         points *= 10.0 ** np.arange(0.0, -24.0, -4.0)[:, None]
         with np.errstate(all="ignore"):
-            h = self.at(0, points)[2][:, :count]
+            h = self.evaluate(0, points)[2][:, :count]
         products = h[:, :, None] * h[0][None, None, :]
         crossed = products - products.transpose(0, 2, 1)
         same = (np.abs(crossed) <= 1e-12 * np.abs(products)).all(axis=0)
@@ -537,7 +539,9 @@ class FrozenField:
         for region in {region for region, _ in points}:
             rows = [k for k, (number, _) in enumerate(points) if number == region]
             table = np.array([points[k][1] for k in rows])
-            found[rows] = np.abs(table[:, : self.n]) > NOISE * self._rounding(region, table)
+            found[rows] = np.abs(table[:, : self.n]) > ROUNDING_ERRORS * self._rounding(
+                region, table
+            )
         return found
 
     @np.errstate(all="ignore")
@@ -547,7 +551,7 @@ class FrozenField:
         |J⁻¹| (|F| + ε (|J| |x| + |F_p| |p|)), of what is left and of rounding, in the
         units of the states; infinite where J is singular.
         """
-        rates, slopes, _, _ = self.at(region, table)
+        rates, slopes, _, _ = self.evaluate(region, table)
         rounding = np.finfo(float).eps * (np.abs(slopes) @ np.abs(table)[:, :, None])
         left = np.abs(rates)[:, :, None] + rounding
         try:
@@ -560,7 +564,7 @@ class FrozenField:
 
     def tangent(self, region: int, u: Array, weight: Array) -> tuple[Array, bool]:
         """Null vector of [F_x F_p], unit in the weighted norm, and whether it is the only one."""
-        _, slopes, _, _ = self.at(region, u)
+        _, slopes, _, _ = self.evaluate(region, u)
         if not np.isfinite(slopes).all():
             return np.zeros(len(u)), False
         scale = 1.0 / np.sqrt(weight)

@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from fastslow.interactive.picking import Curve, curves_of, run_curve
+from fastslow.interactive.picking import PickCurve, curves_of, run_curve
 from fastslow.interactive.views import View
 from fastslow.plot.branches import DiagramDrawing, draw_branches
 from fastslow.plot.layout.labels import place
@@ -22,12 +22,12 @@ from fastslow.plot.quantities import Quantity, along_run
 BESIDE = (13.0, 7.0)
 
 
-def draw_view(axes: Sequence[Axes], view: View) -> tuple[tuple[Curve, ...], list[Artist]]:
+def draw_view(axes: Sequence[Axes], view: View) -> tuple[tuple[PickCurve, ...], list[Artist]]:
     """Draw a view into three empty axes.
 
     Returns
     -------
-    tuple of Curve
+    tuple of PickCurve
         What can be picked.
     list of Artist
         What a legend shows.
@@ -35,7 +35,7 @@ def draw_view(axes: Sequence[Axes], view: View) -> tuple[tuple[Curve, ...], list
     series, portrait, main = axes
     name, run, lay = view.setup.state, view.run, view.overlay
     values: Mapping[str, Any] = {} if view.diagram is None else view.diagram.interface_values
-    curves: list[Curve] = []
+    curves: list[PickCurve] = []
     handles: list[Any] = []
     below: DiagramDrawing | None = None
     if lay is not None:

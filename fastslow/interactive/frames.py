@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fastslow.interactive.tooltips import text_of
 from fastslow.interactive.views import View
+from fastslow.plot.branch_lines import marked_points, runs
 from fastslow.plot.layout.style import (
     BANDS,
     BRANCH,
@@ -25,7 +26,6 @@ from fastslow.plot.layout.style import (
 )
 from fastslow.plot.layout.typesetting import GREEK
 from fastslow.plot.quantities import Quantity, at_crossings
-from fastslow.plot.stretches import runs, worth_a_marker
 from fastslow.results.branch.branch import Branch
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import type_of
@@ -282,7 +282,7 @@ def _special_marks(view: View) -> list[dict[str, Any]]:
     numbers = {point.label: k for k, point in enumerate(diagram.special)}
     named = set()
     for branch in diagram.branches:
-        for point in worth_a_marker([branch]) if branch.admissible else ():
+        for point in marked_points([branch]) if branch.admissible else ():
             k = numbers[point.label]
             # branches that cross share their branch point: it is named once
             name = point.label, *np.round([point[diagram.parameter], *point.state], 9)

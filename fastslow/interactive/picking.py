@@ -14,7 +14,7 @@ from fastslow.arguments import class_of
 from fastslow.errors import ArgumentError
 from fastslow.interactive.tooltips import text_of
 from fastslow.plot.branches import DiagramDrawing
-from fastslow.plot.layout.marks import at_moments
+from fastslow.plot.layout.marks import at_states
 from fastslow.plot.layout.style import root
 from fastslow.plot.motions import MotionDrawing
 from fastslow.plot.panels import PanelDrawing
@@ -72,7 +72,7 @@ class Pick:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class PickCurve:
     """Points in axes, and what a place along them stands for.
 
     Parameters
@@ -95,7 +95,7 @@ class Curve:
     parameter: str = ""
 
 
-def curves_of(drawing: Any, result: Diagram | Trajectory | Overlay) -> tuple[Curve, ...]:
+def curves_of(drawing: Any, result: Diagram | Trajectory | Overlay) -> tuple[PickCurve, ...]:
     """Everything in a drawing that can be picked.
 
     Parameters
@@ -127,12 +127,12 @@ def curves_of(drawing: Any, result: Diagram | Trajectory | Overlay) -> tuple[Cur
     )
 
 
-def nearest_pick(curves: Iterable[Curve], ax: Axes, x: float, y: float) -> Pick | None:
+def nearest_pick(curves: Iterable[PickCurve], ax: Axes, x: float, y: float) -> Pick | None:
     """The drawn point nearest to a place on the screen.
 
     Parameters
     ----------
-    curves : iterable of Curve
+    curves : iterable of PickCurve
     ax : Axes
         Where the place is.
     x, y : float
@@ -145,7 +145,7 @@ def nearest_pick(curves: Iterable[Curve], ax: Axes, x: float, y: float) -> Pick 
     """
     place = np.array([x, y])
     points = 72.0 / root(ax).dpi
-    best: tuple[float, float, Curve, int, float] | None = None
+    best: tuple[float, float, PickCurve, int, float] | None = None
     for curve in curves:
         if curve.ax is not ax or not len(curve.xy):
             continue
@@ -183,11 +183,11 @@ def _nearest(pixels: Array, place: Array, joined: bool) -> tuple[float, int, flo
     return float(away[row]), row, float(part[row])
 
 
-def _diagram_curves(drawing: DiagramDrawing, diagram: Diagram) -> Iterable[Curve]:
+def _diagram_curves(drawing: DiagramDrawing, diagram: Diagram) -> Iterable[PickCurve]:
     virtual = any(line.get_label() == "virtual" for line in drawing.lines)
     for branch in diagram.branches:
         if branch.admissible or virtual:
-            yield Curve(
+            yield PickCurve(
                 drawing.ax,
                 np.column_stack(along_branch(diagram, branch, *drawing.shown)),
                 True,
@@ -201,7 +201,7 @@ def _diagram_curves(drawing: DiagramDrawing, diagram: Diagram) -> Iterable[Curve
         for k, point in enumerate(special)
         if point.code in marked and (point.admissible or virtual)
     ]
-    yield Curve(
+    yield PickCurve(
         drawing.ax,
         np.column_stack(at_points([special[k] for k in numbers], *drawing.shown)),
         False,
@@ -223,38 +223,38 @@ def _on_branch(diagram: Diagram, branch: Branch) -> Callable[[int, float], tuple
     return found
 
 
-def run_curve(ax: Axes, run: Trajectory, *shown: Quantity) -> Curve:
+def run_curve(ax: Axes, run: Trajectory, *shown: Quantity) -> PickCurve:
     """A run drawn over time or in the plane of two quantities."""
-    return Curve(ax, np.column_stack(along_run(run, *shown)), True, _on_run(run))
+    return PickCurve(ax, np.column_stack(along_run(run, *shown)), True, _on_run(run))
 
 
-def _motion_curves(drawing: MotionDrawing, run: Trajectory) -> Iterable[Curve]:
+def _motion_curves(drawing: MotionDrawing, run: Trajectory) -> Iterable[PickCurve]:
     yield run_curve(drawing.ax, run, *drawing.shown)
     if drawing.crossings is not None:
         at = at_crossings(run, *drawing.shown)
         yield _at_crossings(drawing.ax, np.column_stack(at), run)
 
 
-def _overlay_curves(drawing: OverlayDrawing, lay: Overlay) -> Iterable[Curve]:
+def _overlay_curves(drawing: OverlayDrawing, lay: Overlay) -> Iterable[PickCurve]:
     shown, run = drawing.shown, lay.run
-    yield Curve(drawing.ax, np.column_stack(along_overlay(lay, *shown)), True, _on_run(run))
+    yield PickCurve(drawing.ax, np.column_stack(along_overlay(lay, *shown)), True, _on_run(run))
     if drawing.crossings is not None:
         times = np.array([c.time for c in run.crossings])
         state = np.array([c.state for c in run.crossings])
         at = at_times(lay, times, run.states, state, *shown)
         yield _at_crossings(drawing.ax, np.column_stack(at), run)
     if lay.transitions:
-        yield Curve(
+        yield PickCurve(
             drawing.ax,
-            np.column_stack(at_moments(lay, shown, lay.transitions)),
+            np.column_stack(at_states(lay, shown, lay.transitions)),
             False,
             lambda row, _: (lay.transitions[row], f"lay.transitions[{row}]"),
             lay.parameter,
         )
 
 
-def _at_crossings(ax: Axes, at: Array, run: Trajectory) -> Curve:
-    return Curve(ax, at, False, lambda row, _: (run.crossings[row], f"run.crossings[{row}]"))
+def _at_crossings(ax: Axes, at: Array, run: Trajectory) -> PickCurve:
+    return PickCurve(ax, at, False, lambda row, _: (run.crossings[row], f"run.crossings[{row}]"))
 
 
 def _on_run(run: Trajectory) -> Callable[[int, float], tuple[Any, str]]:

@@ -12,9 +12,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg
 from matplotlib.figure import Figure
 
 from fastslow.interactive.drawing import draw_view
-from fastslow.interactive.picking import Curve
+from fastslow.interactive.picking import PickCurve
 from fastslow.interactive.views import View
-from fastslow.plot.layout.style import SMALL, VERMILION, dressed
+from fastslow.plot.layout.style import SMALL, VERMILION
 from fastslow.plot.layout.typesetting import plain
 
 #: Size of a figure of our own, in inches, and places of its axes in it.
@@ -94,7 +94,7 @@ class Picture:
         self._backdrop = Backdrop()
         self._explained: list[Any] = []
 
-    def draw(self, view: View, *, moving: bool = False) -> tuple[Curve, ...]:
+    def draw(self, view: View, *, moving: bool = False) -> tuple[PickCurve, ...]:
         """Draw a view in place of what the figure shows, to be seen when that is drawn.
 
         Parameters
@@ -105,13 +105,13 @@ class Picture:
 
         Returns
         -------
-        tuple of Curve
+        tuple of PickCurve
             What can be picked.
         """
         figure = self.figure
         if not self._axes or tuple(figure.axes) != self._axes:
             figure.clear()
-            self._axes = tuple(dressed(figure.add_axes(place)) for place in PLACES)
+            self._axes = tuple(styled_axes(figure.add_axes(place)) for place in PLACES)
         before = _limits(self._axes)
         for ax in self._axes:
             _empty(ax)

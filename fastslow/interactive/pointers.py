@@ -12,8 +12,8 @@ from matplotlib.text import Annotation
 
 from fastslow.arguments import function, validated
 from fastslow.errors import MissingPackageError
-from fastslow.interactive.picking import Curve, Pick, curves_of, nearest_pick
-from fastslow.plot.layout.style import BLACK, GREY, SMALL, printed
+from fastslow.interactive.picking import Pick, PickCurve, curves_of, nearest_pick
+from fastslow.plot.layout.style import BLACK, GREY, SMALL, rendered
 from fastslow.plot.layout.typesetting import paragraph
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import Overlay
@@ -77,7 +77,7 @@ class Pointer:
     Parameters
     ----------
     figure : Figure
-    curves : sequence of Curve
+    curves : sequence of PickCurve
         What can be meant; may be replaced when the figure is drawn anew.
     on_click : callable, optional
         Called with every pick.
@@ -93,7 +93,7 @@ class Pointer:
     def __init__(
         self,
         figure: Figure,
-        curves: Sequence[Curve] = (),
+        curves: Sequence[PickCurve] = (),
         on_click: Callable[[Pick], object] | None = None,
     ) -> None:
         self.figure = figure
@@ -180,7 +180,7 @@ class Pointer:
 
 def picture(figure: Figure, text: str) -> dict[str, Any]:
     """How a figure is shown where there are no widgets."""
-    return {"text/plain": text, "image/png": printed(figure, "png", figure.dpi)}
+    return {"text/plain": text, "image/png": rendered(figure, "png", figure.dpi)}
 
 
 def _blits(canvas: FigureCanvasBase) -> bool:

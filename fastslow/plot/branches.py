@@ -14,15 +14,15 @@ from matplotlib.text import Annotation
 
 from fastslow.arguments import flag, instance, validated
 from fastslow.plot.arguments import axis_quantity, figure_width, line_colour, line_style
+from fastslow.plot.branch_lines import draw_points, marked_points, runs
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.equilibrium_sets import draw_sets
 from fastslow.plot.layout.bands import Bands, draw_bands
 from fastslow.plot.layout.labels import place
-from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import BRANCH, LINES, axes_for, spatial
 from fastslow.plot.quantities import Quantity, along_branch, joined, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
-from fastslow.plot.stretches import draw_points, runs, worth_a_marker
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.windows import LEFT
@@ -186,7 +186,7 @@ def diagram(
         color=color,
         **style,
     )
-    drawn = replace(drawn, legend=explained(ax, drawn.handles, own, label, legend))
+    drawn = replace(drawn, legend=add_legend(ax, drawn.handles, own, label, legend))
     place(ax, drawn.labels, [], [drawn.bands])
     return drawn
 
@@ -220,7 +220,7 @@ def draw_branches(
             ax.update_datalim(np.column_stack([x[rows], y[rows]])[near])
             ax.autoscale_view()
     sets = draw_sets(ax, diagram, shown, color)
-    markers, labels = draw_points(ax, worth_a_marker(branches), shown, label)
+    markers, labels = draw_points(ax, marked_points(branches), shown, label)
     across, up = shown
     ax.set_xlabel(across.label)
     ax.set_ylabel(up.label)

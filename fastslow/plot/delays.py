@@ -17,8 +17,8 @@ from fastslow.arguments import flag, instance, validated
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.layout.covering import settle
-from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.legends import add_legend
+from fastslow.plot.layout.occupancy import run_layout
 from fastslow.plot.layout.style import BLUE, GREY, SMALL, VERMILION, axes_for
 from fastslow.plot.layout.typesetting import typeset
 from fastslow.results.overlay.delay_scaling import DelayScaling
@@ -132,7 +132,7 @@ def delay_scaling(
     ax.set_ylabel(f"delay past {scaling.point.label} in {typeset(scaling.parameter)}")
     triangle, texts = _triangle(ax, scaling, good, label)
     drawn = [measured, predicted, *([leading] if leading else [])]
-    shown = explained(ax, drawn, own, label, legend)
+    shown = add_legend(ax, drawn, own, label, legend)
     return DelayDrawing(ax, measured, predicted, leading, triangle, texts, shown)
 
 
@@ -173,7 +173,7 @@ def _triangle(
     width = WIDTH * float(np.ptp(x))
     left = float(x.min()) + 0.5 * float(np.ptp(x))
     right = left + width
-    settle(ax)
+    run_layout(ax)
     low, high = np.log10(ax.get_ylim())
     order = np.argsort(x)
     base = float(np.interp(left, x[order], y[order])) - BELOW * (high - low)

@@ -22,7 +22,7 @@ from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place, tag
-from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import GREY, SMALL, TEXT, VERMILION, axes_for, point_colour, root
 from fastslow.plot.layout.typesetting import plain, typeset
 from fastslow.results.branch.branch import Branch
@@ -147,7 +147,7 @@ def eigenvalue_path(
     name = parts[0][0].parameter_name
     bar = _framed(ax, paths, typeset(name))
     handles: list[Artist] = [*markers, *jumps[:1]]
-    shown = explained(ax, handles, own, label, legend)
+    shown = add_legend(ax, handles, own, label, legend)
     place(ax, labels)
     return EigenvalueDrawing(ax, tuple(paths), tuple(jumps), markers, labels, bar, shown)
 
@@ -224,7 +224,7 @@ def clarke_path(
     bar = _framed(ax, paths, typeset("q"))
     if label:
         ax.set_title(plain(f"{point.label}: {point.subtype}"), fontsize=TEXT)
-    shown = explained(ax, markers, own, label, legend)
+    shown = add_legend(ax, markers, own, label, legend)
     return EigenvalueDrawing(ax, paths, (), tuple(markers), (), bar, shown)
 
 

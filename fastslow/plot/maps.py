@@ -18,9 +18,9 @@ from fastslow.arguments import flag, instance, mapping, validated
 from fastslow.plot.areas import draw_areas, samples
 from fastslow.plot.arguments import figure_width, line_style, lines_in_plane, points_in_plane
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.layout.covering import covered, settle
 from fastslow.plot.layout.labels import place, tag
-from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.legends import add_legend
+from fastslow.plot.layout.occupancy import occupied_pixels, run_layout
 from fastslow.plot.layout.style import BLACK, GREY, SMALL, VERMILION, axes_for
 from fastslow.plot.layout.typesetting import as_given, typeset
 from fastslow.results.maps.adaptive_map import RefinedMap
@@ -151,8 +151,8 @@ def regime_map(
         points += ax.plot(*at, "o", label=as_given(str(name)), **dot)
         if label:
             tags.append(tag(ax, as_given(str(name)), at))
-    shown_key = explained(ax, [*samples(drawn), *over], own, label, legend)
-    settle(ax)
+    shown_key = add_legend(ax, [*samples(drawn), *over], own, label, legend)
+    run_layout(ax)
     names = _names(ax, result, list((marks or {}).values())) if label else {}
     unnamed = [word for word in result.labels if word not in names] if label else []
     for number, word in enumerate(unnamed):
@@ -173,7 +173,7 @@ def _names(ax: Axes, result: RefinedMap, marks: list[tuple[float, float]]) -> di
     # a mark needs room for its own name, at any side of it
     room_around = 0.08 * frame.width * np.array([[0, 0], [1, 0], [-1, 0], [0, 0.5], [0, -0.5]])
     ink = [ax.transData.transform(at) + room_around for at in marks]
-    ink += [covered(ax)[:, :2], frame.corners()]
+    ink += [occupied_pixels(ax)[:, :2], frame.corners()]
     legend: Any = ax.get_legend()
     if legend is not None:
         box = legend.get_window_extent()

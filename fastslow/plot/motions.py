@@ -26,14 +26,14 @@ from fastslow.plot.arguments import (
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.arrows import draw_arrows, length_along
 from fastslow.plot.layout.bands import Bands, Values, draw_bands
-from fastslow.plot.layout.covering import at_draw, settle
 from fastslow.plot.layout.labels import place
-from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_dots
+from fastslow.plot.layout.occupancy import on_draw, run_layout
 from fastslow.plot.layout.style import MOTION, axes_for, note_early_end, spatial
 from fastslow.plot.phases import draw_phases, fit_words, strip_height
 from fastslow.plot.quantities import Array, Quantity, along_run, at_crossings, joined, of_run
-from fastslow.plot.spaces import HEIGHT, dress_space
+from fastslow.plot.spaces import HEIGHT, style_space
 from fastslow.results.base.outcome import early_end
 from fastslow.results.overlay.transitions import Phase
 from fastslow.results.trajectory.trajectory import Trajectory
@@ -178,7 +178,7 @@ def time_series(
     bands = _bands(ax, run, (None, shown[1]), interfaces, label)
     drawn = MotionDrawing(ax, "t", shown[1].text, lines, dots, (), bands, *strip, shown=shown)
     if phases:
-        at_draw(ax, lambda renderer: fit_words(*strip, renderer))
+        on_draw(ax, lambda renderer: fit_words(*strip, renderer))
     note_early_end(ax, early_end(run))
     # a legend stays below the strip
     top = 1.0 - strip_height(ax) if phases else 1.0
@@ -283,8 +283,8 @@ def phase_portrait(
     dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
     bands: tuple[Bands, ...] = ()
     if space:
-        dress_space(ax, [q.label for q in shown])
-        settle(ax)
+        style_space(ax, [q.label for q in shown])
+        run_layout(ax)
     else:
         ax.set_xlabel(shown[0].label)
         ax.set_ylabel(shown[1].label)
@@ -304,7 +304,7 @@ def _explained(
 ) -> MotionDrawing:
     """Add a legend where there is more to explain than the trajectory, and place the names."""
     if len(drawn.handles) > 1:
-        drawn = replace(drawn, legend=explained(drawn.ax, drawn.handles, own, label, legend, top))
+        drawn = replace(drawn, legend=add_legend(drawn.ax, drawn.handles, own, label, legend, top))
     place(drawn.ax, bands=drawn.bands)
     return drawn
 

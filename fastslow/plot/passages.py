@@ -18,7 +18,7 @@ from fastslow.plot.branches import DiagramDrawing, draw_branches
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.arrows import draw_heads, points
 from fastslow.plot.layout.labels import place
-from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_crossings, draw_transitions, draw_turning
 from fastslow.plot.layout.style import MOTION, axes_for, note, spatial
 from fastslow.plot.motions import draw_motion
@@ -215,7 +215,7 @@ def overlay(
         color=color,
         **style,
     )
-    drawn = replace(drawn, legend=explained(ax, drawn.handles, own, label, legend))
+    drawn = replace(drawn, legend=add_legend(ax, drawn.handles, own, label, legend))
     place(ax, drawn.diagram.labels, [], [drawn.diagram.bands])
     return drawn
 
@@ -254,7 +254,9 @@ def draw_passage(
     drawn = len(points(lines[-1]))
     # a line in parts has other points than the samples
     round_ = any(q.column in lay.run.periods for q in shown)
-    heads = () if round_ else draw_heads(lines[-1], _heads(lay, up, lay.slow[len(lay) - drawn :]))
+    heads = (
+        () if round_ else draw_heads(lines[-1], _arrow_rows(lay, up, lay.slow[len(lay) - drawn :]))
+    )
     text = shown[1].text
     return OverlayDrawing(
         ax, text, below, lines, dots, changes, turns, heads, None, shown[0].text, shown
@@ -269,7 +271,7 @@ def _caveat(lay: Overlay) -> str:
     return "" if lay.outcome else CAVEATS.get(lay.outcome.code, lay.outcome.code)
 
 
-def _heads(lay: Overlay, values: Array, drawn: Array) -> list[int]:
+def _arrow_rows(lay: Overlay, values: Array, drawn: Array) -> list[int]:
     """Where arrow heads sit, as points of the last period: along the sheets, and halfway in jumps.
 
     Parameters

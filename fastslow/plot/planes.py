@@ -22,7 +22,7 @@ from fastslow.plot.areas import draw_areas, samples
 from fastslow.plot.arguments import axis_quantity, figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place, tag
-from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import (
     HOPF_CURVES,
     VIRTUAL_CURVE,
@@ -33,7 +33,7 @@ from fastslow.plot.layout.style import (
     spatial,
 )
 from fastslow.plot.quantities import Quantity, at_points, quantity_of
-from fastslow.plot.spaces import HEIGHT, dress_space
+from fastslow.plot.spaces import HEIGHT, style_space
 from fastslow.results.branch.point_branch import PointBranch
 from fastslow.results.maps.adaptive_map import RefinedMap
 from fastslow.results.point_types import POINT_TYPES
@@ -182,12 +182,12 @@ def parameter_plane(
             lines += ax.plot(*(place[rows] for place in places), **{**look, **style})
     markers, labels = _special_points(ax, curves, quantities, virtual, label)
     if space:
-        dress_space(ax, [q.label for q in quantities])
+        style_space(ax, [q.label for q in quantities])
     else:
         ax.set_xlabel(quantities[0].label)
         ax.set_ylabel(quantities[1].label)
     seen: dict[str, Artist] = {str(line.get_label()): line for line in (*lines, *markers)}
-    key = explained(ax, [*seen.values(), *samples(fills)], own, label, legend)
+    key = add_legend(ax, [*seen.values(), *samples(fills)], own, label, legend)
     place(ax, labels)
     across, up, *above = (q.text for q in quantities)
     drawn = tuple(lines), tuple(markers), tuple(labels), key

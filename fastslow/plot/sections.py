@@ -13,8 +13,15 @@ from fastslow.arguments import flag, instance, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import axis_quantity, figure_width, line_style
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.layout.legends import explained
-from fastslow.plot.layout.style import BLACK, BLUE, VERMILION, axes_for, note_early_end, widen
+from fastslow.plot.layout.legends import add_legend
+from fastslow.plot.layout.style import (
+    BLACK,
+    BLUE,
+    VERMILION,
+    axes_for,
+    note_early_end,
+    widen_limits,
+)
 from fastslow.plot.quantities import quantity_of
 from fastslow.results.trajectory.section import Section
 
@@ -135,9 +142,9 @@ def section(
         }
         look |= {"linestyle": "none", "label": words, **style}
         points += ax.plot(horizontal[mine], vertical[mine], **look)
-    widen(ax)
+    widen_limits(ax)
     note_early_end(ax, section.ended)
     ax.set_xlabel(across.label)
     ax.set_ylabel(up.label)
-    key = explained(ax, points, own, label, legend) if len(points) > 1 else None
+    key = add_legend(ax, points, own, label, legend) if len(points) > 1 else None
     return SectionDrawing(ax, across.text, up.text, tuple(points), key)

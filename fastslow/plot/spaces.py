@@ -12,15 +12,15 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
+from fastslow.plot.branch_lines import draw_points, marked_points, runs
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.arrows import draw_arrows, length_along
-from fastslow.plot.layout.covering import settle
 from fastslow.plot.layout.labels import place
-from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_crossings, draw_transitions, draw_turning
+from fastslow.plot.layout.occupancy import run_layout
 from fastslow.plot.layout.style import BRANCH, LINES, SMALL, TEXT, axes_for
 from fastslow.plot.quantities import Quantity, along_branch, along_overlay, joined
-from fastslow.plot.stretches import draw_points, runs, worth_a_marker
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import Overlay
 
@@ -129,13 +129,13 @@ def draw_space(
         dots = draw_crossings(space, lay, shown) if crossings else None
         changes = draw_transitions(space, lay, shown)
         turns = draw_turning(space, lay, shown) if turning else None
-    markers, labels = draw_points(space, worth_a_marker(drawn), shown, label)
-    dress_space(space, [q.label for q in shown])
+    markers, labels = draw_points(space, marked_points(drawn), shown, label)
+    style_space(space, [q.label for q in shown])
     seen: dict[str, Artist] = {str(h.get_label()): h for h in [*branches, *markers]}
     handles = [*seen.values(), *(m for m in (line, dots, turns, *changes) if m is not None)]
-    key = explained(space, handles, own, label, legend)
+    key = add_legend(space, handles, own, label, legend)
     place(space, labels)
-    settle(space)
+    run_layout(space)
     if line is not None:
         heads = draw_arrows(line, length_along(line), ARROWS)
     along, x, y = (q.text for q in shown)
@@ -143,7 +143,7 @@ def draw_space(
     return SpaceDrawing(space, x, y, *below, along, dots, changes, turns)
 
 
-def dress_space(space: Any, names: Sequence[str]) -> None:
+def style_space(space: Any, names: Sequence[str]) -> None:
     """Names and small ticks for axes in space."""
     setters = (space.set_xlabel, space.set_ylabel, space.set_zlabel)
     for set_label, text in zip(setters, names, strict=True):

@@ -16,7 +16,7 @@ from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import figure_width, line_colour, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place, tag
-from fastslow.plot.layout.legends import explained
+from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import MOTION, VERMILION, axes_for, note_early_end
 from fastslow.plot.layout.typesetting import typeset
 from fastslow.results.trajectory.spectrum import Spectrum
@@ -138,7 +138,7 @@ def spectrum(
     note_early_end(ax, spectrum.ended)
     found = [p for p in spectrum.peaks(peaks) if over[0] <= unit * p.frequency <= over[1]]
     if not found:
-        return SpectrumDrawing(ax, line, None, (), explained(ax, [line], own, label, legend))
+        return SpectrumDrawing(ax, line, None, (), add_legend(ax, [line], own, label, legend))
     (marks,) = ax.plot(
         [unit * p.frequency for p in found],
         [p.amplitude for p in found],
@@ -155,6 +155,6 @@ def spectrum(
     if label:
         at = [(unit * p.frequency, p.amplitude) for p in found]
         labels = tuple(tag(ax, f"{spot[0]:.4g}", spot) for spot in at)
-    key = explained(ax, [line, marks], own, label, legend)
+    key = add_legend(ax, [line, marks], own, label, legend)
     place(ax, labels)
     return SpectrumDrawing(ax, line, marks, labels, key)

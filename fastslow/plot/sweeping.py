@@ -13,8 +13,8 @@ from matplotlib.lines import Line2D
 from fastslow.arguments import flag, instance, positive, validated
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.layout.legends import explained
-from fastslow.plot.layout.style import BLACK, BLUE, GREY, VERMILION, axes_for, widen
+from fastslow.plot.layout.legends import add_legend
+from fastslow.plot.layout.style import BLACK, BLUE, GREY, VERMILION, axes_for, widen_limits
 from fastslow.plot.layout.typesetting import typeset
 from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
 
@@ -125,14 +125,14 @@ def sweep(
             transform=ax.get_xaxis_transform(),
             label="run failed",
         )
-    widen(ax)
+    widen_limits(ax)
     margin = 0.02 * (sweep.values[-1] - sweep.values[0]) or 0.5
     ax.set_xlim(sweep.values[0] - margin, sweep.values[-1] + margin)
     ax.set_xlabel(typeset(sweep.parameter_name))
     ax.set_ylabel(f"{typeset(sweep.name)} ({sweep.what})")
     drawn = [line for line in (up, down, crosses) if line is not None]
     samples = [_sample(line) for line in drawn]
-    words = explained(ax, samples, own, label, legend) if len(samples) > 1 else None
+    words = add_legend(ax, samples, own, label, legend) if len(samples) > 1 else None
     return SweepDrawing(ax, sweep.parameter_name, sweep.name, up, down, crosses, words)
 
 

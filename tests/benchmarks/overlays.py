@@ -62,7 +62,7 @@ def passages() -> tuple[float, float, float]:
         return reached_delay(site, fs.Drift(way * rate), place, stop, 1e4)[0]
 
     def rates(t: float, z: np.ndarray) -> np.ndarray:
-        values, _, _, _ = site.field.at(0, site.u + z)
+        values, _, _, _ = site.field.evaluate(0, site.u + z)
         return np.append(values, way * rate)
 
     def level(t: float, z: np.ndarray) -> float:

@@ -16,7 +16,7 @@ import fastslow as fs
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.detection import special_points
 from fastslow.diagrams.points.row_tests import pair_sums
-from fastslow.diagrams.trace.across_regions import Piece, Window
+from fastslow.diagrams.trace.across_regions import Segment, Window
 from fastslow.results.branch.windows import state_window
 from fastslow.results.points import stability_of
 from tests.campaigns.detection import campaign
@@ -40,8 +40,8 @@ def trivial_line(model, low, high, state=0.0, name="p", rows=101):
     tangents[:, -1] = high - low
     scale = np.append(np.ones(field.n), high - low)
     window = Window(low, high, scale, state_window(field.model.states))
-    found, piece, values = special_points(field, Piece(0, u, tangents), window, ())
-    return found, piece, values
+    found, segment, values = special_points(field, Segment(0, u, tangents), window, ())
+    return found, segment, values
 
 
 @pytest.mark.parametrize("size", [5, 8, 13, 20, 60])

@@ -228,7 +228,7 @@ def test_normal_forms_in_other_units(system):
             continue
         u = np.append(one.state, one[system.parameter])
         region = field.regions.index(one.regions[0])
-        values, vectors = np.linalg.eig(field.curve(region, u)[1][:, : len(u) - 1])
+        values, vectors = np.linalg.eig(field.residual_and_jacobian(region, u)[1][:, : len(u) - 1])
         wanted = 1j * one.frequency if one.code == "HB" else 0.0
         vector = vectors[:, np.argmin(np.abs(values - wanted))]
         length = np.linalg.norm(vector / sizes) / np.linalg.norm(vector)

@@ -21,7 +21,7 @@ def test_field_equals_sympy_to_rounding(gear):
         at = {**fast.values, **dict(zip(names, u, strict=True))}
         rates = sp.Matrix([region.rates["x"], region.rates["v"]])
         interfaces = sp.Matrix([i.function for i in fast.interfaces.values()])
-        value, slopes, h, gradients = field.at(number, u)
+        value, slopes, h, gradients = field.evaluate(number, u)
         for found, expected in (
             (value, rates),
             (slopes, rates.jacobian(names)),
@@ -47,7 +47,7 @@ def test_zeros_of_a_large_field_are_written_in_every_region():
     for number in (0, 1, 0):
         rows = generator.normal(size=(2, 17))
         expected = sp.Matrix(field.rates(number))
-        for u, value, slopes in zip(rows, *field.at(number, rows)[:2], strict=True):
+        for u, value, slopes in zip(rows, *field.evaluate(number, rows)[:2], strict=True):
             at = dict(zip(names, u, strict=True))
             for found, exact in ((value, expected), (slopes, expected.jacobian(names))):
                 exact = np.array(exact.subs(at), dtype=float).reshape(found.shape)

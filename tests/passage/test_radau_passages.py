@@ -97,7 +97,7 @@ def test_interfaces_are_met_in_their_order_and_to_rounding():
     terms = [sp.Piecewise((x - h, x > h), (0, True)) for h in (near, far)]
     model = fs.Model({x: y, y: -x + p * sum(terms)}, parameters={p: 0})
     here = site(model, [0.0, 0.0])
-    heights = here.field.at(0, np.zeros(3))[2]
+    heights = here.field.evaluate(0, np.zeros(3))[2]
     region = next(k for k, s in enumerate(here.field.signs) if (s * heights > 0).all())
     place = Place(region, np.array([0.0, 1.0, 0.0]), 0.0)
     for number in range(2):

@@ -278,7 +278,7 @@ def test_what_a_run_puts_together_is_fixed_already(given):
 def test_loops_take_copies_of_read_only_and_strided_arrays():
     diagram = results()["diagram"]
     branch, field = diagram[0], tracing._field(results()["fast"], "p")
-    field.at(0, branch.points), field.at(0, branch.points[0])
+    field.evaluate(0, branch.points), field.evaluate(0, branch.points[0])
     field.survey(0, branch.points, branch.tangent, np.ones(2))
     fs.overlay(diagram, results()["run"])
     for array in (branch.state, branch.state[:, ::-1], branch.state.T):

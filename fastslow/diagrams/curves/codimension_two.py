@@ -30,7 +30,7 @@ from fastslow.diagrams.points.center_manifolds import (
     zero_hopf,
     zero_hopf_case,
 )
-from fastslow.diagrams.points.defining import Defining, OnInterface, Pair, row_sizes
+from fastslow.diagrams.points.defining import DefiningSystem, OnInterface, Pair, row_sizes
 from fastslow.diagrams.points.normal_forms import (
     Vector,
     cusp_form,
@@ -100,7 +100,7 @@ class Found:
 class Rows:
     """A traced curve: its equations, its rows, and how points between them are computed."""
 
-    system: Defining
+    system: DefiningSystem
     z: Array
     frame: Frame
     continuation: Continuation
@@ -165,13 +165,13 @@ SAME = 1e-6
 
 
 def criteria(
-    system: Defining, others: list[int], marks: Sequence[tuple[int, float]] = ()
+    system: DefiningSystem, others: list[int], marks: Sequence[tuple[int, float]] = ()
 ) -> list[Criterion]:
     """Give the tests for a curve of one kind.
 
     Parameters
     ----------
-    system : Defining
+    system : DefiningSystem
     others : list of int
         For boundary equilibria the regions that meet there, else empty.
     marks : sequence of (int, float)
@@ -191,7 +191,7 @@ def criteria(
     return [*found, *at_marks]
 
 
-def _mark(system: Defining, k: int, value: float) -> Criterion:
+def _mark(system: DefiningSystem, k: int, value: float) -> Criterion:
     place, span = system.n + k, system.span[k]
     return Criterion("UZ", lambda z: (float(z[place] - value) / span, 1.0), _always, system.region)
 
@@ -297,7 +297,7 @@ def _always(_: Array) -> bool:
     return True
 
 
-def _interface_tests(system: Defining) -> Iterator[Criterion]:
+def _interface_tests(system: DefiningSystem) -> Iterator[Criterion]:
     """Where folds and Hopf points meet an interface, or the edge of sliding along it."""
     field, region = system.field, system.region
     code = {"LP": "BF", "HB": "BH"}.get(system.code)
@@ -366,7 +366,7 @@ def smallest_value(matrix: Array, rate: Array | float = 0.0) -> float:
     return float(np.linalg.slogdet(inner)[0]) * least
 
 
-def _fold_tests(system: Defining) -> Iterator[Criterion]:
+def _fold_tests(system: DefiningSystem) -> Iterator[Criterion]:
     n, w, region = system.n, system.width, system.region
 
     def quadratic(z: Array) -> tuple[float, float]:
@@ -437,11 +437,13 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
     field, n, width = system.field, system.n, system.width
 
     def matrix(z: Array) -> Array:
-        slopes = field.curve(region, z[:width])[1]
+        slopes = field.residual_and_jacobian(region, z[:width])[1]
         return np.asarray(slopes * system.scales / system.unit[:, None])
 
     def least(z: Array) -> Array:
-        sizes = slope_sizes(lambda u: field.curve(region, u), z[:width], system.scales)
+        sizes = slope_sizes(
+            lambda u: field.residual_and_jacobian(region, u), z[:width], system.scales
+        )
         return sizes / system.unit
 
     def eigenvalues(z: Array) -> Vector:
@@ -464,8 +466,8 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
         def bordered(z: Array) -> tuple[float, float]:
             """[[F_x, E], [h_x, 0]] with the jump E: singular where pseudo-equilibria fold."""
             u = z[:width]
-            here, _, _, gradients = field.at(region, u)
-            inner, jump = matrix(z), (field.curve(other, u)[0] - here) / system.unit
+            here, _, _, gradients = field.evaluate(region, u)
+            inner, jump = matrix(z), (field.residual_and_jacobian(other, u)[0] - here) / system.unit
             size = float(np.abs(jump / row_sizes(inner)).max()) or 1.0
             edge = gradients[interface] * system.scales
             rows = np.column_stack([inner[:, :n], jump / size, inner[:, n:]])
@@ -503,14 +505,14 @@ def _imaginary(values: Vector) -> bool:
     return bool((first[k] * second[k]).real > IMAGINARY * size[k] ** 2)
 
 
-def coefficients(system: Defining, found: Found) -> dict[str, Any]:
+def coefficients(system: DefiningSystem, found: Found) -> dict[str, Any]:
     """Normal-form data of a point, by the names of a special point's fields."""
     n, w = system.n, system.width
     code, u, region = found.criterion.code, found.z[:w], found.criterion.region
     field = system.field
     if code not in ("CP", "BT", "GH", "ZH", "HH", "BH"):
         return {}
-    raw = field.curve(region, u)[1][:, :n]
+    raw = field.residual_and_jacobian(region, u)[1][:, :n]
     if code == "CP":
         return {"coefficient": cusp_form(forms_at(field, region, u), raw, system.unit)}
     values = np.linalg.eigvals(raw)
@@ -565,19 +567,19 @@ def _form(
     return {"normal_form": kept, "degeneracy": reason}
 
 
-def along(system: Defining, rows: Array) -> Array:
+def along(system: DefiningSystem, rows: Array) -> Array:
     """Coefficient at every row: a of folds, l₁ of Hopf points; NaN where there is none."""
     return np.array([_coefficient(system, z) for z in rows])
 
 
-def _coefficient(system: Defining, z: Array) -> float:
+def _coefficient(system: DefiningSystem, z: Array) -> float:
     if isinstance(system, Pair):
         value, size = _lyapunov(system, z)
         return 0.0 if abs(value) <= ROUNDING * size else value
     if system.code != "LP":
         return np.nan
     u = z[: system.width]
-    raw = system.field.curve(system.region, u)[1][:, : system.n]
+    raw = system.field.residual_and_jacobian(system.region, u)[1][:, : system.n]
     return fold_form(forms_at(system.field, system.region, u), raw, system.unit)
 
 
@@ -586,5 +588,5 @@ def _lyapunov(system: Pair, z: Array) -> tuple[float, float]:
     w, region = system.width, system.region
     if not z[w] > 0:
         return np.nan, np.nan
-    raw = system.field.curve(region, z[:w])[1][:, : system.n]
+    raw = system.field.residual_and_jacobian(region, z[:w])[1][:, : system.n]
     return lyapunov_terms(forms_at(system.field, region, z[:w]), raw, float(np.sqrt(z[w])))

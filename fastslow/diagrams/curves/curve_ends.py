@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import curves
-from fastslow.diagrams.points.defining import ON, Crossing, Defining, TwoFold
+from fastslow.diagrams.points.defining import ON, Crossing, DefiningSystem, TwoFold
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.windows import StateWindow, left_window
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def outcome_of(
-    status: str, system: Defining, z: Array, names: tuple[str, str], window: StateWindow
+    status: str, system: DefiningSystem, z: Array, names: tuple[str, str], window: StateWindow
 ) -> Outcome:
     """What the status of a trace means, in words."""
     plane = z[system.width - 2 : system.width]
@@ -67,5 +67,5 @@ def outcome_of(
     )
 
 
-def _region(system: Defining) -> str:
+def _region(system: DefiningSystem) -> str:
     return system.field.regions[system.region]

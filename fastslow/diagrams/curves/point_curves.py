@@ -34,7 +34,14 @@ from fastslow.diagrams.curves.codimension_two import (
 )
 from fastslow.diagrams.curves.curve_ends import outcome_of
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.points.defining import Crossing, Defining, Fold, OnInterface, Pair, TwoFold
+from fastslow.diagrams.points.defining import (
+    Crossing,
+    DefiningSystem,
+    Fold,
+    OnInterface,
+    Pair,
+    TwoFold,
+)
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.results.branch.diagram import Diagram
@@ -387,7 +394,7 @@ def _region_of(field: FrozenField, point: SpecialPoint, code: str) -> int:
 
 def _system(
     field: FrozenField, region: int, code: str, point: SpecialPoint, u: Array, span: Array
-) -> tuple[Defining, Array]:
+) -> tuple[DefiningSystem, Array]:
     """The defining system with its first z, the states in units of their diagram."""
     unit = np.maximum(np.abs(u[: field.n]), point.source.unit)
     if code == "LP":
@@ -409,7 +416,9 @@ def _system(
     return edge, edge.start(u)
 
 
-def _frame(system: Defining, start: Array, over: tuple[Array, Array], window: StateWindow) -> Frame:
+def _frame(
+    system: DefiningSystem, start: Array, over: tuple[Array, Array], window: StateWindow
+) -> Frame:
     scale = np.concatenate([system.scales, system.extras(start)])
     lower, upper = (
         np.concatenate([states, plane])
@@ -419,7 +428,7 @@ def _frame(system: Defining, start: Array, over: tuple[Array, Array], window: St
 
 
 def _traced(
-    system: Defining,
+    system: DefiningSystem,
     start: Array,
     frame: Frame,
     point: SpecialPoint,
@@ -564,7 +573,7 @@ def _up_to_interfaces(
     return slice(start, stop)
 
 
-def _tangent_at(system: Defining, z: Array, before: Array, frame: Frame) -> Array:
+def _tangent_at(system: DefiningSystem, z: Array, before: Array, frame: Frame) -> Array:
     """The tangent at a point between rows, in the direction of the row before."""
     tangent = curves.tangent(system, z, frame)
     return tangent if (tangent * frame.weight) @ before >= 0 else -tangent
@@ -589,12 +598,12 @@ def _two_interfaces(system: OnInterface, z: Array) -> Found:
     return Found(0, met, z, residual, True, 0.0)
 
 
-def _inside(system: Defining, z: Array) -> bool:
+def _inside(system: DefiningSystem, z: Array) -> bool:
     """Whether a point lies in the closure of its region; on its own interface it does."""
     return system.inside(z, system.interface if isinstance(system, OnInterface) else None)
 
 
-def _meeting(system: Defining) -> list[int]:
+def _meeting(system: DefiningSystem) -> list[int]:
     """Regions whose Jacobians matter on a curve: both sides of a continuous interface."""
     if not isinstance(system, OnInterface):
         return []
@@ -624,7 +633,7 @@ def _told_apart(found: list[Found], frame: Frame) -> list[Found]:
 
 
 def _special(
-    system: Defining,
+    system: DefiningSystem,
     found: Found,
     point: SpecialPoint,
     names: tuple[str, str],

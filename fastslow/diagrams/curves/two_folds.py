@@ -43,7 +43,7 @@ def two_fold_ahead(field: FrozenField, region: int, u: Array, scale: Array) -> A
     if sides is None or len(u) < 2:
         return None
     signs = field.signs[region][-2:]
-    first, second = signs * field.at(region, u[-2:])[2][:, -2:]
+    first, second = signs * field.evaluate(region, u[-2:])[2][:, -2:]
     passed = bool(np.all(second < 0))
     if not passed and np.any(second < 0):
         return None
@@ -88,7 +88,10 @@ def weight_of(field: FrozenField, region: int, u: Array) -> float:
     """The weight α that makes (1 − α) f₁ + α f₂ smallest at a point."""
     sides = field.modes[region].sides
     assert sides is not None
-    above, below = field.curve(sides.above, u)[0], field.curve(sides.below, u)[0]
+    above, below = (
+        field.residual_and_jacobian(sides.above, u)[0],
+        field.residual_and_jacobian(sides.below, u)[0],
+    )
     jump = below - above
     return -float(above @ jump) / float(jump @ jump) if jump.any() else 0.5
 
@@ -97,8 +100,8 @@ def _regular(field: FrozenField, region: int, u: Array, share: float) -> Array:
     """(1 − α) f₁ + α f₂, h and a − b at a point."""
     sides = field.modes[region].sides
     assert sides is not None
-    above, _, h, gradients = field.at(sides.above, u)
-    below, _ = field.curve(sides.below, u)
+    above, _, h, gradients = field.evaluate(sides.above, u)
+    below, _ = field.residual_and_jacobian(sides.below, u)
     normal = gradients[sides.interface, : field.n]
     weighted = (1.0 - share) * above + share * below
     return np.concatenate([weighted, [h[sides.interface], normal @ (above - below)]])

@@ -1,4 +1,4 @@
-"""Where test functions vanish between the rows of a piece, pairs within one step included."""
+"""Where test functions vanish between the rows of a segment, pairs within one step included."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fastslow.continuation.location import Located
 from fastslow.continuation.loops import loop, writeable
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.trace.across_regions import Piece, Window, beside
+from fastslow.diagrams.trace.across_regions import Segment, Window, on_normal_plane
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 @dataclass(frozen=True, eq=False)
 class Bracket:
-    """Two points of a piece between which a test changes sign, after row ``row``."""
+    """Two points of a segment between which a test changes sign, after row ``row``."""
 
     row: int
     u: tuple[Array, Array]
@@ -47,21 +47,21 @@ class Bracket:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """A test function on a piece.
+    """A test function on a segment.
 
     Parameters
     ----------
     field : FrozenField
-    piece : Piece
+    segment : Segment
     window : Window
     steps : ndarray, shape (N - 1,)
         Lengths of the steps between the rows, in units of the window.
     at : callable
-        A point u and the direction along the piece to the test there.
+        A point u and the direction along the segment to the test there.
     """
 
     field: FrozenField
-    piece: Piece
+    segment: Segment
     window: Window
     steps: Array
     at: Callable[[Array, Array], float]
@@ -70,14 +70,14 @@ class Search:
         """The point of the curve above a part of a chord, with its test."""
         chord = b - a
         guess = a + part * chord
-        found = beside(
-            self.field, self.piece.region, guess, chord * self.window.weight, guess, self.window
+        found = on_normal_plane(
+            self.field, self.segment.region, guess, chord * self.window.weight, guess, self.window
         )
         return (found.u, self.at(found.u, chord)) if found.converged else None
 
     def brackets(self, test: Array) -> Iterator[Bracket]:
         """Changes of sign between rows next to each other but for one zero, and within dips."""
-        u = self.piece.u
+        u = self.segment.u
         for before, after in sign_changes(test):
             yield Bracket(before, (u[before], u[after]), (test[before], test[after]))
         for row in _dips(test, self.steps):
@@ -85,7 +85,7 @@ class Search:
 
     def _dip(self, row: int, test: Array) -> Iterator[Bracket]:
         """Two changes of sign around a minimum of the modulus after a row, if there are."""
-        a, b, sign = self.piece.u[row], self.piece.u[row + 1], float(np.sign(test[row]))
+        a, b, sign = self.segment.u[row], self.segment.u[row + 1], float(np.sign(test[row]))
 
         def value(part: float) -> tuple[Array, float] | None:
             found = self.between(a, b, part)
@@ -159,7 +159,7 @@ class Search:
         return self._at_rounding(a + f / (f - g) * (b - a), length)
 
     def _at_rounding(self, u: Array, length: float) -> Located:
-        rates, _ = self.field.curve(self.piece.region, u)
+        rates, _ = self.field.residual_and_jacobian(self.segment.region, u)
         return Located(u, float(np.abs(rates).max()), True, np.empty(0), length)
 
     def _inside(self, u: Array, a: Array, b: Array) -> bool:

@@ -133,7 +133,7 @@ def bogdanov_takens(
     component is positive. ``unit`` is the size of every state.
     """
     n = field.n
-    matrix = field.curve(region, u)[1][:, :n]
+    matrix = field.residual_and_jacobian(region, u)[1][:, :n]
     left, q0 = null_vectors(matrix, unit)
     bordered = np.block([[matrix, left[:, None]], [q0[None, :], np.zeros((1, 1))]])
     q1 = np.linalg.solve(bordered, np.append(q0, 0.0))[:n]
@@ -201,7 +201,7 @@ def _manifold(
     resonant: Callable[[Power, int], bool],
 ) -> Manifold:
     """Eigenvectors of the eigenvalues nearest to those wanted, the left ones dual to them."""
-    matrix = field.curve(region, u)[1][:, : field.n]
+    matrix = field.residual_and_jacobian(region, u)[1][:, : field.n]
     values, vectors = np.linalg.eig(matrix)
     duals, adjoint = np.linalg.eig(matrix.T)
     right = np.zeros((field.n, len(wanted)), dtype=complex)
@@ -226,7 +226,7 @@ def _normal_form(
     """
     n, m = manifold.right.shape
     space = JetSpace(m, degree)
-    matrix = field.curve(region, u)[1][:, :n]
+    matrix = field.residual_and_jacobian(region, u)[1][:, :n]
     spectrum = np.linalg.eigvals(matrix)
     near = RESONANT * np.abs(manifold.values).max()
     amplitudes = np.array([space.variable(k) for k in range(m)])

@@ -68,7 +68,7 @@ class Corrections:
 
     def _size(self, value: float, unit: Array) -> Array:
         """Size of each rate where the states have their units."""
-        rates, slopes = self.field.curve(self.region, np.append(unit, value))
+        rates, slopes = self.field.residual_and_jacobian(self.region, np.append(unit, value))
         with np.errstate(all="ignore"):
             size = np.abs(rates) + np.abs(slopes[:, :-1]) @ unit
         return np.where(np.isfinite(size), size, 0.0)
@@ -94,7 +94,7 @@ class Corrections:
         if not (np.isfinite(found.residual) and found.correction < PLAIN.correction):
             return None
         solved = found.u[:-1]
-        rates, slopes = self.field.curve(self.region, found.u)
+        rates, slopes = self.field.residual_and_jacobian(self.region, found.u)
         # not of the unit where a state is far below it: a slope that is large because another
         # state is far away would forgive any residual
         terms = np.abs(slopes[:, :-1]) @ np.abs(solved)
@@ -121,7 +121,7 @@ class Corrections:
         units = np.array([self.unit(v) for v in values.tolist()])
         sizes_of_values = [self._parameter_unit(v) for v in values.tolist()]
         scales = np.column_stack([np.maximum(units, np.abs(states)), sizes_of_values])
-        natural, slopes, _, _ = field.at(self.region, np.column_stack([units, values]))
+        natural, slopes, _, _ = field.evaluate(self.region, np.column_stack([units, values]))
         with np.errstate(all="ignore"):
             natural = np.abs(natural) + (np.abs(slopes[:, :, :n]) @ units[:, :, None])[:, :, 0]
             natural = np.where(np.isfinite(natural), natural, 0.0)
@@ -138,7 +138,7 @@ class Corrections:
         if self.field.modes[self.region].sides is None:
             return False
         u = np.append(solved, value)
-        _, _, h, slopes = self.field.at(self.region, u)
+        _, _, h, slopes = self.field.evaluate(self.region, u)
         unit = np.append(self.unit(value), self._parameter_unit(value))
         size = np.abs(slopes) @ np.maximum(np.abs(u), unit)
         return bool(np.all(np.abs(h[-2:]) <= 1e-9 * size[-2:]))
@@ -169,7 +169,7 @@ def point_at(
     field: FrozenField, region: int, u: Array, admissible: bool = True, continuum: bool = False
 ) -> Equilibrium:
     """The equilibrium at a point u, with its eigenvalues."""
-    rates, _ = field.curve(region, u)
+    rates, _ = field.residual_and_jacobian(region, u)
     return Equilibrium(
         field.model.states,
         field.wrapped(u[:-1]),

@@ -27,7 +27,7 @@ ON = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Defining(ABC):
+class DefiningSystem(ABC):
     """What every kind of point has: a field with two varying parameters, a region, units.
 
     Parameters
@@ -79,7 +79,7 @@ class Defining(ABC):
         """Rates and their derivatives in units of states and parameters, at z (…, N + 1)."""
         u = z[..., : self.width]
         rows = u.reshape(-1, self.width)
-        rates, slopes, _, _ = self.field.at(self.region, rows)
+        rates, slopes, _, _ = self.field.evaluate(self.region, rows)
         scaled = slopes * self.scales / self.unit[:, None]
         lead = u.shape[:-1]
         return (rates / self.unit).reshape(*lead, self.n), scaled.reshape(*lead, self.n, self.width)
@@ -114,7 +114,7 @@ class Defining(ABC):
     def heights(self, z: Array) -> Array:
         """What bounds the region, positive inside and relative to its terms, at a point."""
         u = z[: self.width]
-        _, _, h, gradients = self.field.at(self.region, u)
+        _, _, h, gradients = self.field.evaluate(self.region, u)
         size = np.abs(gradients) @ np.maximum(np.abs(u), self.scales)
         return np.asarray(self.field.signs[self.region] * h / np.where(size > 0, size, 1.0))
 
@@ -125,7 +125,7 @@ def row_sizes(matrix: Array) -> Array:
     return np.where(size > 0, size, 1.0)
 
 
-class Fold(Defining):
+class Fold(DefiningSystem):
     """F = 0, J v = 0, |v| = 1; the extra unknowns are v."""
 
     code: ClassVar[str] = "LP"
@@ -146,7 +146,7 @@ class Fold(Defining):
         return np.concatenate([z[: self.width], v / np.linalg.norm(v)])
 
 
-class Pair(Defining):
+class Pair(DefiningSystem):
     """F = 0, (J² + κ) v = 0, |v| = 1, ⟨c, v⟩ = 0: two eigenvalues with sum zero.
 
     The extra unknowns are κ, v and c, a vector that completes v to the plane
@@ -216,7 +216,7 @@ class Pair(Defining):
         return np.concatenate([u, [kappa], v, other])
 
 
-class Crossing(Defining):
+class Crossing(DefiningSystem):
     """F + βψ = 0, [F_x F_p]ᵀψ = 0, |ψ| = 1: a branch point over the first parameter.
 
     The extra unknowns are ψ and β. In a model without symmetry β does not stay
@@ -250,7 +250,7 @@ class Crossing(Defining):
 
 
 @dataclass(frozen=True, eq=False)
-class OnInterface(Defining):
+class OnInterface(DefiningSystem):
     """F = 0, h = 0: a boundary equilibrium; no extra unknowns."""
 
     code: ClassVar[str] = "BE"
@@ -261,12 +261,12 @@ class OnInterface(Defining):
 
     def residual(self, z: Array, guide: Array) -> Array:
         rows = z.reshape(-1, self.width)
-        rates, _, h, _ = self.field.at(self.region, rows)
+        rates, _, h, _ = self.field.evaluate(self.region, rows)
         both = np.column_stack([rates, h[:, self.interface]])
         return both.reshape(*z.shape[:-1], self.n + 1)
 
 
-class TwoFold(Defining):
+class TwoFold(DefiningSystem):
     """(1 − α) f₁ + α f₂ = 0, h = 0, a = b: a pseudo-equilibrium at which both drifts vanish.
 
     With the first equation a = ∇h·f₁ and b = ∇h·f₂ are both zero where they are equal. The extra
@@ -288,8 +288,8 @@ class TwoFold(Defining):
     def residual(self, z: Array, guide: Array) -> Array:
         rows = z.reshape(-1, self.width + 1)
         u, share = rows[:, : self.width], rows[:, self.width :]
-        above, _, h, gradients = self.field.at(self.sides.above, u)
-        below = self.field.at(self.sides.below, u)[0]
+        above, _, h, gradients = self.field.evaluate(self.sides.above, u)
+        below = self.field.evaluate(self.sides.below, u)[0]
         interface, n = self.sides.interface, self.n
         # the gradient in units of its own length, so that no unit of h matters
         edge = gradients[:, interface] * self.scales

@@ -1,4 +1,4 @@
-"""Special points between the rows of a piece, solved for to rounding."""
+"""Special points between the rows of a segment, solved for to rounding."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from fastslow.diagrams.points.row_tests import (
     product_of_pair,
     resolved,
 )
-from fastslow.diagrams.trace.across_regions import Piece, Window
+from fastslow.diagrams.trace.across_regions import Segment, Window
 from fastslow.results.branch.unexplained import unexplained_rows
 from fastslow.results.point_types import POINT_TYPES
 
@@ -37,7 +37,7 @@ DIVISIONS = 12
 
 @dataclass(frozen=True, eq=False)
 class Detected:
-    """A special point after row ``row`` of a piece."""
+    """A special point after row ``row`` of a segment."""
 
     row: int
     code: str
@@ -49,30 +49,30 @@ class Detected:
 
 @np.errstate(all="ignore")
 def special_points(
-    field: FrozenField, piece: Piece, window: Window, marks: Sequence[float]
-) -> tuple[list[Detected], Piece, NDArray[np.complex128]]:
-    """All special points of a piece, in order along it.
+    field: FrozenField, segment: Segment, window: Window, marks: Sequence[float]
+) -> tuple[list[Detected], Segment, NDArray[np.complex128]]:
+    """All special points of a segment, in order along it.
 
     Returns
     -------
     found : list of Detected
-    piece : Piece
-        The piece, with rows added where one step hid several points.
+    segment : Segment
+        The segment, with rows added where one step hid several points.
     eigenvalues : ndarray of complex
         The finite ones of its rows.
     """
-    piece, tests = resolved(field, piece, window)
-    found = _between_rows(field, piece, window, tests, marks)
+    segment, tests = resolved(field, segment, window)
+    found = _between_rows(field, segment, window, tests, marks)
     for _ in range(DIVISIONS):
-        finer = piece
+        finer = segment
         # from the last step on, so that the rows before it keep their numbers
         for first, last in reversed(_unexplained(tests, found)):
             finer = divided(field, finer, window, first, last)
-        if len(finer.u) == len(piece.u):
+        if len(finer.u) == len(segment.u):
             break
-        piece, tests = resolved(field, finer, window)
-        found = _between_rows(field, piece, window, tests, marks)
-    return found, piece, tests.eigenvalues
+        segment, tests = resolved(field, finer, window)
+        found = _between_rows(field, segment, window, tests, marks)
+    return found, segment, tests.eigenvalues
 
 
 def _unexplained(tests: RowTests, found: Sequence[Detected]) -> list[tuple[int, int]]:
@@ -89,17 +89,17 @@ def _unexplained(tests: RowTests, found: Sequence[Detected]) -> list[tuple[int, 
 
 
 def _between_rows(
-    field: FrozenField, piece: Piece, window: Window, tests: RowTests, marks: Sequence[float]
+    field: FrozenField, segment: Segment, window: Window, tests: RowTests, marks: Sequence[float]
 ) -> list[Detected]:
-    """All special points between the rows of a piece, in order along it."""
-    steps = piece.chords(window.scale)
+    """All special points between the rows of a segment, in order along it."""
+    steps = segment.chords(window.scale)
     found = [
-        *_folds(field, piece, window, steps, tests),
-        *_branch_points(field, piece, window, steps, tests),
-        *_turning_pairs(field, piece, window, steps, tests),
-        *_marks(field, piece, window, steps, marks),
+        *_folds(field, segment, window, steps, tests),
+        *_branch_points(field, segment, window, steps, tests),
+        *_hopf_and_neutral_saddles(field, segment, window, steps, tests),
+        *_marks(field, segment, window, steps, marks),
     ]
-    found = [d for d in found if _between(d.located.u, piece, d.row, window)]
+    found = [d for d in found if _between(d.located.u, segment, d.row, window)]
     # where two branches cross the parameter may turn as well: that is no fold
     crossings = [d.located.u for d in found if d.code == "BP"]
     found = [
@@ -108,53 +108,55 @@ def _between_rows(
         if d.code != "LP"
         or all(np.abs((d.located.u - c) / window.scale).max() > 1e-4 for c in crossings)
     ]
-    return sorted(found, key=lambda d: (d.row, _ahead(d.located.u, piece, d.row, window)))
+    return sorted(found, key=lambda d: (d.row, _ahead(d.located.u, segment, d.row, window)))
 
 
 def _folds(
-    field: FrozenField, piece: Piece, window: Window, steps: Array, tests: RowTests
+    field: FrozenField, segment: Segment, window: Window, steps: Array, tests: RowTests
 ) -> Iterator[Detected]:
     def curve(u: Array) -> tuple[Array, Array]:
-        return field.curve(piece.region, u)
+        return field.residual_and_jacobian(segment.region, u)
 
     def turning(u: Array, along: Array) -> float:
-        return float(_tangent(field, piece, u, along, window)[-1] / window.scale[-1])
+        return float(_tangent(field, segment, u, along, window)[-1] / window.scale[-1])
 
-    search = Search(field, piece, window, steps, turning)
+    search = Search(field, segment, window, steps, turning)
     for bracket in search.brackets(tests.turning):
         located = search.solve(bracket, lambda u: fold(curve, u, window.scale))
         if located is not None:
             jacobian = curve(located.u)[1][:, : field.n]
             coefficient = fold_form(
-                forms_at(field, piece.region, located.u), jacobian, window.scale[:-1]
+                forms_at(field, segment.region, located.u), jacobian, window.scale[:-1]
             )
             yield Detected(bracket.row, "LP", located, coefficient=coefficient)
 
 
 def _branch_points(
-    field: FrozenField, piece: Piece, window: Window, steps: Array, tests: RowTests
+    field: FrozenField, segment: Segment, window: Window, steps: Array, tests: RowTests
 ) -> Iterator[Detected]:
     def locate(u: Array) -> Located:
-        return branch_point(lambda z: field.curve(piece.region, z), u, window.scale)
+        return branch_point(
+            lambda z: field.residual_and_jacobian(segment.region, z), u, window.scale
+        )
 
     def crossing(u: Array, along: Array) -> float:
-        tangent = _tangent(field, piece, u, along, window)
-        return float(field.branching(piece.region, u[None], tangent[None], window.scale)[0])
+        tangent = _tangent(field, segment, u, along, window)
+        return float(field.branching(segment.region, u[None], tangent[None], window.scale)[0])
 
-    search = Search(field, piece, window, steps, crossing)
+    search = Search(field, segment, window, steps, crossing)
     for bracket in search.brackets(tests.branching):
         located = search.solve(bracket, locate)
         if located is not None:
             yield Detected(bracket.row, "BP", located)
 
 
-def _turning_pairs(
-    field: FrozenField, piece: Piece, window: Window, steps: Array, tests: RowTests
+def _hopf_and_neutral_saddles(
+    field: FrozenField, segment: Segment, window: Window, steps: Array, tests: RowTests
 ) -> Iterator[Detected]:
-    n, region = field.n, piece.region
+    n, region = field.n, segment.region
 
     def curve(u: Array) -> tuple[Array, Array]:
-        return field.curve(region, u)
+        return field.residual_and_jacobian(region, u)
 
     # a sum that is rounding at most rows, as that of a conservative oscillator, is left out; any
     # other is near zero only beside the point that is looked for
@@ -164,7 +166,7 @@ def _turning_pairs(
     def sums(u: Array, along: Array) -> float:
         return float(pair_sums(field.finite_eigenvalues(region, u), rounding))
 
-    search = Search(field, piece, window, steps, sums)
+    search = Search(field, segment, window, steps, sums)
     product = np.nan
 
     def locate(u: Array) -> Located:
@@ -189,45 +191,45 @@ def _turning_pairs(
             yield Detected(bracket.row, "NSD", located)
 
 
-def _tangent(field: FrozenField, piece: Piece, u: Array, along: Array, window: Window) -> Array:
-    """The unit tangent at a point, in a direction along the piece."""
-    tangent, _ = field.tangent(piece.region, u, window.weight)
+def _tangent(field: FrozenField, segment: Segment, u: Array, along: Array, window: Window) -> Array:
+    """The unit tangent at a point, in a direction along the segment."""
+    tangent, _ = field.tangent(segment.region, u, window.weight)
     return tangent if (tangent * window.weight) @ along >= 0 else -tangent
 
 
 def _marks(
-    field: FrozenField, piece: Piece, window: Window, steps: Array, marks: Sequence[float]
+    field: FrozenField, segment: Segment, window: Window, steps: Array, marks: Sequence[float]
 ) -> Iterator[Detected]:
     along = np.zeros(field.n + 1)
     along[-1] = 1.0
     for mark in marks:
         search = Search(
             field,
-            piece,
+            segment,
             window,
             steps,
             lambda u, _, mark=mark: float(u[-1] - mark),  # type: ignore[misc]
         )
-        for bracket in search.brackets(piece.u[:, -1] - mark):
+        for bracket in search.brackets(segment.u[:, -1] - mark):
             located = search.solve(
                 bracket,
                 lambda u, mark=mark: field.refined(  # type: ignore[misc]
-                    piece.region, u, window.scale, normal=along, point=mark * along
+                    segment.region, u, window.scale, normal=along, point=mark * along
                 ),
             )
             if located is not None:
                 yield Detected(bracket.row, "UZ", located)
 
 
-def _ahead(u: Array, piece: Piece, row: int, window: Window) -> float:
-    return float(((u - piece.u[row]) * window.weight) @ piece.tangents[row])
+def _ahead(u: Array, segment: Segment, row: int, window: Window) -> float:
+    return float(((u - segment.u[row]) * window.weight) @ segment.tangents[row])
 
 
-def _between(u: Array, piece: Piece, row: int, window: Window) -> bool:
+def _between(u: Array, segment: Segment, row: int, window: Window) -> bool:
     """Whether a solution stayed near the rows that bracketed it."""
     if not np.all(np.isfinite(u)):
         return False
-    here = piece.u[row]
-    there = piece.u[min(row + 2, len(piece.u) - 1)]
+    here = segment.u[row]
+    there = segment.u[min(row + 2, len(segment.u) - 1)]
     length = float(np.linalg.norm((there - here) / window.scale))
     return float(np.linalg.norm((u - here) / window.scale)) <= 2.0 * length

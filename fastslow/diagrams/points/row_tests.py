@@ -1,4 +1,4 @@
-"""Test functions of special points at the rows of a piece, and steps that hide some of them.
+"""Test functions of special points at the rows of a segment, and steps that hide some of them.
 
 Every test is free of units: a pair sum is measured by its own pair, the distance
 of a matrix from the singular ones by the matrix's rows.
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fastslow.continuation.loops import loop, writeable
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.brackets import sign_changes
-from fastslow.diagrams.trace.across_regions import Piece, Window, beside
+from fastslow.diagrams.trace.across_regions import Segment, Window, on_normal_plane
 from fastslow.results.branch.unexplained import unstable_range
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ ROUNDING = 4.0 * float(np.finfo(float).eps)
 #: A matrix with rows of length one is singular to rounding nearer to the singular ones than this.
 SINGULAR = 1e-14
 
-#: Rows that may be added to one piece, and the shortest step that is divided, in scaled units.
+#: Rows that may be added to one segment, and the shortest step that is divided, in scaled units.
 ADDED, SHORTEST = 400, 1e-10
 
 
@@ -130,7 +130,7 @@ def product_of_pair(eigenvalues: Complex, rounding: float = ROUNDING) -> float:
 
 @dataclass(frozen=True, eq=False)
 class RowTests:
-    """Test functions at the rows of a piece, each of shape (N,).
+    """Test functions at the rows of a segment, each of shape (N,).
 
     Parameters
     ----------
@@ -165,10 +165,10 @@ class RowTests:
         )
 
 
-def tests_at(field: FrozenField, piece: Piece, window: Window) -> RowTests:
-    """The tests at every row of a piece."""
+def tests_at(field: FrozenField, segment: Segment, window: Window) -> RowTests:
+    """The tests at every row of a segment."""
     turning, branching, eigenvalues = field.survey(
-        piece.region, piece.u, piece.tangents, window.scale
+        segment.region, segment.u, segment.tangents, window.scale
     )
     return RowTests(
         turning,
@@ -178,14 +178,14 @@ def tests_at(field: FrozenField, piece: Piece, window: Window) -> RowTests:
     )
 
 
-def resolved(field: FrozenField, piece: Piece, window: Window) -> tuple[Piece, RowTests]:
-    """A piece with steps divided until the tests explain how many eigenvalues are unstable.
+def resolved(field: FrozenField, segment: Segment, window: Window) -> tuple[Segment, RowTests]:
+    """A segment with steps divided until the tests explain how many eigenvalues are unstable.
 
     Between two rows that number changes by one at a fold or branch point and by
     two at a Hopf point. Where the changes of sign between them allow no such
     sum, some of them cancel within the step.
     """
-    tests = tests_at(field, piece, window)
+    tests = tests_at(field, segment, window)
     low, high = tests.unstable
     known = np.flatnonzero(low == high)
     # where nothing changes and the branch does not turn there is nothing to explain
@@ -202,21 +202,21 @@ def resolved(field: FrozenField, piece: Piece, window: Window) -> tuple[Piece, R
         change = int(low[last]) - int(low[first])
         if added >= ADDED or _explains(tests, slice(first, last + 1), change):
             continue
-        place, extra = _middle(field, piece, window, first, last)
+        place, extra = _middle(field, segment, window, first, last)
         if extra is None:
             continue
         added += 1
         new = tests_at(field, extra, window)
         tests = tests.inserted(place, new)
         low, high = np.insert(low, place, new.unstable[0]), np.insert(high, place, new.unstable[1])
-        piece = _inserted(piece, place, extra)
+        segment = _inserted(segment, place, extra)
         # the pairs that wait lie after this one
         waiting = [(a + 1, b + 1) for a, b in waiting]
         if low[place] == high[place]:
             waiting += [(place, last + 1), (first, place)]
         else:
             waiting.append((first, last + 1))
-    return piece, tests
+    return segment, tests
 
 
 def _explains(tests: RowTests, rows: slice, change: int) -> bool:
@@ -230,39 +230,39 @@ def _explains(tests: RowTests, rows: slice, change: int) -> bool:
     return change in possible
 
 
-def divided(field: FrozenField, piece: Piece, window: Window, first: int, last: int) -> Piece:
+def divided(field: FrozenField, segment: Segment, window: Window, first: int, last: int) -> Segment:
     """With a row in the middle of the longest step between two rows, if one is found there."""
-    place, extra = _middle(field, piece, window, first, last)
-    return piece if extra is None else _inserted(piece, place, extra)
+    place, extra = _middle(field, segment, window, first, last)
+    return segment if extra is None else _inserted(segment, place, extra)
 
 
-def _inserted(piece: Piece, place: int, extra: Piece) -> Piece:
+def _inserted(segment: Segment, place: int, extra: Segment) -> Segment:
     return replace(
-        piece,
-        u=np.insert(piece.u, place, extra.u, axis=0),
-        tangents=np.insert(piece.tangents, place, extra.tangents, axis=0),
+        segment,
+        u=np.insert(segment.u, place, extra.u, axis=0),
+        tangents=np.insert(segment.tangents, place, extra.tangents, axis=0),
     )
 
 
 def _middle(
-    field: FrozenField, piece: Piece, window: Window, first: int, last: int
-) -> tuple[int, Piece | None]:
+    field: FrozenField, segment: Segment, window: Window, first: int, last: int
+) -> tuple[int, Segment | None]:
     """A row in the middle of the longest step between two, and the row before which it comes.
 
     None where the step is too short or no point of the curve is found.
     """
-    chords = np.linalg.norm(np.diff(piece.u[first : last + 1], axis=0) / window.scale, axis=1)
+    chords = np.linalg.norm(np.diff(segment.u[first : last + 1], axis=0) / window.scale, axis=1)
     before = first + int(np.argmax(chords))
     if not chords.max() > SHORTEST:
         return before + 1, None
-    a, b = piece.u[before], piece.u[before + 1]
+    a, b = segment.u[before], segment.u[before + 1]
     guess, chord = 0.5 * (a + b), (b - a) * window.weight
-    found = beside(field, piece.region, guess, chord, guess, window)
+    found = on_normal_plane(field, segment.region, guess, chord, guess, window)
     if not found.converged:
         return before + 1, None
-    tangent, single = field.tangent(piece.region, found.u, window.weight)
+    tangent, single = field.tangent(segment.region, found.u, window.weight)
     if not single:
-        tangent = piece.tangents[before]
+        tangent = segment.tangents[before]
     elif tangent @ chord < 0:
         tangent = -tangent
-    return before + 1, Piece(piece.region, found.u[None], tangent[None])
+    return before + 1, Segment(segment.region, found.u[None], tangent[None])

@@ -157,7 +157,7 @@ def _isolated(
     determinant = _determinant(slopes).as_expr()
     edges = [_polynomial(q, symbols).as_expr() for q in bounds]
     for condition in (None, determinant, *edges):
-        found = _meetings(equations, condition, lower, upper)
+        found = _zeros_at_equilibria(equations, condition, lower, upper)
         if found is None and condition is determinant:
             found = _double_roots(equations, lower, upper)
         elif found is None and condition is not None:
@@ -174,7 +174,7 @@ def _isolated(
 
 
 @lru_cache(maxsize=512)
-def _meetings(
+def _zeros_at_equilibria(
     equations: RegionEquations, condition: sp.Expr | None, lower: float, upper: float
 ) -> list[float] | None:
     """Values at which a function vanishes at an equilibrium, or without one those at infinity."""

@@ -387,7 +387,9 @@ class RegionEquations(Corrections):
         A zero of the numerators on a pole is none of the rates: rounding of the state makes them.
         """
         natural = self._natural(value)
-        slopes = [self.field.curve(self.region, np.append(s, value))[1] for s in states]
+        slopes = [
+            self.field.residual_and_jacobian(self.region, np.append(s, value))[1] for s in states
+        ]
         with np.errstate(all="ignore"):
             terms = [np.abs(a[:, :-1]) @ np.abs(s) for a, s in zip(slopes, states, strict=True)]
         eps = np.finfo(float).eps

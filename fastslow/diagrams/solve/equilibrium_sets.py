@@ -196,7 +196,7 @@ class Family:
             found = self._polytope(value)
             return [] if found is None else [found]
         if self.dimension == 1:
-            return [self._interval(value, *piece) for piece in self._pieces(value)]
+            return [self._interval(value, *segment) for segment in self._pieces(value)]
         return self._searched(value) if self.dimension == len(self.motion.slides) else []
 
     def _interval(self, value: float, low: float, high: float) -> EquilibriumSet:

@@ -14,7 +14,7 @@ from fastslow.arguments import finite, shown
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.correcting import corrections, point_at
-from fastslow.diagrams.trace.across_regions import Window, walk
+from fastslow.diagrams.trace.across_regions import Window, trace_across_regions
 from fastslow.diagrams.trace.windows import known, size_of
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.angles import apart
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 #: Step from a special point onto the branches through it, in units of the window.
 ASIDE = 1e-3
 
-#: Rows of the branch by which its size is measured, and states taken of each of its pieces.
+#: Rows of the branch by which its size is measured, and states taken of each of its segments.
 COARSE, SAMPLES = 2000, 25
 
 #: How far, in parts of its size, a point that claims to be an equilibrium may be from one.
@@ -146,14 +146,16 @@ class Seeds:
         samples = []
         for side in (1, -1):
             coarse = Continuation(points=COARSE)
-            way = walk(field, region, u, side * tangent, window, coarse, bounded=point.admissible)
-            for piece in way.pieces:
-                moved = np.append(0.0, np.cumsum(np.abs(np.diff(piece.u[:, -1]))))
+            traced = trace_across_regions(
+                field, region, u, side * tangent, window, coarse, bounded=point.admissible
+            )
+            for segment in traced.segments:
+                moved = np.append(0.0, np.cumsum(np.abs(np.diff(segment.u[:, -1]))))
                 if moved[-1] == 0:
-                    moved = np.arange(len(piece.u), dtype=float)
+                    moved = np.arange(len(segment.u), dtype=float)
                 places = np.searchsorted(moved, np.linspace(0, moved[-1], SAMPLES))
-                rows = piece.u[places]
-                certain = field.certain([(piece.region, row) for row in rows])
+                rows = segment.u[places]
+                certain = field.certain([(segment.region, row) for row in rows])
                 samples += [*np.where(certain, rows[:, :-1], 0.0)]
         return np.array(samples)
 

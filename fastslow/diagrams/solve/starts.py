@@ -83,10 +83,10 @@ class Starts:
         if self._bounds and not self._sure.get(value, False):
             # what runs to infinity beside a pole need not be decided
             self._solve(value, self._bounds)
-        points = self._asked_at(value, admissible)
+        points = self._requested_at(value, admissible)
         return [e for e in points if self.window.contains(self.window.shifted(e.state), unit)]
 
-    def _asked_at(self, value: float, admissible: bool) -> list[Equilibrium]:
+    def _requested_at(self, value: float, admissible: bool) -> list[Equilibrium]:
         """Equilibria within the bounds that were asked for."""
         if value not in self._found:
             self._solve(value, None)
@@ -131,7 +131,7 @@ class Starts:
     def window(self) -> StateWindow:
         """The window asked for, with defaults about the equilibria at the first values."""
         for values, admissible in product((self._typical, self._first), (True, False)):
-            points = [e for v in values for e in self._asked_at(v, admissible)]
+            points = [e for v in values for e in self._requested_at(v, admissible)]
             if points:
                 break
         states = np.reshape([e.state for e in points], (-1, self._field.n))
@@ -199,7 +199,7 @@ class Starts:
     def scale(self) -> Array:
         """Unit of each state, the size of its equilibria, and the length of the range."""
         n = self._field.n
-        both = [e for v in self._typical for k in (True, False) for e in self._asked_at(v, k)]
+        both = [e for v in self._typical for k in (True, False) for e in self._requested_at(v, k)]
         table = np.reshape([e.state for e in both], (-1, n))
         inside = self.window.contains(self.window.shifted(table))
         states = table[inside]
@@ -219,7 +219,7 @@ class Starts:
 
 
 def _upright(branch: Branch, value: float, near: float, scale: Array) -> bool:
-    """Whether a branch has a vertical piece at a parameter value."""
+    """Whether a branch has a vertical segment at a parameter value."""
     step = np.abs(np.diff(branch.state, axis=0) / scale[:-1]).max(axis=1)
     there = np.abs(branch.parameter - value) < near
     return bool(np.any(there[1:] & there[:-1] & (step > 1e-6)))

@@ -26,7 +26,7 @@ SHORT_OF_RANGE = (0.0, 1e-9, 1e-6, 1e-3)
 FINER, FINEST, CHUNK = 16.0, 3, 64
 
 #: Pieces (regions in order) that one branch may have.
-PIECES = 1000
+SEGMENTS = 1000
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Window:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class Segment:
     """A part of a branch in one region: points u and unit tangents, shape (N, n + 1)."""
 
     region: int
@@ -83,25 +83,25 @@ class Piece:
         steps = np.diff(columns) / scale[:, None]
         return np.asarray(np.sqrt((steps * steps).sum(axis=0)))
 
-    def reversed(self) -> Piece:
-        return Piece(self.region, self.u[::-1].copy(), -self.tangents[::-1])
+    def reversed(self) -> Segment:
+        return Segment(self.region, self.u[::-1].copy(), -self.tangents[::-1])
 
 
 @dataclass(frozen=True, eq=False)
-class Walk:
+class DirectedTrace:
     """Pieces in order, the interface between each two, and why the walk ended.
 
     ``last`` is the interface on which the walk stopped for good, if it did.
     """
 
-    pieces: tuple[Piece, ...]
+    segments: tuple[Segment, ...]
     joins: tuple[int, ...]
     outcome: Outcome
     last: int | None = None
     closed: bool = False
 
 
-def walk(
+def trace_across_regions(
     field: FrozenField,
     region: int,
     start: Array,
@@ -110,7 +110,7 @@ def walk(
     continuation: Continuation,
     *,
     bounded: bool = True,
-) -> Walk:
+) -> DirectedTrace:
     """Follow a curve of equilibria in one direction, through every interface on its way.
 
     Parameters
@@ -122,12 +122,12 @@ def walk(
     bounded : bool
         Whether interfaces bound the regions; False follows virtual equilibria.
     """
-    pieces: list[Piece] = []
+    segments: list[Segment] = []
     joins: list[int] = []
-    first = Piece(region, start[None], tangent[None])
+    first = Segment(region, start[None], tangent[None])
     periods = field.periods
     step = continuation.step
-    while len(pieces) < PIECES:
+    while len(segments) < SEGMENTS:
         signs = field.signs[region] if bounded else np.zeros(field.compiled.m)
         u, tangents, status, step, again = _traced(
             field, region, start, tangent, signs, window, continuation, step, closing=not joins
@@ -135,15 +135,15 @@ def walk(
         joined = bool(joins) or again
         back = _returned(region, u, tangents, first, window, periods) if joined else None
         if back is not None:
-            pieces.append(back)
-            return Walk(tuple(pieces), tuple(joins), _closed(), closed=True)
+            segments.append(back)
+            return DirectedTrace(tuple(segments), tuple(joins), _closed(), closed=True)
         met = None
         if status in (spaces.INTERFACE, spaces.SMALL_STEP):
             end = two_fold_ahead(field, region, u, window.scale)
             inside = end is not None and window.lower <= end[-1] <= window.upper
             if end is not None and inside and window.contains(end):
-                pieces.append(Piece(region, *cut_at_two_fold(u, tangents, end, window.scale)))
-                return Walk(tuple(pieces), tuple(joins), _two_fold(field, region, end))
+                segments.append(Segment(region, *cut_at_two_fold(u, tangents, end, window.scale)))
+                return DirectedTrace(tuple(segments), tuple(joins), _two_fold(field, region, end))
         if status == spaces.INTERFACE:
             met = _first_interface(field, region, u, tangents, window)
             if met is None:
@@ -156,26 +156,28 @@ def walk(
         if status in (spaces.RANGE, spaces.WINDOW):
             u, tangents, status = _cut(field, region, u, tangents, window, status)
         if status != spaces.INTERFACE or met is None:
-            pieces.append(Piece(region, u, tangents))
+            segments.append(Segment(region, u, tangents))
             closed = status == spaces.CLOSED
             if closed:
                 u[-1] = nearest_copy(first.u[0], u[-1], np.append(periods, 0.0))
                 tangents[-1] = first.tangents[0]
             outcome = _outcome(status, field, u[-1], window, continuation)
-            return Walk(tuple(pieces), tuple(joins), outcome, closed=closed)
+            return DirectedTrace(tuple(segments), tuple(joins), outcome, closed=closed)
         row, corner = met
         interface = _interface_of(field, region, row)
         end = _oriented(field.tangent(region, corner, window.weight)[0], tangents[-1], window)
         u[-1], tangents[-1] = corner, end
-        pieces.append(Piece(region, u, tangents))
+        segments.append(Segment(region, u, tangents))
         beyond, outcome = _enter(field, region, row, corner, window)
         if beyond is None:
             # at a two-fold the branch of pseudo-equilibria itself ends, at no boundary
             inner = outcome.code == "two-fold" and field.modes[region].sides is not None
             last = None if inner else interface
-            return Walk(tuple(pieces), tuple(joins), outcome, last=last)
+            return DirectedTrace(tuple(segments), tuple(joins), outcome, last=last)
         if window.leads_out(corner, beyond[1]):
-            return Walk(tuple(pieces), tuple(joins), _left(field, corner, window), last=interface)
+            return DirectedTrace(
+                tuple(segments), tuple(joins), _left(field, corner, window), last=interface
+            )
         joins.append(interface)
         region, tangent = beyond
         start = corner
@@ -183,8 +185,8 @@ def walk(
         away = np.abs(moved / window.scale).max()
         home = region == first.region and away < 1e-9
         if home:
-            return Walk(tuple(pieces), tuple(joins), _closed(), closed=True)
-    return Walk(tuple(pieces), tuple(joins), _full(field, start, continuation))
+            return DirectedTrace(tuple(segments), tuple(joins), _closed(), closed=True)
+    return DirectedTrace(tuple(segments), tuple(joins), _full(field, start, continuation))
 
 
 def _traced(
@@ -257,8 +259,8 @@ def _at_end(u: Array, window: Window) -> bool:
 
 
 def _returned(
-    region: int, u: Array, tangents: Array, first: Piece, window: Window, periods: Array
-) -> Piece | None:
+    region: int, u: Array, tangents: Array, first: Segment, window: Window, periods: Array
+) -> Segment | None:
     """The rows before a curve that left the first region passes its start again."""
     if region != first.region:
         return None
@@ -274,7 +276,7 @@ def _returned(
         return None
     stop = int(passed[0]) + 1
     start = nearest_copy(start, u[stop - 1], np.append(periods, 0.0))
-    return Piece(region, np.vstack([u[:stop], start]), np.vstack([tangents[:stop], direction]))
+    return Segment(region, np.vstack([u[:stop], start]), np.vstack([tangents[:stop], direction]))
 
 
 def _first_interface(
@@ -283,8 +285,8 @@ def _first_interface(
     """The switching function met first on the last step, with the point where it vanishes."""
     before, after = u[-2], u[-1]
     signs = field.signs[region]
-    _, _, h0, _ = field.at(region, before)
-    _, _, h1, _ = field.at(region, after)
+    _, _, h0, _ = field.evaluate(region, before)
+    _, _, h1, _ = field.evaluate(region, after)
     length = float(np.linalg.norm((after - before) / window.scale))
     best: tuple[float, int, Array] | None = None
     for k in np.flatnonzero(signs * h1 < 0):
@@ -303,7 +305,7 @@ def on_interface(
     return field.refined(region, guess, window.scale, row=interface)
 
 
-def beside(
+def on_normal_plane(
     field: FrozenField, region: int, point: Array, normal: Array, guess: Array, window: Window
 ) -> Located:
     """Where the curve meets the plane through a point with a given normal."""
@@ -323,7 +325,7 @@ def _enter(
     sides = field.modes[region].sides
     if sides is None or row < len(field.interfaces):
         return _cross(field, region, row, corner, window)
-    _, _, h, slopes = field.at(region, corner)
+    _, _, h, slopes = field.evaluate(region, corner)
     size = np.abs(slopes) @ window.size(corner)
     if np.all(np.abs(h[-2:]) <= 1e-9 * size[-2:]):
         return None, _two_fold(field, region, corner)
@@ -337,7 +339,7 @@ def _cross(
 ) -> tuple[tuple[int, Array] | None, Outcome]:
     """The same beyond an interface; where the rates jump there, sliding along it."""
     name, where = field.interfaces[interface], _where(field, corner)
-    _, _, h, gradients = field.at(region, corner)
+    _, _, h, gradients = field.evaluate(region, corner)
     size = np.abs(gradients * window.scale).max(axis=1)
     near = (np.abs(h) <= 1e-9 * size) & (field.signs[region] != 0)
     met = {interface, *np.flatnonzero(near[: len(field.interfaces)]).tolist()}
@@ -354,7 +356,7 @@ def _cross(
         return None, Outcome(
             "no region beyond", f"no region lies beyond {name} = 0 at {where}.", False
         )
-    rates, slopes = field.curve(beyond, corner)
+    rates, slopes = field.residual_and_jacobian(beyond, corner)
     bound = 1e-8 * (np.abs(slopes) @ window.size(corner))
     if np.all(np.abs(rates) <= bound):
         return _led_into(field, beyond, interface, interface, corner, window)
@@ -384,7 +386,7 @@ def _led_into(
 ) -> tuple[tuple[int, Array] | None, Outcome]:
     """A region and the tangent along which one of the functions that bound it grows."""
     tangent, single = field.tangent(beyond, corner, window.weight)
-    _, _, _, gradients = field.at(beyond, corner)
+    _, _, _, gradients = field.evaluate(beyond, corner)
     size = float(np.abs(gradients[row] * window.scale).max())
     ahead = field.signs[beyond, row] * float(gradients[row] @ tangent)
     if not single or abs(ahead) < 1e-9 * size:

@@ -1,4 +1,4 @@
-"""From the pieces of a walk to a Branch with its special points."""
+"""Assembly of traced segments into a Branch with its special points."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fastslow.continuation.location import crossing_tangents
 from fastslow.diagrams.curves.two_folds import two_fold_residual
 from fastslow.diagrams.field import FrozenField, Source
 from fastslow.diagrams.points.detection import Detected, special_points
-from fastslow.diagrams.trace.across_regions import Piece, Walk, Window
+from fastslow.diagrams.trace.across_regions import DirectedTrace, Segment, Window
 from fastslow.results.angles import principal
 from fastslow.results.base.immutable import read_only
 from fastslow.results.base.outcome import Outcome
@@ -30,31 +30,31 @@ KINDS = {1: "persistence", 0: "degenerate", -1: "non-smooth fold"}
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
-    """Both directions of a branch joined: pieces, the interfaces between, and both ends."""
+class EquilibriumCurve:
+    """Both directions of a branch: its segments, the interfaces between, and both ends."""
 
-    pieces: tuple[Piece, ...]
+    segments: tuple[Segment, ...]
     joins: tuple[int, ...]
     outcomes: tuple[Outcome, Outcome]
     ends: tuple[int | None, int | None]
     closed: bool
 
 
-def joined(backward: Walk | None, forward: Walk) -> Curve:
+def join_directions(backward: DirectedTrace | None, forward: DirectedTrace) -> EquilibriumCurve:
     """One curve from the walks in both directions from a start."""
     if backward is None:
-        return Curve(
-            forward.pieces, forward.joins, (forward.outcome, forward.outcome), (None, None), True
+        return EquilibriumCurve(
+            forward.segments, forward.joins, (forward.outcome, forward.outcome), (None, None), True
         )
-    left = [p.reversed() for p in reversed(backward.pieces)]
-    first, second = left[-1], forward.pieces[0]
-    middle = Piece(
+    left = [p.reversed() for p in reversed(backward.segments)]
+    first, second = left[-1], forward.segments[0]
+    middle = Segment(
         second.region,
         np.concatenate([first.u, second.u[1:]]),
         np.concatenate([first.tangents[:-1], second.tangents]),
     )
-    return Curve(
-        (*left[:-1], middle, *forward.pieces[1:]),
+    return EquilibriumCurve(
+        (*left[:-1], middle, *forward.segments[1:]),
         (*reversed(backward.joins), *forward.joins),
         (backward.outcome, forward.outcome),
         (backward.last, forward.last),
@@ -62,12 +62,12 @@ def joined(backward: Walk | None, forward: Walk) -> Curve:
     )
 
 
-def rising(curve: Curve) -> Curve:
+def oriented_upwards(curve: EquilibriumCurve) -> EquilibriumCurve:
     """The curve in the direction in which the parameter at its ends does not fall."""
-    if curve.closed or curve.pieces[0].u[0, -1] <= curve.pieces[-1].u[-1, -1]:
+    if curve.closed or curve.segments[0].u[0, -1] <= curve.segments[-1].u[-1, -1]:
         return curve
-    return Curve(
-        tuple(p.reversed() for p in reversed(curve.pieces)),
+    return EquilibriumCurve(
+        tuple(p.reversed() for p in reversed(curve.segments)),
         tuple(reversed(curve.joins)),
         (curve.outcomes[1], curve.outcomes[0]),
         (curve.ends[1], curve.ends[0]),
@@ -76,27 +76,31 @@ def rising(curve: Curve) -> Curve:
 
 
 def branch_of(
-    field: FrozenField, curve: Curve, window: Window, marks: Sequence[float], admissible: bool
+    field: FrozenField,
+    curve: EquilibriumCurve,
+    window: Window,
+    marks: Sequence[float],
+    admissible: bool,
 ) -> Branch:
     """The table of a curve, with its special points solved for and put among its rows."""
     special: list[SpecialPoint] = []
     at_row: list[int] = []
     tables: list[tuple[Array, Array, NDArray[np.complex128], int]] = []
     rows = 0
-    for number, walked in enumerate(curve.pieces):
-        found, piece, finite = special_points(field, walked, window, marks)
-        u, tangents = piece.u, piece.tangents
-        eigenvalues = field.with_infinite(piece.region, finite)
+    for number, raw in enumerate(curve.segments):
+        found, segment, finite = special_points(field, raw, window, marks)
+        u, tangents = segment.u, segment.tangents
+        eigenvalues = field.with_infinite(segment.region, finite)
         if found:
             largest = np.abs(finite).max(axis=-1, initial=0.0)
-            points = [_point(field, piece, d, window, float(largest[d.row])) for d in found]
+            points = [_point(field, segment, d, window, float(largest[d.row])) for d in found]
             places = [d.row + 1 for d in found]
             u = np.insert(u, places, [d.located.u for d in found], axis=0)
             tangents = np.insert(tangents, places, [p.tangent for p in points], axis=0)
             eigenvalues = np.insert(eigenvalues, places, [p.eigenvalues for p in points], axis=0)
             special += points
             at_row += [rows + place + k for k, place in enumerate(places)]
-        tables.append((u, tangents, eigenvalues, piece.region))
+        tables.append((u, tangents, eigenvalues, segment.region))
         rows += len(u)
         if number < len(curve.joins):
             special.append(_corner(field, curve, number))
@@ -151,7 +155,7 @@ def _centred(field: FrozenField, u: Array, window: Window) -> Array:
 def _special(
     field: FrozenField, code: str, region: int, u: Array, tangent: Array, **more: object
 ) -> SpecialPoint:
-    rates, _ = field.curve(region, u)
+    rates, _ = field.residual_and_jacobian(region, u)
     entries: dict[str, object] = {
         "label": code,
         "regions": (field.regions[region],),
@@ -171,17 +175,17 @@ def _special(
 
 
 def _point(
-    field: FrozenField, piece: Piece, detected: Detected, window: Window, beside: float
+    field: FrozenField, segment: Segment, detected: Detected, window: Window, beside: float
 ) -> SpecialPoint:
     """A special point; ``beside`` is the largest eigenvalue at the row before."""
     located = detected.located
-    tangent, single = field.tangent(piece.region, located.u, window.weight)
-    before = piece.tangents[detected.row]
+    tangent, single = field.tangent(segment.region, located.u, window.weight)
+    before = segment.tangents[detected.row]
     if not single:
         tangent = before
     elif (tangent * window.weight) @ before < 0:
         tangent = -tangent
-    eigenvalues = field.eigenvalues(piece.region, located.u)
+    eigenvalues = field.eigenvalues(segment.region, located.u)
     finite = np.isfinite(eigenvalues)
     if np.all(np.abs(eigenvalues[finite]) <= NEUTRAL * beside):
         # all rounding, as the only one at a fold: no unit is left by which to tell its sign
@@ -189,7 +193,7 @@ def _point(
     return _special(
         field,
         detected.code,
-        piece.region,
+        segment.region,
         located.u,
         tangent,
         eigenvalues=eigenvalues,
@@ -199,27 +203,29 @@ def _point(
         frequency=detected.frequency,
         lyapunov=detected.lyapunov,
         accuracy=located.correction,
-        switch=_switch(field, piece, detected, window),
+        switch=_switch(field, segment, detected, window),
     )
 
 
-def _switch(field: FrozenField, piece: Piece, detected: Detected, window: Window) -> Array | None:
+def _switch(
+    field: FrozenField, segment: Segment, detected: Detected, window: Window
+) -> Array | None:
     """At a branch point the tangent of the branch that crosses this one."""
     if detected.code != "BP":
         return None
     both = crossing_tangents(
-        lambda u: field.curve(piece.region, u), detected.located.u, window.scale
+        lambda u: field.residual_and_jacobian(segment.region, u), detected.located.u, window.scale
     )
     if both is None:
         return None
-    here = piece.tangents[detected.row]
+    here = segment.tangents[detected.row]
     return np.asarray(both[np.argmin(np.abs(both @ (here * window.weight)))])
 
 
-def _corner(field: FrozenField, curve: Curve, number: int) -> SpecialPoint:
-    """The boundary equilibrium between two pieces."""
+def _corner(field: FrozenField, curve: EquilibriumCurve, number: int) -> SpecialPoint:
+    """The boundary equilibrium between two segments."""
     # a closed branch may have its start on an interface
-    before, after = curve.pieces[number], curve.pieces[(number + 1) % len(curve.pieces)]
+    before, after = curve.segments[number], curve.segments[(number + 1) % len(curve.segments)]
     u, interface = before.u[-1], curve.joins[number]
     names = (field.regions[before.region], field.regions[after.region])
     sliding = [field.modes[p.region].sides is not None for p in (before, after)]
@@ -229,11 +235,13 @@ def _corner(field: FrozenField, curve: Curve, number: int) -> SpecialPoint:
         subtype = _filippov(field, active, interface, u)
     else:
         active = before.region
-        jacobians = np.array([field.curve(p.region, u)[1][:, : field.n] for p in (before, after)])
+        jacobians = np.array(
+            [field.residual_and_jacobian(p.region, u)[1][:, : field.n] for p in (before, after)]
+        )
         first, second = (_determinant_sign(j) for j in jacobians)
         subtype = KINDS[first * second]
         clarke = None if sliding[0] else ClarkePath(names, jacobians)
-    rates, _, h, _ = field.at(active, u)
+    rates, _, h, _ = field.evaluate(active, u)
     return _special(
         field,
         "BE",
@@ -268,8 +276,8 @@ def _filippov(field: FrozenField, region: int, interface: int, u: Array) -> str 
     beyond = field.neighbour(region, interface)
     if beyond is None:
         return "degenerate"
-    active, slopes, _, gradients = field.at(region, u)
-    other, _ = field.curve(beyond, u)
+    active, slopes, _, gradients = field.evaluate(region, u)
+    other, _ = field.residual_and_jacobian(beyond, u)
     matrix = slopes[:, : field.n]
     if _determinant_sign(matrix) == 0:
         return "degenerate"
@@ -282,41 +290,45 @@ def _filippov(field: FrozenField, region: int, interface: int, u: Array) -> str 
 
 
 def _with_ends(
-    field: FrozenField, curve: Curve, special: list[SpecialPoint], at_row: list[int], rows: int
+    field: FrozenField,
+    curve: EquilibriumCurve,
+    special: list[SpecialPoint],
+    at_row: list[int],
+    rows: int,
 ) -> tuple[list[SpecialPoint], list[int]]:
     """End points first and last, a boundary equilibrium where an interface was the end."""
     ends = []
-    for side, piece in ((0, curve.pieces[0]), (-1, curve.pieces[-1])):
-        u, tangent, interface = piece.u[side], piece.tangents[side], curve.ends[side]
+    for side, segment in ((0, curve.segments[0]), (-1, curve.segments[-1])):
+        u, tangent, interface = segment.u[side], segment.tangents[side], curve.ends[side]
         note = curve.outcomes[side].message
         if interface is None:
             outcome = curve.outcomes[side]
             reason = None if outcome.success else outcome.code
-            point = _special(field, "EP", piece.region, u, tangent, note=note, subtype=reason)
-            sides = field.modes[piece.region].sides
+            point = _special(field, "EP", segment.region, u, tangent, note=note, subtype=reason)
+            sides = field.modes[segment.region].sides
             if curve.outcomes[side].code == "two-fold" and sides is not None:
-                point = replace(point, residual=two_fold_residual(field, piece.region, u))
+                point = replace(point, residual=two_fold_residual(field, segment.region, u))
                 name = field.interfaces[sides.interface]
                 ends.append([replace(point, code="TF", label="TF", interface=name), point])
             else:
                 ends.append([point])
             continue
-        beyond = field.neighbour(piece.region, interface)
-        names: tuple[str, ...] = (field.regions[piece.region],)
+        beyond = field.neighbour(segment.region, interface)
+        names: tuple[str, ...] = (field.regions[segment.region],)
         if beyond is not None:
             names = (*names, field.regions[beyond])
         point = _special(
             field,
             "BE",
-            piece.region,
+            segment.region,
             u,
             tangent,
             regions=names,
             interface=field.interfaces[interface],
-            subtype=_filippov(field, piece.region, interface, u),
+            subtype=_filippov(field, segment.region, interface, u),
             note=note,
         )
-        ends.append([point, _special(field, "EP", piece.region, u, tangent, note=note)])
+        ends.append([point, _special(field, "EP", segment.region, u, tangent, note=note)])
     first, last = ends[0][::-1], ends[1]
     return (
         [*first, *special, *last],

@@ -26,8 +26,19 @@ from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.field import FrozenField, StoredFrozen, require_frozen
 from fastslow.diagrams.points.correcting import corrections, point_at
 from fastslow.diagrams.solve.seeds import Seeds
-from fastslow.diagrams.trace.across_regions import Piece, Window, beside, on_interface, walk
-from fastslow.diagrams.trace.assembly import Curve, branch_of, joined, rising
+from fastslow.diagrams.trace.across_regions import (
+    Segment,
+    Window,
+    on_interface,
+    on_normal_plane,
+    trace_across_regions,
+)
+from fastslow.diagrams.trace.assembly import (
+    EquilibriumCurve,
+    branch_of,
+    join_directions,
+    oriented_upwards,
+)
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.base.outcome import Outcome, with_ends
@@ -320,7 +331,7 @@ def _traced(
     window: Window,
     continuation: Continuation,
     bounded: bool,
-) -> Curve:
+) -> EquilibriumCurve:
     """The whole branch through a start."""
     region = field.regions.index(start.region)
     u = np.append(window.states.shifted(start.state), value)
@@ -328,14 +339,16 @@ def _traced(
     if bounded and _along_interface(field, region, np.array([u]), window).any():
         # rounding would end it everywhere: no side of the interface is left or entered
         curve = _traced(field, start, value, window, continuation, False)
-        rows = np.concatenate([piece.u for piece in curve.pieces])
+        rows = np.concatenate([segment.u for segment in curve.segments])
         if _along_interface(field, region, rows, window).any():
             return curve
-    forward = walk(field, region, u, tangent, window, continuation, bounded=bounded)
+    forward = trace_across_regions(field, region, u, tangent, window, continuation, bounded=bounded)
     if forward.closed:
-        return joined(None, forward)
-    backward = walk(field, region, u, -tangent, window, continuation, bounded=bounded)
-    return rising(joined(backward, forward))
+        return join_directions(None, forward)
+    backward = trace_across_regions(
+        field, region, u, -tangent, window, continuation, bounded=bounded
+    )
+    return oriented_upwards(join_directions(backward, forward))
 
 
 def _entering(
@@ -350,19 +363,21 @@ def _entering(
         u = np.append(start.state, value)
         tangent, _ = field.tangent(region, u, window.weight)
         for side in (1, -1):
-            for piece in walk(field, region, u, side * tangent, around, coarse).pieces:
-                states = window.states.shifted(piece.u[:, :-1])
+            for segment in trace_across_regions(
+                field, region, u, side * tangent, around, coarse
+            ).segments:
+                states = window.states.shifted(segment.u[:, :-1])
                 inside = window.states.contains(states, window.scale[:-1])
                 # the middle of every part inside
                 edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
                 for first, last in zip(edges[::2], edges[1::2], strict=True):
-                    row = piece.u[(first + last - 1) // 2]
-                    yield point_at(field, piece.region, row), float(row[-1])
+                    row = segment.u[(first + last - 1) // 2]
+                    yield point_at(field, segment.region, row), float(row[-1])
 
 
 def _along_interface(field: FrozenField, region: int, rows: Array, window: Window) -> Array:
     """Which of the interfaces that bound a region hold all of the points."""
-    _, _, values, slopes = field.at(region, rows)
+    _, _, values, slopes = field.evaluate(region, rows)
     near = np.abs(values) < INSIDE * np.abs(slopes * window.scale).max(axis=-1)
     return near.all(axis=0) & (field.signs[region] != 0)
 
@@ -386,7 +401,9 @@ def _switched(
         u = np.append(point.state, point.parameters[field.parameter])
         for step in (SWITCH, -SWITCH):
             guess = u + step * point.switch
-            near = beside(field, region, guess, point.switch * window.weight, guess, window)
+            near = on_normal_plane(
+                field, region, guess, point.switch * window.weight, guess, window
+            )
             value = float(near.u[-1])
             if not near.converged or not window.lower <= value <= window.upper:
                 continue
@@ -405,38 +422,44 @@ def _switched(
 
 
 def _branches(
-    field: FrozenField, curve: Curve, window: Window, marks: Sequence[float], admissible: bool
+    field: FrozenField,
+    curve: EquilibriumCurve,
+    window: Window,
+    marks: Sequence[float],
+    admissible: bool,
 ) -> list[Branch]:
     """The branch of a curve; of a virtual one, its parts outside the region."""
     if admissible:
         return [branch_of(field, curve, window, marks, True)]
     found = []
-    (piece,) = curve.pieces
-    inside = np.array([not field.virtual(piece.region, u, window.scale) for u in piece.u])
+    (segment,) = curve.segments
+    inside = np.array([not field.virtual(segment.region, u, window.scale) for u in segment.u])
     edges = np.flatnonzero(np.diff(inside)) + 1
     for rows in np.split(np.arange(len(inside)), edges):
         if inside[rows[0]] or len(rows) < 2:
             continue
-        part = Piece(piece.region, piece.u[rows], piece.tangents[rows])
+        part = Segment(segment.region, segment.u[rows], segment.tangents[rows])
         first, last = curve.outcomes
         if rows[0] > 0:
-            part = _led_to_interface(field, part, piece.u[rows[0] - 1], 0, window)
+            part = _led_to_interface(field, part, segment.u[rows[0] - 1], 0, window)
             first = ADMISSIBLE
         if rows[-1] < len(inside) - 1:
-            part = _led_to_interface(field, part, piece.u[rows[-1] + 1], -1, window)
+            part = _led_to_interface(field, part, segment.u[rows[-1] + 1], -1, window)
             last = ADMISSIBLE
-        cut = Curve((part,), (), (first, last), (None, None), curve.closed and not len(edges))
+        cut = EquilibriumCurve(
+            (part,), (), (first, last), (None, None), curve.closed and not len(edges)
+        )
         found.append(branch_of(field, cut, window, marks, False))
     return found
 
 
 def _led_to_interface(
-    field: FrozenField, part: Piece, inside: Array, end: int, window: Window
-) -> Piece:
-    """A virtual piece with the boundary equilibrium added at which it ends."""
+    field: FrozenField, part: Segment, inside: Array, end: int, window: Window
+) -> Segment:
+    """A virtual segment with the boundary equilibrium added at which it ends."""
     outside = part.u[end]
-    _, _, h0, _ = field.at(part.region, outside)
-    _, _, h1, _ = field.at(part.region, inside)
+    _, _, h0, _ = field.evaluate(part.region, outside)
+    _, _, h1, _ = field.evaluate(part.region, inside)
     bounding = field.signs[part.region] != 0
     for interface in np.flatnonzero((h0 * h1 < 0) & bounding):
         share = h0[interface] / (h0[interface] - h1[interface])
@@ -446,7 +469,7 @@ def _led_to_interface(
             place = 0 if end == 0 else len(part.u)
             u = np.insert(part.u, place, corner.u, axis=0)
             tangents = np.insert(part.tangents, place, part.tangents[end], axis=0)
-            return Piece(part.region, u, tangents)
+            return Segment(part.region, u, tangents)
     return part
 
 

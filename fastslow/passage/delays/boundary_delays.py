@@ -248,7 +248,7 @@ def _linear_legs(site: Site, drift: Drift, way: Approach, stop: Event) -> tuple[
         linear &= site.affine(region)
         flow = _flow(site, drift, region)
         rows = np.zeros((count + 1, n + 3))
-        _, _, heights, gradients = field.at(region, site.u)
+        _, _, heights, gradients = field.evaluate(region, site.u)
         rows[:count, : n + 1] = field.signs[region, :count, None] * gradients[:count]
         rows[:count, -1] = field.signs[region, :count] * heights[:count]
         if stop.level == TURN:
@@ -279,7 +279,7 @@ def _linear_legs(site: Site, drift: Drift, way: Approach, stop: Event) -> tuple[
 
 def _flow(site: Site, drift: Drift, region: int) -> LinearFlow:
     """The rates of a region linearised at the point, with a drift."""
-    rates, slopes, _, _ = site.field.at(region, site.u)
+    rates, slopes, _, _ = site.field.evaluate(region, site.u)
     by_state = np.array([drift.by_state.get(name, 0.0) for name in site.field.model.states])
     # at an equilibrium of the region rounding is all there is
     rounding = 1e-12 * (np.abs(slopes) @ np.abs(site.u))
@@ -422,7 +422,7 @@ def approach_of(site: Site, drift: Drift) -> Approach:
         if np.abs(values).min() <= 1e-10 * np.abs(values).max(initial=0.0):
             continue
         first = np.linalg.solve(-jacobian, slope)
-        _, _, _, gradients = field.at(behind, site.u)
+        _, _, _, gradients = field.evaluate(behind, site.u)
         inward = np.zeros(n + 3)
         inward[: n + 1] = field.signs[behind, k] * gradients[k]
         speed = float(inward[:n] @ first + inward[n]) * drift.rate
@@ -476,7 +476,7 @@ def _normalised(site: Site, p: Array, q: Array, way: Approach) -> tuple[Array, A
 def _far_side(site: Site, way: Approach, q: Array) -> tuple[int, float, Array]:
     """The next interface along the continuum, how far it is, and its function, positive inside."""
     field, n = site.field, site.n
-    _, _, heights, gradients = field.at(way.behind, site.u)
+    _, _, heights, gradients = field.evaluate(way.behind, site.u)
     found: list[tuple[float, int]] = []
     for j in range(len(field.interfaces)):
         along = float(gradients[j, :n] @ q)

@@ -137,7 +137,7 @@ class CriticalMode:
 
     def _slopes(self, region: int, state: Array, value: float) -> tuple[Array, Array]:
         assert self.site is not None
-        _, slopes, _, _ = self.site.field.at(region, np.append(state, value))
+        _, slopes, _, _ = self.site.field.evaluate(region, np.append(state, value))
         n = self.site.n
         return slopes[:, :n] * self.unit / self.unit[:, None], slopes[:, n] / self.unit
 

@@ -88,7 +88,7 @@ def _form(mode: CriticalMode, site: Site) -> Form | None:
     scale = float(np.ptp(mode.before.diagram.over))
 
     def slopes(y: Array, mu: float) -> tuple[Array, Array]:
-        _, table, _, _ = site.field.at(region, u + np.append(y * unit, mu))
+        _, table, _, _ = site.field.evaluate(region, u + np.append(y * unit, mu))
         return table[:, :n] * unit / unit[:, None], table[:, n] / unit
 
     jacobian, by_parameter = slopes(np.zeros(n), 0.0)

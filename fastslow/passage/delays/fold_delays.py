@@ -301,7 +301,7 @@ def _past(site: Site, form: FoldForm, y: float) -> Array:
 def _inside(site: Site, state: Array) -> bool:
     """Whether a state at the fold's parameter is in the region of the fold."""
     region, count = site.region(site.point.regions[0]), len(site.field.interfaces)
-    _, _, heights, _ = site.field.at(region, np.append(state, site.u[-1]))
+    _, _, heights, _ = site.field.evaluate(region, np.append(state, site.u[-1]))
     return bool((site.field.signs[region, :count] * heights[:count] >= 0.0).all())
 
 

@@ -71,7 +71,7 @@ class Site:
 
     def slopes(self, region: int) -> tuple[Array, Array]:
         """Jacobian (n, n) and derivative by the parameter (n,) of a region's rates."""
-        _, slopes, _, _ = self.field.at(region, self.u)
+        _, slopes, _, _ = self.field.evaluate(region, self.u)
         return slopes[:, : self.n], slopes[:, self.n]
 
     def mixed(self, region: int) -> Array:

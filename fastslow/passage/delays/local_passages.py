@@ -111,7 +111,7 @@ def quasi_static(site: Site, drift: Drift, region: int, mu: float, guess: Array)
     y, n = guess.copy(), site.n
     jacobian = np.empty((n, n))
     for _ in range(60):
-        rates, slopes, _, _ = site.field.at(region, site.u + np.append(y, mu))
+        rates, slopes, _, _ = site.field.evaluate(region, site.u + np.append(y, mu))
         jacobian = slopes[:, :n]
         try:
             step = np.linalg.solve(jacobian, -rates)
@@ -122,7 +122,7 @@ def quasi_static(site: Site, drift: Drift, region: int, mu: float, guess: Array)
             return None
         if (np.abs(step) <= 1e-14 * (np.abs(y) + site.unit)).all():
             break
-    _, slopes, heights, _ = site.field.at(region, site.u + np.append(y, mu))
+    _, slopes, heights, _ = site.field.evaluate(region, site.u + np.append(y, mu))
     count = len(site.field.interfaces)
     if (site.field.signs[region, :count] * heights[:count] < 0).any():
         return None

@@ -217,7 +217,7 @@ def _starts(site: Site, laws: list[Law], start: float | None) -> list[tuple[floa
         across, sheet = branch.parameter[rows][order], branch.state[rows][order]
         guess = np.array([np.interp(value, across, sheet[:, k]) for k in range(site.n)])
         corrected = _corrected(site, diagram, region, guess, value)
-        _, slopes, _, _ = site.field.at(site.region(region), np.append(corrected, value))
+        _, slopes, _, _ = site.field.evaluate(site.region(region), np.append(corrected, value))
         jacobian, slope = slopes[:, : site.n], slopes[:, site.n]
         lag = np.linalg.solve(jacobian, np.linalg.solve(jacobian, slope)) * law.rate
         found.append((value, corrected - lag))

@@ -159,7 +159,7 @@ def _modes(slow: SlowQuantity, course: Course) -> NDArray[np.complex128]:
             continue
         on = rows[branch.region[rows] == name]
         points = np.column_stack([branch.state[on], branch.parameter[on]])
-        jacobians = field.at(field.regions.index(name), points)[1][:, :, : field.n]
+        jacobians = field.evaluate(field.regions.index(name), points)[1][:, :, : field.n]
         jacobians = jacobians[np.isfinite(jacobians).all(axis=(1, 2))]
         found.append(np.linalg.eig(jacobians)[1].astype(complex))
     return np.concatenate(found)

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
-from fastslow.plot.layout.covering import at_draw, pixels_of, projected
+from fastslow.plot.layout.occupancy import on_draw, pixels_of, projected
 from fastslow.plot.layout.style import root
 
 Values = NDArray[np.float64]
@@ -73,7 +73,7 @@ def draw_heads(line: Line2D, rows: Sequence[int]) -> tuple[Annotation, ...]:
         head.set_in_layout(False)
         drawn.append(head)
     if places.shape[1] == 3 and drawn:
-        at_draw(ax, lambda _: _turn(ax, drawn, places[ends]))
+        on_draw(ax, lambda _: _turn(ax, drawn, places[ends]))
     return tuple(drawn)
 
 

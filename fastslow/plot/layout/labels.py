@@ -14,13 +14,13 @@ from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox, IdentityTransform
 
 from fastslow.plot.layout.bands import Bands, fit_bands
-from fastslow.plot.layout.covering import (
+from fastslow.plot.layout.occupancy import (
     FAINT,
     Points,
-    at_draw,
     box_of,
-    covered,
-    overlaid,
+    occupied_pixels,
+    on_draw,
+    overlap_cost,
     projected,
 )
 from fastslow.plot.layout.style import BLACK, GREY, SMALL, root
@@ -80,7 +80,7 @@ def place(
     tags : sequence of Annotation
         From `tag`.
     taken : sequence of Artist
-        What else must not be covered, e.g. a legend of the figure.
+        Further artists that must not be covered, e.g. a legend of the figure.
     bands : sequence of Bands
         Whose names are moved too, along and within their regions.
     """
@@ -92,7 +92,7 @@ def place(
     leaders.set_in_layout(False)
     if tags:
         ax.add_artist(leaders)
-    at_draw(ax, lambda renderer: _place(ax, tags, taken, bands, leaders, renderer))
+    on_draw(ax, lambda renderer: _place(ax, tags, taken, bands, leaders, renderer))
 
 
 def _place(
@@ -105,7 +105,7 @@ def _place(
 ) -> None:
     for drawn in bands:
         fit_bands(ax, drawn)
-    ink, scale = covered(ax), root(ax).dpi / 72.0
+    ink, scale = occupied_pixels(ax), root(ax).dpi / 72.0
     whole = ax.get_window_extent()
     frame = whole.padded(-AIR * scale)
     own = [*tags, *(name for drawn in bands for name in drawn.names)]
@@ -124,7 +124,7 @@ def _place(
         label.set_position((0.0, 0.0))
         centred = box_of(label, renderer)
         places = centred + np.tile(scale * offsets, 2)
-        cost = overlaid(places, ink, boxes, frame) + 0.5 * reach
+        cost = overlap_cost(places, ink, boxes, frame) + 0.5 * reach
         middles = 0.5 * (places[:, :2] + places[:, 2:])
         gaps = np.hypot(*np.moveaxis(anchors - middles[:, None], 2, 0))
         away = np.hypot(*(anchor - middles).T)
@@ -191,7 +191,7 @@ def _move(
     seat = name.get_transform()
     around = box_of(name, renderer) - np.tile(seat.transform(name.get_position()), 2)
     places = around + np.tile(seat.transform(spots), 2)
-    costs = overlaid(places + air, ink, boxes, frame)
+    costs = overlap_cost(places + air, ink, boxes, frame)
     best = int(np.argmin(costs))
     name.set_position((float(spots[best, 0]), float(spots[best, 1])))
     name.set_visible(bool(costs[best] < TAKEN))

@@ -11,7 +11,13 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.transforms import ScaledTranslation
 
-from fastslow.plot.layout.covering import Points, at_draw, covered, overlaid, settle
+from fastslow.plot.layout.occupancy import (
+    Points,
+    occupied_pixels,
+    on_draw,
+    overlap_cost,
+    run_layout,
+)
 from fastslow.plot.layout.style import SMALL, root
 
 Corner = Literal[
@@ -25,7 +31,7 @@ MOST = 0.5
 LOOK: dict[str, Any] = {"fontsize": SMALL, "handlelength": 2.2, "columnspacing": 1.0}
 
 
-def explained(
+def add_legend(
     ax: Axes,
     handles: Sequence[Artist],
     own: bool,
@@ -82,7 +88,7 @@ def legend_inside(ax: Axes, handles: Sequence[Artist], top: float = 1.0) -> Lege
     Limits that were set by hand are kept. Where there is no room at all the legend stands
     below the axes if the figure has a layout that makes room there; otherwise it is left out.
     """
-    settle(ax)
+    run_layout(ax)
     frame = ax.get_window_extent()
     found: list[tuple[float, int, float]] = []
     for columns in (1, 2, 3):
@@ -95,7 +101,7 @@ def legend_inside(ax: Axes, handles: Sequence[Artist], top: float = 1.0) -> Lege
     flat = min(found, key=lambda one: one[2], default=None)
     if free:
         columns = free[0][1]
-    elif ax.name != "3d" and flat is not None and _made_room(ax, flat[2], top):
+    elif ax.name != "3d" and flat is not None and _raised_limit(ax, flat[2], top):
         columns = flat[1]
     elif root(ax).get_layout_engine() is not None:
         return _outside(ax, handles)
@@ -103,7 +109,7 @@ def legend_inside(ax: Axes, handles: Sequence[Artist], top: float = 1.0) -> Lege
         return None
     legend = _inside(ax, handles, columns, top)
     _choose(ax, legend, top)
-    at_draw(ax, lambda _: _choose(ax, legend, top))
+    on_draw(ax, lambda _: _choose(ax, legend, top))
     return legend
 
 
@@ -144,7 +150,7 @@ def _costs(ax: Axes, legend: Legend, top: float) -> Points:
         middle = (frame.y0 + highest - box.height) / 2.0
         y0 = {"upper": highest - pad - box.height, "lower": frame.y0 + pad}.get(upright, middle)
         places.append([x0, y0, x0 + box.width, y0 + box.height])
-    return overlaid(np.array(places), covered(ax), np.empty((0, 4)), frame.padded(1.0))
+    return overlap_cost(np.array(places), occupied_pixels(ax), np.empty((0, 4)), frame.padded(1.0))
 
 
 def _choose(ax: Axes, legend: Legend, top: float) -> None:
@@ -153,7 +159,7 @@ def _choose(ax: Axes, legend: Legend, top: float) -> None:
         legend.set_loc(CORNERS[int(np.argmin(_costs(ax, legend, top)))])
 
 
-def _made_room(ax: Axes, height: float, top: float) -> bool:
+def _raised_limit(ax: Axes, height: float, top: float) -> bool:
     """Raise the upper limit by the height of a legend, if that may be and is not too much."""
     part = (height + 2.0 * _pad(ax)) / ax.get_window_extent().height
     if part > MOST * top or not ax.get_autoscaley_on():

@@ -39,7 +39,7 @@ def draw_crossings(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> Line2D |
     return draw_dots(ax, at_times(lay, times, lay.run.states, state, *shown)) if met else None
 
 
-def at_moments(lay: Overlay, shown: Sequence[Quantity], moments: Any) -> list[Array]:
+def at_states(lay: Overlay, shown: Sequence[Quantity], moments: Any) -> list[Array]:
     """Quantities at moments, which know their fast states and the slow quantity."""
     state = np.array([[*m.state, m.value] for m in moments])
     names = (*lay.diagram.states, lay.parameter)
@@ -54,7 +54,7 @@ def draw_transitions(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> tuple[
         if met:
             filled = marker in "*PX"
             drawn += ax.plot(
-                *at_moments(lay, shown, met),
+                *at_states(lay, shown, met),
                 linestyle="none",
                 marker=marker,
                 markersize=7.0 if marker == "*" else 5.5,
@@ -72,7 +72,7 @@ def draw_turning(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> Line2D | N
     if not lay.turning:
         return None
     (line,) = ax.plot(
-        *at_moments(lay, shown, lay.turning),
+        *at_states(lay, shown, lay.turning),
         linestyle="none",
         marker="|",
         markersize=9.0,

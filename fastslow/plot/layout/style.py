@@ -111,7 +111,7 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def dressed(ax: Axes) -> Axes:
+def styled_axes(ax: Axes) -> Axes:
     """Axes of our own figures: small text, thin frame."""
     ax.tick_params(labelsize=SMALL, width=0.6, length=2.5)
     ax.xaxis.label.set_fontsize(TEXT)
@@ -180,7 +180,7 @@ def axes_for(
     figure = new_figure(across, height * MM * (across / COLUMN) ** 0.4)
     if space:
         return figure.add_subplot(projection="3d")
-    axes = dressed(figure.add_subplot())
+    axes = styled_axes(figure.add_subplot())
     axes.locator_params(axis="x", nbins=6 if across < 1.5 * COLUMN else 10)
     return axes
 
@@ -225,7 +225,7 @@ def dot_look(code: str, size: float = 4.5) -> dict[str, Any]:
     }
 
 
-def widen(ax: Axes) -> None:
+def widen_limits(ax: Axes) -> None:
     """Keep points that agree to rounding from filling the axes with their noise."""
     box = ax.dataLim
     limits: list[Any] = [(box.intervalx, ax.set_xlim), (box.intervaly, ax.set_ylim)]
@@ -288,22 +288,22 @@ def save(figure: Figure, path: str | Path, dpi: float = 300) -> Path:
     target = Path(path)
     ending = target.suffix.removeprefix(".").lower()
     word("figure format", sorted(figure.canvas.get_supported_filetypes()))("path", ending)
-    write_file(target, printed(figure, ending, dpi))
+    write_file(target, rendered(figure, ending, dpi))
     return target
 
 
-def printed(figure: Figure, ending: str, dpi: float) -> bytes:
+def rendered(figure: Figure, ending: str, dpi: float) -> bytes:
     """A figure in a format, laid out for it and drawn once."""
     stream = BytesIO()
     # Matplotlib 3.11 looks up under "ps" how many characters a font in PDF may hold
     fonts = rc_context({"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "none"})
-    with fonts, _laid_out(figure, ending, dpi):
+    with fonts, _layout_fixed(figure, ending, dpi):
         figure.savefig(stream, format=ending, dpi=dpi)
     return stream.getvalue()
 
 
 @contextmanager
-def _laid_out(figure: Figure, ending: str, dpi: float) -> Iterator[None]:
+def _layout_fixed(figure: Figure, ending: str, dpi: float) -> Iterator[None]:
     """Lay a figure out for a format, and keep that from being done anew.
 
     Matplotlib draws a figure with a layout twice when it saves it, the first time to lay

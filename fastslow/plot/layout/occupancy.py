@@ -31,7 +31,7 @@ MARKER = 10.0
 FAINT = "fastslow faint"
 
 
-class Settler(Artist):
+class LayoutArtist(Artist):
     """Runs a step of the layout as soon as axes are drawn in another way than before.
 
     Invisible; whatever is to be placed by where other things are (labels, legends, the
@@ -58,16 +58,16 @@ class Settler(Artist):
             self.step(renderer)
 
 
-def at_draw(ax: Axes, step: Step) -> None:
+def on_draw(ax: Axes, step: Step) -> None:
     """Run a step of the layout whenever the axes are drawn in another way than before.
 
     The step receives the renderer: a text measures itself with the one that drew it last,
     whose resolution may be another.
     """
-    ax.add_artist(Settler(step))
+    ax.add_artist(LayoutArtist(step))
 
 
-def settle(ax: Axes) -> None:
+def run_layout(ax: Axes) -> None:
     """Give the axes of a figure, and what stands in them, their places.
 
     Axes that were given are left to be settled when their figure is drawn.
@@ -87,7 +87,7 @@ def pixels_of(ax: Axes, places: Points) -> Points:
     return np.asarray(ax.transData.transform(flat))
 
 
-def covered(ax: Axes) -> Points:
+def occupied_pixels(ax: Axes) -> Points:
     """Points in pixels along all curves and around all markers of the axes, and their weights.
 
     Returns
@@ -100,10 +100,10 @@ def covered(ax: Axes) -> Points:
     parts = [np.empty((0, 3))]
     for pixels, drawn, radius in _shapes(ax, scale):
         if drawn:
-            parts.append(_weighed(_dense(pixels, frame, step), 1.0))
+            parts.append(_weighted(_dense(pixels, frame, step), 1.0))
         if radius:
             near = np.isfinite(pixels).all(axis=1)
-            parts.append(_weighed(_rounded(pixels[near], radius), MARKER))
+            parts.append(_weighted(_rounded(pixels[near], radius), MARKER))
     ink = np.vstack(parts)
     # of several points in one little square the heaviest counts
     ink = ink[np.argsort(-ink[:, 2], kind="stable")]
@@ -113,7 +113,7 @@ def covered(ax: Axes) -> Points:
     return np.asarray(ink[inside][first])
 
 
-def _weighed(points: Points, weight: float) -> Points:
+def _weighted(points: Points, weight: float) -> Points:
     return np.column_stack([points, np.full(len(points), weight)])
 
 
@@ -170,7 +170,7 @@ def _rounded(pixels: Points, radius: float) -> Points:
     return (pixels[:, None] + np.vstack([[0.0, 0.0], around])).reshape(-1, 2)
 
 
-def overlaid(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Points:
+def overlap_cost(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Points:
     """How much would be covered by boxes, shape (K, 4) as x0, y0, x1, y1.
 
     Parameters

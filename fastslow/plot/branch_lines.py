@@ -65,7 +65,7 @@ def _words(point: SpecialPoint) -> str:
     return point.subtype or point.label
 
 
-def worth_a_marker(branches: Sequence[Branch]) -> list[SpecialPoint]:
+def marked_points(branches: Sequence[Branch]) -> list[SpecialPoint]:
     """Special points worth a marker: an end point only where the tracing could not go on."""
     return [p for branch in branches for p in _shown(branch)]
 
