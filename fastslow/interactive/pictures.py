@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from fastslow.interactive.drawing import draw_view
 from fastslow.interactive.picking import PickCurve
 from fastslow.interactive.views import View
-from fastslow.plot.layout.style import SMALL, VERMILION
+from fastslow.plot.layout.style import SMALL, VERMILION, styled_axes
 from fastslow.plot.layout.typesetting import plain
 
 #: Size of a figure of our own, in inches, and places of its axes in it.

@@ -16,7 +16,7 @@ from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import legend_below, legend_inside
-from fastslow.plot.layout.style import MM, PHASES, TEXT, inches, new_figure
+from fastslow.plot.layout.style import MM, PHASES, TEXT, inches, new_figure, styled_axes
 from fastslow.plot.layout.typesetting import as_given
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.passages import OverlayDrawing, draw_passage
