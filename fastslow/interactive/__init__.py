@@ -1,1 +1,1 @@
-"""Looking at a model with sliders, hover and click, in a notebook and as a page of its own."""
+"""Exploration of models with sliders and picking, in notebooks and HTML pages."""

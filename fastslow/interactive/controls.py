@@ -1,4 +1,4 @@
-"""An explorer in a notebook: sliders of ipywidgets beside a figure of ipympl."""
+"""Notebook controls of an explorer: ipywidgets sliders and an ipympl figure."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ if TYPE_CHECKING:
 #: Steps of a slider over its range.
 STEPS = 100
 
-#: A slider rests that has not moved for this long, in seconds.
-REST = 0.4
+#: Time after the last movement of a slider until the overlay is computed, in seconds.
+DEBOUNCE = 0.4
 
 
 def live_canvas(figure: Figure) -> Any:
-    """A canvas of ipympl for a figure, in place of the one that it has."""
+    """Replace the canvas of a figure by one of ipympl and return it."""
     kept = matplotlib.get_backend()
     backend = extra("ipympl.backend_nbagg", "interactive")
     if matplotlib.get_backend() != kept:
-        # its import makes it the backend of pyplot
+        # its import sets the backend of pyplot
         matplotlib.use(kept)
     canvas = backend.Canvas(figure)
-    # shows itself as part of the canvas
+    # the manager attaches itself to the canvas
     backend.FigureManager(canvas, 0)
     canvas.header_visible = False
     return canvas
 
 
 def step_of(slider: Slider) -> float:
-    """About a hundredth of a slider, such that its value lies on a step.
+    """Step of a slider, about a hundredth of its range, that includes its value.
 
     Examples
     --------
@@ -53,7 +53,7 @@ def step_of(slider: Slider) -> float:
 
 
 def brief(value: float, step: float) -> float:
-    """A value with no more decimals than its slider resolves.
+    """Round a value to the resolution of its slider.
 
     Examples
     --------
@@ -64,7 +64,7 @@ def brief(value: float, step: float) -> float:
 
 
 class Controls:
-    """Sliders, figure, and what was clicked, of an explorer.
+    """Sliders, figure and selected point of an explorer.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Controls:
     Attributes
     ----------
     box : ipywidgets.VBox
-        All of it.
+        Box with all widgets.
     sliders : dict
         Name to ipywidgets.FloatSlider.
     """
@@ -81,8 +81,8 @@ class Controls:
     def __init__(self, explorer: Explorer) -> None:
         widgets = extra("ipywidgets", "interactive")
         self._explorer = explorer
-        self._following = False
-        self._later: asyncio.TimerHandle | None = None
+        self._syncing = False
+        self._pending: asyncio.TimerHandle | None = None
         self.canvas = live_canvas(explorer.figure)
         shown = explorer.values
         self.sliders = {
@@ -101,36 +101,36 @@ class Controls:
         for slider in self.sliders.values():
             slider.observe(self._moved, names="value")
         self.words = widgets.HTML()
-        self.tell()
+        self.show_text()
         rows = widgets.Box(
             tuple(self.sliders.values()), layout=widgets.Layout(flex_flow="row wrap")
         )
         self.box = widgets.VBox((rows, self.canvas, self.words))
 
-    def tell(self, text: str = "") -> None:
-        """Show what was clicked, or what went wrong, and the call that reproduces the view."""
+    def show_text(self, text: str = "") -> None:
+        """Show the selected point or an error, and the call that reproduces the view."""
         above = f"<pre>{escape(text)}</pre>" if text else ""
         self.words.value = f"{above}<pre>{escape(self._explorer.call())}</pre>"
 
-    def follow(self) -> None:
-        """Put the sliders where the explorer is."""
-        self._following = True
+    def sync_sliders(self) -> None:
+        """Set the sliders to the values of the explorer."""
+        self._syncing = True
         try:
             for name, slider in self.sliders.items():
                 value = self._explorer.values[name]
-                # one that is being dragged is left to the hand that drags it
+                # not the slider that is being dragged
                 if abs(slider.value - value) > 0.5 * slider.step:
                     slider.value = value
         finally:
-            self._following = False
-        self.tell()
+            self._syncing = False
+        self.show_text()
 
     def _moved(self, change: Any) -> None:
-        if self._following:
+        if self._syncing:
             return
         (name,) = (name for name, slider in self.sliders.items() if slider is change.owner)
         if abs(change.new - self._explorer.values[name]) < 0.5 * change.owner.step:
-            # the browser's own rounding
+            # rounded by the browser
             return
         value = {name: brief(change.new, change.owner.step)}
         try:
@@ -138,14 +138,14 @@ class Controls:
         except RuntimeError:
             self._show(self._explorer.set, value)
             return
-        # while the slider moves without the measurement, which follows when it rests
-        if self._later is not None:
-            self._later.cancel()
+        # without the overlay while the slider moves
+        if self._pending is not None:
+            self._pending.cancel()
         self._show(self._explorer.glance, value)
-        self._later = loop.call_later(REST, self._show, self._explorer.set, {})
+        self._pending = loop.call_later(DEBOUNCE, self._show, self._explorer.set, {})
 
     def _show(self, how: Callable[[Mapping[str, float]], object], values: dict[str, float]) -> None:
         try:
             how(values)
         except FastSlowError as error:
-            self.tell(str(error))
+            self.show_text(str(error))

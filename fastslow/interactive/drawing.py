@@ -1,4 +1,4 @@
-"""A view drawn into axes: time series, phase portrait and overlay."""
+"""Drawing of a view: time series, phase portrait and overlay."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from fastslow.plot.motions import draw_motion, phase_portrait, time_series
 from fastslow.plot.passages import draw_passage
 from fastslow.plot.quantities import Quantity, along_run
 
-#: Where the label of a special point stands, in points from it.
-BESIDE = (13.0, 7.0)
+#: Offset of the label of a special point, in points (1/72 inch).
+LABEL_OFFSET = (13.0, 7.0)
 
 
 def draw_view(axes: Sequence[Axes], view: View) -> tuple[tuple[PickCurve, ...], list[Artist]]:
@@ -28,9 +28,9 @@ def draw_view(axes: Sequence[Axes], view: View) -> tuple[tuple[PickCurve, ...], 
     Returns
     -------
     tuple of PickCurve
-        What can be picked.
+        Curves that can be picked.
     list of Artist
-        What a legend shows.
+        Legend entries.
     """
     series, portrait, main = axes
     name, run, lay = view.setup.state, view.run, view.overlay
@@ -80,8 +80,8 @@ def draw_view(axes: Sequence[Axes], view: View) -> tuple[tuple[PickCurve, ...], 
     if below is not None:
         place(main, bands=[below.bands])
         for label in below.labels:
-            # to place them freely would take as long as all the rest
-            label.set_position(BESIDE)
+            # placing them without overlap would double the time
+            label.set_position(LABEL_OFFSET)
     return tuple(curves), handles
 
 
@@ -104,7 +104,7 @@ def _empty(ax: Axes, words: str) -> None:
 
 
 def _mark_value(ax: Axes, view: View) -> list[Any]:
-    """Where the run stands on a diagram over a parameter of its own."""
+    """Mark the value of the diagram's parameter in the run."""
     assert view.diagram is not None
     name = view.diagram.parameter
     value = view.model.parameters.get(name)

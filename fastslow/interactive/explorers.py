@@ -1,4 +1,4 @@
-"""Exploring a model: sliders beside a live figure."""
+"""Interactive exploration of a model: sliders and a live figure."""
 
 from __future__ import annotations
 
@@ -44,22 +44,21 @@ def explore(
     sliders: Mapping[Any, Sequence[float]] | None = None,
     figure: Figure | None = None,
 ) -> Explorer:
-    """Vary a model's parameters by sliders, beside its diagram, trajectory and overlay.
+    """Vary parameters of a model by sliders, with its diagram, trajectory and overlay.
 
-    In a notebook the last line of a cell shows the explorer (extra
-    ``interactive``); as a page that needs no Python it is written by
-    `Explorer.export`. The pointer shows the point that it is near, and a click
-    gives it as `Explorer.selected`.
+    A notebook displays the explorer as the last line of a cell (extra ``interactive``);
+    `Explorer.export` writes it as a page that needs no Python. Hover shows the nearest point,
+    and a click returns it as `Explorer.selected`.
 
     Parameters
     ----------
     model : Model
     parameter : str or Symbol, optional
-        What the diagram is over; by default the first slow quantity, in a model
-        without one the first parameter.
+        Continuation parameter of the diagram; by default the first slow quantity, or the
+        first parameter of a model without slow quantities.
     over : (float, float), optional
-        Its range; by default a little more than the run covers, for a parameter
-        from zero to twice its value.
+        Its range; by default that of the run with a margin, for a parameter from zero to
+        twice its value.
     start : sequence of float or mapping, optional
         Initial states, then slow states; by default zeros.
     t, periods
@@ -68,12 +67,12 @@ def explore(
     integration : Integration
         Error control of the run.
     state : str or Symbol, optional
-        What stands over time and over the parameter, by default the first state.
+        State drawn over time and over the parameter, by default the first.
     sliders : mapping, optional
         Parameter, or state for its initial value, to the range of its slider; by
         default every parameter has one, from zero to twice its value.
     figure : Figure, optional
-        Drawn into, e.g. ``plt.figure()`` for a window of its own.
+        Figure to draw into, e.g. ``plt.figure()`` for a separate window.
 
     Returns
     -------
@@ -82,9 +81,9 @@ def explore(
     Raises
     ------
     UnknownNameError
-        For a name that is not in the model.
+        For a name that does not occur in the model.
     ArgumentError
-        For a range, start or time span that is none.
+        For an invalid range, start or time span.
 
     Examples
     --------
@@ -109,20 +108,20 @@ def explore(
 
 
 class Explorer:
-    """A model with sliders, drawn live; made by `fastslow.explore`.
+    """A model with sliders and a live figure, returned by `fastslow.explore`.
 
     Attributes
     ----------
     model : Model
-        As it was given.
+        The model as given.
     setup : Setup
-        How views are computed.
+        Settings by which views are computed.
     sliders : tuple of Slider
     view : View
-        What is shown.
+        The current view.
     figure : Figure
     pointer : Pointer
-        Hover and click.
+        Picking in the figure.
     """
 
     def __init__(
@@ -136,7 +135,7 @@ class Explorer:
         self.pointer = Pointer(figure, (), self._clicked)
         self._widget: Any = None
         self._picked_in: View | None = None
-        # Jupyter handles some messages of widgets in a thread beside that of the cells
+        # Jupyter handles some messages of widgets in a second thread
         self._lock = threading.RLock()
         self.view = view_of(model, setup)
         if self.view.diagram is not None:
@@ -145,18 +144,18 @@ class Explorer:
 
     @property
     def selected(self) -> Pick | None:
-        """What was clicked last: ``selected.point`` is the point itself."""
+        """The last clicked point, ``selected.point``, with its description."""
         return self.pointer.selected
 
     def set(self, values: Mapping[Any, float] | None = None, /, **named: float) -> View:
-        """Show other values of parameters, or of initial states.
+        """Set values of parameters or initial states, and update the figure.
 
         Parameters
         ----------
         values : mapping, optional
             Parameter or state to value.
         **named : float
-            The same by name.
+            The same by keyword.
 
         Returns
         -------
@@ -165,7 +164,7 @@ class Explorer:
         Raises
         ------
         UnknownNameError
-            For a name that is neither.
+            For a name that is neither a parameter nor a state.
         ModelError
             For a value that is not a finite number.
         """
@@ -189,12 +188,12 @@ class Explorer:
             return self.view
 
     def glance(self, values: Mapping[Any, float]) -> View:
-        """As `set`, without measuring the run against the diagram: for a slider that moves."""
+        """Set values without computing the overlay, as while a slider moves."""
         return self._shown(values, measured=False)
 
     @property
     def values(self) -> dict[str, float]:
-        """Parameters and initial states as they are shown."""
+        """Current values of parameters and initial states."""
         begin = zip(self._states, self.view.setup.start, strict=True)
         return {**self.view.model.parameters, **dict(begin)}
 
@@ -203,7 +202,7 @@ class Explorer:
         return (*self.model.states, *self.model.slow_states)
 
     def call(self) -> str:
-        """Python source that reproduces what is shown, with the point if one was clicked in it."""
+        """Return Python source that reproduces the view and the selected point, if any."""
         text = self.view.call()
         if self.selected is None or self._picked_in is not self.view:
             return text
@@ -219,24 +218,24 @@ class Explorer:
         most: int = 500,
         progress: bool = True,
     ) -> Path:
-        """Write a page that shows the same in any browser, without Python or network.
+        """Write an HTML page with sliders and picking, which needs no Python or network.
 
-        Every combination of the sliders' values is computed now. Hovering and
-        clicking in the page find the rows of branches and runs, not places between.
+        All combinations of slider values are computed in advance. Picking in the page finds
+        rows of branches and runs, not points between them.
 
         Parameters
         ----------
         path : str or path
-            Where to, e.g. ``"gear.html"``.
+            Destination, e.g. ``"gear.html"``.
         sliders : mapping, optional
-            Name to a number of values evenly over its slider, or to the values
-            themselves; by default 11 of the first slider. Others stay where they are.
+            Name to a number of equidistant values or to the values themselves; by default
+            11 values of the first slider. Other sliders keep their current values.
         title : str
-            Stands above.
+            Heading of the page.
         source : str
-            Python source that makes the model, for the calls that the page shows.
+            Python source that defines the model, for the calls shown in the page.
         most : int
-            Most combinations that are computed.
+            Largest number of combinations.
         progress : bool
             Whether to show a progress bar.
 
@@ -247,9 +246,9 @@ class Explorer:
         Raises
         ------
         UnknownNameError
-            For a name without slider.
+            For a name without a slider.
         ArgumentError
-            For values that are none, or more combinations than ``most``.
+            For invalid values, or more combinations than ``most``.
         FileError
             If the file cannot be written.
         """
@@ -259,7 +258,7 @@ class Explorer:
 
     @property
     def widget(self) -> Any:
-        """Sliders and figure as an ipywidgets box.
+        """Return sliders and figure as an ipywidgets box.
 
         Raises
         ------
@@ -277,14 +276,14 @@ class Explorer:
         self.pointer.near = None
         self.figure.canvas.draw_idle()
         if self._widget is not None:
-            self._widget.follow()
+            self._widget.sync_sliders()
 
     def _clicked(self, found: Pick) -> None:
         self._picked_in = self.view
         if self._widget is None:
             print(self.call())
         else:
-            self._widget.tell(found.text)
+            self._widget.show_text(found.text)
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         try:

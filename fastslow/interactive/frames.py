@@ -1,4 +1,4 @@
-"""What a page shows at one set of values, as plain data."""
+"""Frames of a page: a view at one set of values, as plain data."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
-#: A page keeps about this many samples of a run, and every turning point.
+#: Approximate number of samples of a run in a page, in addition to all turning points.
 SAMPLES = 2500
 
 
 class Store:
-    """Arrays as text, each once.
+    """Store of arrays as text, without duplicates.
 
     Examples
     --------
@@ -53,9 +53,9 @@ class Store:
         self._known: dict[tuple[int, tuple[float, ...], str], int] = {}
 
     def add(self, table: Array) -> int:
-        """Keep a table (N, k) column by column, in 32 bits; its number.
+        """Store a table (N, k) by columns in 32 bits and return its number.
 
-        A column that varies little beside its size is kept as what it adds to its first value.
+        A column with small variation relative to its size is stored relative to its first value.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             first = np.where(np.ptp(table, axis=0) < 0.5 * np.abs(table[0]), table[0], 0.0)
@@ -69,7 +69,7 @@ class Store:
 
 
 def looks() -> dict[str, dict[str, Any]]:
-    """How everything in a page is drawn: the style of the figures.
+    """Return the style of all lines and markers of a page, that of the figures.
 
     Examples
     --------
@@ -82,7 +82,7 @@ def looks() -> dict[str, dict[str, Any]]:
         opacity = look.get("alpha", 1.0)
         made[kind] = {"color": BRANCH, "width": look["linewidth"], "dash": dash, "opacity": opacity}
         made[kind]["label"] = kind
-    # wide enough to be seen beneath a trajectory that follows it
+    # wide enough to remain visible under a trajectory that follows it
     made["followed"] = {**made["stable"], "width": 2.2}
     motion = {"color": MOTION, "width": 0.9, "dash": [], "opacity": 1.0}
     made["earlier"] = {**motion, "opacity": 0.4, "label": "earlier periods"}
@@ -102,13 +102,13 @@ def looks() -> dict[str, dict[str, Any]]:
 
 
 def frame_of(view: View, store: Store) -> dict[str, Any]:
-    """A view as plain data: its call, its tables, and three panels that draw them.
+    """Convert a view to plain data: its call, its tables, and three panels.
 
     Parameters
     ----------
     view : View
     store : Store
-        Where the numbers go.
+        Store of the arrays.
     """
     tables: list[dict[str, Any]] = []
     panels: list[dict[str, Any]] = []
@@ -164,7 +164,7 @@ def frame_of(view: View, store: Store) -> dict[str, Any]:
 
 
 def kept_rows(run: Trajectory) -> NDArray[np.intp]:
-    """Samples that a page keeps: evenly many, all turning points, all changes of region."""
+    """Rows of a run kept in a page: equidistant ones, turning points, changes of region."""
     count = len(run.t)
     every = np.arange(0, count, max(count // SAMPLES, 1))
     region = regions_at(run, run.t)
@@ -210,7 +210,7 @@ def _branch_table(branch: Branch, store: Store) -> dict[str, Any]:
 
 
 def _changes(words: Iterable[Any]) -> list[tuple[int, str]]:
-    """Rows at which a word changes, with the word from there on.
+    """Return the rows at which a text changes, each with the new text.
 
     Examples
     --------
@@ -225,22 +225,22 @@ def _changes(words: Iterable[Any]) -> list[tuple[int, str]]:
 
 
 def _panel(x: str, y: str, bands: list[dict[str, Any]]) -> dict[str, Any]:
-    names = [letters(x), letters(y)]
+    names = [greek(x), greek(y)]
     return {"x": x, "y": y, "names": names, "lines": [], "marks": [], "bands": bands}
 
 
-def letters(name: str) -> str:
-    """A name with the Greek letter that it spells.
+def greek(name: str) -> str:
+    """Replace the name of a Greek letter by the letter.
 
     Examples
     --------
-    >>> letters("omega"), letters("Omega_1"), letters("x")
+    >>> greek("omega"), greek("Omega_1"), greek("x")
     ('ω', 'Ω_1', 'x')
     """
     head, *below = name.split("_")
     if head in GREEK:
         size = "CAPITAL" if head[0].isupper() else "SMALL"
-        # Unicode spells the letter so
+        # the Unicode name of lambda
         word = head.upper().replace("LAMBDA", "LAMDA")
         head = lookup(f"GREEK {size} LETTER {word}")
     return "_".join([head, *below])
@@ -253,7 +253,7 @@ def _line(look: str, table: int, x: int, y: int, start: int, stop: int) -> dict[
 def _motion_lines(
     names: Sequence[str], x: str, y: str, last: int, count: int
 ) -> list[dict[str, Any]]:
-    """The run, the first table, what comes before its last period faintly."""
+    """Return the lines of the run, the first table, faint before its last period."""
     across, up = (["t", *names].index(name) for name in (x, y))
     lines = [_line("earlier", 0, across, up, 0, last + 1)] if last else []
     return [*lines, _line("trajectory", 0, across, up, last, count)]
@@ -284,7 +284,7 @@ def _special_marks(view: View) -> list[dict[str, Any]]:
     for branch in diagram.branches:
         for point in marked_points([branch]) if branch.admissible else ():
             k = numbers[point.label]
-            # branches that cross share their branch point: it is named once
+            # a branch point is on both branches: it is labelled once
             name = point.label, *np.round([point[diagram.parameter], *point.state], 9)
             found.setdefault(point.code, []).append(
                 [
@@ -313,7 +313,7 @@ def _transition_marks(view: View) -> list[dict[str, Any]]:
 
 
 def _bands(view: View, x: str, y: str) -> list[dict[str, Any]]:
-    """Interfaces that are a value of a state on an axis, and the regions between them."""
+    """Return interfaces at a constant value of a state on an axis, and the regions between them."""
     made = []
     values = {} if view.diagram is None else dict(view.diagram.interface_values)
     for axis, name in (("x", x), ("y", y)):
@@ -324,7 +324,7 @@ def _bands(view: View, x: str, y: str) -> list[dict[str, Any]]:
 
 
 def _regions(view: View, state: str, levels: list[float]) -> list[str]:
-    """The region between each two levels where all that is drawn agrees, else ""."""
+    """Return the region between each two levels if it is unique in the data, else ""."""
     heights, regions = [], []
     if view.run is not None and state in view.run.columns:
         heights.append(view.run[state])

@@ -1,15 +1,15 @@
 "use strict";
-// Draws the frames that Python computed: sliders choose one, the pointer asks for its points.
+// Draws precomputed frames: sliders select a frame, the pointer picks its points.
 
 const data = JSON.parse(document.getElementById("data").textContent);
 const SVG = "http://www.w3.org/2000/svg";
-const REACH = 14; // pixels within which a drawn point is meant
-const LEAD = 6; // a marker counts as nearer than a line by these
+const REACH = 14; // largest distance of a picked point, in pixels
+const LEAD = 6; // advantage of a marker over a line, in pixels
 const element = (id) => document.getElementById(id);
 
 // --- numbers -------------------------------------------------------------------------------
 
-// Columns of a stored table: what 32 bits add to the first value.
+// Columns of a stored table: 32-bit differences from the first value.
 const arrays = data.arrays.map((stored) => {
   let columns = null;
   return () => {
@@ -25,9 +25,9 @@ const arrays = data.arrays.map((stored) => {
 
 const shown = (value, digits = 6) => String(Number(value.toPrecision(digits))).replaceAll("-", "−");
 
-// Ticks at 1, 2 or 5 times a power of ten, about as many as fit.
-function ticks(low, high, room) {
-  const rough = (high - low) / Math.max(room, 1);
+// About `count` ticks at 1, 2 or 5 times a power of ten.
+function ticks(low, high, count) {
+  const rough = (high - low) / Math.max(count, 1);
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = power * ([1, 2, 5, 10].find((factor) => factor * power >= rough) || 10);
   const found = [];
@@ -37,7 +37,7 @@ function ticks(low, high, room) {
   return found;
 }
 
-// --- what is known of a row of a table -----------------------------------------------------
+// --- descriptions of table rows ------------------------------------------------------------
 
 function wordAt(table, row) {
   let word = "";
@@ -120,7 +120,7 @@ function stroke(look) {
   };
 }
 
-// Limits of one axis: those of the frame, or all that is drawn and a margin.
+// Limits of one axis: those of the frame, or the range of the data with a margin.
 function limits(panel, axis) {
   if (axis === "x" && panel.over) return panel.over;
   let [low, high] = [Infinity, -Infinity];
@@ -185,7 +185,7 @@ function drawLine(line, toX, toY, parent) {
   let pen = "M";
   for (let row = line.start; row < line.stop; row += 1) {
     const [x, y] = [toX(columns[line.x][row]), toY(columns[line.y][row])];
-    // what is not a number, or too far away to be drawn, breaks the line
+    // the line is broken at values that are not finite or far outside
     if (!(Math.abs(x) < 1e6 && Math.abs(y) < 1e6)) { pen = "M"; continue; }
     path += `${pen}${x.toFixed(2)} ${y.toFixed(2)}`;
     pen = "L";
@@ -255,7 +255,7 @@ function drawLegend(panels) {
 
 // --- the pointer ---------------------------------------------------------------------------
 
-// The drawn point nearest to a pointer over a panel, if one is near.
+// The drawn point nearest to the pointer, if it is near enough.
 function nearest(drawn, event) {
   const frame = drawn.svg.getBoundingClientRect();
   const scale = drawn.width / frame.width;
@@ -292,12 +292,12 @@ function choose(drawn, event) {
   make("circle", {
     cx: found.x, cy: found.y, r: 8, class: "ring", fill: "none", stroke: "#d55e00", "stroke-width": 2,
   }, drawn.svg);
-  tell();
+  showCall();
 }
 
-function tell() {
+function showCall() {
   const { frame, chosen } = state;
-  element("chosen").textContent = chosen ? chosen.text : "Point at a curve for its numbers; click to keep a point.";
+  element("chosen").textContent = chosen ? chosen.text : "Hover over a curve to see its values; click to select a point.";
   const point = chosen ? `\npoint = ${chosen.call}` : "";
   element("call").textContent = `${data.source}\n${frame.call}${point}`;
 }
@@ -305,7 +305,7 @@ function tell() {
 function copy() {
   document.getSelection().selectAllChildren(element("call"));
   const done = navigator.clipboard?.writeText(element("call").textContent);
-  // where the browser keeps the clipboard from pages, the text is at least selected
+  // if the browser denies access to the clipboard, the text is at least selected
   (done || Promise.reject()).catch(() => document.execCommand("copy"));
 }
 
@@ -314,7 +314,7 @@ function copy() {
 const state = { frame: null, drawn: [], chosen: null, at: data.sliders.map((slider) => slider.at) };
 
 function show() {
-  // frames are stored with the last slider turning fastest
+  // the last slider varies fastest in the order of the frames
   const index = data.sliders.reduce((sum, slider, k) => sum * slider.values.length + state.at[k], 0);
   state.frame = data.frames[index];
   state.chosen = null;
@@ -323,7 +323,7 @@ function show() {
     for (const line of panel.lines) line.tableOf = state.frame.tables[line.table];
   }
   draw();
-  tell();
+  showCall();
 }
 
 function draw() {
@@ -355,17 +355,17 @@ function addSlider(slider, k) {
   const output = document.createElement("output");
   name.textContent = slider.label;
   Object.assign(input, { type: "range", min: 0, max: slider.values.length - 1, step: 1, value: slider.at });
-  const tellValue = () => {
+  const showValue = () => {
     const text = shown(slider.values[state.at[k]], 5);
     output.textContent = text;
     input.setAttribute("aria-valuetext", `${slider.label} = ${text}`);
   };
   input.addEventListener("input", () => {
     state.at[k] = Number(input.value);
-    tellValue();
+    showValue();
     show();
   });
-  tellValue();
+  showValue();
   label.append(name, input, output);
   element("sliders").append(label);
 }
@@ -375,7 +375,7 @@ data.sliders.forEach(addSlider);
 element("copy").addEventListener("click", copy);
 let width = 0;
 new ResizeObserver(() => {
-  // only a change of width asks for a new drawing
+  // redraw only after a change of width
   if (document.body.clientWidth !== width) {
     width = document.body.clientWidth;
     draw();

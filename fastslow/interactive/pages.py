@@ -1,4 +1,4 @@
-"""An explorer as a page of HTML: computed beforehand, drawn by the browser."""
+"""Export of an explorer as an HTML page: computed in advance, drawn by the browser."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from tqdm import tqdm
 
 from fastslow.disk import write_text
 from fastslow.errors import ArgumentError, FastSlowError, unknown_name
-from fastslow.interactive.frames import Store, frame_of, letters, looks
+from fastslow.interactive.frames import Store, frame_of, greek, looks
 from fastslow.interactive.sliders import VALUES, Slider
 from fastslow.interactive.views import at_start, view_of
 
 if TYPE_CHECKING:
     from fastslow.interactive.explorers import Explorer
 
-#: Stands for the source of a model that is not given.
+#: Placeholder for the source of the model.
 SOURCE = """import fastslow as fs
 
 # model: the fs.Model with the equations above"""
@@ -52,14 +52,14 @@ def page_data(
     most: int = 500,
     progress: bool = False,
 ) -> dict[str, Any]:
-    """Everything that a page shows; a frame for every combination of values."""
-    chosen = _chosen(explorer.sliders, sliders)
+    """Compute the data of a page, with a frame for each combination of values."""
+    chosen = _selected_sliders(explorer.sliders, sliders)
     values = {slider.name: slider.values(wanted).tolist() for slider, wanted in chosen}
     count = math.prod(map(len, values.values()))
     if count > most:
         each = " × ".join(f"{len(v)} of {name}" for name, v in values.items())
         raise ArgumentError(
-            f"the page would hold {count} frames ({each}), more than most={most}; give fewer "
+            f"the page would have {count} frames ({each}), more than most={most}; give fewer "
             "values, as in sliders={'" + next(iter(values)) + "': 5}, or raise most="
         )
     store = Store()
@@ -72,7 +72,7 @@ def page_data(
         "source": source or SOURCE,
         "sliders": [
             {
-                "label": letters(slider.label),
+                "label": greek(slider.label),
                 "values": values[slider.name],
                 "at": _closest(values[slider.name], now[slider.name]),
             }
@@ -85,7 +85,7 @@ def page_data(
 
 
 def page_text(title: str, data: Mapping[str, Any]) -> str:
-    """The page as HTML, nothing in it taken from elsewhere.
+    """Return the page as self-contained HTML.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def page_text(title: str, data: Mapping[str, Any]) -> str:
     folder = files("fastslow.interactive")
     parts = {
         "title": escape(title),
-        # in a script no text may look like a tag
+        # no text in a script may resemble a tag
         "data": json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
         "script": (folder / "page.js").read_text(encoding="utf-8"),
     }
@@ -103,10 +103,10 @@ def page_text(title: str, data: Mapping[str, Any]) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], template)
 
 
-def _chosen(
+def _selected_sliders(
     sliders: tuple[Slider, ...], wanted: Mapping[Any, Any] | None
 ) -> list[tuple[Slider, Any]]:
-    """The sliders that the page has, with what is wanted of each."""
+    """Return the sliders of the page, each with its number of values or its values."""
     if wanted is None:
         return [(slider, VALUES) for slider in sliders[:1]]
     known = {slider.name: slider for slider in sliders}
@@ -117,7 +117,7 @@ def _chosen(
 
 
 def _frame(explorer: Explorer, values: Mapping[str, float], store: Store) -> dict[str, Any]:
-    """A frame at some values, beside those that the explorer shows."""
+    """Compute a frame at some values, keeping the other values of the explorer."""
     names = (*explorer.model.states, *explorer.model.slow_states)
     begin = {name: explorer.values[name] for name in names}
     starts = {name: value for name, value in values.items() if name in begin}
@@ -127,7 +127,7 @@ def _frame(explorer: Explorer, values: Mapping[str, float], store: Store) -> dic
     try:
         return frame_of(view_of(explorer.model, setup, changes), store)
     except FastSlowError as error:
-        # a model that does not exist at these values: the page says so there
+        # no model at these values: the frame shows the error
         return {"call": "", "outcomes": [str(error)], "tables": [], "panels": []}
 
 

@@ -1,4 +1,4 @@
-"""Which point of a drawing is meant by a place on the screen, and what is known of it."""
+"""Picking: the point of a drawing nearest to a screen position, with its description."""
 
 from __future__ import annotations
 
@@ -37,29 +37,29 @@ from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
-#: What is drawn farther away than this, in points (1/72 inch), is not meant.
+#: Largest distance of a picked point, in points (1/72 inch).
 REACH = 12.0
 
-#: A marker counts as nearer than a line by this many points.
+#: Advantage of a marker over a line, in points.
 LEAD = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class Pick:
-    """The point of a drawing that is meant.
+    """A picked point of a drawing.
 
     Parameters
     ----------
     point : Equilibrium, SpecialPoint, Crossing, Transition or StatePoint
     ax : Axes
     x, y : float
-        Where it is drawn.
+        Position in data coordinates.
     distance : float
-        From the place asked for, in points (1/72 inch).
+        Distance from the pointer, in points (1/72 inch).
     text : str
-        What is known of it, line by line.
+        Description, one property per line.
     call : str
-        Python source that gives it, of results named diagram, run and lay.
+        Python source that returns it, given results named diagram, run and lay.
     """
 
     point: Any
@@ -73,7 +73,7 @@ class Pick:
 
 @dataclass(frozen=True, eq=False)
 class PickCurve:
-    """Points in axes, and what a place along them stands for.
+    """Points or a line in axes that can be picked.
 
     Parameters
     ----------
@@ -81,9 +81,9 @@ class PickCurve:
     xy : ndarray, shape (N, 2)
         In data coordinates.
     joined : bool
-        Whether a line joins them; markers otherwise.
+        Whether a line joins the points; markers otherwise.
     found : callable
-        (row, part of the step after it) -> (point, source text).
+        (row, fraction of the following step) -> (point, source text).
     parameter : str
         What the horizontal axis of a diagram shows.
     """
@@ -96,19 +96,19 @@ class PickCurve:
 
 
 def curves_of(drawing: Any, result: Diagram | Trajectory | Overlay) -> tuple[PickCurve, ...]:
-    """Everything in a drawing that can be picked.
+    """Return the curves and markers of a drawing that can be picked.
 
     Parameters
     ----------
     drawing : DiagramDrawing, MotionDrawing, OverlayDrawing or PanelDrawing
-        As `fastslow.plot` returned it.
+        Drawing returned by `fastslow.plot`.
     result : Diagram, Trajectory or Overlay
-        What was drawn.
+        The result in the drawing.
 
     Raises
     ------
     ArgumentError
-        For another drawing, or a result that does not belong to it.
+        For any other drawing, or if the result is not the one drawn.
     """
     if isinstance(drawing, PanelDrawing) and isinstance(result, Overlay):
         parts = (drawing.time_series, drawing.phase_portrait)
@@ -123,25 +123,25 @@ def curves_of(drawing: Any, result: Diagram | Trajectory | Overlay) -> tuple[Pic
         return tuple(_motion_curves(drawing, result))
     raise ArgumentError(
         f"cannot pick in {class_of(drawing)} of {class_of(result)}; expected the "
-        "drawing of a diagram, a trajectory or an overlay in the plane, with what was drawn"
+        "drawing of a diagram, a trajectory or an overlay in the plane, and the result drawn"
     )
 
 
 def nearest_pick(curves: Iterable[PickCurve], ax: Axes, x: float, y: float) -> Pick | None:
-    """The drawn point nearest to a place on the screen.
+    """Return the drawn point nearest to a screen position.
 
     Parameters
     ----------
     curves : iterable of PickCurve
     ax : Axes
-        Where the place is.
+        Axes that contain the position.
     x, y : float
-        The place in pixels, as a Matplotlib event has it.
+        Position in pixels, as in a Matplotlib event.
 
     Returns
     -------
     Pick or None
-        None where nothing is drawn near.
+        None if nothing is drawn nearby.
     """
     place = np.array([x, y])
     points = 72.0 / root(ax).dpi
@@ -165,7 +165,7 @@ def nearest_pick(curves: Iterable[PickCurve], ax: Axes, x: float, y: float) -> P
 
 
 def _nearest(pixels: Array, place: Array, joined: bool) -> tuple[float, int, float]:
-    """Distance, row and part of the step after it, of the nearest drawn point."""
+    """Return distance, row and fraction of the following step of the nearest point."""
     with np.errstate(invalid="ignore", over="ignore"):
         if not joined or len(pixels) == 1:
             away = np.nan_to_num(np.hypot(*(pixels - place).T), nan=np.inf)
@@ -211,7 +211,7 @@ def _diagram_curves(drawing: DiagramDrawing, diagram: Diagram) -> Iterable[PickC
 
 
 def _on_branch(diagram: Diagram, branch: Branch) -> Callable[[int, float], tuple[Any, str]]:
-    """The equilibrium at a place along a branch, corrected where the model is attached."""
+    """Return the equilibrium at a position along a branch, corrected if the model is known."""
 
     def found(row: int, part: float) -> tuple[Equilibrium, str]:
         table = branch.points
@@ -224,7 +224,7 @@ def _on_branch(diagram: Diagram, branch: Branch) -> Callable[[int, float], tuple
 
 
 def run_curve(ax: Axes, run: Trajectory, *shown: Quantity) -> PickCurve:
-    """A run drawn over time or in the plane of two quantities."""
+    """Return the curve of a run over time or in the plane of two quantities."""
     return PickCurve(ax, np.column_stack(along_run(run, *shown)), True, _on_run(run))
 
 
@@ -258,7 +258,7 @@ def _at_crossings(ax: Axes, at: Array, run: Trajectory) -> PickCurve:
 
 
 def _on_run(run: Trajectory) -> Callable[[int, float], tuple[Any, str]]:
-    """The moment at a place along a trajectory: of its series where it kept them."""
+    """Return the state at a position along a trajectory, by dense output if available."""
 
     def found(row: int, part: float) -> tuple[StatePoint, str]:
         times = run.t

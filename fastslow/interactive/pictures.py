@@ -1,4 +1,4 @@
-"""The figure of an explorer: its axes stay, and what moves in them is drawn over them."""
+"""The figure of an explorer, redrawn over a stored background."""
 
 from __future__ import annotations
 
@@ -17,38 +17,38 @@ from fastslow.interactive.views import View
 from fastslow.plot.layout.style import SMALL, VERMILION, styled_axes
 from fastslow.plot.layout.typesetting import plain
 
-#: Size of a figure of our own, in inches, and places of its axes in it.
+#: Size of a new figure in inches, and positions of its axes.
 SIZE = (9.0, 5.0)
 PLACES = ((0.065, 0.6, 0.36, 0.34), (0.065, 0.115, 0.36, 0.34), (0.5, 0.235, 0.485, 0.705))
 
-#: Limits stay while a slider moves as long as what is drawn fills this part of them.
+#: While a slider moves the limits are kept if the data fill at least this fraction of them.
 FILLED = 0.7
 
-#: Nearer to a limit than this, in parts of the limits, there is no margin left, and ...
+#: Smallest margin between data and limits, as a fraction of the limits, and ...
 NEAR = 0.04
 
-#: ... this is added where limits have to change.
-ROOM = 0.15
+#: ... margin added where the limits change.
+MARGIN_ADDED = 0.15
 
 Limits = tuple[float, float]
 
 
 def own_figure() -> Figure:
-    """A figure of our own, outside pyplot."""
+    """Create a figure outside pyplot."""
     figure = Figure(figsize=SIZE, dpi=100)
     FigureCanvasAgg(figure)
     return figure
 
 
 class Backdrop(Artist):
-    """Axes, ticks, names and legend beneath what moves: kept as pixels until they change.
+    """Axes, ticks, labels and legend, stored as pixels until they change.
 
     Attributes
     ----------
     still : sequence of Artist
-        What is drawn by the backdrop alone, and hidden otherwise.
+        Artists drawn by the backdrop alone.
     state : list
-        All that they depend on, but for the size of the figure.
+        Everything they depend on except for the size of the figure.
     """
 
     def __init__(self) -> None:
@@ -60,11 +60,11 @@ class Backdrop(Artist):
         self.set_zorder(-1e9)
 
     def draw(self, renderer: Any) -> None:
-        """Lay down what was kept, or draw it and keep it, if the renderer keeps pixels."""
+        """Restore the stored pixels, or draw and store them if the renderer has pixels."""
         figure: Any = self.get_figure(root=True)
         limits = [(ax.get_xlim(), ax.get_ylim()) for ax in figure.axes]
         seen = [*self.state, limits, figure.dpi, figure.bbox.extents.tolist()]
-        # to draw without output, Matplotlib replaces the methods of the renderer
+        # Matplotlib replaces the methods of the renderer in a draw without output
         keeps = isinstance(renderer, RendererAgg) and "draw_path" not in vars(renderer)
         if keeps and seen == self._seen:
             renderer.restore_region(self._kept)
@@ -78,10 +78,10 @@ class Backdrop(Artist):
 
 
 class Picture:
-    """A figure in which views are drawn one after the other.
+    """A figure in which views are drawn in succession.
 
-    At rest a view is drawn as a whole, as into a new figure. While a slider moves, limits
-    change only when they must, and a backdrop keeps what depends on nothing else.
+    A single view is drawn as into a new figure. While a slider moves, the limits change only
+    if necessary, and a backdrop stores the unchanged artists.
 
     Parameters
     ----------
@@ -95,18 +95,18 @@ class Picture:
         self._explained: list[Any] = []
 
     def draw(self, view: View, *, moving: bool = False) -> tuple[PickCurve, ...]:
-        """Draw a view in place of what the figure shows, to be seen when that is drawn.
+        """Replace the contents of the figure by a view; visible after the next draw.
 
         Parameters
         ----------
         view : View
         moving : bool
-            Whether the next one will follow at once.
+            Whether a slider is moving.
 
         Returns
         -------
         tuple of PickCurve
-            What can be picked.
+            Curves that can be picked.
         """
         figure = self.figure
         if not self._axes or tuple(figure.axes) != self._axes:
@@ -117,7 +117,7 @@ class Picture:
             _empty(ax)
         curves, handles = draw_view(self._axes, view)
         if moving:
-            _hold(self._axes, before)
+            _keep_limits(self._axes, before)
         self._explain(handles, moving)
         for artist in (*figure.texts, *figure.artists):
             artist.remove()
@@ -136,7 +136,7 @@ class Picture:
         return curves
 
     def _explain(self, handles: Sequence[Any], moving: bool) -> None:
-        """A legend of handles; one that explains the same serves on while a slider moves."""
+        """Add a legend; while a slider moves an unchanged legend is kept."""
         explained = [(str(h.get_label()), np.ravel(h.get_linewidth()).tolist()) for h in handles]
         if moving and explained == self._explained:
             return
@@ -157,7 +157,7 @@ class Picture:
 
 
 def _empty(ax: Axes) -> None:
-    """Take everything out of axes, which are then as new ones are."""
+    """Reset axes to an empty state."""
     for artist in (*ax.lines, *ax.patches, *ax.collections, *ax.texts, *ax.artists):
         artist.remove()
     ax.relim()
@@ -165,10 +165,10 @@ def _empty(ax: Axes) -> None:
     ax.set_axis_on()
 
 
-def _hold(axes: Sequence[Axes], before: Sequence[Limits]) -> None:
-    """Keep the limits of all axes if they hold what is drawn and are not too wide for it.
+def _keep_limits(axes: Sequence[Axes], before: Sequence[Limits]) -> None:
+    """Keep the limits of all axes that contain the data and are not too wide for them.
 
-    Otherwise those that what is drawn has come near to, and would soon leave again, get room.
+    Limits that the data have come close to get an additional margin.
     """
     data = [data for ax in axes for data in (ax.dataLim.intervalx, ax.dataLim.intervaly)]
     wanted = _limits(axes)
@@ -179,12 +179,12 @@ def _hold(axes: Sequence[Axes], before: Sequence[Limits]) -> None:
     if not (held & (spans >= FILLED * np.ptp(kept, axis=1))).all():
         near = np.column_stack([low - kept[:, 0], kept[:, 1] - high]) < NEAR * spans[:, None]
         changed = near & (kept != wanted)
-        kept = np.array(wanted) + ROOM * spans[:, None] * changed * np.array([-1.0, 1.0])
+        kept = np.array(wanted) + MARGIN_ADDED * spans[:, None] * changed * np.array([-1.0, 1.0])
     setters = [set_limits for ax in axes for set_limits in (ax.set_xlim, ax.set_ylim)]
     for set_limits, (first, last) in zip(setters, kept.tolist(), strict=True):
         set_limits(first, last, auto=None)
 
 
 def _limits(axes: Sequence[Axes]) -> list[Limits]:
-    """Limits of axes, the horizontal ones of each first."""
+    """Return the limits of axes, horizontal before vertical."""
     return [limits for ax in axes for limits in (ax.get_xlim(), ax.get_ylim())]

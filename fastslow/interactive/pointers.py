@@ -1,4 +1,4 @@
-"""Hover and click on a drawing: what is near is shown, and given back."""
+"""Picking in figures: hover shows the nearest point, a click returns it."""
 
 from __future__ import annotations
 
@@ -27,31 +27,31 @@ def pick(
     *,
     on_click: Callable[[Pick], object] | None = None,
 ) -> Pointer:
-    """Show what a drawn point is when the pointer is near, and give it back on a click.
+    """Describe drawn points on hover, and return them on a click.
 
-    Works on every interactive backend of Matplotlib, in axes of ``plt.figure()``;
-    other figures become live in a notebook where the pointer is the last line of a
-    cell (extra ``interactive``). Equilibria between the rows of a branch are solved
-    for where the model is attached.
+    Works with the interactive backends of Matplotlib, in axes of ``plt.figure()``; other
+    figures become interactive in a notebook if the pointer is the last line of a cell (extra
+    ``interactive``). Equilibria between the rows of a branch are computed if the diagram has
+    its model.
 
     Parameters
     ----------
     drawing : DiagramDrawing, MotionDrawing, OverlayDrawing or PanelDrawing
-        As `fastslow.plot` returned it.
+        Drawing returned by `fastslow.plot`.
     result : Diagram, Trajectory or Overlay
-        What was drawn.
+        The result in the drawing.
     on_click : callable, optional
-        Called with the Pick of every click, which is `Pointer.selected` too.
+        Called with the Pick of each click, which is also `Pointer.selected`.
 
     Returns
     -------
     Pointer
-        To be kept: hovering ends with it.
+        Keep a reference; picking ends with the object.
 
     Raises
     ------
     ArgumentError
-        For another drawing, or a result that does not belong to it.
+        For any other drawing, or if the result is not the one drawn.
 
     Examples
     --------
@@ -78,16 +78,16 @@ class Pointer:
     ----------
     figure : Figure
     curves : sequence of PickCurve
-        What can be meant; may be replaced when the figure is drawn anew.
+        Curves that can be picked; may be replaced when the figure is redrawn.
     on_click : callable, optional
-        Called with every pick.
+        Called with each pick.
 
     Attributes
     ----------
     selected : Pick or None
-        What was clicked last.
+        The point clicked last.
     near : Pick or None
-        What the pointer is near to.
+        The point near the pointer.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class Pointer:
         ]
 
     def release(self) -> None:
-        """Stop listening."""
+        """Disconnect from the figure."""
         for number in self._connected:
             self.figure.canvas.mpl_disconnect(number)
         self._connected = []
@@ -135,7 +135,7 @@ class Pointer:
                 self._show()
         elif self.near is None or found.text != self.near.text:
             self._hide()
-            self._box = box_for(found)
+            self._box = tooltip_for(found)
             self._show()
         self.near = found
 
@@ -143,7 +143,7 @@ class Pointer:
         assert isinstance(event, MouseEvent)
         toolbar: Any = self.figure.canvas.toolbar
         found = self._found(event)
-        # a drag of the toolbar's zoom or pan is no click on a point
+        # a drag for zoom or pan is not a click on a point
         if found is None or event.button != 1 or (toolbar is not None and toolbar.mode):
             return
         self.selected = found
@@ -161,7 +161,7 @@ class Pointer:
         self._box = None
 
     def _drawn(self, _: Event) -> None:
-        """Keep what was drawn, without the box: to lay the next one over it is quick."""
+        """Store the canvas without the tooltip, so that the next tooltip needs no full redraw."""
         canvas: Any = self.figure.canvas
         self._beneath = canvas.copy_from_bbox(self.figure.bbox) if _blits(canvas) else None
         if self._box is not None and self._box.axes is not None:
@@ -179,7 +179,7 @@ class Pointer:
 
 
 def picture(figure: Figure, text: str) -> dict[str, Any]:
-    """How a figure is shown where there are no widgets."""
+    """Return a static representation of a figure, for frontends without widgets."""
     return {"text/plain": text, "image/png": rendered(figure, "png", figure.dpi)}
 
 
@@ -187,8 +187,8 @@ def _blits(canvas: FigureCanvasBase) -> bool:
     return bool(canvas.supports_blit)
 
 
-def box_for(found: Pick) -> Annotation:
-    """A box with what is known of a point, beside it and inside the figure."""
+def tooltip_for(found: Pick) -> Annotation:
+    """Create a tooltip next to a point and inside the figure."""
     ax = found.ax
     frame = ax.get_window_extent()
     x, y = ax.transData.transform((found.x, found.y))

@@ -1,4 +1,4 @@
-"""Sliders: what can be varied, and how far."""
+"""Sliders: parameters and initial values with their ranges."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.interactive.views import around
 from fastslow.model.model import Model
 
-#: Values that a page holds of a slider, if not said otherwise.
+#: Default number of values of a slider in a page.
 VALUES = 11
 
 
 @dataclass(frozen=True)
 class Slider:
-    """A parameter, or the initial value of a state, that can be varied.
+    """A variable parameter or initial value of a state.
 
     Parameters
     ----------
     name : str
     low, high : float
     value : float
-        Where it stands at first.
+        Initial value.
     state : bool
-        Whether it is an initial value.
+        Whether it is the initial value of a state.
     """
 
     name: str
@@ -40,11 +40,11 @@ class Slider:
 
     @property
     def label(self) -> str:
-        """The name, of an initial value with a zero in brackets."""
+        """The name; for an initial value followed by (0)."""
         return f"{self.name}(0)" if self.state else self.name
 
     def values(self, wanted: Any = VALUES) -> NDArray[np.float64]:
-        """Values on the slider: a number of them evenly over it, or those given, sorted.
+        """Values of the slider: a number of equidistant ones, or the given ones, sorted.
 
         Raises
         ------
@@ -77,7 +77,7 @@ class Slider:
 def sliders_of(
     model: Model, start: Mapping[str, float], ranges: Mapping[Any, Any] | None = None
 ) -> tuple[Slider, ...]:
-    """Sliders for a model: those asked for, else one for every parameter.
+    """Create the sliders of a model, by default one for each parameter.
 
     Parameters
     ----------
@@ -94,9 +94,9 @@ def sliders_of(
     Raises
     ------
     UnknownNameError
-        For a name that is neither.
+        For a name that is neither a parameter nor a state.
     ArgumentError
-        For a range that is none, or does not hold the value.
+        For an invalid range, or one that does not contain the value.
 
     Examples
     --------
@@ -118,7 +118,7 @@ def sliders_of(
         low, high = interval(f"the range of slider {name}", limits)
         if not low <= value <= high:
             raise ArgumentError(
-                f"slider {name} = ({low:g}, {high:g}) does not hold its value, {value:g}"
+                f"slider {name} = ({low:g}, {high:g}) does not contain its value, {value:g}"
             )
         made.append(Slider(name, low, high, value, state))
     return tuple(made)

@@ -1,4 +1,4 @@
-"""What is said of a point when the pointer is near it."""
+"""Texts of tooltips."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from fastslow.results.overlay.transitions import Transition
 from fastslow.results.points import Equilibrium, SpecialPoint
 from fastslow.results.trajectory.crossings import Crossing
 
-#: Letters in a line of a sentence.
+#: Characters in a line of a sentence.
 WIDTH = 44
 
 
 def text_of(point: Any, parameter: str = "") -> str:
-    """What is known of a point, in a few short lines.
+    """Describe a point in a few short lines.
 
     Parameters
     ----------
     point : Equilibrium, SpecialPoint, Crossing, Transition or StatePoint
     parameter : str
-        What the diagram is over.
+        Continuation parameter of the diagram.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def text_of(point: Any, parameter: str = "") -> str:
 
 
 def spectrum(eigenvalues: NDArray[np.complex128]) -> str:
-    """Eigenvalues as text, a complex pair once; empty where none is known.
+    """Format eigenvalues, a complex pair once; empty if none is known.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def spectrum(eigenvalues: NDArray[np.complex128]) -> str:
 
 
 def numbers(names: Iterable[str], values: Iterable[float]) -> str:
-    """Names with their values, to six digits.
+    """Format names with their values to six digits.
 
     Examples
     --------

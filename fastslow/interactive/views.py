@@ -1,4 +1,4 @@
-"""What an explorer shows at one set of values: diagram, trajectory and overlay."""
+"""Views: diagram, trajectory and overlay of a model at one set of values."""
 
 from __future__ import annotations
 
@@ -25,23 +25,24 @@ from fastslow.simulation.settings import DEFAULT, Integration
 R = TypeVar("R")
 Range = tuple[float, float]
 
-#: A diagram goes beyond what its slow quantity covers by this part of it.
+#: Margin of the range of a diagram, as a fraction of the range of its slow quantity.
 MARGIN = 0.2
 
-#: Length of a run of a model without a period.
+#: Duration of a run of a model without a period.
 LONG = 100.0
 
 
 @dataclass(frozen=True)
 class Setup:
-    """How the views of a model are computed.
+    """Settings by which the views of a model are computed.
 
     Parameters
     ----------
     parameter : str or None
-        What the diagram is over; None for a model without slow quantity and parameter.
+        Continuation parameter of the diagram; None for a model without slow quantities and
+        parameters.
     over : tuple of float or None
-        The range of the diagram; None for a little more than the run covers.
+        Range of the diagram; None for that of the run with a margin.
     start : tuple of float
         Initial states, then slow states.
     t : tuple of float or None
@@ -50,9 +51,9 @@ class Setup:
     integration : Integration
         Error control of the run.
     state : str
-        What stands over time and over the parameter.
+        State drawn over time and over the parameter.
     otherwise : tuple of float, optional
-        The range of the diagram where there is no run to go by.
+        Range of the diagram if there is no run.
     """
 
     parameter: str | None
@@ -69,22 +70,22 @@ class Setup:
 class View:
     """Diagram, trajectory and overlay of a model at one set of values.
 
-    What could not be computed is None, and ``outcomes`` says why.
+    Results that could not be computed are None; ``outcomes`` gives the reasons.
 
     Parameters
     ----------
     model : Model
     setup : Setup
     changes : mapping
-        The parameters that differ from those of the model that was given.
+        Parameters that differ from those of the given model.
     diagram : Diagram or None
     run : Trajectory or None
     overlay : Overlay or None
-        None too where the diagram is not over a slow quantity, or nothing was measured.
+        None too if the diagram is not over a slow quantity, or the overlay was skipped.
     held : mapping
-        Values at which the diagram holds further slow quantities.
+        Values at which further slow quantities are frozen in the diagram.
     outcomes : tuple of Outcome
-        What failed, or did not go all the way.
+        Outcomes of failed and of incomplete computations.
     """
 
     model: Model
@@ -97,7 +98,7 @@ class View:
     outcomes: tuple[Outcome, ...]
 
     def call(self) -> str:
-        """Python source that computes and draws the same, of a model named ``model``.
+        """Return Python source that reproduces the view of a model named ``model``.
 
         Examples
         --------
@@ -152,7 +153,7 @@ def setup_of(
     integration: Integration = DEFAULT,
     state: object = None,
 ) -> Setup:
-    """Check how views are to be computed, and fill in what is not given.
+    """Validate the settings of views, and fill in defaults.
 
     Parameters are those of `fastslow.explore`.
 
@@ -161,7 +162,7 @@ def setup_of(
     UnknownNameError
         For a parameter or state that is not in the model.
     ArgumentError
-        For a range, start or time span that is none.
+        For an invalid range, start or time span.
 
     Examples
     --------
@@ -203,17 +204,17 @@ def view_of(
     *,
     measured: bool = True,
 ) -> View:
-    """Compute a view; what fails is left out and said.
+    """Compute a view; failures are recorded as outcomes.
 
     Parameters
     ----------
     model : Model
-        As it was given.
+        The model as given.
     setup : Setup
     changes : mapping, optional
-        Parameters and their values, where they differ.
+        Changed parameters with their values.
     measured : bool
-        Whether to measure the run against the diagram, which takes longest.
+        Whether to compute the overlay, which takes longest.
 
     Returns
     -------
@@ -222,14 +223,14 @@ def view_of(
     Raises
     ------
     UnknownNameError
-        For a name that is no parameter of the model.
+        For a name that is not a parameter of the model.
     ModelError
         For a value that is not a finite number.
     """
     changes = dict(changes or {})
     here = model.with_parameters(changes) if changes else model
     failures: list[Outcome] = []
-    run = _tried(
+    run = _attempted(
         failures,
         "trajectory",
         lambda: simulate(
@@ -242,11 +243,11 @@ def view_of(
     )
     diagram, held = None, _held(here, setup, run)
     if setup.parameter is not None:
-        diagram = _tried(failures, "diagram", lambda: _diagram(here, setup, run, held))
+        diagram = _attempted(failures, "diagram", lambda: _diagram(here, setup, run, held))
     lay = None
     slow = diagram is not None and diagram.parameter in _slow(here)
     if measured and slow and run is not None and diagram is not None:
-        lay = _tried(failures, "overlay", lambda: overlay(diagram, run))
+        lay = _attempted(failures, "overlay", lambda: overlay(diagram, run))
     reached = [result.outcome for result in (run, diagram, lay) if result is not None]
     return View(
         here,
@@ -261,7 +262,7 @@ def view_of(
 
 
 def around(value: float) -> Range:
-    """A range about a value: from zero to twice the value, for zero from −1 to 1.
+    """Return a range around a value: from zero to twice the value, for zero from −1 to 1.
 
     Examples
     --------
@@ -274,14 +275,14 @@ def around(value: float) -> Range:
 
 
 def at_start(setup: Setup, model: Model, states: Mapping[str, float]) -> Setup:
-    """The setup with other initial values of some states."""
+    """Return the setup with other initial values of some states."""
     names = (*model.states, *model.slow_states)
     begin = {**dict(zip(names, setup.start, strict=True)), **states}
     return replace(setup, start=tuple(initial_state(model, begin).tolist()))
 
 
-def _tried(failures: list[Outcome], what: str, compute: Callable[[], R]) -> R | None:
-    """A result, or None and why there is none."""
+def _attempted(failures: list[Outcome], what: str, compute: Callable[[], R]) -> R | None:
+    """Return a result, or None after recording why it failed."""
     try:
         return compute()
     except FastSlowError as error:
@@ -294,14 +295,14 @@ def _slow(model: Model) -> tuple[str, ...]:
 
 
 def _held(model: Model, setup: Setup, run: Trajectory | None) -> dict[str, float]:
-    """Slow quantities that the diagram is not over, in the middle of what the run covers."""
+    """Return values of the other slow quantities, the middles of their ranges in the run."""
     others = [name for name in _slow(model) if name != setup.parameter]
     covered = {name: _covered(run, name) for name in others}
     return {name: 0.0 if c is None else 0.5 * (c[0] + c[1]) for name, c in covered.items()}
 
 
 def _covered(run: Trajectory | None, name: str) -> Range | None:
-    """Least and greatest finite value of a column of a run."""
+    """Return the smallest and largest finite value of a column of a run."""
     values = np.empty(0) if run is None else run[name]
     values = values[np.isfinite(values)]
     return (float(values.min()), float(values.max())) if len(values) else None
@@ -320,13 +321,13 @@ def _diagram(
         over = setup.otherwise if covered is None else widened(*covered)
     if over is None:
         raise ArgumentError(
-            f"without a trajectory there is no range of {setup.parameter}; give it as over="
+            f"the range of {setup.parameter} is unknown without a trajectory; give it as over="
         )
     return continue_equilibria(frozen, setup.parameter, over)
 
 
 def widened(low: float, high: float) -> Range:
-    """A range with a margin, its ends rounded outwards.
+    """Return a range with a margin, its ends rounded outwards.
 
     Examples
     --------
@@ -337,5 +338,5 @@ def widened(low: float, high: float) -> Range:
     unit = 10.0 ** math.floor(math.log10(high - low + 2.0 * margin))
     unit = unit if high - low + 2.0 * margin >= 5.0 * unit else 0.5 * unit
     ends = unit * math.floor((low - margin) / unit), unit * math.ceil((high + margin) / unit)
-    # a tenth is no binary number: 23 of them are to be 2.3
+    # multiples of 0.1 are rounded in decimal: 23 of them give 2.3
     return float(f"{ends[0]:.12g}"), float(f"{ends[1]:.12g}")

@@ -1,39 +1,38 @@
-"""Figures from results: Matplotlib and results only, no display and no global settings.
+"""Matplotlib figures of results, without a display and without global settings.
 
-Every function takes a result, and by name:
+Every function takes a result and, by keyword:
 
 ``ax``
-    Axes to draw into (a `panel` takes three). Without them a figure of its own is made,
-    outside pyplot, which a notebook shows and ``drawn.save("figure.pdf")`` writes. Limits
-    and scales that were set on given axes before are kept.
+    Axes to draw into (three for `panel`). Otherwise a new figure outside pyplot is created,
+    which a notebook displays and ``drawn.save("figure.pdf")`` writes. Limits and scales set
+    on given axes are kept.
 ``width``
-    Of a new figure, as it will stand in print: ``"column"`` (85 mm), ``"page"`` (170 mm),
-    or a number of millimetres. Text is 6 to 8 points high at that size.
+    Width of a new figure in print: ``"column"`` (85 mm), ``"page"`` (170 mm), or a number of
+    millimetres. Text is 6 to 8 points high at that size.
 ``label``, ``legend``
-    ``label=False`` leaves out every text within the axes and the legend; ``legend=True`` or
-    ``False`` decides about the legend alone. A legend stands below the axes of a figure of
-    its own, inside given axes where it covers nothing; ``drawn.handles`` serves for one
-    that stands elsewhere.
+    ``label=False`` omits all text within the axes and the legend; ``legend`` sets the legend
+    alone. The legend is below the axes in a new figure and at a free position inside given
+    axes; ``drawn.handles`` are the entries for a legend elsewhere.
 ``**style``
-    Properties of the lines or points drawn, by their names in Matplotlib:
+    Matplotlib properties of the lines or points:
     ``linewidth=0.5``, ``color="black"``.
 
-Axes of curves (``x``, ``y``, in space ``z``) take a name, a SymPy symbol or expression, an
-expression as text such as ``"x**2 + v"``, or a function that is given the columns by name:
+Quantities on axes (``x``, ``y``, in space ``z``) are a name, a SymPy symbol or expression, an
+expression as text such as ``"x**2 + v"``, or a function of the columns by name:
 ``lambda c: c["x"] ** 2``. With ``z``, or in axes with ``projection="3d"``, the view is in space.
 
-What is returned is a frozen `Drawing`: its axes, its figure, its lines, markers, labels and
-legend by name, all of them as ``artists``, and in ``data`` the points drawn, by what the
-legend calls them. Labels keep off curves, markers and each other, also after the limits or
-the size of the figure have been changed.
+The functions return a frozen `Drawing` with its axes, figure, lines, markers, labels and
+legend; ``artists`` contains all of them, and ``data`` the plotted points by legend entry.
+Labels do not overlap curves, markers or each other, and are placed again after a change of
+the limits or the size of the figure.
 
-Files in PDF embed their fonts (Type 42), SVG keeps text as text. Colours are those of Okabe
-and Ito (2008), areas differ in lightness too, and every kind of line or point also has a
-line style or a marker of its own.
+PDF files embed their fonts (Type 42), and SVG files keep text as text. Colours are those of
+Okabe and Ito (2008), areas also differ in lightness, and every kind of line or point also has
+its own line style or marker.
 
 Examples
 --------
-Two figures in one, 170 mm wide:
+Two diagrams in one figure, 170 mm wide:
 
 >>> import fastslow as fs
 >>> from matplotlib.figure import Figure

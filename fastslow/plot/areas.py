@@ -1,4 +1,4 @@
-"""Areas of a refined map as polygons in light colours."""
+"""Regions of an adaptive map, as filled polygons."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fastslow.results.maps.adaptive_map import FAILED, RefinedMap
 
 Floats = NDArray[np.float64]
 
-#: Fills of the regimes of a gap; tints of the Okabe-Ito colours, apart in lightness too.
+#: Fills of the gap regimes: tints of the Okabe-Ito colours that differ in lightness too.
 FILLS: dict[Any, str] = {
     "bilateral": "#85C0E6",
     "unilateral upper": "#F8E0A9",
@@ -33,26 +33,26 @@ FILLS: dict[Any, str] = {
     FAILED: "#6E6E6E",
 }
 
-#: Fills of other labels, in turn; like the above, steps of lightness, so that grey will do.
+#: Fills of other labels, cyclically; lightness differs too, so that a print in grey is readable.
 OTHERS = ("#F3F3F3", "#85C0E6", "#F8E0A9", "#B5DDCE", "#E7BAD3", "#BBA583", "#71A29A", "#8A82BA")
 
 
 def draw_areas(
     ax: Axes, result: RefinedMap, fills: Mapping[Any, str] | None = None
 ) -> dict[Any, PolyCollection]:
-    """Draw the area of each label; the limits of the axes do not depend on it.
+    """Draw the area of each label, without changing the limits of the axes.
 
     Parameters
     ----------
     ax : Axes
     result : RefinedMap
     fills : mapping, optional
-        Label to colour, where another than the default is wanted.
+        Label to colour, replacing the default.
 
     Returns
     -------
     dict
-        Label to its area.
+        Label to the polygons of its area.
     """
     colours, shapes = _colours(result, fills or {}), _polygons(result)
     drawn = {}
@@ -66,7 +66,7 @@ def draw_areas(
 
 
 def samples(fills: Mapping[Any, PolyCollection]) -> list[Patch]:
-    """What a legend shows of areas."""
+    """Return legend entries for areas."""
     found = []
     for word, area in fills.items():
         colour: Any = area.get_facecolor()
@@ -87,7 +87,7 @@ def _colours(result: RefinedMap, fills: Mapping[Any, str]) -> dict[Any, str]:
 
 
 def _polygons(result: RefinedMap) -> list[list[Floats]]:
-    """The area of each label: whole cells, and the parts of those that a boundary cuts."""
+    """Return the polygons of each label: whole cells, and fragments of cells cut by a boundary."""
     found: list[list[Floats]] = [[] for _ in result.labels]
     low = np.array([r[0] for r in result.over])
     steps, mixed = result.steps, result.mixed
@@ -121,7 +121,7 @@ def _crossing(side: tuple[int, int, int], crossings: Mapping[Any, float]) -> Poi
 def _parts(
     corners: list[tuple[int, int]], around: list[int], points: list[Point], middle: Point
 ) -> list[tuple[int, list[Point]]]:
-    """Outlines of the labels within a cell that a boundary cuts."""
+    """Return the outline of each label within a cell that is cut by a boundary."""
     changes = [k for k in range(4) if around[k] != around[(k + 1) % 4]]
     if len(changes) == 2:
         first, second = changes
@@ -129,7 +129,7 @@ def _parts(
         rest = [corners[k % 4] for k in range(second + 1, first + 5)]
         return [(around[second], one), (around[first], [points[second], *rest, points[first]])]
     for k in (0, 1):
-        # equal labels at opposite corners are joined, of two such pairs the earlier one
+        # saddle: equal labels at opposite corners are joined, for two such pairs the first one
         mine, others = around[k], (around[k + 1], around[k - 1])
         if len(changes) == 4 and mine == around[k + 2] and not others[0] == others[1] < mine:
             joined: list[Point] = []

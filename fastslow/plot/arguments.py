@@ -1,4 +1,4 @@
-"""What the look of a figure may be, checked before anything is drawn."""
+"""Validation of the arguments of plot functions."""
 
 from __future__ import annotations
 
@@ -26,37 +26,37 @@ from fastslow.arguments import (
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.plot.layout.style import WIDTHS
 
-#: What an axis shows: a name, an expression, or a function of the columns.
+#: Quantity on an axis: a name, an expression, or a function of the columns.
 axis_quantity = either(function, formula)
 
 
-#: Millimetres that can be drawn in.
+#: Accepted widths in millimetres.
 _drawable = within(30.0, 2000.0)
 
 
 def figure_width(name: str, value: Any) -> str | float:
-    """The width of a figure: by its name, or in millimetres."""
+    """Validate the width of a figure, a name or millimetres."""
     if isinstance(value, str):
         return word("width", WIDTHS)(name, value)
     return _drawable(name, value)
 
 
 def line_colour(name: str, value: Any) -> Any:
-    """A colour, as matplotlib reads it."""
+    """Validate a Matplotlib colour."""
     if not is_color_like(value):
         raise refusal(name, value, "a colour, such as '#0072B2' or 'black'")
     return value
 
 
 def line_style(name: str, value: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Properties of a line, as matplotlib names them.
+    """Validate Matplotlib properties of a line.
 
     Raises
     ------
     UnknownNameError
-        For a name that is no property of a line.
+        For a name that is not a property of a line.
     ArgumentError
-        For a value that its property cannot have.
+        For an invalid value of a property.
     """
     for key, entry in value.items():
         if isinstance(entry, float) and not math.isfinite(entry):
@@ -64,7 +64,7 @@ def line_style(name: str, value: Mapping[str, Any]) -> Mapping[str, Any]:
         try:
             Line2D([], []).set(**{key: entry})
         except AttributeError:
-            # the properties themselves, by the setters of the class
+            # the properties that have a setter
             valid = sorted(p[4:] for p in dir(Line2D) if p.startswith("set_"))
             if key not in valid:
                 raise unknown_name("property of a line", key, valid) from None
@@ -75,7 +75,7 @@ def line_style(name: str, value: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def levels_of_states(name: str, value: Any) -> Mapping[str, tuple[str, float]]:
-    """Interfaces with the state and the value where each is, as `Diagram.interface_values`."""
+    """Validate interfaces with their state and value, as `Diagram.interface_values`."""
     given = mapping(name, value)
     return {str(key): _level(f"{name}[{key!r}]", entry) for key, entry in given.items()}
 
@@ -87,7 +87,7 @@ def _level(name: str, value: Any) -> tuple[str, float]:
 
 
 def points_in_plane(name: str, value: Any) -> Mapping[str, tuple[float, float]]:
-    """Texts with a point each."""
+    """Validate a mapping of texts to points."""
     return {
         text(f"a name in {name}", key): _point(f"{name}[{key!r}]", at)
         for key, at in mapping(name, value).items()
@@ -102,7 +102,7 @@ def _point(name: str, value: Any) -> tuple[float, float]:
 
 
 def lines_in_plane(name: str, value: Any) -> Mapping[str, Any]:
-    """Texts with the two columns of a line each, which may have gaps of NaN."""
+    """Validate a mapping of texts to the two columns of a line, with NaN for gaps."""
     return {
         text(f"a name in {name}", key): _line(f"{name}[{key!r}]", line)
         for key, line in mapping(name, value).items()

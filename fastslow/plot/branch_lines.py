@@ -1,4 +1,4 @@
-"""The parts of a branch that are drawn alike, and its special points, in the plane or in space."""
+"""Stability intervals of a branch and its special points, in the plane or in space."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from fastslow.results.branch.windows import LEFT
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
 
-#: What is written beside an end point is no longer than this; a sentence is for the hover.
-WORDY = 24
+#: Longest text beside an end point; longer ones are shown on hover only.
+LONGEST_NOTE = 24
 
 
 def runs(branch: Branch) -> Iterator[tuple[str, slice]]:
-    """Runs of constant stability, as (kind, rows); neighbours share their joint row."""
+    """Yield intervals of constant stability as (kind, rows); neighbours share a row."""
     kinds = branch.stability
     if not branch.admissible or len(kinds) < 2:
         yield str(kinds[0]) if branch.admissible and len(kinds) else "virtual", slice(0, len(kinds))
         return
-    # a step beside a single neutral row (a fold, a Hopf point) has the stability of its other end
+    # a step from a single neutral row (a fold, a Hopf point) has the stability of its other end
     steps = np.where(kinds[:-1] == "neutral", kinds[1:], kinds[:-1])
     breaks = np.flatnonzero(steps[1:] != steps[:-1]) + 1
     for start, stop in zip([0, *breaks], [*breaks, len(steps)], strict=True):
@@ -39,7 +39,7 @@ def runs(branch: Branch) -> Iterator[tuple[str, slice]]:
 def draw_points(
     ax: Any, points: Sequence[SpecialPoint], shown: Sequence[Quantity], label: bool
 ) -> tuple[tuple[Line2D, ...], tuple[Annotation, ...]]:
-    """Draw special points in the plane or in space, one marker for each code, and label them."""
+    """Draw and label special points in the plane or in space, one marker for each code."""
     markers: list[Line2D] = []
     labels: list[Annotation] = []
     for code in POINT_TYPES:
@@ -50,7 +50,7 @@ def draw_points(
         look = {"zorder": 5, "label": POINT_TYPES[code].title}
         markers += ax.plot(*at.T, **dot_look(code), **look)
         if label:
-            # branches that cross share their branch point: it is named once
+            # a branch point is on both branches: it is labelled once
             spots = {(_words(p), *np.round(s, 9)): s for p, s in zip(same, at, strict=True)}
             labels += [tag(ax, plain(word), spot) for (word, *_), spot in spots.items()]
     return tuple(markers), tuple(labels)
@@ -59,19 +59,19 @@ def draw_points(
 def _words(point: SpecialPoint) -> str:
     if point.code != "EP":
         return point.label
-    if 0 < len(point.note) <= WORDY:
+    if 0 < len(point.note) <= LONGEST_NOTE:
         return point.note
-    # of an end that was cut short, the reason
+    # the reason for an early end
     return point.subtype or point.label
 
 
 def marked_points(branches: Sequence[Branch]) -> list[SpecialPoint]:
-    """Special points worth a marker: an end point only where the tracing could not go on."""
+    """Return the special points to be marked; an end point only where tracing failed."""
     return [p for branch in branches for p in _shown(branch)]
 
 
 def _shown(branch: Branch) -> list[SpecialPoint]:
-    # an end at infinity is outside the figure
+    # an end at infinity is outside of the figure
     usual = [o.success or o.code == LEFT for o in branch.outcomes]
     ends = {0: usual[0], len(branch) - 1: usual[1]}
     return [

@@ -1,4 +1,4 @@
-"""The equilibrium diagram: branches by stability, with their special points."""
+"""Bifurcation diagrams of equilibria: branches by stability, with special points."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ from fastslow.results.branch.windows import LEFT
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DiagramDrawing(Drawing):
-    """A drawn equilibrium diagram.
+    """A drawn bifurcation diagram of equilibria.
 
     Parameters
     ----------
     ax : Axes
     state : str
-        What the vertical axis shows.
+        Quantity on the vertical axis.
     lines : tuple of Line2D
-        One for each run of constant stability.
+        One for each interval of constant stability.
     markers : tuple of Line2D
         One for each code of special points.
     labels : tuple of Annotation
@@ -47,11 +47,11 @@ class DiagramDrawing(Drawing):
         Interfaces and regions.
     legend : Legend or None
     x : str
-        What the horizontal axis shows.
+        Quantity on the horizontal axis.
     shown : tuple of Quantity
-        What the axes show, the horizontal one first.
+        Quantities on the axes, the horizontal one first.
     sets : tuple of Artist
-        Sets of equilibria within discontinuities: filled bands and their edges.
+        Equilibrium sets within discontinuities: filled bands and their edges.
     """
 
     state: str
@@ -66,7 +66,7 @@ class DiagramDrawing(Drawing):
 
     @property
     def handles(self) -> list[Artist]:
-        """What a legend shows: each stability, kind of equilibrium set and code once."""
+        """Legend entries: each stability, kind of equilibrium set and code once."""
         shown = {str(line.get_label()): line for line in self.lines}
         sets = {str(one.get_label()): one for one in self.sets}
         named = [one for label, one in sets.items() if not label.startswith("_")]
@@ -104,26 +104,26 @@ def diagram(
 ) -> DiagramDrawing | SpaceDrawing:
     """Draw the branches of equilibria over their parameter.
 
-    Stable branches are solid, unstable ones dashed, neutral ones dash-dotted
-    (a continuum of equilibria, such as a gap), virtual ones dotted and faint. A set of
-    equilibria within a discontinuity, such as the states at which dry friction holds a
-    block, is filled between its edges.
+    Stable branches are solid, unstable ones dashed, neutral ones dash-dotted (a continuum of
+    equilibria, such as a gap), virtual ones dotted and faint. A set of equilibria within a
+    discontinuity, such as the sticking states of a block under dry friction, is filled
+    between its edges.
 
     Parameters
     ----------
     diagram : Diagram
     y : str, Symbol, Expr or callable, optional
-        What the vertical axis shows: a state, by default the first, the parameter, an
+        Quantity on the vertical axis: a state, by default the first, the parameter, an
         expression in states and parameters, or a function of the columns.
     z : str, Symbol, Expr or callable, optional
-        With this the view is in space, and ``z`` its vertical axis.
+        Quantity on the vertical axis of a view in space.
     x : str, Symbol, Expr or callable, optional
-        What the horizontal axis shows, by default the parameter.
+        Quantity on the horizontal axis, by default the parameter.
     ax : Axes, optional
         Axes to draw into (with ``projection="3d"`` for a view in space), in which limits set
         by hand are kept; new ones otherwise.
     width : str or float
-        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+        Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
         Whether to write LP1, BE1, … beside special points and the names of the regions.
     legend : bool, optional
@@ -135,7 +135,7 @@ def diagram(
     color : str
         Colour of the branches.
     **style
-        Properties of every branch line, over those of its stability.
+        Properties of every branch line, overriding those of its stability.
 
     Returns
     -------
@@ -145,10 +145,10 @@ def diagram(
     Raises
     ------
     UnknownNameError
-        For a name that is no state and no parameter; for an expression without any of
-        the states or the parameter of the diagram.
+        For a name that is neither a state nor a parameter; for an expression that contains
+        neither a state nor the parameter of the diagram.
     ArgumentError
-        For what is no expression, or for a view in space with plane axes.
+        For an invalid expression, or a view in space with axes of the plane.
 
     Examples
     --------
@@ -202,7 +202,7 @@ def draw_branches(
     color: str = BRANCH,
     **style: Any,
 ) -> DiagramDrawing:
-    """Draw a diagram without a legend, its labels not placed yet; arguments as for `diagram`."""
+    """Draw a diagram without legend and without placing its labels; arguments as for `diagram`."""
     lines: list[Line2D] = []
     branches = [b for b in diagram.branches if b.admissible or virtual]
     for branch in branches:
@@ -213,7 +213,7 @@ def draw_branches(
             if diagram.window is None or not _goes_to_infinity(branch):
                 lines += ax.plot(*line, **look)
                 continue
-            # drawn whole, but the axes are scaled to what is not far away
+            # drawn whole, but the axes are not scaled to distant points
             near = diagram.window.near(branch.state[rows])
             lines.append(Line2D(*line, **look))
             ax.add_artist(lines[-1])
@@ -245,5 +245,5 @@ def draw_branches(
 
 
 def _goes_to_infinity(branch: Branch) -> bool:
-    """Whether an end of a branch is on a default bound of the window."""
+    """Return whether an end of a branch is on a default bound of the window."""
     return any(o.code == LEFT and not o.success for o in branch.outcomes)

@@ -1,4 +1,4 @@
-"""Delays over rates, measured and predicted."""
+"""Measured and predicted delays over the rate of drift."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ from fastslow.results.overlay.delay_scaling import DelayScaling
 
 Array = NDArray[np.float64]
 
-#: Exponents that have a short name.
+#: Exponents written as fractions.
 FRACTIONS = {2.0 / 3.0: "2/3", 0.5: "1/2", 1.0: "1"}
 
-#: Width of the slope triangle in parts of the range, its distance below, and of its text in points.
+#: Width of the slope triangle and its distance below the points, as fractions of the range;
+#: distance of its text, in points.
 WIDTH, BELOW, TEXT_OFF = 0.26, 0.10, 3.0
 
 
@@ -41,13 +42,13 @@ class DelayDrawing(Drawing):
     ax : Axes
     measured : Line2D
     predicted : Line2D
-        The law at the same rates.
+        The predicted delay at the same rates.
     leading : Line2D or None
-        Its leading power alone.
+        Leading term of the prediction.
     triangle : Line2D or None
-        With the slope of the leading power; none where the law is no power.
+        Slope of the leading term; None where that is not a power of the rate.
     texts : tuple of Text
-        Of the triangle.
+        Texts of the triangle.
     legend : Legend or None
     """
 
@@ -76,7 +77,7 @@ def delay_scaling(
     legend: bool | None = None,
     **style: Any,
 ) -> DelayDrawing:
-    """Draw delays over the rate of drift, both logarithmic, beside the law.
+    """Draw measured and predicted delays over the rate of drift, on logarithmic axes.
 
     Parameters
     ----------
@@ -84,11 +85,11 @@ def delay_scaling(
     ax : Axes, optional
         Axes to draw into; new ones otherwise.
     width : str or float
-        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+        Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
         Whether to write the slope beside its triangle.
     legend : bool, optional
-        Whether to explain the lines, with the fitted exponent; by default as ``label``.
+        Whether to draw a legend, with the fitted exponent; by default as ``label``.
     **style
         Properties of the measured points.
 
@@ -99,11 +100,11 @@ def delay_scaling(
     Raises
     ------
     ArgumentError
-        If no run reached its event.
+        If no run has a delay.
     """
     good = np.isfinite(scaling.delay) & (scaling.delay > 0)
     if not good.any():
-        raise ArgumentError("no run of this scaling has a delay to draw; see its outcomes")
+        raise ArgumentError("no run of this scaling has a delay to draw; see scaling.outcomes")
     own = ax is None
     ax = axes_for(ax, width, height=66.0)
     ax.set_xscale("log")
@@ -143,7 +144,7 @@ def _law_words(scaling: DelayScaling) -> str:
 
 
 def _leading(ax: Axes, scaling: DelayScaling) -> Line2D | None:
-    """The leading power alone, where it is not all of the law."""
+    """Draw the leading term of the prediction, if there are further terms."""
     first = float(scaling.predicted_coefficients[0])
     if not (math.isfinite(scaling.law_exponent) and len(scaling.terms) > 1):
         return None
@@ -153,7 +154,7 @@ def _leading(ax: Axes, scaling: DelayScaling) -> Line2D | None:
         color=GREY,
         linewidth=0.9,
         linestyle=(0, (3.5, 1.8)),
-        label=rf"its leading term, ${first:.4g}\,\varepsilon^{{{_written(scaling)}}}$",
+        label=rf"leading term, ${first:.4g}\,\varepsilon^{{{_written(scaling)}}}$",
     )
     return line
 
@@ -165,7 +166,7 @@ def _written(scaling: DelayScaling) -> str:
 def _triangle(
     ax: Axes, scaling: DelayScaling, good: NDArray[np.bool_], label: bool
 ) -> tuple[Line2D | None, tuple[Text, ...]]:
-    """A triangle below the points with the slope of the law."""
+    """Draw a triangle with the slope of the leading term below the points."""
     power = scaling.law_exponent
     if not math.isfinite(power) or good.sum() < 2:
         return None, ()

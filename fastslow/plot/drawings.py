@@ -1,4 +1,4 @@
-"""What every plot function returns: the axes, what was drawn into them, and its data."""
+"""The base class of the objects that plot functions return: axes, artists and data."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from fastslow.results.base.immutable import fixed
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Drawing:
-    """What was drawn, and where.
+    """Axes and the artists drawn into them.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Drawing:
 
     @property
     def figure(self) -> Figure:
-        """The figure that holds the axes."""
+        """The figure of the axes."""
         return root(self.ax)
 
     @property
@@ -44,10 +44,9 @@ class Drawing:
 
     @property
     def data(self) -> dict[str, tuple[NDArray[np.float64], ...]]:
-        """The points drawn, by what the legend calls them.
+        """The plotted points by legend entry.
 
-        For each kind one array for each curve, shape (N, 2), or (N, 3) in space: copies of
-        what is drawn, read-only.
+        For each entry one read-only array for each curve, shape (N, 2), or (N, 3) in space.
 
         Examples
         --------
@@ -61,23 +60,23 @@ class Drawing:
         found: dict[str, list[NDArray[np.float64]]] = {}
         for artist in self.artists:
             curves = _curves(artist)
-            # what helps the eye (interfaces, triangles) has no name
+            # auxiliary artists (interfaces, triangles) have no name
             if curves and not str(artist.get_label()).startswith("_"):
                 found.setdefault(str(artist.get_label()), []).extend(curves)
         return {kind: fixed(kind, curves) for kind, curves in found.items()}
 
     @validated(path=path, dpi=within(10.0, 10_000.0))
     def save(self, path: str | Path, dpi: float = 300) -> Path:
-        """Write the figure, in the format of the suffix, with text kept as text.
+        """Write the figure in the format of the suffix.
 
-        Fonts are embedded in PDF as Type 42 (TrueType), SVG keeps text as text.
+        PDF files embed fonts as Type 42 (TrueType); SVG files keep text as text.
 
         Parameters
         ----------
         path : str or Path
-            Where to, e.g. ``"overlay.pdf"``; its folder must exist.
+            Destination, e.g. ``"overlay.pdf"``, in an existing folder.
         dpi : float
-            Dots per inch of pixel formats.
+            Dots per inch of raster formats.
 
         Returns
         -------
@@ -86,7 +85,7 @@ class Drawing:
         return save(self.figure, path, dpi)
 
     def __repr__(self) -> str:
-        # not the artists with their addresses, which would fill a page
+        # the artists with their addresses would fill a page
         x, y = (label.replace("$", "") for label in (self.ax.get_xlabel(), self.ax.get_ylabel()))
         return f"{type(self).__name__}({y} over {x})"
 
@@ -95,7 +94,7 @@ class Drawing:
 
 
 def _artists(value: Any) -> Iterator[Artist]:
-    """The artists in the fields of a drawing, and in what these hold."""
+    """Yield the artists in the fields of a drawing, including nested ones."""
     if isinstance(value, Axes):
         return
     if isinstance(value, Artist):
@@ -112,7 +111,7 @@ def _artists(value: Any) -> Iterator[Artist]:
 
 
 def _curves(artist: Artist) -> list[NDArray[np.float64]]:
-    """The data of one artist, nothing for what is no curve."""
+    """Return the data of one artist, empty unless it is a curve."""
     if isinstance(artist, Line2D):
         if hasattr(artist, "get_data_3d"):
             return [np.column_stack([np.asarray(d, dtype=float) for d in artist.get_data_3d()])]

@@ -33,7 +33,7 @@ from fastslow.results.points import SpecialPoint
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: A colour map that grows evenly in lightness, for all kinds of sight.
+#: A perceptually uniform colour map.
 COLOURS = "viridis"
 
 #: Points along a Clarke path.
@@ -48,11 +48,11 @@ class EigenvalueDrawing(Drawing):
     ----------
     ax : Axes
     paths : tuple of LineCollection
-        One for each region gone through, coloured by the parameter.
+        One for each region on the path, coloured by the parameter.
     jumps : tuple of Line2D
-        From the eigenvalues on one side of an interface to those on the other.
+        Segments from the eigenvalues on one side of an interface to those on the other.
     markers : tuple of Line2D
-        Special points: where an eigenvalue crosses the imaginary axis, or jumps.
+        Special points, at which an eigenvalue crosses the imaginary axis or jumps.
     labels : tuple of Annotation
     bar : Colorbar
     legend : Legend or None
@@ -85,19 +85,18 @@ def eigenvalue_path(
 ) -> EigenvalueDrawing:
     """Draw the eigenvalues along a branch, coloured by its parameter.
 
-    At an interface the eigenvalues jump; grey dashes lead from the old ones to the
-    new ones. Folds and Hopf points are marked on the imaginary axis, where they cross
-    it. Eigenvalues at infinity (of sliding) are left out.
+    Jumps of the eigenvalues at an interface are dashed grey lines. Folds and Hopf points are
+    marked at the crossings of the imaginary axis. Infinite eigenvalues (of sliding) are omitted.
 
     Parameters
     ----------
     source : Overlay or Branch
-        Of an overlay, the parts of the branches between the sheets that are followed,
-        as far as the slow quantity goes.
+        For an overlay, the branches between the stable branches followed, over the range of
+        the slow quantity.
     ax : Axes, optional
         Axes to draw into; new ones otherwise.
     width : str or float
-        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+        Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
         Whether to write LP1, BE1, … beside the marks.
     legend : bool, optional
@@ -112,7 +111,7 @@ def eigenvalue_path(
     Raises
     ------
     ArgumentError
-        For an overlay in which no sheet is followed.
+        For an overlay whose trajectory follows no stable branch.
     """
     parts = [(source, slice(0, len(source)))] if isinstance(source, Branch) else _followed(source)
     own, ax = ax is None, axes_for(ax, width, height=78.0)
@@ -171,9 +170,8 @@ def clarke_path(
 ) -> EigenvalueDrawing:
     """Draw the eigenvalues of q J₁ + (1 − q) J₂ at a boundary equilibrium for 0 ≤ q ≤ 1.
 
-    Where the path crosses the imaginary axis at zero the boundary equilibrium
-    is a non-smooth fold; where a pair crosses it, in the plane, a Clarke-Hopf point
-    (Leine and Nijmeijer 2004).
+    If the path crosses zero the boundary equilibrium is a non-smooth fold; if, in the plane,
+    a pair crosses the imaginary axis, it is a Clarke-Hopf point (Leine and Nijmeijer 2004).
 
     Parameters
     ----------
@@ -182,9 +180,9 @@ def clarke_path(
     ax : Axes, optional
         Axes to draw into; new ones otherwise.
     width : str or float
-        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+        Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
-        Whether to write the point and its kind above.
+        Whether to write the point and its type above the axes.
     legend : bool, optional
         Whether to draw a legend; by default as ``label``.
     **style
@@ -229,10 +227,12 @@ def clarke_path(
 
 
 def _followed(lay: Overlay) -> list[tuple[Branch, slice]]:
-    """Rows of every branch from the first to the last that is followed."""
+    """Return the rows of each branch from the first to the last row that is followed."""
     used = [lay.sheets[k] for k in np.unique(lay.followed) if k >= 0]
     if not used:
-        raise ArgumentError("this trajectory follows no sheet, so that there is no path to draw")
+        raise ArgumentError(
+            "this trajectory follows no stable branch: there are no eigenvalues to draw"
+        )
     low, high = float(lay.slow.min()), float(lay.slow.max())
     parts = []
     for number in dict.fromkeys(sheet.branch for sheet in used):
@@ -244,12 +244,14 @@ def _followed(lay: Overlay) -> list[tuple[Branch, slice]]:
         if len(rows) > 1:
             parts.append((branch, slice(int(rows[0]), int(rows[-1]) + 1)))
     if not parts:
-        raise ArgumentError("the slow quantity passes fewer than two points of the branches")
+        raise ArgumentError(
+            "the range of the slow quantity contains fewer than two points of the branches"
+        )
     return parts
 
 
 def _matched(values: Complex) -> Complex:
-    """Eigenvalues row by row in an order in which each goes on from its nearest."""
+    """Order the eigenvalues of each row by continuity, nearest to nearest."""
     path = np.where(np.isfinite(values.real), values, np.nan + 0j)
     for row in range(1, len(path)):
         left = list(range(path.shape[1]))
@@ -264,7 +266,7 @@ def _matched(values: Complex) -> Complex:
 def _coloured(
     ax: Axes, path: Complex, parameter: Array, scale: Normalize, style: dict[str, Any]
 ) -> LineCollection:
-    """Lines of all eigenvalues of one stretch, coloured by the parameter."""
+    """Draw lines of all eigenvalues on one interval, coloured by the parameter."""
     path, parameter = _through_collisions(path, parameter)
     places = np.stack([path.real, path.imag], axis=-1)
     pieces = np.stack([places[:-1], places[1:]], axis=2).reshape(-1, 2, 2)
@@ -279,9 +281,9 @@ def _coloured(
 
 
 def _through_collisions(path: Complex, parameter: Array) -> tuple[Complex, Array]:
-    """The path with a row put in wherever two real eigenvalues and a pair go over into each other.
+    """Insert a row at each collision of two real eigenvalues into a complex pair or back.
 
-    They meet on the real axis; without that point a line would cut the corner.
+    The collision is on the real axis; without it a line would cut the corner.
     """
     real = np.abs(path.imag) <= 1e-9 * np.maximum(np.abs(path).max(axis=1, keepdims=True), 1e-300)
     changed = real[1:] != real[:-1]
@@ -311,7 +313,7 @@ def _dots(ax: Axes, roots: Complex, marker: str, face: str, edge: str, text: str
 def _marks(
     ax: Axes, met: Sequence[SpecialPoint], label: bool
 ) -> tuple[tuple[Line2D, ...], tuple[Annotation, ...]]:
-    """Special points: what crosses the imaginary axis, or all eigenvalues of the point."""
+    """Mark special points: eigenvalues on the imaginary axis, or all of the point."""
     markers: list[Line2D] = []
     labels: list[Annotation] = []
     for code, known in POINT_TYPES.items():
@@ -328,14 +330,14 @@ def _marks(
         if roots:
             marker, colour = known.marker, point_colour(code)
             at = np.array(roots)
-            # open with two rows, whose eigenvalues in the other region lie there too
+            # open if the point has a row, and eigenvalues, on each side
             face, edge = ("none", colour) if known.two_rows else (colour, "white")
             markers += _dots(ax, at, marker, face, edge, known.title)
     return tuple(markers), tuple(labels)
 
 
 def _framed(ax: Axes, paths: Sequence[LineCollection], name: str) -> Colorbar:
-    """Axes, their names, both axes of the plane, and the bar of colours."""
+    """Add axis labels, both axes of the complex plane, and the colour bar."""
     ax.autoscale_view()
     ax.margins(0.08)
     ax.axvline(0.0, color="black", linewidth=0.8, zorder=1.0)

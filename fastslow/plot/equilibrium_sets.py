@@ -15,7 +15,7 @@ from fastslow.results.branch.equilibrium_sets import EquilibriumBand
 
 Array = NDArray[np.float64]
 
-#: How much of the colour of the branches a filled band has.
+#: Opacity of filled bands.
 FILL = 0.25
 
 
@@ -24,8 +24,8 @@ def draw_sets(
 ) -> tuple[Artist, ...]:
     """Draw the bands of a diagram; arguments as for `draw_branches`.
 
-    Over the parameter the range of the quantity is filled between its edges; in
-    other views the corners are drawn as curves. What has no end is not drawn.
+    Over the parameter the range of the quantity is filled between its edges; in other views
+    the corners are drawn as curves. Unbounded ranges are not drawn.
     """
     across, up = shown
     drawn: list[Artist] = []
@@ -51,14 +51,14 @@ def draw_sets(
 
 
 def _along(diagram: Diagram, band: EquilibriumBand, states: Array, quantity: Quantity) -> Array:
-    """A quantity along states of shape (N, n)."""
+    """Return a quantity along states of shape (N, n)."""
     columns: dict[str, Any] = dict(zip(band.states, states.T, strict=True))
     columns = {**diagram.parameters, **columns, band.parameter: band.values}
     return quantity.of(columns, len(band.values))
 
 
 def _range(diagram: Diagram, band: EquilibriumBand, quantity: Quantity) -> tuple[Array, Array]:
-    """The range of a quantity: of a state exactly, of others between the corners."""
+    """Return the range of a quantity: exact for a state, otherwise between the corners."""
     if quantity.column in band.states:
         k = band.states.index(quantity.column)
         low, high = band.lower[:, k], band.upper[:, k]

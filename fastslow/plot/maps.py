@@ -1,4 +1,4 @@
-"""Maps over two parameters: areas by label, boundaries as lines, names within the areas."""
+"""Adaptive maps over two parameters: labelled areas and their boundaries."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from fastslow.plot.layout.style import BLACK, GREY, SMALL, VERMILION, axes_for
 from fastslow.plot.layout.typesetting import as_given, typeset
 from fastslow.results.maps.adaptive_map import RefinedMap
 
-#: Hatches of areas too small for their names, in turn.
+#: Hatches of areas too small for their names, cyclically.
 HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----", "||||")
 
 
@@ -41,14 +41,14 @@ class MapDrawing(Drawing):
     lines : tuple of Line2D
         The boundaries.
     curves : tuple of Line2D
-        What was drawn over the map.
+        Curves drawn over the map.
     names : dict of Text
-        Labels written into their areas, where they fit.
+        Names of the areas in which they fit.
     marks : tuple of Annotation
-        Labels of the points marked.
+        Labels of the marked points.
     legend : Legend or None
     points : tuple of Line2D
-        The points marked.
+        The marked points.
     """
 
     fills: dict[Any, PolyCollection]
@@ -83,29 +83,29 @@ def regime_map(
     fills: Mapping[Any, str] | None = None,
     **style: Any,
 ) -> MapDrawing:
-    """Draw a refined map: each area in its colour and with its name, boundaries as lines.
+    """Draw an adaptive map: coloured, named areas and their boundaries.
 
-    An area too small for its name is hatched.
+    Areas too small for their names are hatched.
 
     Parameters
     ----------
     result : RefinedMap
-        Of regimes, or of any other labels.
+        Map of regimes or of other labels.
     ax : Axes, optional
         Axes to draw into, in which limits set by hand are kept; new ones otherwise.
     width : str or float
-        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+        Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
-        Whether to write names into the areas and beside the points marked.
+        Whether to name the areas and the marked points.
     legend : bool, optional
         Whether to draw a legend; by default as ``label``.
     curves : mapping, optional
-        What to lay over it, e.g. a criterion: name to values along both axes;
-        NaN interrupts a curve.
+        Curves over the map, e.g. a criterion: name to values along both axes; NaN
+        interrupts a curve.
     marks : mapping, optional
         Points to mark: name to values along both axes.
     fills : mapping, optional
-        Label to colour, where another than the default is wanted.
+        Label to colour, replacing the default.
     **style
         Properties of the boundary lines.
 
@@ -168,11 +168,11 @@ def regime_map(
 
 
 def _names(ax: Axes, result: RefinedMap, marks: list[tuple[float, float]]) -> dict[Any, Text]:
-    """Write each label where its area is widest, if it fits there."""
+    """Write the name of each area at its widest position, if it fits."""
     frame = ax.get_window_extent()
-    # a mark needs room for its own name, at any side of it
-    room_around = 0.08 * frame.width * np.array([[0, 0], [1, 0], [-1, 0], [0, 0.5], [0, -0.5]])
-    ink = [ax.transData.transform(at) + room_around for at in marks]
+    # space for the name of a mark, at any side of it
+    margins = 0.08 * frame.width * np.array([[0, 0], [1, 0], [-1, 0], [0, 0.5], [0, -0.5]])
+    ink = [ax.transData.transform(at) + margins for at in marks]
     ink += [occupied_pixels(ax)[:, :2], frame.corners()]
     legend: Any = ax.get_legend()
     if legend is not None:
@@ -180,7 +180,7 @@ def _names(ax: Axes, result: RefinedMap, marks: list[tuple[float, float]]) -> di
         raster = np.meshgrid(np.linspace(box.x0, box.x1, 20), np.linspace(box.y0, box.y1, 20))
         ink.append(np.column_stack([part.ravel() for part in raster]))
     met = np.vstack(ink)
-    # a raster of places, coarse enough to be quick
+    # a coarse raster of positions, for speed
     across, up = np.meshgrid(np.linspace(0.02, 0.98, 41), np.linspace(0.02, 0.98, 41))
     low, high = np.transpose(result.over)
     places = low + (high - low) * np.column_stack([across.ravel(), up.ravel()])
@@ -196,7 +196,7 @@ def _names(ax: Axes, result: RefinedMap, marks: list[tuple[float, float]]) -> di
         half = np.array([box.width, box.height]) / 2.0
         best, room = None, 1.0
         for k in mine.tolist():
-            # how far the box may grow until it meets a line or the frame
+            # factor by which the box may grow before it touches a line or the frame
             gaps = np.abs(met - pixels[k]) / half
             walls = np.abs(np.array([frame.x0, frame.x1]) - pixels[k, 0]).min() / half[0]
             floors = np.abs(np.array([frame.y0, frame.y1]) - pixels[k, 1]).min() / half[1]

@@ -1,4 +1,4 @@
-"""Trajectories on their own: time series and phase portraits."""
+"""Time series and phase portraits of trajectories."""
 
 from __future__ import annotations
 
@@ -49,26 +49,25 @@ class MotionDrawing(Drawing):
     ----------
     ax : Axes
     x, y : str
-        What the axes show.
+        Quantities on the axes.
     lines : tuple of Line2D
-        The trajectory; in a phase portrait earlier periods, if there are any,
-        and the last one.
+        The trajectory; in a phase portrait earlier periods, if any, and the last one.
     crossings : Line2D or None
         One dot for each crossing of an interface.
     arrows : tuple of Annotation
-        Sense of direction.
+        Direction of motion.
     bands : tuple of Bands
         Interfaces and regions.
     phases : tuple of Rectangle
         The strip of phases above a time series.
     words : tuple of Text
-        What is written in it.
+        Texts of the strip.
     legend : Legend or None
-        Where there is more than the trajectory to explain.
+        None if only the trajectory is drawn.
     z : str
-        What the third axis shows, in space.
+        Quantity on the third axis, in space.
     shown : tuple of Quantity
-        What the axes show, the horizontal one first.
+        Quantities on the axes, the horizontal one first.
     """
 
     x: str
@@ -85,7 +84,7 @@ class MotionDrawing(Drawing):
 
     @property
     def handles(self) -> list[Artist]:
-        """What a legend shows: trajectory, earlier periods, crossings of interfaces."""
+        """Legend entries: trajectory, earlier periods, crossings of interfaces."""
         return [*self.lines[::-1], *([] if self.crossings is None else [self.crossings])]
 
 
@@ -127,19 +126,19 @@ def time_series(
     ax : Axes, optional
         Axes to draw into, in which limits set by hand are kept; new ones otherwise.
     width : str or float
-        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+        Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
         Whether to write the names of regions and phases.
     legend : bool, optional
-        Whether to draw a legend, where there is more to explain than the trajectory; by
-        default as ``label``.
+        Whether to draw a legend, if more than the trajectory is drawn; by default as
+        ``label``.
     crossings : bool
         Whether to mark the crossings of interfaces.
     interfaces : mapping, optional
-        Interface to (state, value), as a diagram's ``interface_values``: these
-        are drawn, with the regions between them.
+        Interface to (state, value), such as ``diagram.interface_values``, to be drawn with
+        the regions between them.
     phases : sequence of Phase
-        Of an overlay, ``lay.phases``: a strip above shows them, and names those with room.
+        Phases of an overlay, ``lay.phases``, drawn as a strip and named where the names fit.
     color : str
         Colour of the trajectory.
     **style
@@ -154,7 +153,7 @@ def time_series(
     UnknownNameError
         If ``y`` is no state or slow quantity of the trajectory.
     ArgumentError
-        For what is no expression.
+        For an invalid expression.
 
     Examples
     --------
@@ -180,7 +179,7 @@ def time_series(
     if phases:
         on_draw(ax, lambda renderer: fit_words(*strip, renderer))
     note_early_end(ax, early_end(run))
-    # a legend stays below the strip
+    # the legend is below the strip
     top = 1.0 - strip_height(ax) if phases else 1.0
     return _explained(drawn, own, label, legend, top)
 
@@ -226,24 +225,25 @@ def phase_portrait(
         state over its slow quantity), expressions in them and in parameters and t, or
         functions of the columns.
     z : str, Symbol, Expr or callable, optional
-        With this the view is in space; for axes in space the third quantity by default.
+        Quantity on the vertical axis of a view in space; by default the third if ``ax`` is in
+        space.
     ax : Axes, optional
         Axes to draw into (with ``projection="3d"`` for a view in space), in which limits set
         by hand are kept; new ones otherwise.
     width : str or float
-        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+        Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
         Whether to write the names of regions.
     legend : bool, optional
-        Whether to draw a legend, where there is more to explain than the trajectory; by
-        default as ``label``.
+        Whether to draw a legend, if more than the trajectory is drawn; by default as
+        ``label``.
     crossings : bool
         Whether to mark the crossings of interfaces.
     interfaces : mapping, optional
-        Interface to (state, value), as a diagram's ``interface_values``: these
-        are drawn, with the regions between them (in the plane).
+        Interface to (state, value), such as ``diagram.interface_values``, to be drawn with
+        the regions between them (in the plane).
     arrows : int
-        How many arrow heads show the direction.
+        Number of arrow heads.
     color : str
         Colour of the trajectory.
     **style
@@ -258,8 +258,8 @@ def phase_portrait(
     UnknownNameError
         For a name in ``x``, ``y`` or ``z`` that is no state or slow quantity.
     ArgumentError
-        If there is only one quantity to draw, for what is no expression, or for a view in
-        space with plane axes.
+        If there is only one quantity, for an invalid expression, or for a view in space with
+        axes of the plane.
 
     Examples
     --------
@@ -302,7 +302,7 @@ def phase_portrait(
 def _explained(
     drawn: MotionDrawing, own: bool, label: bool, legend: bool | None, top: float = 1.0
 ) -> MotionDrawing:
-    """Add a legend where there is more to explain than the trajectory, and place the names."""
+    """Add a legend if more than the trajectory is drawn, and place the names of regions."""
     if len(drawn.handles) > 1:
         drawn = replace(drawn, legend=add_legend(drawn.ax, drawn.handles, own, label, legend, top))
     place(drawn.ax, bands=drawn.bands)
@@ -318,7 +318,7 @@ def draw_motion(
     color: str,
     style: dict[str, Any],
 ) -> tuple[Line2D, ...]:
-    """Draw a curve in time, what comes before its last period faintly."""
+    """Draw a trajectory, faint before its last period."""
     look = {"color": color, **LINE, **_alone(len(t)), **style}
     last = 0
     if run.period is not None:
@@ -333,7 +333,7 @@ def draw_motion(
 
 
 def _alone(count: int) -> dict[str, Any]:
-    """A single sample is no line: it is drawn as a dot."""
+    """Return properties that draw a single sample as a dot."""
     return {"marker": ".", "markersize": 4.0} if count == 1 else {}
 
 
@@ -344,7 +344,7 @@ def _bands(
     interfaces: Values | None,
     label: bool,
 ) -> tuple[Bands, ...]:
-    """Bands across the horizontal and the vertical axis, where these show a state."""
+    """Draw bands across the axes that show a state."""
     starts = np.array([segment.start for segment in run.segments])
     names = np.array([segment.region for segment in run.segments])
     if not len(starts) or not interfaces:

@@ -1,4 +1,4 @@
-"""The figure of a paper: time series, phase portrait and overlay, side by side."""
+"""Panels for papers: time series, phase portrait and overlay in one figure."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from fastslow.plot.passages import OverlayDrawing, draw_passage
 from fastslow.plot.quantities import of_diagram
 from fastslow.results.overlay.overlay import Overlay
 
-#: Figures narrower than this have their three parts one below the other.
+#: Narrower figures have their three axes in one column.
 NARROW = 120 * MM
 
 
@@ -34,11 +34,11 @@ class PanelDrawing(Drawing):
     Parameters
     ----------
     ax : Axes
-        Those of the overlay.
+        Axes of the overlay.
     time_series, phase_portrait : MotionDrawing
     overlay : OverlayDrawing
     legend : Legend or None
-        For all three: below them, or in the overlay's axes if axes were given.
+        Common legend: below the axes, or inside those of the overlay if axes were given.
     """
 
     time_series: MotionDrawing
@@ -71,23 +71,22 @@ def panel(
     legend: bool | None = None,
     **style: Any,
 ) -> PanelDrawing:
-    """Draw time series, phase portrait and overlay as one figure, 170 mm wide.
+    """Draw time series, phase portrait and overlay as one figure, by default 170 mm wide.
 
-    A strip above the time series shows the phases of the motion: the sheet that is
-    followed, oscillations, jumps. In a figure of a column's width the three stand one
-    below the other.
+    A strip above the time series shows the phases of the motion: the stable branch followed,
+    oscillations, jumps. In a figure as wide as a column the three are arranged vertically.
 
     Parameters
     ----------
     lay : Overlay
     state : str or Symbol, optional
-        The state shown over time and over the slow quantity, by default the first.
+        State drawn over time and over the slow quantity, by default the first.
     ax : sequence of three Axes, optional
-        Axes for the three; a new figure otherwise.
+        Axes of the three plots; a new figure otherwise.
     title : str
-        Written above a new figure, e.g. the parameter values.
+        Title of a new figure, e.g. the parameter values.
     width : str or float
-        Of a new figure: ``"page"`` (170 mm), ``"column"`` (85 mm), or millimetres.
+        Width of a new figure: ``"page"`` (170 mm), ``"column"`` (85 mm), or millimetres.
     label : bool
         Whether to write labels, and the letters (a), (b), (c).
     legend : bool, optional
@@ -142,7 +141,7 @@ def panel(
 
 
 def _new_axes(width: float, title: str) -> list[Axes]:
-    """Three axes side by side, or one below the other where the figure is narrow."""
+    """Create three axes, side by side or, in a narrow figure, in one column."""
     narrow = width < NARROW
     figure = new_figure(width, (168 if narrow else 68) * MM)
     if narrow:

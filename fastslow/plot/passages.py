@@ -1,4 +1,4 @@
-"""A trajectory laid over the equilibrium diagram of its frozen model."""
+"""A trajectory drawn over the equilibrium diagram of its frozen model."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from fastslow.plot.spaces import SpaceDrawing, draw_space
 from fastslow.results.base.outcome import early_end
 from fastslow.results.overlay.overlay import Overlay
 
-#: What a figure says of an overlay that does not tell all, by the code of its outcome.
+#: Note in the figure of an incomplete overlay, by the code of its outcome.
 CAVEATS = {
-    "outside the diagram": "the run goes beyond the diagram",
-    "another slow quantity": "the diagram holds another slow quantity fixed",
-    "at rest": "the slow quantity is at rest",
-    "not compared": "diagram and run were not compared",
+    "outside the diagram": "the trajectory leaves the range of the diagram",
+    "another slow quantity": "another slow quantity is frozen in the diagram",
+    "at rest": "the slow quantity is constant",
+    "not compared": "diagram and trajectory were not compared",
 }
 
-#: Shares of the slow quantity's travel over a period at which an arrow head sits: uneven, so that
-#: the way up and the way down of a harmonic load do not meet.
+#: Positions of arrow heads, as fractions of the path length of the slow quantity over a period:
+#: uneven, so that the heads of rising and falling halves of a harmonic load do not coincide.
 ARROWS = (0.08, 0.36, 0.58, 0.86)
 
 
@@ -48,9 +48,9 @@ class OverlayDrawing(Drawing):
     ----------
     ax : Axes
     state : str
-        What the vertical axis shows.
+        Quantity on the vertical axis.
     diagram : DiagramDrawing
-        The branches beneath.
+        The branches.
     lines : tuple of Line2D
         The trajectory: earlier periods, if there are any, and the last one.
     crossings : Line2D or None
@@ -58,14 +58,14 @@ class OverlayDrawing(Drawing):
     transitions : tuple of Line2D
         One for each kind of transition.
     turning : Line2D or None
-        Where the slow quantity turns back.
+        Turning points of the slow quantity.
     arrows : tuple of Annotation
-        Sense of direction, along the sheets and in the jumps.
+        Direction of motion, along stable branches and in jumps.
     legend : Legend or None
     x : str
-        What the horizontal axis shows.
+        Quantity on the horizontal axis.
     shown : tuple of Quantity
-        What the axes show, the horizontal one first.
+        Quantities on the axes, the horizontal one first.
     """
 
     state: str
@@ -81,7 +81,7 @@ class OverlayDrawing(Drawing):
 
     @property
     def handles(self) -> list[Artist]:
-        """What a legend shows: branches, special points, trajectory, crossings, transitions."""
+        """Legend entries: branches, special points, trajectory, crossings, transitions."""
         extra = [line for line in (self.crossings, self.turning) if line is not None]
         return [*self.diagram.handles, *self.lines[::-1], *extra, *self.transitions]
 
@@ -119,28 +119,27 @@ def overlay(
     color: str = MOTION,
     **style: Any,
 ) -> OverlayDrawing | SpaceDrawing:
-    """Draw a trajectory over the branches of equilibria that it passes.
+    """Draw a trajectory over the branches of equilibria of its frozen model.
 
-    Every kind of transition has a marker of its own, where it happened: a jump
-    at a fold is not to be taken for a passage of an interface, whose crossings are
-    small dots. Where the slow quantity turns back there is a bar.
+    Each kind of transition has its own marker, so that a jump at a fold is distinguished from
+    a crossing of an interface (a small dot). A bar marks a turning point of the slow quantity.
 
     Parameters
     ----------
     lay : Overlay
     y : str, Symbol, Expr or callable, optional
-        What the vertical axis shows: a state, by default the first, the slow quantity, an
+        Quantity on the vertical axis: a state, by default the first, the slow quantity, an
         expression in states and parameters such as ``"x**2 + v"``, or a function of the
         columns.
     z : str, Symbol, Expr or callable, optional
-        With this the view is in space, and ``z`` its vertical axis.
+        Quantity on the vertical axis of a view in space.
     x : str, Symbol, Expr or callable, optional
-        What the horizontal axis shows, by default the slow quantity.
+        Quantity on the horizontal axis, by default the slow quantity.
     ax : Axes, optional
         Axes to draw into (with ``projection="3d"`` for a view in space), in which limits set
         by hand are kept; new ones otherwise.
     width : str or float
-        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+        Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
         Whether to write LP1, BE1, … beside special points and the names of the regions.
     legend : bool, optional
@@ -148,7 +147,7 @@ def overlay(
     crossings : bool
         Whether to mark the crossings of interfaces.
     turning : bool
-        Whether to mark where the slow quantity turns back.
+        Whether to mark the turning points of the slow quantity.
     interfaces : bool
         Whether to draw interfaces and regions.
     virtual : bool
@@ -168,7 +167,7 @@ def overlay(
     UnknownNameError
         For a name in ``x``, ``y`` or ``z`` that is no state, slow quantity or parameter.
     ArgumentError
-        For what is no expression, or for a view in space with plane axes.
+        For an invalid expression, or a view in space with axes of the plane.
 
     Examples
     --------
@@ -233,26 +232,26 @@ def draw_passage(
     color: str = MOTION,
     **style: Any,
 ) -> OverlayDrawing:
-    """Draw an overlay without a legend, its labels not placed yet; arguments as for `overlay`."""
+    """Draw an overlay without legend and without placing its labels; arguments as for `overlay`."""
     across, up = along_overlay(lay, *shown)
     lines = draw_motion(ax, lay.time, (across, up), shown, lay.run, color, style)
     dots = draw_crossings(ax, lay, shown) if crossings else None
     changes = draw_transitions(ax, lay, shown)
     note(ax, _caveat(lay))
     turns = draw_turning(ax, lay, shown) if turning else None
-    # after the trajectory, so that the bands take its limits in
+    # after the trajectory, so that the bands extend to its limits
     below = draw_branches(
         ax, lay.diagram, shown, label=label, virtual=virtual, interfaces=interfaces
     )
     for line in below.lines:
         if line.get_label() == "stable":
-            # wide enough to be seen beneath a trajectory that follows it
+            # wide enough to remain visible under a trajectory that follows it
             line.set_linewidth(2.2)
         elif any(phase.kind == "oscillating" for phase in lay.phases):
-            # oscillations would cover it
+            # otherwise hidden by oscillations
             line.set_zorder(3.5)
     drawn = len(points(lines[-1]))
-    # a line in parts has other points than the samples
+    # a line broken at a period has more points than the samples
     round_ = any(q.column in lay.run.periods for q in shown)
     heads = (
         () if round_ else draw_heads(lines[-1], _arrow_rows(lay, up, lay.slow[len(lay) - drawn :]))
@@ -264,7 +263,7 @@ def draw_passage(
 
 
 def _caveat(lay: Overlay) -> str:
-    """What the figure of an overlay says of what it does not tell."""
+    """Return the note of an incomplete overlay, or an empty text."""
     ended = early_end(lay.run)
     if ended:
         return f"run ended early: {ended}"
@@ -272,13 +271,13 @@ def _caveat(lay: Overlay) -> str:
 
 
 def _arrow_rows(lay: Overlay, values: Array, drawn: Array) -> list[int]:
-    """Where arrow heads sit, as points of the last period: along the sheets, and halfway in jumps.
+    """Return rows of arrow heads in the last period: along branches, and midway in jumps.
 
     Parameters
     ----------
     lay : Overlay
     values : ndarray, shape (N,)
-        What the vertical axis shows.
+        Quantity on the vertical axis.
     drawn : ndarray, shape (M,)
         The slow quantity of the last period, the last M samples.
     """

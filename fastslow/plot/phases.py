@@ -1,4 +1,4 @@
-"""The phases of a motion as a strip above its time series."""
+"""Phases of a motion, drawn as a strip above its time series."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from fastslow.plot.layout.style import BLACK, PHASES, WHITE_WORDS, root
 from fastslow.plot.layout.typesetting import plain
 from fastslow.results.overlay.transitions import Phase
 
-#: Height of the strip and size of its words, in points.
+#: Height of the strip and font size of its text, in points.
 HEIGHT, WORDS = 10.0, 6.0
 
 
 def draw_phases(
     ax: Axes, phases: Sequence[Phase], label: bool = True
 ) -> tuple[tuple[Rectangle, ...], tuple[Text, ...]]:
-    """Draw phases as a strip along the upper edge of a time series.
+    """Draw the phases of a motion as a strip along the upper edge of a time series.
 
     Parameters
     ----------
     ax : Axes
-        With time on the horizontal axis; room is made above what is drawn.
+        Axes with time on the horizontal axis; the upper limit is raised for the strip.
     phases : sequence of Phase
     label : bool
-        Whether to write into the strip.
+        Whether to name the phases.
 
     Returns
     -------
     tuple of Rectangle
         One for each phase.
     tuple of Text
-        What each is called: the sheets that a quasi-static phase follows, the number of
-        oscillations. `fit_words` hides those without room.
+        Name of each: the stable branches followed in a quasi-static phase, the number of
+        oscillations. `fit_words` hides names that do not fit.
     """
     height = strip_height(ax)
     low, high = ax.get_ylim()
@@ -75,14 +75,14 @@ def draw_phases(
 
 
 def strip_height(ax: Axes) -> float:
-    """Height of the strip in parts of the axes."""
+    """Height of the strip as a fraction of the axes."""
     whole = ax.get_window_extent().height * 72.0 / root(ax).dpi
     return min(HEIGHT / whole, 0.5)
 
 
 def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text], renderer: RendererBase) -> None:
-    """Hide the words that are wider than their boxes, in axes with their final places."""
-    # without labels there are no words
+    """Hide names that are wider than their boxes, once the layout is final."""
+    # no names without labels
     for box, word in zip(boxes, words, strict=False):
         # a hidden text has no extent, and an earlier draw may have hidden it
         word.set_visible(True)

@@ -1,4 +1,4 @@
-"""Curves of special points over two parameters, in their plane or with a state above it."""
+"""Two-parameter bifurcation diagrams: curves of special points, in the plane or in space."""
 
 from __future__ import annotations
 
@@ -48,16 +48,16 @@ class PlaneDrawing(Drawing):
     ----------
     ax : Axes
     lines : tuple of Line2D
-        One for each run of one kind, admissible or virtual.
+        One for each arc of one kind, admissible or virtual.
     markers : tuple of Line2D
         One for each code of codimension-two points.
     labels : tuple of Annotation
         CP1, BT1, … beside the points.
     legend : Legend or None
     x, y, z : str
-        What the axes show; ``z`` is empty in the plane.
+        Quantities on the axes; ``z`` is empty in the plane.
     fills : dict of PolyCollection
-        The area of each label of the regions beneath.
+        The area of each label of ``regions``.
     """
 
     lines: tuple[Line2D, ...]
@@ -98,33 +98,33 @@ def parameter_plane(
 ) -> PlaneDrawing:
     """Draw curves of folds, Hopf points, boundary equilibria, … over two parameters.
 
-    Each kind has its colour and line style; virtual parts are dotted and faint,
-    neutral saddles, which are no bifurcation, thin. Supercritical Hopf points are solid
-    and subcritical ones dashed, with GH between them; the marker of a point that
-    was not solved for to rounding is hollow.
+    Each kind has its own colour and line style. Virtual arcs are dotted and faint; neutral
+    saddles, which are not bifurcations, are thin. Supercritical Hopf points are solid and
+    subcritical ones dashed, separated by generalized Hopf points GH. Points that did not
+    converge have hollow markers.
 
     Parameters
     ----------
     *curves : PointBranch
-        Over the same two parameters.
+        Curves over the same two parameters.
     x, y : str, Symbol, Expr or callable, optional
-        What the axes show, by default the two parameters: parameters, states, expressions
+        Quantities on the axes, by default the two parameters: parameters, states, expressions
         in them, or functions of the columns.
     z : str, Symbol, Expr or callable, optional
-        With this the view is in space, e.g. a state over the plane; for axes in space the
-        first state by default.
+        Quantity on the vertical axis of a view in space, e.g. a state over the parameter
+        plane; by default the first state if ``ax`` is in space.
     regions : RefinedMap, optional
-        Over the same two parameters: its areas lie beneath the curves, in light colours.
+        Map over the same two parameters, drawn under the curves in light colours.
     ax : Axes, optional
         Axes to draw into (with ``projection="3d"`` for a view in space); new ones otherwise.
     width : str or float
-        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+        Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
         Whether to write CP1, BT1, … beside codimension-two points.
     legend : bool, optional
         Whether to draw a legend; by default as ``label``.
     virtual : bool
-        Whether to draw the virtual parts.
+        Whether to draw virtual arcs.
     **style
         Properties of every line, over those of its kind.
 
@@ -137,8 +137,8 @@ def parameter_plane(
     UnknownNameError
         For a name in ``x``, ``y`` or ``z`` that is no state and no parameter.
     ArgumentError
-        If there is no curve, or they are over different parameters, or the regions are; for
-        what is no expression; for a view in space with plane axes.
+        Without a curve; for curves or regions over different parameters; for an invalid
+        expression; for a view in space with axes of the plane.
 
     Examples
     --------
@@ -156,13 +156,15 @@ def parameter_plane(
     names = {curve.parameter_names for curve in curves}
     if len(names) != 1:
         shown = "; ".join(", ".join(n) for n in sorted(names)) or "none"
-        raise ArgumentError(f"parameter_plane: expected curves over one plane, received {shown}")
+        raise ArgumentError(
+            f"parameter_plane: expected curves over the same two parameters, received {shown}"
+        )
     space = spatial("parameter_plane", ax, z)
     quantities = _axes(curves[0], (x, y, z) if space else (x, y))
     shown_names = tuple(q.column for q in quantities)
     if regions is not None and shown_names != regions.names:
         raise ArgumentError(
-            f"parameter_plane: regions over {', '.join(regions.names)} cannot lie beneath axes "
+            f"parameter_plane: regions over {', '.join(regions.names)} cannot be drawn in axes "
             f"of {', '.join(q.text for q in quantities)}"
         )
     own, ax = ax is None, axes_for(ax, width, HEIGHT if space else 64.0, space)
@@ -195,7 +197,7 @@ def parameter_plane(
 
 
 def _axes(curve: PointBranch, given: tuple[object, ...]) -> list[Quantity]:
-    """What the axes show, by default the parameters and the first state."""
+    """Return the quantities on the axes, by default the parameters and the first state."""
     defaults = (*curve.parameter_names, curve.states[0])
     names = curve.point_names
     return [
@@ -209,11 +211,11 @@ def _columns(curve: PointBranch) -> dict[str, Any]:
 
 
 def _runs(curve: PointBranch) -> list[tuple[str, bool, str, slice]]:
-    """Runs of one code and criticality, admissible or not; neighbours share their joint row."""
+    """Return arcs of one code, criticality and admissibility; neighbours share a row."""
     criticality = curve.criticality.copy()
     known = np.flatnonzero((criticality != "") & (criticality != "degenerate"))
     if known.size:
-        # a generalized Hopf point belongs to both sides
+        # a generalized Hopf point separates both criticalities
         for row in np.flatnonzero(criticality == "degenerate"):
             before = known[known < row]
             criticality[row] = criticality[before[-1] if before.size else known[0]]
@@ -244,7 +246,7 @@ def _special_points(
         seen: list[NDArray[np.float64]] = []
         for point in (p for curve in curves for p in curve.special(code)):
             at = np.array([point.parameters[n] for n in names])
-            # one point may stand on two of the curves
+            # two curves may share a point
             again = any(np.all(np.abs(at - other) < 1e-6 * spans) for other in seen)
             if again or not (point.admissible or virtual):
                 continue
@@ -264,6 +266,6 @@ def _special_points(
             if rows.any():
                 markers += ax.plot(*places[rows].T, **own)
         if label:
-            # numbered over all curves, which number their own points each
+            # numbered over all curves, each of which has its own numbers
             labels += [tag(ax, f"{code}{k}", at) for k, at in enumerate(places, start=1)]
     return markers, labels

@@ -1,4 +1,4 @@
-"""What an axis shows: a column, an expression in columns, or a function of them."""
+"""Quantities on axes: a column, an expression in columns, or a function of them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 class Columns(dict[str, Any]):
-    """Numbers and arrays by name, which says what it holds when asked for something else."""
+    """Numbers and arrays by name, with an error that lists the known names."""
 
     def __missing__(self, name: object) -> Any:
         raise unknown_name("column", name, self)
@@ -32,28 +32,28 @@ class Columns(dict[str, Any]):
 
 @dataclass(frozen=True)
 class Quantity:
-    """What an axis shows.
+    """A quantity on an axis.
 
     Parameters
     ----------
     text : str
-        A name or an expression; of a function its name.
+        Name or expression; for a function its name.
     function : callable, optional
-        Given the columns, by name, it returns the values.
+        Function of the columns by name that returns the values.
     """
 
     text: str
     function: Callable[[Columns], Any] | None = None
 
     def of(self, columns: Mapping[str, Any], count: int) -> Array:
-        """Values for columns of a length, shape (count,).
+        """Evaluate at columns of length ``count``, shape (count,).
 
         Raises
         ------
         UnknownNameError
-            For a name that is no column.
+            For a name that is not a column.
         ArgumentError
-            For what is no expression; for a function with values of another shape.
+            For an invalid expression; for a function that returns another shape.
         """
         if self.function is None:
             return np.broadcast_to(evaluated(self.text, columns), (count,))
@@ -61,18 +61,18 @@ class Quantity:
         if values.shape not in ((), (count,)):
             raise ArgumentError(
                 f"{self.text} returned values of shape {values.shape}; expected ({count},), "
-                "one for each row of the columns it was given"
+                "one for each row of its columns"
             )
         return np.broadcast_to(values, (count,))
 
     @property
     def column(self) -> str:
-        """The name or expression, empty for a function."""
+        """Name or expression, empty for a function."""
         return self.text if self.function is None else ""
 
     @property
     def label(self) -> str:
-        """The label of the axis."""
+        """Label of the axis."""
         if self.function is not None:
             return "$f$" if self.text == "<lambda>" else plain(self.text.replace("_", " "))
         return written(self.text)
@@ -81,28 +81,28 @@ class Quantity:
 def quantity_of(
     given: object, default: str, varying: Sequence[str], fixed: Iterable[str], kind: str
 ) -> Quantity:
-    """Read what an axis is to show.
+    """Parse the quantity of an axis.
 
     Parameters
     ----------
     given : str, Symbol, Expr, callable or None
     default : str
-        Shown if nothing is given.
+        Quantity if ``given`` is None.
     varying : sequence of str
-        Columns; at least one must stand in an expression.
+        Columns, at least one of which an expression must contain.
     fixed : iterable of str
-        Names of constants that may stand in an expression too.
+        Names of constants that an expression may contain.
     kind : str
-        What the columns are, for the error.
+        Kind of the columns, for the error.
 
     Raises
     ------
     UnknownNameError
         For an unknown name; for an expression in constants alone.
     ArgumentError
-        For what is no expression.
+        For an invalid expression.
     """
-    # symbols of SymPy are callable too
+    # SymPy symbols are callable too
     if callable(given) and not hasattr(given, "free_symbols"):
         return Quantity(getattr(given, "__name__", type(given).__name__), given)
     text = default if given is None else written_formula(given)
@@ -114,13 +114,13 @@ def quantity_of(
 
 
 def of_diagram(diagram: Diagram, given: object, default: str) -> Quantity:
-    """What an axis of a diagram shows: states, its parameter, expressions, functions."""
+    """Parse the quantity of an axis of a diagram: state, parameter, expression or function."""
     names = (*diagram.states, diagram.parameter)
     return quantity_of(given, default, names, diagram.parameters, "state or parameter")
 
 
 def of_run(run: Trajectory, given: object, default: str) -> Quantity:
-    """What an axis of a trajectory shows: time, states, slow quantities, expressions, functions."""
+    """Parse the quantity of an axis of a trajectory: time, state, slow quantity or expression."""
     names = (*run.columns, "t")
     return quantity_of(given, default, names, run.parameters, "state or slow quantity")
 
@@ -128,10 +128,10 @@ def of_run(run: Trajectory, given: object, default: str) -> Quantity:
 def joined(
     columns: Sequence[Array], shown: Sequence[Quantity], periods: Mapping[str, float]
 ) -> list[Array]:
-    """Columns of a line, in parts where a periodic state goes round.
+    """Break the columns of a line where a periodic state wraps around.
 
-    Where the line leaves the principal range by one end it is led up to it and goes
-    on from the other; between both stands a row of NaN.
+    The line is extended to the end of the principal range, and continues from the other end
+    after a row of NaN.
 
     Examples
     --------
@@ -163,7 +163,7 @@ def joined(
 
 
 def _wrapped(values: Array, quantity: Quantity, periods: Mapping[str, float]) -> Array:
-    """Values of a periodic state in its principal range (−period/2, period/2]."""
+    """Wrap values of a periodic state to its principal range (−period/2, period/2]."""
     period = periods.get(quantity.column, 0.0)
     return principal(values, period) if period else values
 
@@ -192,7 +192,7 @@ def along_run(run: Trajectory, *shown: Quantity) -> list[Array]:
 
 
 def at_crossings(run: Trajectory, *shown: Quantity) -> list[Array]:
-    """Quantities where a trajectory crosses interfaces, each of shape (number of crossings,)."""
+    """Quantities at crossings of interfaces, each of shape (number of crossings,)."""
     met = run.crossings
     times = np.array([c.time for c in met])
     columns = {name: np.interp(times, run.t, run[name]) for name in run.columns}
@@ -212,7 +212,7 @@ def along_overlay(lay: Overlay, *shown: Quantity) -> list[Array]:
 def at_times(
     lay: Overlay, times: Array, names: Sequence[str], state: Array, *shown: Quantity
 ) -> list[Array]:
-    """Quantities at times between samples, where some states are known, shape (K, states)."""
+    """Quantities at times between samples, given some states, shape (K, states)."""
     columns = {n: np.interp(times, lay.time, lay.run[n]) for n in lay.run.columns}
     columns[lay.parameter] = np.interp(times, lay.time, lay.slow)
     columns |= dict(zip(names, state.reshape(len(times), -1).T, strict=True))

@@ -1,4 +1,4 @@
-"""Points of a trajectory on a section."""
+"""Poincaré and stroboscopic sections."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from fastslow.plot.layout.style import (
 from fastslow.plot.quantities import quantity_of
 from fastslow.results.trajectory.section import Section
 
-#: Marker, colour and words by direction.
+#: Marker, colour and legend text by direction.
 LOOKS = {
     1: ("^", BLUE, "upwards"),
     -1: ("v", VERMILION, "downwards"),
@@ -41,11 +41,11 @@ class SectionDrawing(Drawing):
     ----------
     ax : Axes
     x, y : str
-        What the axes show.
+        Quantities on the axes.
     points : tuple of Line2D
         The points, by direction.
     legend : Legend or None
-        Where there is more than one direction.
+        None for a single direction.
     """
 
     x: str
@@ -77,7 +77,7 @@ def section(
     size: float = 2.4,
     **style: Any,
 ) -> SectionDrawing:
-    """Draw the points of a section in the plane of two columns.
+    """Draw the points of a Poincaré or stroboscopic section in the plane of two columns.
 
     Parameters
     ----------
@@ -89,10 +89,10 @@ def section(
     ax : Axes, optional
         Axes to draw into; new ones otherwise.
     width : str or float
-        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+        Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label, legend : bool, optional
-        Whether to draw a legend, where there is more than one direction; ``legend``, by
-        default as ``label``, decides.
+        Whether to draw a legend, if there is more than one direction; ``legend`` takes
+        precedence and is by default as ``label``.
     size : float
         Size of the markers in points.
     **style
@@ -105,9 +105,9 @@ def section(
     Raises
     ------
     UnknownNameError
-        If ``x`` or ``y`` is no column of the section.
+        If ``x`` or ``y`` is not a column of the section.
     ArgumentError
-        If there is only one column and none was named; for what is no expression.
+        If there is only one column and none is named; for an invalid expression.
 
     Examples
     --------
@@ -119,7 +119,7 @@ def section(
     """
     if len(section.names) < 2 and (x is None or y is None):
         raise ArgumentError(
-            f'a section of {section.names[0]} alone has no plane; draw it over "t", or name x and y'
+            f'a section with the single column {section.names[0]}; give x and y, such as x="t"'
         )
     names = (*section.names, "t")
     across = quantity_of(x, names[0], names, (), "column")

@@ -24,28 +24,28 @@ from fastslow.plot.quantities import Quantity, along_branch, along_overlay, join
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import Overlay
 
-#: Size of the box of axes in space, which leaves room for the names of its axes.
+#: Zoom of axes in space, which leaves space for the axis labels.
 ZOOM = 0.86
 
 #: Height of a figure in space, in millimetres.
 HEIGHT = 92.0
 
-#: Shares of the length of a trajectory at which an arrow head sits.
+#: Positions of arrow heads, as fractions of the length of a trajectory.
 ARROWS = (0.2, 0.45, 0.7, 0.95)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SpaceDrawing(Drawing):
-    """A diagram or an overlay drawn in space.
+    """A diagram or an overlay drawn in three dimensions.
 
     Parameters
     ----------
     ax : Axes
-        With the projection "3d".
+        Axes with the projection "3d".
     x, y : str
-        What the second and the vertical axis show.
+        Quantities on the second and the vertical axis.
     branches : tuple of Line2D
-        One for each run of constant stability.
+        One for each interval of constant stability.
     markers : tuple of Line2D
         One for each code of special points.
     line : Line2D or None
@@ -54,15 +54,15 @@ class SpaceDrawing(Drawing):
     labels : tuple of Annotation
         LP1, BE1, … beside the points.
     arrows : tuple of Annotation
-        Sense of direction.
+        Direction of motion.
     along : str
-        What the first axis shows.
+        Quantity on the first axis.
     crossings : Line2D or None
         One dot for each crossing of an interface.
     transitions : tuple of Line2D
         One for each kind of transition.
     turning : Line2D or None
-        Where the slow quantity turns back.
+        Turning points of the slow quantity.
     """
 
     x: str
@@ -94,16 +94,16 @@ def draw_space(
     color: str = BRANCH,
     style: dict[str, Any],
 ) -> SpaceDrawing:
-    """Draw a diagram in space, and over it a trajectory; see `fastslow.plot.diagram`.
+    """Draw a diagram in space, optionally with a trajectory; see `fastslow.plot.diagram`.
 
     Parameters
     ----------
     shown : tuple of Quantity
-        Along the three axes.
+        Quantities on the three axes.
     lay : Overlay, optional
-        With the trajectory.
+        Overlay with the trajectory.
     color, style
-        Of the trajectory, else of the branches.
+        Of the trajectory if there is one, otherwise of the branches.
     """
     own, space = ax is None, axes_for(ax, width, HEIGHT, space=True)
     of_branches = {"color": color, **style} if lay is None else {"color": BRANCH}
@@ -114,7 +114,7 @@ def draw_space(
         for kind, rows in runs(branch):
             look = {**LINES[kind], "label": kind, **of_branches}
             if lay is not None and kind == "stable":
-                # wide enough to be seen beneath a trajectory that follows it
+                # wide enough to remain visible under a trajectory that follows it
                 look["linewidth"] = 2.0
             line_places = joined([p[rows] for p in places], shown, branch.periods)
             branches += space.plot(*line_places, **look)
@@ -144,12 +144,12 @@ def draw_space(
 
 
 def style_space(space: Any, names: Sequence[str]) -> None:
-    """Names and small ticks for axes in space."""
+    """Set axis labels and small ticks in space."""
     setters = (space.set_xlabel, space.set_ylabel, space.set_zlabel)
     for set_label, text in zip(setters, names, strict=True):
         set_label(text, fontsize=TEXT, labelpad=-4)
     space.tick_params(labelsize=SMALL, pad=-3)
     space.tick_params(axis="z", pad=1)
     space.locator_params(nbins=5)
-    # the name of the vertical axis stands outside of what the layout allows for
+    # the layout does not reserve space for the label of the vertical axis
     space.set_box_aspect(None, zoom=ZOOM)

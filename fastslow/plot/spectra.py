@@ -21,13 +21,13 @@ from fastslow.plot.layout.style import MOTION, VERMILION, axes_for, note_early_e
 from fastslow.plot.layout.typesetting import typeset
 from fastslow.results.trajectory.spectrum import Spectrum
 
-#: Amplitudes below this part of the largest are not looked for when the axes are chosen.
+#: Amplitudes below this fraction of the largest are disregarded in the default limits.
 FLOOR = 1e-4
 
-#: The lower edge of the axes in parts of the largest amplitude.
+#: Lower limit of the axes, as a fraction of the largest amplitude.
 LOWEST = 1e-7
 
-#: The part of the axes above the largest line, for its frequency.
+#: Fraction of the axes above the largest line, for its label.
 ABOVE = 0.12
 
 
@@ -44,7 +44,7 @@ class SpectrumDrawing(Drawing):
     labels : tuple of Annotation
         Their frequencies.
     legend : Legend or None
-        Only where one was asked for.
+        None unless requested.
     """
 
     line: Line2D
@@ -78,7 +78,7 @@ def spectrum(
     color: str = MOTION,
     **style: Any,
 ) -> SpectrumDrawing:
-    """Draw amplitude over frequency, with a logarithmic vertical axis.
+    """Draw an amplitude spectrum, with a logarithmic vertical axis.
 
     Parameters
     ----------
@@ -86,17 +86,17 @@ def spectrum(
     ax : Axes, optional
         Axes to draw into; new ones otherwise.
     width : str or float
-        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+        Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
-        Whether to write the frequencies of the largest lines.
+        Whether to label the largest lines with their frequencies.
     legend : bool
-        Whether to draw a legend; the axes explain the curve without one.
+        Whether to draw a legend.
     angular : bool
         Whether to show angular frequency.
     over : (float, float), optional
-        Frequencies to show; by default up to the last that is worth it.
+        Range of frequencies; by default up to the last significant amplitude.
     peaks : int
-        How many lines to mark.
+        Number of lines to mark.
     color : str
         Colour of the curve.
     **style
@@ -128,7 +128,7 @@ def spectrum(
         raise ArgumentError(f"over = {over!r}; expected a range of frequencies, low < high")
     own, ax = ax is None, axes_for(ax, width, height=54.0)
     look = {"color": color, "linewidth": 0.8, "label": "amplitude", **style}
-    # an exact zero has no place on a logarithmic axis
+    # a logarithmic axis cannot show zero
     (line,) = ax.plot(frequency, np.maximum(amplitude, 1e-300), **look)
     ax.set_yscale("log")
     ax.set_xlim(*over)

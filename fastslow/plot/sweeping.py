@@ -1,4 +1,4 @@
-"""Bifurcation diagrams by simulation."""
+"""Bifurcation diagrams by simulation (brute-force diagrams)."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from fastslow.plot.layout.style import BLACK, BLUE, GREY, VERMILION, axes_for, w
 from fastslow.plot.layout.typesetting import typeset
 from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
 
-#: More points than this are stored as pixels, in files of vectors too.
+#: Above this number points are rasterized, in vector formats too.
 MANY = 20_000
 
-#: Look of a pass by its direction: rings that show around dots where both passes agree.
+#: Markers by direction of the sweep: rings remain visible around dots where both agree.
 LOOKS: dict[int, dict[str, Any]] = {
     1: {"color": BLUE, "markerfacecolor": "none", "markeredgewidth": 0.5, "label": "swept up"},
     -1: {"color": VERMILION, "markeredgewidth": 0.0, "label": "swept down"},
@@ -36,11 +36,11 @@ class SweepDrawing(Drawing):
     ----------
     ax : Axes
     x, y : str
-        What the axes show.
+        Quantities on the axes.
     up, down : Line2D or None
-        The points of each pass.
+        The points of the sweep in each direction.
     failures : Line2D or None
-        Values whose run failed, along the lower edge.
+        Values at which the simulation failed, along the lower edge.
     legend : Legend or None
     """
 
@@ -71,7 +71,7 @@ def sweep(
     size: float | None = None,
     **style: Any,
 ) -> SweepDrawing:
-    """Draw a bifurcation diagram by simulation, both passes over each other.
+    """Draw a bifurcation diagram by simulation, with both directions in one figure.
 
     Parameters
     ----------
@@ -79,14 +79,14 @@ def sweep(
     ax : Axes, optional
         Axes to draw into; new ones otherwise.
     width : str or float
-        Of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+        Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label, legend : bool, optional
-        Whether to draw a legend that says which pass is which; ``legend``, by default as
-        ``label``, decides.
+        Whether to draw a legend of the two directions; ``legend`` takes precedence and is by
+        default as ``label``.
     size : float, optional
-        Diameter of the dots in points; by default smaller for more points.
+        Diameter of the dots in points; by default decreasing with their number.
     **style
-        Properties of the points of both passes.
+        Properties of the points of both directions.
 
     Returns
     -------
@@ -148,7 +148,7 @@ def _points(
 
 
 def _sample(line: Line2D) -> Line2D:
-    """The same points, large enough for a legend."""
+    """Return a legend entry with larger markers."""
     sample = Line2D([], [])
     sample.update_from(line)
     sample.set_label(str(line.get_label()))

@@ -161,7 +161,7 @@ BY_PARAMETER = {
         *MAPPING,
         ({"omga": (0, 1)}, Unknown, "unknown parameter or state 'omga'; did you mean 'omega'?"),
         ({"C": (1, 0)}, Wrong, "the lower one first; did you mean (0, 1)?"),
-        ({"C": (0, 1)}, Wrong, "slider C = (0, 1) does not hold its value, 2.443"),
+        ({"C": (0, 1)}, Wrong, "slider C = (0, 1) does not contain its value, 2.443"),
     ],
     "slow": MAPPING,
     "smallest_step": POSITIVE,

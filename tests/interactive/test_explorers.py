@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fastslow as fs
-from fastslow.interactive.controls import REST
+from fastslow.interactive.controls import DEBOUNCE
 
 #: ipympl 0.10 makes its toolbar in a way that traitlets will refuse one day
 IPYMPL = pytest.mark.filterwarnings("ignore:Passing unrecognized arguments:DeprecationWarning")
@@ -65,10 +65,10 @@ def test_unknown_names_and_numbers_that_are_none(explorer):
     ("sliders", "message"),
     [
         ({"E": (0, 1)}, "unknown parameter or state 'E'"),
-        ({"D": (0.3, 0.5)}, "does not hold its value, 0.25"),
+        ({"D": (0.3, 0.5)}, "does not contain its value, 0.25"),
         ({"D": (1, 0)}, "expected two finite numbers"),
         ({"D": 3}, "expected two finite numbers"),
-        ({"x": (0.5, 1)}, "does not hold its value, 0"),
+        ({"x": (0.5, 1)}, "does not contain its value, 0"),
     ],
 )
 def test_wrong_sliders_raise_at_once(folded, sliders, message):
@@ -174,7 +174,7 @@ def test_a_slider_that_moves_is_followed_at_once_and_measured_when_it_rests(expl
             slider.value = value
             seen.append((explorer.view.changes["D"], explorer.view.overlay))
             await asyncio.sleep(0.01)
-        await asyncio.sleep(2 * REST)
+        await asyncio.sleep(2 * DEBOUNCE)
 
     asyncio.run(drag())
     assert seen == [(0.3, None), (0.35, None), (0.4, None)]

@@ -62,7 +62,7 @@ def test_a_pair_that_becomes_real_meets_on_the_axis(folded_lay):
 
 def test_nothing_followed_is_refused(gear, gear_diagram):
     away = fs.overlay(gear_diagram, fs.simulate(gear, [0, 0], t=(0, 0.1)))
-    with pytest.raises(fs.ArgumentError, match="follows no sheet"):
+    with pytest.raises(fs.ArgumentError, match="follows no stable branch"):
         fs.plot.eigenvalue_path(away)
 
 

@@ -96,7 +96,7 @@ def test_an_expression_on_the_vertical_axis(folded_lay):
 def test_turning_points_are_marked(gear_lay):
     drawn = fs.plot.overlay(gear_lay)
     assert drawn.turning.get_xdata() == pytest.approx([5.918, -1.174] * 2, abs=1e-3)
-    assert drawn.turning.get_label() == "$w$ turns back"
+    assert drawn.turning.get_label() == "turning point of $w$"
     assert fs.plot.overlay(gear_lay, turning=False).turning is None
 
 
@@ -163,7 +163,7 @@ def test_what_an_overlay_does_not_tell_is_in_its_figure():
         ax = fs.plot.overlay(fs.overlay(diagram, trajectory)).ax
         return [text.get_text() for text in ax.texts]
 
-    assert "the run goes beyond the diagram" in words((-0.5, 0.5), run)
-    assert "the run goes beyond the diagram" not in words((-1.1, 1.1), run)
+    assert "the trajectory leaves the range of the diagram" in words((-0.5, 0.5), run)
+    assert "the trajectory leaves the range of the diagram" not in words((-1.1, 1.1), run)
     short = fs.simulate(model, [0.0], t=(0, 628), integration=fs.Integration(max_steps=5))
     assert any(word.startswith("run ended early") for word in words((-1.1, 1.1), short))

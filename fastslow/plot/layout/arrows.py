@@ -1,4 +1,4 @@
-"""A sense of direction along a curve, in the plane or in space."""
+"""Arrow heads along a curve, in the plane or in space."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from fastslow.plot.layout.style import root
 
 Values = NDArray[np.float64]
 
-#: Distance of the two points that give an arrow its direction, in points.
+#: Distance of the two points that define the direction of an arrow, in points (1/72 inch).
 SPAN = 3.0
 
 
 def draw_arrows(line: Line2D, along: Values, fractions: Sequence[float]) -> tuple[Annotation, ...]:
-    """Put arrow heads on a curve at fractions of a growing quantity.
+    """Draw arrow heads on a curve at fractions of an increasing quantity.
 
     Parameters
     ----------
     line : Line2D
         The curve, of N points.
     along : ndarray, shape (N,)
-        Grows along the curve, e.g. its length.
+        Quantity that increases along the curve, e.g. arclength.
     fractions : sequence of float
-        Where, between 0 and 1 of ``along``.
+        Positions, from 0 to 1 of ``along``.
     """
     if len(along) < 2 or not along[-1] > along[0]:
         return ()
@@ -38,7 +38,7 @@ def draw_arrows(line: Line2D, along: Values, fractions: Sequence[float]) -> tupl
 
 
 def draw_heads(line: Line2D, rows: Sequence[int]) -> tuple[Annotation, ...]:
-    """Put arrow heads on a curve at given points of it; those outside the axes are left out."""
+    """Draw arrow heads on a curve at given rows; those outside the axes are omitted."""
     ax = axes_of(line)
     ax.autoscale_view()
     places = points(line)
@@ -78,7 +78,7 @@ def draw_heads(line: Line2D, rows: Sequence[int]) -> tuple[Annotation, ...]:
 
 
 def _turn(ax: Axes, heads: Sequence[Annotation], ends: Values) -> None:
-    """Put heads in space where they are seen; ends of shape (heads, 2, 3)."""
+    """Project arrow heads in space; ends of shape (heads, 2, 3)."""
     for head, both in zip(heads, ends, strict=True):
         tip, start = projected(ax, both)
         head.xy = (float(tip[0]), float(tip[1]))
@@ -86,9 +86,9 @@ def _turn(ax: Axes, heads: Sequence[Annotation], ends: Values) -> None:
 
 
 def length_along(line: Line2D) -> Values:
-    """Length of a curve in pixels up to each of its points, shape (N,)."""
+    """Arclength of a curve in pixels at each of its points, shape (N,)."""
     pixels = pixels_of(axes_of(line), points(line))
-    # where a line is in parts, the way between them is none
+    # gaps of a line have no length
     return np.r_[0.0, np.nancumsum(np.hypot(*np.diff(pixels, axis=0).T))]
 
 
@@ -100,7 +100,7 @@ def points(line: Line2D) -> Values:
 
 
 def axes_of(line: Line2D) -> Axes:
-    """The axes that a line was drawn into."""
+    """The axes of a line."""
     if not isinstance(line.axes, Axes):
         raise ValueError("this line was removed from its axes")
     return line.axes

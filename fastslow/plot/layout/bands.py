@@ -1,4 +1,4 @@
-"""Interfaces as thin lines and regions as light bands."""
+"""Interfaces drawn as thin lines, regions as light bands."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fastslow.plot.layout.style import BANDS, DARK, GREY, SMALL
 from fastslow.plot.layout.typesetting import plain
 
-#: Interface to (state, value), for interfaces that are a plain value of one state.
+#: Interface to (state, value), for interfaces at a constant value of one state.
 Values = Mapping[str, tuple[str, float]]
 
 
@@ -31,13 +31,13 @@ class Bands:
     fills : tuple of Rectangle
         The regions.
     names : tuple of Text
-        The regions' names, to be placed by `fastslow.plot.layout.labels.place`.
+        Names of the regions, to be placed by `fastslow.plot.layout.labels.place`.
     spans : tuple of (float, float)
-        Where each named region begins and ends along the axis, infinite beyond all interfaces.
+        Interval of each named region along the axis, infinite beyond the outermost interfaces.
     vertical : bool
         Whether the state is on the horizontal axis.
     parts : tuple of (float, float)
-        Where each fill begins and ends.
+        Interval of each fill.
     """
 
     lines: tuple[Line2D, ...] = ()
@@ -58,14 +58,14 @@ def draw_bands(
     vertical: bool = False,
     label: bool = True,
 ) -> Bands:
-    """Draw the interfaces at values of one state and tint the regions between them.
+    """Draw the interfaces at values of one state and fill the regions between them.
 
-    A band is named where all results drawn in it lie in one region.
+    A band is named if all results drawn in it are in one region.
 
     Parameters
     ----------
     ax : Axes
-        Whose limits are kept; bands reach as far as the axes, also when these change.
+        Axes, whose limits are kept; bands extend to the limits, also after these change.
     state : str
         The state on the axis.
     values : mapping
@@ -73,7 +73,7 @@ def draw_bands(
     heights : ndarray, shape (N,)
         Values of the state in the results drawn.
     regions : ndarray of str, shape (N,)
-        The region of each.
+        Region of each value.
     vertical : bool
         Whether the state is on the horizontal axis.
     label : bool
@@ -91,7 +91,7 @@ def draw_bands(
             (0.0, 0.0), 1.0, 1.0, transform=frame, facecolor=BANDS[number % 3], linewidth=0.0
         )
         fill.set(zorder=0, in_layout=False)
-        # added as an artist, so that the limits do not depend on it
+        # as an artist, which does not change the limits
         ax.add_artist(fill)
         fills.append(fill)
         parts.append((float(start), float(stop)))
@@ -113,7 +113,7 @@ def draw_bands(
 
 
 def fit_bands(ax: Axes, drawn: Bands) -> None:
-    """Let bands reach to the limits of the axes; hide names for which there is no room."""
+    """Extend bands to the limits of the axes; hide names that do not fit."""
     low, high = sorted(ax.get_xlim() if drawn.vertical else ax.get_ylim())
     for fill, (start, stop) in zip(drawn.fills, drawn.parts, strict=True):
         first, last = np.clip([start, stop], low, high).tolist()
@@ -130,7 +130,7 @@ def fit_bands(ax: Axes, drawn: Bands) -> None:
         name.set_position((middle, SIDE) if drawn.vertical else (SIDE, middle))
 
 
-#: Where a name stands along its band until it is placed, in parts of the axes.
+#: Initial position of a name along its band, as a fraction of the axes.
 SIDE = 0.95
 
 

@@ -1,4 +1,4 @@
-"""Small texts beside points, put where they cover nothing."""
+"""Labels of points and regions, placed without overlap."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ from fastslow.plot.layout.occupancy import (
 )
 from fastslow.plot.layout.style import BLACK, GREY, SMALL, root
 
-#: Directions of a label from its point, the better ones first, and its distances in points.
+#: Directions of a label from its point in order of preference, and distances in points.
 TURNS = np.deg2rad([45, 135, -45, -135, 90, -90, 0, 180, 22, 158, -22, -158])
 REACH = (7.0, 10.0, 14.0, 19.0, 25.0, 33.0, 43.0, 55.0)
 
-#: Labels further away than this are joined to their points by a thin line.
+#: Labels farther away than this are connected to their points by a leader line.
 FAR = 20.0
 
-#: What a text keeps from the edges of the axes, in points.
+#: Margin between texts and the edges of the axes, in points.
 AIR = 1.5
 
-#: Where the name of a region may stand: across its band, and along it in parts of the axes.
+#: Positions of the name of a region: across its band, and along it as fractions of the axes.
 DEPTHS = (0.5, 0.25, 0.75)
 SIDES = (0.95, 0.05, 0.9, 0.1, 0.8, 0.2, 0.65, 0.35, 0.5)
 
-#: From here on a place is no place: over another text, or out of the axes.
+#: Cost from which a position is excluded: over another text, or outside the axes.
 TAKEN = 1e3
 
 
 def tag(ax: Axes, text: str, at: Sequence[float]) -> Annotation:
-    """A label for a point of the plane or in space, to be placed by `place`."""
+    """Create a label for a point of the plane or in space, to be placed by `place`."""
     label = ax.annotate(
         text,
         (float(at[0]), float(at[1])),
@@ -56,7 +56,7 @@ def tag(ax: Axes, text: str, at: Sequence[float]) -> Annotation:
         color=BLACK,
         zorder=6,
     )
-    # it stays within the axes, whose size must not depend on it
+    # within the axes, whose size must not depend on it
     label.set_in_layout(False)
     if len(at) == 3:
         label._point_in_space = np.array(at, dtype=float)  # type: ignore[attr-defined]
@@ -69,10 +69,10 @@ def place(
     taken: Sequence[Artist] = (),
     bands: Sequence[Bands] = (),
 ) -> None:
-    """Keep labels off the curves, off each other, in the axes, and near to their own points.
+    """Place labels near their points, inside the axes and without overlap.
 
-    They are placed when the axes are drawn, and anew after their limits or their size
-    have changed. A label without any room is left out until there is some.
+    The labels are placed when the axes are drawn, and again after a change of their limits or
+    size. A label without a free position is hidden.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def place(
     taken : sequence of Artist
         Further artists that must not be covered, e.g. a legend of the figure.
     bands : sequence of Bands
-        Whose names are moved too, along and within their regions.
+        Bands, whose names are placed too, within their regions.
     """
     if not tags and not any(drawn.fills or drawn.lines for drawn in bands):
         return
@@ -113,7 +113,7 @@ def _place(
     anchors = _anchors(ax, tags)
     reach = np.repeat(REACH, len(TURNS))
     turns = np.tile(TURNS, len(REACH))
-    # an ellipse, since a label is wider than high
+    # on an ellipse, since a label is wider than high
     offsets = np.column_stack([1.3 * reach * np.cos(turns), reach * np.sin(turns)])
     joined: list[Points] = []
     for label, anchor in zip(tags, anchors, strict=True):
@@ -152,7 +152,7 @@ def _nearest_in(box: Points, point: Points) -> Points:
 def _others(
     ax: Axes, own: Sequence[Artist], taken: Sequence[Artist], renderer: RendererBase
 ) -> Points:
-    """Boxes of the texts and legends already there, shape (M, 4)."""
+    """Boxes of existing texts and legends, shape (M, 4)."""
     texts = [t for t in ax.texts if t.get_visible() and t.get_text() and t not in own]
     legend: Any = ax.get_legend()
     met = dict.fromkeys([*texts, *([legend] if legend is not None else []), *taken])
@@ -160,7 +160,7 @@ def _others(
 
 
 def _anchors(ax: Axes, tags: Sequence[Annotation]) -> Points:
-    """The points of labels in pixels; those in space are put where they are seen."""
+    """Return the points of labels in pixels, projecting those in space."""
     for label in tags:
         spot = getattr(label, "_point_in_space", None)
         if spot is not None:
@@ -179,7 +179,7 @@ def _move(
     boxes: Points,
     renderer: RendererBase,
 ) -> Points:
-    """Move the name of a region to a free place in its band, at an edge of the axes if it can."""
+    """Move the name of a region to a free position in its band, preferably at an edge."""
     low, high = sorted(ax.get_xlim() if vertical else ax.get_ylim())
     start, stop = max(span[0], low), min(span[1], high)
     axis = (ax.xaxis if vertical else ax.yaxis).get_transform()

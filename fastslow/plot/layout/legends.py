@@ -1,4 +1,4 @@
-"""Legends, put where they cover nothing."""
+"""Legends at free positions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Corner = Literal[
 ]
 CORNERS: tuple[Corner, ...] = get_args(Corner)
 
-#: Part of the axes that a legend may take at their top where the curves leave no room for it.
+#: Largest fraction of the axes that is added at the top for a legend without a free position.
 MOST = 0.5
 
 LOOK: dict[str, Any] = {"fontsize": SMALL, "handlelength": 2.2, "columnspacing": 1.0}
@@ -39,18 +39,18 @@ def add_legend(
     legend: bool | None,
     top: float = 1.0,
 ) -> Legend | None:
-    """A legend if one is wanted: below the axes of our own figure, inside axes that were given.
+    """Add a legend if requested: below the axes of a new figure, inside given axes.
 
     Parameters
     ----------
     ax : Axes
     handles : sequence of Artist
     own : bool
-        Whether the figure is our own.
+        Whether the figure was created by the plot function.
     label, legend : bool, bool or None
-        As given to the plot function: without a word about the legend labels decide.
+        Arguments of the plot function; ``legend=None`` stands for ``label``.
     top : float
-        Up to where a legend inside the axes may stand, in parts of their height.
+        Upper bound of a legend inside the axes, as a fraction of their height.
     """
     if not handles or not (label if legend is None else legend):
         return None
@@ -58,7 +58,7 @@ def add_legend(
 
 
 def legend_below(ax: Axes, handles: Sequence[Artist]) -> Legend:
-    """A legend for the whole figure, below its axes, in as many columns as have room."""
+    """Add a legend of the figure below its axes, in as many columns as fit."""
     figure = root(ax)
 
     def draw(columns: int) -> Legend:
@@ -69,24 +69,24 @@ def legend_below(ax: Axes, handles: Sequence[Artist]) -> Legend:
 
 
 def _fitting(draw: Callable[[int], Legend], count: int, width: float) -> Legend:
-    """A legend in as many columns as fit into a width in pixels."""
+    """Draw a legend in as many columns as fit into a width in pixels."""
     columns = min(count, 6)
     while True:
         legend = draw(columns)
         if columns == 1 or legend.get_window_extent().width <= width:
             return legend
         legend.remove()
-        # as many rows, or one more, in columns that are filled
+        # balance the columns at the same number of rows, or one more
         rows = -(-count // columns)
         fewer = -(-count // rows)
         columns = fewer if fewer < columns else columns - 1
 
 
 def legend_inside(ax: Axes, handles: Sequence[Artist], top: float = 1.0) -> Legend | None:
-    """A legend inside the axes where it covers nothing; if need be room is made above the curves.
+    """Add a legend at a free position inside the axes, raising their upper limit if needed.
 
-    Limits that were set by hand are kept. Where there is no room at all the legend stands
-    below the axes if the figure has a layout that makes room there; otherwise it is left out.
+    Limits set by hand are kept. Without a free position the legend is placed below the axes
+    if the figure has a layout engine that reserves space there; otherwise it is omitted.
     """
     run_layout(ax)
     frame = ax.get_window_extent()
@@ -120,7 +120,7 @@ def _inside(ax: Axes, handles: Sequence[Artist], columns: int, top: float) -> Le
 
 
 def _outside(ax: Axes, handles: Sequence[Artist]) -> Legend:
-    """A legend below the axes, their ticks and their name."""
+    """Add a legend below the axes, their ticks and their label."""
     figure = root(ax)
     frame, all_of_it = ax.get_window_extent(), ax.get_tightbbox()
     depth = 0.0 if all_of_it is None else (frame.y0 - all_of_it.y0) / figure.dpi
@@ -140,7 +140,7 @@ def _pad(ax: Axes) -> float:
 
 
 def _costs(ax: Axes, legend: Legend, top: float) -> Points:
-    """How much the legend would cover at each corner and side, shape (corners,)."""
+    """Cost of the legend at each corner and side, shape (corners,)."""
     frame, box, pad = ax.get_window_extent(), legend.get_window_extent(), _pad(ax)
     highest = frame.y0 + top * frame.height
     places = []
@@ -154,13 +154,13 @@ def _costs(ax: Axes, legend: Legend, top: float) -> Points:
 
 
 def _choose(ax: Axes, legend: Legend, top: float) -> None:
-    """Move a legend to the best corner, unless it was removed or replaced."""
+    """Move a legend to the best position, unless it was removed or replaced."""
     if ax.get_legend() is legend:
         legend.set_loc(CORNERS[int(np.argmin(_costs(ax, legend, top)))])
 
 
 def _raised_limit(ax: Axes, height: float, top: float) -> bool:
-    """Raise the upper limit by the height of a legend, if that may be and is not too much."""
+    """Raise the upper limit by the height of a legend; False if fixed or too much is needed."""
     part = (height + 2.0 * _pad(ax)) / ax.get_window_extent().height
     if part > MOST * top or not ax.get_autoscaley_on():
         return False

@@ -1,4 +1,4 @@
-"""Marks along a trajectory: crossings of interfaces, transitions, turning points."""
+"""Markers along a trajectory: crossings of interfaces, transitions, turning points."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fastslow.results.overlay.overlay import Overlay
 
 
 def draw_dots(ax: Any, places: Sequence[Array]) -> Line2D | None:
-    """Mark crossings of interfaces by small dots."""
+    """Draw crossings of interfaces as small dots."""
     if not len(places[0]):
         return None
     (dots,) = ax.plot(
@@ -33,21 +33,21 @@ def draw_dots(ax: Any, places: Sequence[Array]) -> Line2D | None:
 
 
 def draw_crossings(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> Line2D | None:
-    """Mark the crossings of interfaces by the trajectory of an overlay."""
+    """Draw the crossings of interfaces by the trajectory of an overlay."""
     met = lay.run.crossings
     times, state = np.array([c.time for c in met]), np.array([c.state for c in met])
     return draw_dots(ax, at_times(lay, times, lay.run.states, state, *shown)) if met else None
 
 
-def at_states(lay: Overlay, shown: Sequence[Quantity], moments: Any) -> list[Array]:
-    """Quantities at moments, which know their fast states and the slow quantity."""
-    state = np.array([[*m.state, m.value] for m in moments])
+def at_states(lay: Overlay, shown: Sequence[Quantity], states: Any) -> list[Array]:
+    """Quantities at instants with known fast states and slow quantity."""
+    state = np.array([[*s.state, s.value] for s in states])
     names = (*lay.diagram.states, lay.parameter)
-    return at_times(lay, np.array([m.time for m in moments]), names, state, *shown)
+    return at_times(lay, np.array([s.time for s in states]), names, state, *shown)
 
 
 def draw_transitions(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> tuple[Line2D, ...]:
-    """Mark the transitions, every kind by a marker of its own."""
+    """Draw the transitions, each kind with its own marker."""
     drawn: list[Line2D] = []
     for kind, (marker, colour, text) in TRANSITIONS.items():
         met = [t for t in lay.transitions if t.kind == kind]
@@ -68,7 +68,7 @@ def draw_transitions(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> tuple[
 
 
 def draw_turning(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> Line2D | None:
-    """Bars where the slow quantity turns back."""
+    """Draw a bar at each turning point of the slow quantity."""
     if not lay.turning:
         return None
     (line,) = ax.plot(
@@ -79,6 +79,6 @@ def draw_turning(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> Line2D | N
         markeredgewidth=1.4,
         color=MOTION,
         zorder=4.6,
-        label=f"{typeset(lay.parameter)} turns back",
+        label=f"turning point of {typeset(lay.parameter)}",
     )
     return line

@@ -1,4 +1,4 @@
-"""Where the curves and markers of axes are, in pixels, so that nothing is written over them."""
+"""Pixels occupied by curves and markers, which labels and legends must not cover."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from fastslow.plot.layout.style import root
 
 Points = NDArray[np.float64]
 
-#: A step of the layout, which measures texts with the renderer given.
+#: A step of the layout; texts are measured with the given renderer.
 Step = Callable[[RendererBase], None]
 
-#: Distance of the points that stand for a curve, in points (1/72 inch).
+#: Spacing of the samples of a curve, in points (1/72 inch).
 STEP = 1.5
 
-#: What it costs to cover a point of a marker, in points of curves.
+#: Cost of covering a sample of a marker, relative to a sample of a curve.
 MARKER = 10.0
 
-#: Group of artists that may be written over.
+#: Group of artists that may be covered.
 FAINT = "fastslow faint"
 
 
 class LayoutArtist(Artist):
-    """Runs a step of the layout as soon as axes are drawn in another way than before.
+    """Invisible artist that repeats a step of the layout when its axes have changed.
 
-    Invisible; whatever is to be placed by where other things are (labels, legends, the
-    names of regions) is so placed anew when limits, size or resolution have changed.
+    Labels, legends and names of regions, whose positions depend on other artists, are thus
+    placed again after a change of the limits, the size or the resolution.
     """
 
     def __init__(self, step: Step) -> None:
@@ -46,7 +46,7 @@ class LayoutArtist(Artist):
         self.set_zorder(-1e9)
 
     def draw(self, renderer: RendererBase) -> None:
-        """Run the step, unless nothing has changed since the last time."""
+        """Run the step if the axes have changed since the last draw."""
         ax: Any = self.axes
         frame = ax.get_window_extent().bounds
         limits = [ax.get_xlim(), ax.get_ylim(), ax.get_xscale(), ax.get_yscale()]
@@ -59,41 +59,41 @@ class LayoutArtist(Artist):
 
 
 def on_draw(ax: Axes, step: Step) -> None:
-    """Run a step of the layout whenever the axes are drawn in another way than before.
+    """Run a step of the layout at each draw before which the axes have changed.
 
-    The step receives the renderer: a text measures itself with the one that drew it last,
-    whose resolution may be another.
+    The step receives the renderer, since a text would otherwise be measured with the last
+    one, whose resolution may differ.
     """
     ax.add_artist(LayoutArtist(step))
 
 
 def run_layout(ax: Axes) -> None:
-    """Give the axes of a figure, and what stands in them, their places.
+    """Run the layout of a figure and place the contents of its axes.
 
-    Axes that were given are left to be settled when their figure is drawn.
+    For given axes the layout runs when their figure is drawn.
     """
     root(ax).draw_without_rendering()
 
 
 def projected(ax: Any, places: Points) -> Points:
-    """Points in space, shape (N, 3), in the plane of the data that is drawn, shape (N, 2)."""
+    """Project points in space, shape (N, 3), to the plane of the axes, shape (N, 2)."""
     onto = np.column_stack([places, np.ones(len(places))]) @ ax.get_proj().T
     return np.asarray(onto[:, :2] / onto[:, 3:])
 
 
 def pixels_of(ax: Axes, places: Points) -> Points:
-    """Points of the plane, shape (N, 2), or in space, shape (N, 3), in pixels."""
+    """Transform points, shape (N, 2) or in space (N, 3), to pixels."""
     flat = projected(ax, places) if places.shape[1] == 3 else places
     return np.asarray(ax.transData.transform(flat))
 
 
 def occupied_pixels(ax: Axes) -> Points:
-    """Points in pixels along all curves and around all markers of the axes, and their weights.
+    """Sample all curves and markers of the axes, in pixels, with weights.
 
     Returns
     -------
     ndarray, shape (N, 3)
-        x, y, and what it costs to cover the point: 1 on a curve, more on a marker.
+        x, y, and the cost of covering the sample: 1 on a curve, more on a marker.
     """
     frame, scale = ax.get_window_extent(), root(ax).dpi / 72.0
     step = STEP * scale
@@ -105,7 +105,7 @@ def occupied_pixels(ax: Axes) -> Points:
             near = np.isfinite(pixels).all(axis=1)
             parts.append(_weighted(_rounded(pixels[near], radius), MARKER))
     ink = np.vstack(parts)
-    # of several points in one little square the heaviest counts
+    # of several samples in a cell the heaviest counts
     ink = ink[np.argsort(-ink[:, 2], kind="stable")]
     cells = np.floor((ink[:, :2] - (frame.x0, frame.y0)) / step)
     inside = (np.abs(cells) < 100_000).all(axis=1)
@@ -118,7 +118,7 @@ def _weighted(points: Points, weight: float) -> Points:
 
 
 def _shapes(ax: Axes, scale: float) -> Iterator[tuple[Points, bool, float]]:
-    """Curves in pixels, whether a line joins their points, and the radius of the markers."""
+    """Yield curves in pixels, whether a line joins their points, and the radius of markers."""
     for line in ax.lines:
         if not line.get_visible() or line.get_gid() == FAINT:
             continue
@@ -136,12 +136,12 @@ def _of_line(ax: Axes, line: Line2D) -> Points:
         places = np.column_stack([np.asarray(d, dtype=float) for d in line.get_data_3d()])
         return pixels_of(ax, places)
     places = np.asarray(line.get_xydata(), dtype=float)
-    with np.errstate(all="ignore"):  # what a logarithmic axis cannot show
+    with np.errstate(all="ignore"):  # values that a logarithmic axis cannot show
         return np.asarray(line.get_transform().transform(places))
 
 
 def _dense(pixels: Points, frame: Bbox, step: float) -> Points:
-    """Points along a curve as far as it is within the frame."""
+    """Sample the portion of a curve within the frame."""
     start, run = pixels[:-1], np.diff(pixels, axis=0)
     good = np.isfinite(start).all(axis=1) & np.isfinite(run).all(axis=1)
     start, run = start[good], run[good]
@@ -164,24 +164,24 @@ def _dense(pixels: Points, frame: Bbox, step: float) -> Points:
 
 
 def _rounded(pixels: Points, radius: float) -> Points:
-    """Markers as their centres and eight points around each."""
+    """Sample markers at their centres and eight points around each."""
     turns = np.linspace(0, 2 * np.pi, 8, endpoint=False)
     around = radius * np.column_stack([np.cos(turns), np.sin(turns)])
     return (pixels[:, None] + np.vstack([[0.0, 0.0], around])).reshape(-1, 2)
 
 
 def overlap_cost(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Points:
-    """How much would be covered by boxes, shape (K, 4) as x0, y0, x1, y1.
+    """Cost of placing boxes, shape (K, 4) as x0, y0, x1, y1.
 
     Parameters
     ----------
     boxes : ndarray, shape (K, 4)
     ink : ndarray, shape (N, 3)
-        Points with their weights, from `covered`.
+        Samples with weights, from `covered`.
     taken : ndarray, shape (M, 4)
-        Other boxes: a thousand each.
+        Other boxes, at a cost of 1000 each.
     frame : Bbox
-        To stand out of it costs ten thousand.
+        Frame of the axes; leaving it costs 10 000.
 
     Returns
     -------
@@ -198,5 +198,5 @@ def overlap_cost(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Poin
 
 
 def box_of(artist: Artist, renderer: RendererBase, pad: float = 1.0) -> Points:
-    """Extent of an artist in pixels with some air, shape (4,)."""
+    """Extent of an artist in pixels with a margin, shape (4,)."""
     return np.asarray(artist.get_window_extent(renderer).padded(pad).extents)

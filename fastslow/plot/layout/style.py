@@ -1,4 +1,4 @@
-"""Colours, line styles and markers of all figures, and the axes they are drawn into."""
+"""Colours, line styles and markers of all figures, new figures and axes, and saving."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ COLOURS = {
     "grey": GREY,
 }
 
-#: Markers that are strokes, without a face.
+#: Markers without a face.
 STROKES = "x|"
 
-#: Line of the virtual parts of a curve of special points.
+#: Line style of virtual arcs of a curve of special points.
 VIRTUAL_CURVE: dict[str, Any] = {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.6}
 
-#: Line of a curve of Hopf points by their criticality.
+#: Line style of Hopf curves by criticality.
 HOPF_CURVES: dict[str, dict[str, Any]] = {
     "supercritical": {"linestyle": "-"},
     "subcritical": {"linestyle": (0, (3, 1.5))},
@@ -61,9 +61,9 @@ HOPF_CURVES: dict[str, dict[str, Any]] = {
 #: Marker, colour and legend text of a transition by kind.
 TRANSITIONS: dict[str, tuple[str, str, str]] = {
     "jump": ("*", VERMILION, "jump at a fold"),
-    "Hopf": ("P", GREEN, "leaves past Hopf"),
-    "branch point": ("^", GREEN, "leaves past BP"),
-    "crossing": ("D", ORANGE, "passage of BE"),
+    "Hopf": ("P", GREEN, "delayed exit past Hopf"),
+    "branch point": ("^", GREEN, "delayed exit past BP"),
+    "crossing": ("D", ORANGE, "passage through BE"),
     "gap crossing": (">", PURPLE, "gap crossing"),
     "steep": ("X", BLACK, "steep slope"),
     "rate-induced": ("o", VERMILION, "rate-induced tipping"),
@@ -74,7 +74,7 @@ TRANSITIONS: dict[str, tuple[str, str, str]] = {
     "unclassified": ("d", GREY, "unclassified transition"),
 }
 
-#: Look of a phase of the motion by kind.
+#: Properties of the phases of a motion by kind.
 PHASES: dict[str, dict[str, Any]] = {
     "quasi-static": {"facecolor": "#C2DBEB"},
     "oscillating": {"facecolor": "#EBBC72"},
@@ -89,10 +89,10 @@ PHASES: dict[str, dict[str, Any]] = {
 #: Phases whose name is drawn in white.
 WHITE_WORDS = ("sticking",)
 
-#: Light fills of the regions, in turn.
+#: Light fills of the regions, cyclically.
 BANDS = ("#D6E7F4", "#FFFFFF", "#FEF0D8")
 
-#: Dots per inch of a figure on a screen.
+#: Dots per inch on screen.
 SHOWN = 150
 
 MM = 1 / 25.4
@@ -104,15 +104,15 @@ WIDTHS = {"column": 85.0, "page": 170.0}
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of a size in inches, outside pyplot."""
+    """Create an empty figure outside pyplot, with a size in inches."""
     figure = Figure(figsize=(width, height), dpi=SHOWN, layout="constrained")
-    # keeps one renderer, which measures a text once, where a bare figure makes one for each
+    # one renderer for all texts; a bare figure would create one for each
     FigureCanvasAgg(figure)
     return figure
 
 
 def styled_axes(ax: Axes) -> Axes:
-    """Axes of our own figures: small text, thin frame."""
+    """Apply the style of new figures to axes: small text, thin frame."""
     ax.tick_params(labelsize=SMALL, width=0.6, length=2.5)
     ax.xaxis.label.set_fontsize(TEXT)
     ax.yaxis.label.set_fontsize(TEXT)
@@ -124,7 +124,7 @@ def styled_axes(ax: Axes) -> Axes:
 
 
 def inches(width: str | float) -> float:
-    """The width of a figure in inches.
+    """Convert the width of a figure to inches.
 
     Parameters
     ----------
@@ -134,9 +134,9 @@ def inches(width: str | float) -> float:
     Raises
     ------
     UnknownNameError
-        For another name.
+        For an unknown name.
     ArgumentError
-        For no width to draw in.
+        For a width outside of 30 to 2000 mm.
 
     Examples
     --------
@@ -157,15 +157,15 @@ def inches(width: str | float) -> float:
 def axes_for(
     ax: Axes | None, width: str | float = "column", height: float = 64.0, space: bool = False
 ) -> Any:
-    """The axes given, or new ones.
+    """Return the given axes, or new ones.
 
     Parameters
     ----------
     ax : Axes or None
     width : str or float
-        Of a new figure, as for `inches`.
+        Width of a new figure, as for `inches`.
     height : float
-        Of a figure of a column's width, in millimetres; wider ones are somewhat higher.
+        Height in millimetres at the width of a column; wider figures are somewhat higher.
     space : bool
         Whether new axes are in space.
 
@@ -186,12 +186,12 @@ def axes_for(
 
 
 def spatial(function: str, ax: Axes | None, z: object) -> bool:
-    """Whether to draw in space.
+    """Return whether to draw in space.
 
     Raises
     ------
     ArgumentError
-        For a third quantity and axes of the plane.
+        For a third quantity with axes of the plane.
     """
     given = ax is not None and ax.name == "3d"
     if z is not None and ax is not None and not given:
@@ -200,7 +200,7 @@ def spatial(function: str, ax: Axes | None, z: object) -> bool:
 
 
 def point_colour(code: str) -> str:
-    """Colour of the special points of a code and of their curves."""
+    """Colour of special points of a code and of their curves."""
     return COLOURS[POINT_TYPES[code].colour]
 
 
@@ -226,14 +226,14 @@ def dot_look(code: str, size: float = 4.5) -> dict[str, Any]:
 
 
 def widen_limits(ax: Axes) -> None:
-    """Keep points that agree to rounding from filling the axes with their noise."""
+    """Widen limits that would otherwise magnify rounding errors of nearly equal values."""
     box = ax.dataLim
     limits: list[Any] = [(box.intervalx, ax.set_xlim), (box.intervaly, ax.set_ylim)]
     sizes = [max(abs(low), abs(high)) for (low, high), _ in limits]
     if not max(sizes) < float("inf"):
         return
     for ((low, high), set_limits), size in zip(limits, sizes, strict=True):
-        if size <= 1e-12 * max(sizes):  # nothing but the rounding of zero
+        if size <= 1e-12 * max(sizes):  # rounding errors of zero
             size = max(sizes)
         if size > 0.0 and high - low <= 1e-6 * size:
             middle = 0.5 * (low + high)
@@ -241,7 +241,7 @@ def widen_limits(ax: Axes) -> None:
 
 
 def note_early_end(ax: Axes, why: str) -> None:
-    """Write why a run ended early below the upper edge of axes, where there is a reason.
+    """Annotate axes with the reason for an early end of a run, if any.
 
     Examples
     --------
@@ -254,7 +254,7 @@ def note_early_end(ax: Axes, why: str) -> None:
 
 
 def note(ax: Axes, words: str) -> None:
-    """Write what a reader of a figure must know below the upper edge of axes, if anything.
+    """Write a note at the top of axes, unless it is empty.
 
     Examples
     --------
@@ -284,7 +284,7 @@ def root(ax: Axes) -> Figure:
 
 
 def save(figure: Figure, path: str | Path, dpi: float = 300) -> Path:
-    """Write a figure with fonts that editors and journals can read."""
+    """Save a figure with embedded, editable fonts."""
     target = Path(path)
     ending = target.suffix.removeprefix(".").lower()
     word("figure format", sorted(figure.canvas.get_supported_filetypes()))("path", ending)
@@ -293,9 +293,9 @@ def save(figure: Figure, path: str | Path, dpi: float = 300) -> Path:
 
 
 def rendered(figure: Figure, ending: str, dpi: float) -> bytes:
-    """A figure in a format, laid out for it and drawn once."""
+    """Render a figure in a format, with a single layout and a single draw."""
     stream = BytesIO()
-    # Matplotlib 3.11 looks up under "ps" how many characters a font in PDF may hold
+    # Matplotlib 3.11 takes the number of characters of a PDF font from the "ps" entry
     fonts = rc_context({"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "none"})
     with fonts, _layout_fixed(figure, ending, dpi):
         figure.savefig(stream, format=ending, dpi=dpi)
@@ -304,13 +304,12 @@ def rendered(figure: Figure, ending: str, dpi: float) -> bytes:
 
 @contextmanager
 def _layout_fixed(figure: Figure, ending: str, dpi: float) -> Iterator[None]:
-    """Lay a figure out for a format, and keep that from being done anew.
+    """Run the layout of a figure for a format once, and disable it meanwhile.
 
-    Matplotlib draws a figure with a layout twice when it saves it, the first time to lay
-    it out alone.
+    Matplotlib would otherwise draw the figure twice, the first time for the layout alone.
     """
     engine, canvas, resolution = figure.get_layout_engine(), figure.canvas, figure.dpi
-    # a canvas on a fine screen has scaled the figure, which another one would do again
+    # the canvas of a high-resolution screen has scaled the figure already
     if engine is None or not figure.axes or canvas.device_pixel_ratio != 1:
         yield
         return

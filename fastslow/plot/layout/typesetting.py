@@ -1,4 +1,4 @@
-"""Names, expressions and words as Matplotlib draws them: the one place where they are escaped."""
+"""Escaping and typesetting of names, expressions and texts for Matplotlib."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ from fastslow.formulas.grammar import (
     text_of,
 )
 
-#: Names that are letters.
+#: Names of Greek letters.
 LETTERS = (
     "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau "
     "upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega"
 )
 GREEK = frozenset(LETTERS.split())
 
-#: Functions that mathematics has commands for.
+#: Functions that have a command in TeX.
 FUNCTIONS = "cos cosh cot coth csc exp log max min sec sin sinh tan tanh"
 COMMANDS = frozenset(FUNCTIONS.split())
 
-#: How comparisons and connectives are written.
+#: Notation of comparisons and connectives.
 SIGNS = {"<=": r"\leq", ">=": r"\geq", "==": "=", "!=": r"\neq"}
 JOINED = {"and": r"\wedge", "or": r"\vee"}
 
-#: What Matplotlib's mathematics can draw of a name.
+#: Characters of names that Matplotlib's mathtext can draw.
 _LETTERS = re.compile(r"[A-Za-z0-9_\u00a1-\U0001ffff]+")
 
 
 def plain(text: str) -> str:
-    r"""A text in which nothing is mathematics, on one line.
+    r"""Escape a text as one line without mathematics.
 
     Examples
     --------
@@ -54,12 +54,12 @@ def plain(text: str) -> str:
         c if c.isprintable() else " " if c.isspace() else "\ufffd" for c in " ".join(text.split())
     )
     line = line.replace("$", r"\$")
-    # Matplotlib leaves a label with an underscore in front out of legends
+    # Matplotlib omits labels with a leading underscore from legends
     return rf"$\_${line[1:]}" if line.startswith("_") else line
 
 
 def as_given(text: str) -> str:
-    r"""A text of the user's own, with its mathematics between dollars where Matplotlib can read it.
+    r"""Return a user's text, keeping formulas between dollars that Matplotlib can parse.
 
     Examples
     --------
@@ -79,14 +79,14 @@ def as_given(text: str) -> str:
 
 
 def paragraph(text: str) -> str:
-    """A text of several lines in which nothing is mathematics."""
+    """Escape a text of several lines without mathematics."""
     return "\n".join(map(plain, text.split("\n")))
 
 
 def typeset(name: str) -> str:
-    r"""A name as mathematics: Greek letters by their names, subscripts after an underscore.
+    r"""Typeset a name: Greek letters by their names, subscripts after an underscore.
 
-    A name that is no identifier is written as it is.
+    A name that is not an identifier is left unchanged.
 
     Examples
     --------
@@ -103,7 +103,7 @@ def _drawn(name: str) -> bool:
 
 
 def _symbol(name: str) -> str:
-    """A name within mathematics."""
+    """Typeset a name within a formula."""
     if not _drawn(name):
         return r"\mathrm{?}"
     head, *below = name.split("_")
@@ -119,7 +119,7 @@ def _letter(word: str) -> str:
 
 
 def written(expression: str) -> str:
-    r"""An expression as the label of an axis, in mathematics.
+    r"""Typeset an expression as the label of an axis.
 
     Examples
     --------
@@ -128,13 +128,13 @@ def written(expression: str) -> str:
     """
     try:
         tree = parse(expression)
-    except ArgumentError:  # a name need not be an identifier
+    except ArgumentError:  # a name that is not an identifier
         return typeset(expression)
     return typeset(tree.name) if isinstance(tree, Name) else f"${_mathematics(tree)[0]}$"
 
 
 def _mathematics(node: Node) -> tuple[str, int]:
-    """A part of an expression in mathematics, and how tightly it binds."""
+    """Typeset a subexpression; return it with its operator precedence."""
     match node:
         case Name(name):
             return _symbol(name), 4
@@ -147,7 +147,7 @@ def _mathematics(node: Node) -> tuple[str, int]:
             return f"-{_bound(operand, 2)}", 1
         case Sum(((_, first), *rest)):
             terms = [_bound(first, 1)]
-            # a − (b − c) keeps its brackets
+            # a − (b − c) needs its brackets
             terms += [f" {sign} {_bound(term, 1 + (sign == '-'))}" for sign, term in rest]
             return "".join(terms), 1
         case Product(((_, first), *rest)):
