@@ -1,1 +1,1 @@
-"""Equilibria at a value, boundary equilibria, and all branches of a frozen model."""
+"""Equilibria and bifurcation diagrams of frozen models."""

@@ -1,4 +1,4 @@
-"""What a frozen field needs of a model, derived from its equations."""
+"""Derivation of a frozen field from the equations of a model."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from fastslow.results.stored.unit_equations import UnitEquations
 
 @dataclass(frozen=True, eq=False)
 class DerivedField:
-    """What `FrozenField` needs of a model with equations.
+    """Compiled rates, derivatives and units of a model with equations, for `FrozenField`.
 
     Parameters
     ----------
     model : Model
     varying : tuple of str
-        The parameters that vary.
+        The varying parameters.
     """
 
     model: Model
@@ -53,23 +53,23 @@ class DerivedField:
         return compile_field(self.model, *self.varying, modes=self._rows)
 
     def unit_equations(self, values: Mapping[str, float]) -> UnitEquations:
-        """Of natural units, where these parameters have values."""
+        """Return the equations of natural units at parameter values."""
         names = (*self.model.states, *self.varying)
         functions = [i.function for i in self.model.interfaces.values()]
         known = {real(n): v for n, v in values.items()}
         return unit_equations(names, self.model.regions.values(), functions, known)
 
     def derivatives(self, region: int) -> tuple[Sequence[tuple[int, ...]], Callable[..., Any]]:
-        """Which second and third derivatives of a region's rates there are, and their values.
+        """Return the indices of non-zero second and third derivatives, and their function.
 
-        The values are a function of states, varying parameters and the other ones.
+        Its arguments are the states, the varying parameters and the other parameters.
         """
         names = [*self.varying, *(p for p in self.model.parameters if p not in self.varying)]
         rates = tuple(self.modes[region].rates)
         return derivatives(rates, tuple(map(real, self.model.states)), tuple(map(real, names)))
 
     def levels(self) -> dict[str, tuple[str, float]]:
-        """Interfaces that are a constant value of one state."""
+        """Return the interfaces at a constant value of one state."""
         values = self.model.values
         found = {}
         zero = tuple(s for s, v in values.items() if v == 0)
@@ -83,11 +83,11 @@ class DerivedField:
         return found
 
     def path(self) -> dict[str, str]:
-        """Of a model frozen along a path, each slow quantity as text."""
+        """Return each slow quantity as text, for a model frozen along a path."""
         return {quantity: str(law) for quantity, law in self.model.path.items()}
 
     def stored(self) -> StoredField:
-        """The field as it is kept in a file, where one parameter varies.
+        """Return the field in the form stored in files, with one varying parameter.
 
         Raises
         ------
@@ -130,9 +130,9 @@ def _stored_sides(mode: Mode) -> FieldSides | None:
 def _levels(
     model: Model, parameter: str, zero: tuple[sp.Symbol, ...]
 ) -> list[tuple[str, str, list[sp.Symbol], Callable[..., float], sp.Expr]]:
-    """Interfaces h = a x + b with a state x and no varying parameter, and −b/a as a function.
+    """Return interfaces h = a x + b in a state x without varying parameters, with −b/a.
 
-    With some parameters zero.
+    The symbols in ``zero`` are set to zero; −b/a is a function.
     """
     found = []
     for name, interface in model.interfaces.items():
@@ -149,13 +149,13 @@ def _levels(
     return found
 
 
-#: NumPy's names of functions that have others in texts.
+#: NumPy names of functions whose canonical names differ.
 _NAMES = {f"arc{n}": f"a{n}" for n in ("sin", "cos", "tan", "sinh", "cosh", "tanh")}
 _NAMES |= {"arctan2": "atan2"}
 
 
 class _CanonicalNames(ast.NodeTransformer):
-    """Source that SymPy has written for NumPy, as arithmetic in canonical names."""
+    """Convert NumPy source printed by SymPy to arithmetic in canonical names."""
 
     def __init__(self, arguments: Sequence[str]) -> None:
         self.names = {name: f"u{k}" for k, name in enumerate(arguments)}
@@ -176,7 +176,7 @@ class _CanonicalNames(ast.NodeTransformer):
 def _stored_derivatives(
     entries: Sequence[tuple[int, ...]], values: Callable[..., Any]
 ) -> Derivatives | None:
-    """The source that SymPy has made of derivatives, operation by operation the same."""
+    """Return the SymPy source of derivatives, with identical operations."""
     (function,) = ast.parse(inspect.getsource(values)).body
     assert isinstance(function, ast.FunctionDef)
     naming = _CanonicalNames([a.arg for a in function.args.args])

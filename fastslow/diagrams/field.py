@@ -1,4 +1,4 @@
-"""A frozen model as numbers: rates, Jacobian, interfaces and eigenvalues at points."""
+"""Numerical evaluation of frozen models: rates, Jacobians, switching functions, eigenvalues."""
 
 from __future__ import annotations
 
@@ -30,48 +30,48 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Stands for the varying parameter in a model that has none; no user's symbol has this name.
+#: Placeholder for the varying parameter of a model without one; not a valid symbol name.
 IDLE = "(none)"
 
 _NONE = np.empty(0)
 
-#: A point belongs to the closure of a region where every switching function is beyond zero by
-#: less than this part of its terms: Newton's method leaves some 1e-15, ill conditioned ones 1e-11.
+#: A point is in the closure of a region if no switching function has the wrong sign by more than
+#: this fraction of its terms: Newton's method leaves some 1e-15, in ill-conditioned cases 1e-11.
 CLOSURE = 1e-9
 
-#: A state below this part of its natural unit may be zero but for rounding.
+#: A state below this fraction of its natural unit may be zero to rounding.
 DOUBTFUL = 1e-8
 
-#: An equation whose terms are all below this part of the largest is empty but for rounding.
+#: An equation whose terms are all below this fraction of the largest is empty to rounding.
 EMPTY = 1e-14
 
-#: A tangent's share of the parameter, times the distance from zero in units of the states, below
+#: Parameter component of a tangent, times the distance from zero in units of the states, below
 #: which a segment is vertical to rounding.
 VERTICAL = 1e-10
 
-#: Of Newton's method at one point.
+#: Iterations of Newton's method at one point.
 ITERATIONS = 40
 
-#: A component of a state below this many times its rounding error counts as zero.
+#: A component of a state below this multiple of its rounding error is zero.
 ROUNDING_ERRORS = 100.0
 
 
-def require_frozen(model: Model | StoredModel, instead: str) -> None:
-    """Raise unless a model is frozen; ``instead`` begins what to do with the frozen one."""
+def require_frozen(model: Model | StoredModel, action: str) -> None:
+    """Raise ModelError unless a model is frozen; ``action`` is what to do with the frozen model."""
     for quantity in (*model.forcing, *model.slow_states):
-        raise ModelError(f"'{quantity}' still varies in time; {instead} model.frozen() instead")
+        raise ModelError(f"'{quantity}' still varies in time; {action} model.frozen() instead")
 
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """Where a special point comes from: the frozen model, and the units of its states.
+    """Origin of a special point: its frozen model, units of the states, and window.
 
     Parameters
     ----------
     model : Model
     unit : ndarray, shape (n,)
     window : StateWindow
-        In which its diagram was traced.
+        Window in which its diagram was traced.
     """
 
     model: Model
@@ -81,7 +81,7 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class StoredFrozen:
-    """What a stored model says of its frozen rates, with the part of `DerivedField`."""
+    """The frozen rates of a stored model, with the interface of `DerivedField`."""
 
     model: StoredModel
     varying: tuple[str, ...]
@@ -124,18 +124,18 @@ class StoredFrozen:
         return self.field.unit_equations[self.field.parameter in values]
 
     def derivatives(self, region: int) -> tuple[Sequence[tuple[int, ...]], Callable[..., Any]]:
-        """Which second and third derivatives there are, and their values; see `DerivedField`."""
+        """Return indices and function of second and third derivatives; see `DerivedField`."""
         found = self.modes[region].derivatives
         if found is None:
             raise ModelError(f"the normal form of a special point is not known: {INSTEAD}")
         return found.entries, found
 
     def levels(self) -> dict[str, tuple[str, float]]:
-        """Interfaces that are a constant value of one state."""
+        """Return the interfaces at a constant value of one state."""
         return self.field.interface_values(self.model.parameters)
 
     def path(self) -> dict[str, str]:
-        """Of a model frozen along a path, each slow quantity as text."""
+        """Return each slow quantity as text, for a model frozen along a path."""
         return dict(self.field.path)
 
 
@@ -143,17 +143,17 @@ class StoredFrozen:
 class FrozenField:
     """The frozen rates of every region over (states, varying parameters).
 
-    In a Filippov model the sliding motions along its discontinuities follow the
-    regions; "region" and its number then stand for either (see `Mode`).
+    In a Filippov model the sliding motions along its discontinuities are numbered after the
+    regions; "region" and its number then denote either (see `Mode`).
 
     Parameters
     ----------
     model : Model or StoredModel
-        With a value for every parameter but the one that varies.
+        Model with values of all parameters except the varying ones.
     parameter : str
-        The one that varies.
+        The varying parameter.
     second : str, optional
-        One more that varies, along curves in a parameter plane.
+        Second varying parameter, for curves in a parameter plane.
     """
 
     model: Any
@@ -169,22 +169,22 @@ class FrozenField:
                 f"as in with_parameters({missing[0]}=…)"
             )
         if isinstance(self.model, StoredModel):
-            # what was not stored is said before anything is asked
+            # missing data raise at once
             object.__setattr__(self, "source", StoredFrozen(self.model, self.varying))
 
     @property
     def varying(self) -> tuple[str, ...]:
-        """The parameters that vary, k of them."""
+        """The varying parameters, k of them."""
         return (self.parameter,) if self.second is None else (self.parameter, self.second)
 
     @cached_property
     def source(self) -> DerivedField | StoredFrozen:
-        """Where its numbers come from: the equations, or what was stored of them.
+        """The source of its functions: the equations, or stored data.
 
         Raises
         ------
         ModelError
-            If what was stored does not hold for this parameter or these values.
+            If the stored data are not valid for this parameter or these values.
         """
         if isinstance(self.model, StoredModel):
             return StoredFrozen(self.model, self.varying)
@@ -203,7 +203,7 @@ class FrozenField:
 
     @cached_property
     def modes(self) -> tuple[Any, ...]:
-        """Every smooth motion, as `Mode`, or as `FieldMode` of a stored model."""
+        """Every smooth motion, as `Mode`, or for a stored model as `FieldMode`."""
         return self.source.modes
 
     @cached_property
@@ -234,9 +234,9 @@ class FrozenField:
         return self.units_at(None)
 
     def units_at(self, size: float | None) -> Array:
-        """The same where the (first) varying parameter is of a given size.
+        """Return `units` for a given size of the (first) varying parameter.
 
-        Rates that are homogeneous leave the size of the states to that of the parameter.
+        For homogeneous rates the size of the states depends on that of the parameter.
         """
         octave = None if not size else round(math.log2(size))
         if octave not in self._units:
@@ -253,7 +253,7 @@ class FrozenField:
         return {}
 
     def sizes(self, points: Sequence[tuple[int, Array]]) -> Array:
-        """Unit of each state by equilibria known, or the natural one where all are zero.
+        """Return the unit of each state given equilibria; the natural unit if all are zero.
 
         Parameters
         ----------
@@ -275,7 +275,7 @@ class FrozenField:
         return periods_of(self.model.states, self.model.periodic)
 
     def wrapped(self, state: Array) -> Array:
-        """A state with angles in their principal range."""
+        """Return a state with angles in their principal range."""
         if not self.model.periodic:
             return np.array(state, dtype=float)
         return principal(state, self.periods)
@@ -288,11 +288,11 @@ class FrozenField:
         return n, m, columns, first, first + m, loop("value_at")
 
     def rates(self, region: int) -> list[sp.Expr]:
-        """The rates of a region in SymPy, in the order of the states."""
+        """Return the symbolic rates of a region, in the order of the states."""
         return list(self.modes[region].rates)
 
     def evaluate(self, region: int, points: ArrayLike) -> tuple[Array, Array, Array, Array]:
-        """F (…, n), [F_x F_p] (…, n, n + k), h (…, m) and ∇h (…, m, n + k) at points u."""
+        """Evaluate F (…, n), [F_x F_p] (…, n, n + k), h (…, m) and ∇h (…, m, n + k) at points u."""
         u = writeable(np.asarray(points, dtype=float))
         n, m, columns, first, second, one = self._layout
         if u.ndim == 1:
@@ -318,27 +318,27 @@ class FrozenField:
         )
 
     def residual_and_jacobian(self, region: int, u: Array) -> tuple[Array, Array]:
-        """F and its Jacobian at one point."""
+        """Evaluate F and [F_x F_p] at one point."""
         value, slopes, _, _ = self.evaluate(region, u)
         return value, slopes
 
     def eigenvalues(self, region: int, points: ArrayLike) -> NDArray[np.complex128]:
         """Eigenvalues of the state Jacobian at points u, shape (…, n).
 
-        Of a sliding motion those along the interface, and as the last one −∞
-        (+∞ where it escapes): the interface is reached (left) in finite time.
+        For a sliding motion those along the interface, followed by −∞ (+∞ for escaping): the
+        interface is reached (left) in finite time.
         """
         return self.with_infinite(region, self.finite_eigenvalues(region, points))
 
     def finite_eigenvalues(self, region: int, points: ArrayLike) -> NDArray[np.complex128]:
-        """As `eigenvalues` without the infinite one, shape (…, n) or (…, n − 1)."""
+        """Eigenvalues without the infinite one, shape (…, n) or (…, n − 1)."""
         _, slopes, _, gradients = self.evaluate(region, points)
         jacobian, sides = slopes[..., : self.n], self.modes[region].sides
         if sides is not None:
             normal = gradients[..., sides.interface, : self.n, None]
-            # the columns of Q after the first span the interface's tangent space
+            # the columns of Q after the first span the tangent space of the interface
             along = np.linalg.qr(normal, mode="complete")[0][..., 1:]
-            # at a two-fold it is 0/0
+            # 0/0 at a two-fold
             with np.errstate(invalid="ignore"):
                 jacobian = np.swapaxes(along, -1, -2) @ jacobian @ along
         return self.spectrum(jacobian)
@@ -346,9 +346,9 @@ class FrozenField:
     def survey(
         self, region: int, points: Array, tangents: Array, scale: Array
     ) -> tuple[Array, Array, NDArray[np.complex128]]:
-        """How far points are from a fold and a branch point, with signs, and finite eigenvalues.
+        """Return signed test functions of folds and branch points, and the finite eigenvalues.
 
-        The first is the tangent's component along the parameter, 0 on a vertical segment; see
+        The first is the parameter component of the tangent, 0 on a vertical segment; see
         `branching` for the second.
         """
         turning, branching, jacobians = self._surveyed(region, points, tangents, scale)
@@ -357,7 +357,7 @@ class FrozenField:
         return turning, branching, self.spectrum(jacobians)
 
     def branching(self, region: int, points: Array, tangents: Array, scale: Array) -> Array:
-        """How far [F_x F_p; tangent] is from singular, with its determinant's sign, at rows."""
+        """Distance of [F_x F_p; tangent] from singularity, with the sign of its determinant."""
         return self._surveyed(region, points, tangents, scale)[1]
 
     def _surveyed(
@@ -378,7 +378,7 @@ class FrozenField:
         return turning, branching, jacobians
 
     def with_infinite(self, region: int, finite: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Eigenvalues with the infinite one of a sliding motion."""
+        """Append the infinite eigenvalue of a sliding motion."""
         sides = self.modes[region].sides
         if sides is None:
             return finite
@@ -387,7 +387,7 @@ class FrozenField:
 
     @staticmethod
     def spectrum(jacobian: Array) -> NDArray[np.complex128]:
-        """Eigenvalues of matrices; NaN where one is not finite, as at a two-fold (0/0)."""
+        """Eigenvalues of matrices; NaN if a matrix is not finite, as at a two-fold (0/0)."""
         if jacobian.shape[-1] == 2:
             flat = writeable(np.ascontiguousarray(jacobian).reshape(-1, 2, 2))
             found = np.empty((len(flat), 2), dtype=complex)
@@ -395,12 +395,12 @@ class FrozenField:
             return found.reshape(jacobian.shape[:-1])
         finite = np.asarray(np.isfinite(jacobian).all(axis=(-1, -2)))[..., None]
         if jacobian.shape[-1] < 2:
-            # one eigenvalue, or none where a motion slides in all directions
+            # one eigenvalue, or none for sliding in all directions
             return np.where(finite, np.diagonal(jacobian, axis1=-2, axis2=-1) + 0j, np.nan)
         n = jacobian.shape[-1]
         flat = np.where(finite[..., None], jacobian, 0.0).reshape(-1, n, n)
         values = np.empty((len(flat), n), dtype=complex)
-        # some 25 n**3 products each
+        # about 25 n**3 products each
         for s in blocks(len(flat), 25 * n**3):
             values[s] = np.linalg.eigvals(flat[s])
         return np.where(finite, values.reshape(jacobian.shape[:-1]), np.nan)
@@ -415,7 +415,7 @@ class FrozenField:
         normal: Array | None = None,
         point: Array | None = None,
     ) -> Located:
-        """Where the curve F = 0 meets h[row] = 0, or the plane through a point with a normal."""
+        """Solve F = 0 with h[row] = 0, or with the plane through a point with a normal."""
         normal = writeable(start if normal is None else normal)
         point = writeable(start if point is None else point)
         u = start.copy()
@@ -432,7 +432,7 @@ class FrozenField:
             _, _, h, slopes = self.evaluate(region, u)
             return float(h[row]), slopes[row]
 
-        # least-norm steps where the equations are singular
+        # least-norm steps if the equations are singular
         return with_condition(
             lambda u: self.residual_and_jacobian(region, u), condition, start, scale
         )
@@ -440,13 +440,13 @@ class FrozenField:
     def solved(
         self, region: int, starts: Array, scales: Array, natural: Array, limits: Limits
     ) -> tuple[Array, NDArray[np.bool_]]:
-        """Where Newton's method at a fixed parameter leads, and what plainly is a solution.
+        """Apply Newton's method at a fixed parameter, with a test of clear convergence.
 
         Parameters
         ----------
         region : int
         starts : ndarray, shape (N, n + 1)
-            Points u.
+            Starting points u.
         scales : ndarray, shape (N, n + 1)
             Their units.
         natural : ndarray, shape (N, n)
@@ -469,23 +469,23 @@ class FrozenField:
         return points, plain
 
     def slides_into(self, region: int, beyond: int, point: Array, unit: Array) -> int | None:
-        """The sliding or escaping motion that an equilibrium of a region on an interface enters.
+        """Return the sliding or escaping motion that an equilibrium on an interface enters.
 
-        None where both fields are tangent to it (a two-fold), or nothing slides.
+        None if both fields are tangent to the interface (a two-fold), or without sliding.
         """
         for number, mode in enumerate(self.modes):
             if mode.sides is None or {mode.sides.above, mode.sides.below} != {region, beyond}:
                 continue
             _, _, h, slopes = self.evaluate(number, point)
             size = np.abs(slopes) @ np.maximum(np.abs(point), unit)
-            # the drift of the region itself vanishes: the other one decides
+            # the drift of the region itself vanishes: the sign of the other one decides
             other = -1 if mode.sides.above == region else -2
             if self.signs[number, other] * h[other] > CLOSURE * size[other]:
                 return number
         return None
 
     def virtual(self, region: int, u: Array, unit: Array | None = None) -> bool:
-        """Whether a zero of a region's rates lies outside it; of sliding, outside escaping too."""
+        """Return whether a zero of the rates is outside its region (for sliding, escaping too)."""
         sides = self.modes[region].sides
         twins = [region]
         if sides is not None:
@@ -493,19 +493,19 @@ class FrozenField:
         return not any(self.admissible(k, u, unit) for k in twins)
 
     def admissible(self, region: int, u: Array, unit: Array | None = None) -> bool:
-        """Whether a point lies in the closure of a region.
+        """Return whether a point is in the closure of a region.
 
-        ``unit`` of the states and the parameter says what a component that is zero
-        but for rounding is compared with; the natural ones where it is not given.
+        ``unit`` of the states and the parameter is the scale of rounding errors; by default
+        the natural units.
         """
         _, _, h, slopes = self.evaluate(region, u)
         size = np.abs(slopes) @ np.maximum(np.abs(u), self.units if unit is None else unit)
         return bool(np.all(self.signs[region] * h >= -CLOSURE * size))
 
     def neighbour(self, region: int, interface: int) -> int | None:
-        """The region across an interface, and across those that coincide with it, if any.
+        """Return the region across an interface and across those that coincide with it.
 
-        None if there is none.
+        None if there is no such region.
         """
         if self.signs[region, interface] == 0:
             return None
@@ -519,9 +519,9 @@ class FrozenField:
 
     @cached_property
     def coinciding(self) -> list[list[int]]:
-        """For every interface those with its zero set at these parameter values, itself included.
+        """Return for every interface those with the same zero set, itself included.
 
-        Told by their ratio at points in general position, as x − D and x + D at D = 0.
+        For example x − D and x + D at D = 0; compared at points in general position.
         """
         count = len(self.interfaces)
         points = _points(self.n + self.compiled.k) * self.units
@@ -534,7 +534,7 @@ class FrozenField:
         return [np.flatnonzero(same[k] | (np.arange(count) == k)).tolist() for k in range(count)]
 
     def certain(self, points: Sequence[tuple[int, Array]]) -> NDArray[np.bool_]:
-        """Which states of equilibria, as `sizes` is given them, are more than rounding."""
+        """Return which states of equilibria exceed rounding errors; argument as for `sizes`."""
         found = np.zeros((len(points), self.n), dtype=bool)
         for region in {region for region, _ in points}:
             rows = [k for k, (number, _) in enumerate(points) if number == region]
@@ -548,7 +548,7 @@ class FrozenField:
     def _rounding(self, region: int, table: Array) -> Array:
         """Bound on the error of each state at equilibria of a region, shape (N, n).
 
-        |J⁻¹| (|F| + ε (|J| |x| + |F_p| |p|)), of what is left and of rounding, in the
+        |J⁻¹| (|F| + ε (|J| |x| + |F_p| |p|)), due to the residual and to rounding, in the
         units of the states; infinite where J is singular.
         """
         rates, slopes, _, _ = self.evaluate(region, table)
@@ -563,13 +563,13 @@ class FrozenField:
         return np.asarray((np.abs(inverses) @ left)[:, :, 0])
 
     def tangent(self, region: int, u: Array, weight: Array) -> tuple[Array, bool]:
-        """Null vector of [F_x F_p], unit in the weighted norm, and whether it is the only one."""
+        """Null vector of [F_x F_p], of unit weighted norm, and whether it is unique."""
         _, slopes, _, _ = self.evaluate(region, u)
         if not np.isfinite(slopes).all():
             return np.zeros(len(u)), False
         scale = 1.0 / np.sqrt(weight)
         matrix = slopes * scale / scale[: self.n, None]
-        # equations of different time scales or units are regular together
+        # rows are scaled, since time scales and units of the equations differ
         sizes = np.abs(matrix).max(axis=1, initial=0.0)
         least = max(EMPTY * sizes.max(initial=0.0), np.finfo(float).tiny)
         _, singular, right = np.linalg.svd(matrix / np.maximum(sizes, least)[:, None])
@@ -578,5 +578,5 @@ class FrozenField:
 
 @cache
 def _points(columns: int) -> Array:
-    """Points in general position, shape (6, columns)."""
+    """Return points in general position, shape (6, columns)."""
     return np.random.default_rng(0).normal(size=(6, columns))

@@ -15,7 +15,7 @@ from fastslow.model.structure import real
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """What sliding along an interface lies between.
+    """The regions on both sides of a sliding motion.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Mode:
     signs : tuple of int
         Sign of each row within the mode; 0 where a row does not bound it.
     sides : Sides, optional
-        For sliding.
+        For sliding motions.
     """
 
     name: str
@@ -68,10 +68,10 @@ class Mode:
 
 @once(partition_of)
 def modes_of(model: Model) -> tuple[Mode, ...]:
-    """Every region of a frozen model, then sliding and escaping along each discontinuity.
+    """Return the regions of a frozen model, then sliding and escaping along discontinuities.
 
-    Sliding along several interfaces at once is no mode of a branch; the equilibria
-    within it are found one value at a time (see `fastslow.diagrams.solve.equilibrium_sets`).
+    Sliding along several interfaces at once is not a mode of a branch; its equilibria are
+    computed for one parameter value at a time (see `fastslow.diagrams.solve.equilibrium_sets`).
 
     Examples
     --------
@@ -87,14 +87,14 @@ def modes_of(model: Model) -> tuple[Mode, ...]:
     sliding = tuple(mode for m in motions.sliding for mode in _both(model, functions, m))
     if not sliding:
         return regions
-    # the rows of the drifts bound no region: a constant stands for them
+    # the rows of the drifts do not bound regions: constant placeholders
     none = (sp.Integer(1), sp.Integer(1))
     longer = (replace(r, rows=(*r.rows, *none), signs=(*r.signs, 0, 0)) for r in regions)
     return (*longer, *sliding)
 
 
 def _both(model: Model, functions: Sequence[sp.Expr], motion: Motion) -> Iterator[Mode]:
-    """Sliding along one interface, and escaping from it."""
+    """Yield sliding along one interface and escaping from it."""
     (number,), (above, below) = motion.slides, motion.corners
     a, b = motion.bounds
     h = functions[number]

@@ -1,4 +1,4 @@
-"""Second and third derivatives of rates, derived once for each set of rates."""
+"""Symbolic second and third derivatives of rates, cached."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def derivatives(
     entries : list of tuple
         (i, j, k) or (i, j, k, l) with j ≤ k ≤ l.
     values : callable
-        Numbers for states and others to the list of values.
+        Function of states and others that returns the list of values.
 
     Examples
     --------

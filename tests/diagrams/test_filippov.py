@@ -200,7 +200,7 @@ def test_two_discontinuities_at_once_end_the_branch_in_words():
     assert diagram.completeness == "found"
     outcomes = [o for b in diagram.branches for o in b.outcomes if not o.success]
     assert [o.code for o in outcomes] == ["discontinuous interface"] * 2
-    assert all("two discontinuities meet" in o.message for o in outcomes)
+    assert all("two discontinuities intersect" in o.message for o in outcomes)
     assert sorted(b["p"] for b in diagram.boundary_equilibria) == pytest.approx([-0.5, 0.5])
 
 

@@ -192,7 +192,7 @@ def test_random_models(first, second, tmp_path_factory):
 def test_what_takes_equations_is_refused(kept):
     stored = fs.load(kept["power"][1]).model
     start = {"x": 1.0, "p": 1.0}
-    with pytest.raises(fs.ModelError, match="no equations in which to look for equilibria"):
+    with pytest.raises(fs.ModelError, match="without the equations from which equilibria"):
         fs.continue_equilibria(stored, "p", (0.5, 3))
     with pytest.raises(fs.ModelError, match="build the Model from its equations"):
         fs.continue_equilibria(stored, "a", (0.5, 3), from_points=[start])

@@ -1,4 +1,4 @@
-"""One curve of equilibria followed from region to region."""
+"""Continuation of a curve of equilibria across regions."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from fastslow.results.branch.windows import ON_EDGE, StateWindow, left_window
 
 Array = NDArray[np.float64]
 
-#: How far inside the range, in parts of it, an end is looked for where there is none at its edge.
-SHORT_OF_RANGE = (0.0, 1e-9, 1e-6, 1e-3)
+#: Distances from the end of the range, as fractions of it, at which an end point is searched for.
+INSETS = (0.0, 1e-9, 1e-6, 1e-3)
 
-#: A last step that ends nowhere is taken again in steps so many times shorter, so often in turn,
-#: with so many rows before the usual steps are taken again.
+#: Repetition of a failed last step: factor of the step length, number of repetitions, and number
+#: of rows with short steps.
 FINER, FINEST, CHUNK = 16.0, 3, 64
 
-#: Pieces (regions in order) that one branch may have.
+#: Pieces (regions in order) of a branch, at most.
 SEGMENTS = 1000
 
 
 @dataclass(frozen=True)
 class Window:
-    """Where branches are traced, and in which units.
+    """Ranges of parameter and states in which branches are traced, with units.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ class Window:
         return self.scale**-2.0
 
     def contains(self, u: Array) -> bool:
-        """Whether the states of a point u are in their window."""
+        """Return whether the states of a point u are in their window."""
         return bool(self.states.contains(u[:-1], self.scale[:-1]))
 
     def leads_out(self, u: Array, tangent: Array) -> bool:
-        """Whether a direction from a point on an edge of the window leaves it."""
+        """Return whether a direction from a point on an edge of the window leaves it."""
         low, high = np.array(self.states.lower), np.array(self.states.upper)
         slack = ON_EDGE * self.scale[:-1]
         out = (u[:-1] <= low + slack) & (tangent[:-1] < 0)
@@ -70,15 +70,15 @@ class Window:
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """A part of a branch in one region: points u and unit tangents, shape (N, n + 1)."""
+    """A segment of a branch in one region: points u and unit tangents, shape (N, n + 1)."""
 
     region: int
     u: Array
     tangents: Array
 
     def chords(self, scale: Array) -> Array:
-        """Lengths of the steps in units of the scale."""
-        # NumPy reduces a short last axis slowly
+        """Return the lengths of the steps in units of the scale."""
+        # reduction over a short last axis is slow in NumPy
         columns = np.ascontiguousarray(self.u.T)
         steps = np.diff(columns) / scale[:, None]
         return np.asarray(np.sqrt((steps * steps).sum(axis=0)))
@@ -89,9 +89,9 @@ class Segment:
 
 @dataclass(frozen=True, eq=False)
 class DirectedTrace:
-    """Pieces in order, the interface between each two, and why the walk ended.
+    """A curve traced in one direction: segments, interfaces between them, and its outcome.
 
-    ``last`` is the interface on which the walk stopped for good, if it did.
+    ``last`` is the interface on which the curve ends, if it does.
     """
 
     segments: tuple[Segment, ...]
@@ -111,16 +111,16 @@ def trace_across_regions(
     *,
     bounded: bool = True,
 ) -> DirectedTrace:
-    """Follow a curve of equilibria in one direction, through every interface on its way.
+    """Trace a curve of equilibria in one direction, across interfaces.
 
     Parameters
     ----------
     region : int
-        Region whose rates vanish at the start.
+        Region whose rates vanish at the starting point.
     start, tangent : ndarray, shape (n + 1,)
-        A point of the branch and the direction to go.
+        A point on the curve and the direction.
     bounded : bool
-        Whether interfaces bound the regions; False follows virtual equilibria.
+        Whether interfaces bound the regions; False traces virtual equilibria.
     """
     segments: list[Segment] = []
     joins: list[int] = []
@@ -168,9 +168,9 @@ def trace_across_regions(
         end = _oriented(field.tangent(region, corner, window.weight)[0], tangents[-1], window)
         u[-1], tangents[-1] = corner, end
         segments.append(Segment(region, u, tangents))
-        beyond, outcome = _enter(field, region, row, corner, window)
+        beyond, outcome = _region_beyond(field, region, row, corner, window)
         if beyond is None:
-            # at a two-fold the branch of pseudo-equilibria itself ends, at no boundary
+            # a branch of pseudo-equilibria ends at a two-fold, which is not a boundary
             inner = outcome.code == "two-fold" and field.modes[region].sides is not None
             last = None if inner else interface
             return DirectedTrace(tuple(segments), tuple(joins), outcome, last=last)
@@ -201,10 +201,10 @@ def _traced(
     *,
     closing: bool,
 ) -> tuple[Array, Array, int, float, bool]:
-    """Rows in one region, their tangents, what ended them, the step, and whether it was divided.
+    """Trace rows in one region; return them, tangents, status, step, and whether it was divided.
 
-    Where the last step left the range, and no equilibrium is found at the end of the range, the
-    step may have missed a turn of the branch: it is taken again in shorter ones.
+    If the last step left the range and no equilibrium is found at the end of the range, the
+    step may have missed a fold: it is repeated with shorter steps.
     """
     low, high = np.array(window.states.lower), np.array(window.states.upper)
     rows: list[Array] = []
@@ -254,14 +254,14 @@ def _traced(
 
 
 def _at_end(u: Array, window: Window) -> bool:
-    """Whether a row is an end of the range, to which its parameter was set."""
+    """Return whether a row is at an end of the range, to which its parameter was set."""
     return bool(u[-1] in (window.lower, window.upper))
 
 
 def _returned(
     region: int, u: Array, tangents: Array, first: Segment, window: Window, periods: Array
 ) -> Segment | None:
-    """The rows before a curve that left the first region passes its start again."""
+    """Return the rows up to the start of a curve that has returned to its first region."""
     if region != first.region:
         return None
     start, direction = first.u[0], first.tangents[0]
@@ -282,7 +282,7 @@ def _returned(
 def _first_interface(
     field: FrozenField, region: int, u: Array, tangents: Array, window: Window
 ) -> tuple[int, Array] | None:
-    """The switching function met first on the last step, with the point where it vanishes."""
+    """Return the first switching function with a zero on the last step, and its zero."""
     before, after = u[-2], u[-1]
     signs = field.signs[region]
     _, _, h0, _ = field.evaluate(region, before)
@@ -301,43 +301,43 @@ def _first_interface(
 def on_interface(
     field: FrozenField, region: int, interface: int, guess: Array, window: Window
 ) -> Located:
-    """The boundary equilibrium F = 0, h = 0 near a guess."""
+    """Solve for the boundary equilibrium F = 0, h = 0 near a guess."""
     return field.refined(region, guess, window.scale, row=interface)
 
 
 def on_normal_plane(
     field: FrozenField, region: int, point: Array, normal: Array, guess: Array, window: Window
 ) -> Located:
-    """Where the curve meets the plane through a point with a given normal."""
+    """Solve for the intersection of the curve with the plane through a point with a normal."""
     return field.refined(region, guess, window.scale, normal=normal, point=point)
 
 
 def _interface_of(field: FrozenField, region: int, row: int) -> int:
-    """The interface that a switching function is about: of a drift, the one slid along."""
+    """Return the interface of a switching function; for a drift, the one of the sliding motion."""
     sides = field.modes[region].sides
     return row if sides is None or row < len(field.interfaces) else sides.interface
 
 
-def _enter(
+def _region_beyond(
     field: FrozenField, region: int, row: int, corner: Array, window: Window
 ) -> tuple[tuple[int, Array] | None, Outcome]:
-    """The region (or sliding motion) beyond a switching function, and the tangent into it."""
+    """Return the region (or sliding motion) beyond a switching function, with the tangent."""
     sides = field.modes[region].sides
     if sides is None or row < len(field.interfaces):
-        return _cross(field, region, row, corner, window)
+        return _region_across(field, region, row, corner, window)
     _, _, h, slopes = field.evaluate(region, corner)
     size = np.abs(slopes) @ window.size(corner)
     if np.all(np.abs(h[-2:]) <= 1e-9 * size[-2:]):
         return None, _two_fold(field, region, corner)
-    # the first drift belongs to the region above, whose equilibrium this is
+    # the first drift is that of the region above, whose equilibrium this is
     beyond = sides.above if row == len(h) - 2 else sides.below
-    return _led_into(field, beyond, sides.interface, sides.interface, corner, window)
+    return _tangent_into(field, beyond, sides.interface, sides.interface, corner, window)
 
 
-def _cross(
+def _region_across(
     field: FrozenField, region: int, interface: int, corner: Array, window: Window
 ) -> tuple[tuple[int, Array] | None, Outcome]:
-    """The same beyond an interface; where the rates jump there, sliding along it."""
+    """Return the region beyond an interface, or sliding along a discontinuity, with the tangent."""
     name, where = field.interfaces[interface], _where(field, corner)
     _, _, h, gradients = field.evaluate(region, corner)
     size = np.abs(gradients * window.scale).max(axis=1)
@@ -347,24 +347,24 @@ def _cross(
         meeting = [field.interfaces[k] for k in sorted(met)]
         return None, Outcome(
             "interfaces meet",
-            f"the interfaces {' and '.join(meeting)} meet at the equilibrium {where}; where the "
-            "branch goes on is not unique.",
+            f"the interfaces {' and '.join(meeting)} meet at the equilibrium {where}; the "
+            "continuation of the branch is not unique.",
             False,
         )
     beyond = field.neighbour(region, interface)
     if beyond is None:
         return None, Outcome(
-            "no region beyond", f"no region lies beyond {name} = 0 at {where}.", False
+            "no region beyond", f"there is no region beyond {name} = 0 at {where}.", False
         )
     rates, slopes = field.residual_and_jacobian(beyond, corner)
     bound = 1e-8 * (np.abs(slopes) @ window.size(corner))
     if np.all(np.abs(rates) <= bound):
-        return _led_into(field, beyond, interface, interface, corner, window)
+        return _tangent_into(field, beyond, interface, interface, corner, window)
     if field.modes[region].sides is not None:
         return None, Outcome(
             "discontinuous interface",
-            f"the sliding field jumps across {name} = 0 at {where}, where two discontinuities "
-            "meet; the motion along both at once is not unique.",
+            f"the sliding vector field is discontinuous across {name} = 0 at {where}, where two "
+            "discontinuities intersect; sliding along their intersection is not unique.",
             False,
         )
     along = field.slides_into(region, beyond, corner, window.scale)
@@ -372,19 +372,19 @@ def _cross(
         return None, Outcome(
             "two-fold",
             f"both fields are tangent to {name} = 0 at the boundary equilibrium {where}; there is "
-            "no sliding motion beside it.",
+            "no sliding motion near it.",
             True,
         )
-    # the drift of this region's field, which vanishes here, is the bound to leave
+    # the branch leaves the bound at which the drift of this region's field vanishes
     sides = field.modes[along].sides
     drift = -2 if sides is not None and sides.above == region else -1
-    return _led_into(field, along, len(h) + drift, interface, corner, window)
+    return _tangent_into(field, along, len(h) + drift, interface, corner, window)
 
 
-def _led_into(
+def _tangent_into(
     field: FrozenField, beyond: int, row: int, interface: int, corner: Array, window: Window
 ) -> tuple[tuple[int, Array] | None, Outcome]:
-    """A region and the tangent along which one of the functions that bound it grows."""
+    """Return a region and the tangent along which one of its bounds increases."""
     tangent, single = field.tangent(beyond, corner, window.weight)
     _, _, _, gradients = field.evaluate(beyond, corner)
     size = float(np.abs(gradients[row] * window.scale).max())
@@ -403,7 +403,7 @@ def _led_into(
 def _cut(
     field: FrozenField, region: int, u: Array, tangents: Array, window: Window, status: int
 ) -> tuple[Array, Array, int]:
-    """Replace the last row, beyond the range or the window, by the first point on an edge."""
+    """Replace the last row, outside the range or the window, by the first point on an edge."""
     if not window.contains(u[-1]):
         edge = _on_window(field, region, u, tangents, window)
         if edge is None and status == spaces.WINDOW:
@@ -421,7 +421,7 @@ def _cut(
 def _on_window(
     field: FrozenField, region: int, u: Array, tangents: Array, window: Window
 ) -> Array | None:
-    """Where the last step leaves the window of the states: at the first of the edges passed."""
+    """Return the point at which the last step leaves the window of the states."""
     before, after = u[-2], u[-1]
     length = float(np.linalg.norm((after - before) / window.scale))
     best: tuple[float, Array] | None = None
@@ -445,16 +445,16 @@ def _on_window(
 def _cut_at_range(
     field: FrozenField, region: int, u: Array, tangents: Array, window: Window
 ) -> tuple[Array, Array]:
-    """Replace the last row, beyond the range, by the point exactly at its end.
+    """Replace the last row, outside the range, by the point at its end.
 
-    Where the rates are not defined there, by the nearest that is found inside.
+    If the rates are not defined there, by the nearest point found inside.
     """
     beyond, before = u[-1], u[-2]
     below = beyond[-1] < window.lower
     bound = window.lower if below else window.upper
     along = np.zeros(u.shape[1])
     along[-1] = 1.0
-    for short in SHORT_OF_RANGE:
+    for short in INSETS:
         target = bound + (short if below else -short) * (window.upper - window.lower)
         if not min(before[-1], beyond[-1]) <= target <= max(before[-1], beyond[-1]):
             break
@@ -487,8 +487,8 @@ def _two_fold(field: FrozenField, region: int, u: Array) -> Outcome:
     name = field.interfaces[sides.interface] if sides is not None else ""
     return Outcome(
         "two-fold",
-        f"both fields are tangent to {name} = 0 at {_where(field, u)}; at this two-fold the "
-        f"pseudo-equilibria of {field.regions[region]} end.",
+        f"both fields are tangent to {name} = 0 at {_where(field, u)}; the branch of "
+        f"pseudo-equilibria of {field.regions[region]} ends at this two-fold.",
         True,
     )
 
@@ -500,14 +500,14 @@ def _closed() -> Outcome:
 def _full(field: FrozenField, u: Array, continuation: Continuation) -> Outcome:
     return Outcome(
         "too many points",
-        f"the branch has {continuation.points} rows and goes on at {_where(field, u)}; "
-        "raise Continuation(points=…) or largest_step.",
+        f"the branch has {continuation.points} rows and continues beyond {_where(field, u)}; "
+        "increase Continuation(points=…) or largest_step.",
         False,
     )
 
 
 def _left(field: FrozenField, u: Array, window: Window) -> Outcome:
-    """What is said of a branch that ends on an edge of the window of the states."""
+    """Return the outcome of a branch that ends on an edge of the window."""
     where = f"{field.parameter} = {u[-1]:.6g}"
     return left_window(window.states, u[:-1], window.scale[:-1], where)
 
@@ -523,7 +523,7 @@ def _outcome(
     if status == spaces.RANGE and not _at_end(u, window):
         return Outcome(
             "edge of domain",
-            f"followed to {where}; no equilibrium was found at the end of the range itself, where "
+            f"traced to {where}; no equilibrium was found at the end of the range, where "
             "the rates may not be defined.",
             False,
         )

@@ -22,7 +22,7 @@ from fastslow.results.stored.model import StoredModel
 
 Array = NDArray[np.float64]
 
-#: A determinant below this times the product of its row norms counts as zero.
+#: A determinant below this multiple of the product of its row norms is zero to rounding.
 SINGULAR = 1e-10
 
 #: Kind of a boundary equilibrium by the product of the signs of both determinants.
@@ -41,7 +41,7 @@ class EquilibriumCurve:
 
 
 def join_directions(backward: DirectedTrace | None, forward: DirectedTrace) -> EquilibriumCurve:
-    """One curve from the walks in both directions from a start."""
+    """Join the traces in both directions from a starting point."""
     if backward is None:
         return EquilibriumCurve(
             forward.segments, forward.joins, (forward.outcome, forward.outcome), (None, None), True
@@ -63,7 +63,7 @@ def join_directions(backward: DirectedTrace | None, forward: DirectedTrace) -> E
 
 
 def oriented_upwards(curve: EquilibriumCurve) -> EquilibriumCurve:
-    """The curve in the direction in which the parameter at its ends does not fall."""
+    """Orient a curve such that the parameter at its end is not below that at its start."""
     if curve.closed or curve.segments[0].u[0, -1] <= curve.segments[-1].u[-1, -1]:
         return curve
     return EquilibriumCurve(
@@ -82,7 +82,7 @@ def branch_of(
     marks: Sequence[float],
     admissible: bool,
 ) -> Branch:
-    """The table of a curve, with its special points solved for and put among its rows."""
+    """Return the branch of a curve, with special points computed and inserted as rows."""
     special: list[SpecialPoint] = []
     at_row: list[int] = []
     tables: list[tuple[Array, Array, NDArray[np.complex128], int]] = []
@@ -103,10 +103,10 @@ def branch_of(
         tables.append((u, tangents, eigenvalues, segment.region))
         rows += len(u)
         if number < len(curve.joins):
-            special.append(_corner(field, curve, number))
+            special.append(_boundary_equilibrium(field, curve, number))
             at_row.append(rows - 1)
     u = _centred(field, np.concatenate([t[0] for t in tables]), window)
-    # nobody else has these: a read-only array is kept as it is
+    # not shared: a read-only array is not copied
     tangents = read_only(np.concatenate([t[1] for t in tables]))
     eigenvalues = read_only(np.concatenate([t[2] for t in tables]))
     names = np.array(field.regions)[[t[3] for t in tables]]
@@ -114,7 +114,7 @@ def branch_of(
     if not curve.closed:
         special, at_row = _with_ends(field, curve, special, at_row, rows)
     size = _sizes(u[:, :-1], window.scale[:-1])
-    # curves of points take equations
+    # two-parameter continuation needs equations
     stored = isinstance(field.model, StoredModel)
     source = None if stored else Source(field.model, size, window.states)
     return Branch(
@@ -136,13 +136,13 @@ def branch_of(
 
 
 def _sizes(states: Array, scale: Array) -> Array:
-    """Typical size of every state on a branch; its unit where it is zero on most of it."""
+    """Return the typical size of each state on a branch; its unit if it is mostly zero."""
     typical = np.median(np.abs(states), axis=0)
     return np.where(typical > 1e-12 * scale, typical, scale)
 
 
 def _centred(field: FrozenField, u: Array, window: Window) -> Array:
-    """Rows shifted by whole periods, so that angles without a window are about zero."""
+    """Shift rows by whole periods so that angles without a window are near zero."""
     if not field.periods.any():
         return u
     low, high = u[:, :-1].min(axis=0), u[:, :-1].max(axis=0)
@@ -175,9 +175,9 @@ def _special(
 
 
 def _point(
-    field: FrozenField, segment: Segment, detected: Detected, window: Window, beside: float
+    field: FrozenField, segment: Segment, detected: Detected, window: Window, largest_before: float
 ) -> SpecialPoint:
-    """A special point; ``beside`` is the largest eigenvalue at the row before."""
+    """Return a special point; ``largest_before`` is the largest eigenvalue at the row before."""
     located = detected.located
     tangent, single = field.tangent(segment.region, located.u, window.weight)
     before = segment.tangents[detected.row]
@@ -187,8 +187,8 @@ def _point(
         tangent = -tangent
     eigenvalues = field.eigenvalues(segment.region, located.u)
     finite = np.isfinite(eigenvalues)
-    if np.all(np.abs(eigenvalues[finite]) <= NEUTRAL * beside):
-        # all rounding, as the only one at a fold: no unit is left by which to tell its sign
+    if np.all(np.abs(eigenvalues[finite]) <= NEUTRAL * largest_before):
+        # rounding errors only, as for a single eigenvalue at a fold: its sign is undetermined
         eigenvalues = np.where(finite, 0.0, eigenvalues)
     return _special(
         field,
@@ -210,7 +210,7 @@ def _point(
 def _switch(
     field: FrozenField, segment: Segment, detected: Detected, window: Window
 ) -> Array | None:
-    """At a branch point the tangent of the branch that crosses this one."""
+    """Return the tangent of the crossing branch at a branch point."""
     if detected.code != "BP":
         return None
     both = crossing_tangents(
@@ -222,9 +222,9 @@ def _switch(
     return np.asarray(both[np.argmin(np.abs(both @ (here * window.weight)))])
 
 
-def _corner(field: FrozenField, curve: EquilibriumCurve, number: int) -> SpecialPoint:
-    """The boundary equilibrium between two segments."""
-    # a closed branch may have its start on an interface
+def _boundary_equilibrium(field: FrozenField, curve: EquilibriumCurve, number: int) -> SpecialPoint:
+    """Return the boundary equilibrium between two segments."""
+    # a closed branch may start on an interface
     before, after = curve.segments[number], curve.segments[(number + 1) % len(curve.segments)]
     u, interface = before.u[-1], curve.joins[number]
     names = (field.regions[before.region], field.regions[after.region])
@@ -257,19 +257,19 @@ def _corner(field: FrozenField, curve: EquilibriumCurve, number: int) -> Special
 
 
 def _determinant_sign(matrix: Array) -> int:
-    """Sign of a determinant, 0 where it vanishes to rounding."""
+    """Return the sign of a determinant, 0 if it vanishes to rounding."""
     size = float(np.prod(np.maximum(np.linalg.norm(matrix, axis=1), 1e-300)))
     value = float(np.linalg.det(matrix))
     return 0 if abs(value) <= SINGULAR * size else int(np.sign(value))
 
 
 def _filippov(field: FrozenField, region: int, interface: int, u: Array) -> str | None:
-    """Persistence or non-smooth fold of a boundary equilibrium where the rates jump.
+    """Classify a boundary equilibrium at a discontinuity: persistence or non-smooth fold.
 
-    With N the Jacobian of the region whose equilibrium it is, E the jump of
-    the rates and C the gradient of h towards that region: C·N⁻¹E < 0 is
-    persistence, > 0 a non-smooth fold (di Bernardo et al. 2008, chapter 5).
-    None for a sliding motion, whose branch ends there.
+    With N the Jacobian of the region whose equilibrium it is, E the jump of the rates and C
+    the gradient of h towards that region, C·N⁻¹E < 0 is persistence and C·N⁻¹E > 0 a
+    non-smooth fold (di Bernardo et al. 2008, chapter 5). None for a sliding motion, whose
+    branch ends there.
     """
     if field.modes[region].sides is not None:
         return None
@@ -296,7 +296,7 @@ def _with_ends(
     at_row: list[int],
     rows: int,
 ) -> tuple[list[SpecialPoint], list[int]]:
-    """End points first and last, a boundary equilibrium where an interface was the end."""
+    """Add the end points, as boundary equilibria where the branch ends on an interface."""
     ends = []
     for side, segment in ((0, curve.segments[0]), (-1, curve.segments[-1])):
         u, tangent, interface = segment.u[side], segment.tangents[side], curve.ends[side]

@@ -1,4 +1,4 @@
-"""All branches of equilibria of a frozen model over one parameter."""
+"""Bifurcation diagrams: all branches of equilibria of a frozen model over one parameter."""
 
 from __future__ import annotations
 
@@ -56,20 +56,22 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Largest distance from an interface, in units of the window, of what lies in it.
+#: Largest distance from an interface, in units of the window, of a point on it.
 INSIDE = 1e-9
 
-#: Rows of a branch outside the window along which is looked for where it enters.
+#: Largest number of rows along which a branch outside the window is searched for its entries.
 COARSE = 2000
 
-#: A state counts in units of this part of itself where that is more than its unit.
+#: Relative unit of large states: the unit is at least this fraction of the state.
 FAR = 0.5
 
 #: First step along the branch that crosses at a branch point, in units of the window.
 SWITCH = 1e-3
 
 ADMISSIBLE = Outcome(
-    "becomes admissible", "the virtual branch meets the interface and is admissible beyond.", True
+    "becomes admissible",
+    "the virtual branch reaches the interface and is admissible beyond it.",
+    True,
 )
 
 
@@ -96,37 +98,36 @@ def continue_equilibria(
 ) -> Diagram:
     """Trace every branch of equilibria of a frozen model over a parameter range.
 
-    Pseudo-arclength continuation (Keller 1977) inside each region; at an
-    interface the boundary equilibrium is solved for exactly and the branch
-    goes on in the region beyond, turning back in the parameter where it must.
-    Where the rates jump it goes on as a pseudo-equilibrium of the sliding field,
-    and ends at a two-fold. Sets of equilibria, such as the states at which dry friction
-    holds a block, are the ``bands`` of the diagram.
+    Pseudo-arclength continuation (Keller 1977) in each region. At an interface the boundary
+    equilibrium is computed and the branch continues in the region beyond: over the same
+    direction of the parameter (persistence) or the opposite one (non-smooth fold). Across a
+    discontinuity it continues as a branch of pseudo-equilibria of the sliding vector field,
+    which ends at a two-fold. Equilibrium sets, such as the sticking states of a block under
+    dry friction, are the ``bands`` of the diagram.
 
     Parameters
     ----------
     model : Model or StoredModel
-        A frozen model; every parameter but ``parameter`` has a value. That of a diagram from a
-        file is a stored one: its branches are traced ``from_points``, without SymPy.
+        A frozen model with values of all parameters except ``parameter``. The model of a
+        diagram read from a file is a StoredModel, whose branches are traced ``from_points``.
     parameter : str or Symbol
-        What varies.
+        The continuation parameter.
     over : (float, float)
         Its range, in its own units.
     continuation : Continuation, optional
     marks : sequence of float
-        Parameter values at which a point UZ is wanted exactly.
+        Parameter values at which points UZ are computed.
     virtual : bool
-        Whether to trace the virtual branches too.
+        Whether to trace virtual branches too.
     window : mapping, optional
-        State to its range (low, high), in its own units: what lies outside is
-        neither looked for nor traced, and a branch that leaves ends exactly on
-        the edge. None in place of an end leaves the default there, an infinite
-        end is no bound. The default is 10⁴ times the size of the equilibria from
-        which branches are traced, and ``diagram.window`` records it.
+        State to its range (low, high), in its own units. Only equilibria inside are computed,
+        and a branch that leaves the window ends on its edge. None in place of a bound is the
+        default, an infinite bound is none. By default the window is 10⁴ times the size of the
+        equilibria from which branches are traced; see ``diagram.window``.
     from_points : sequence, optional
-        Trace only the branches through these points, and look for no others: each an
-        Equilibrium, a SpecialPoint (of a branch point both branches), or a mapping
-        of every state and the parameter to a value near an equilibrium.
+        Trace only the branches through these points, without a search for others: each an
+        Equilibrium, a SpecialPoint (from a branch point both branches), or a mapping of
+        every state and the parameter to values near an equilibrium.
 
     Returns
     -------
@@ -135,12 +136,12 @@ def continue_equilibria(
     Raises
     ------
     UnknownNameError
-        If the parameter is not one of the model's, or a name in the window no state.
+        If the parameter does not belong to the model, or a name in the window is not a state.
     ModelError
         If the model is not frozen, or a slow quantity has no value.
     ArgumentError
-        If a range is empty, reversed or not finite, a mark lies outside, or a given
-        point is no equilibrium or lies outside the range or the window.
+        If a range is empty, reversed or not finite, a mark is outside the range, or a given
+        point is not an equilibrium or is outside the range or the window.
 
     Examples
     --------
@@ -161,13 +162,13 @@ def continue_equilibria(
     require_frozen(model, "trace the branches of")
     field = _field(model, name)
     continuation = continuation or Continuation()
-    asked = state_window(model.states, window, model.periodic)
+    requested = state_window(model.states, window, model.periodic)
     starts: Starts | Seeds
     if from_points is None:
         if isinstance(model, StoredModel):
             raise ModelError(
-                "this is a stored model, which has no equations in which to look for equilibria: "
-                "give from_points=, points of the branches that are to be traced"
+                "this is a stored model, without the equations from which equilibria are computed: "
+                "give from_points=, points on the branches to be traced"
             )
         from fastslow.diagrams.solve.starts import starts_of
         from fastslow.symbolic.closed_forms.conserved import conserved_quantities
@@ -181,9 +182,9 @@ def continue_equilibria(
                 "conserved quantity", f"no branch of equilibria is traced; {same[0]}.", False
             )
             return _without_branches(field, name, (lower, upper), continuation, why)
-        starts = starts_of(field, lower, upper, continuation.starts, asked)
+        starts = starts_of(field, lower, upper, continuation.starts, requested)
     else:
-        starts = Seeds(field, (lower, upper), from_points, asked, virtual)
+        starts = Seeds(field, (lower, upper), from_points, requested, virtual)
     within = Window(lower, upper, starts.scale, starts.window)
     branches: list[Branch] = []
     for admissible in (True, False) if virtual else (True,):
@@ -191,13 +192,13 @@ def continue_equilibria(
             if len(branches) >= continuation.branches:
                 break
             for start in starts.at(value, admissible)[: continuation.branches - len(branches)]:
-                if not any(_passes(field, b, start, value, within) for b in branches):
+                if not any(_contains_equilibrium(field, b, start, value, within) for b in branches):
                     curve = _traced(field, start, value, within, continuation, admissible)
                     branches += _branches(field, curve, within, marks, admissible)
         for start, value in _entering(field, starts, within) if admissible else ():
             if len(branches) >= continuation.branches:
                 break
-            if not any(_passes(field, b, start, value, within) for b in branches):
+            if not any(_contains_equilibrium(field, b, start, value, within) for b in branches):
                 curve = _traced(field, start, value, within, continuation, admissible)
                 branches += _branches(field, curve, within, marks, admissible)
         if from_points is None:
@@ -222,35 +223,35 @@ def continue_equilibria(
         _text(model),
         corrector,
         with_ends(
-            _ending(name, full, missed, continuation, from_points),
+            _outcome(name, full, missed, continuation, from_points),
             [branch.outcomes for branch in branches],
             unexplained,
         ),
         field.source.path(),
         asdict(continuation),
         starts.window,
-        _bands(field, lower, upper, asked) if from_points is None else (),
+        _bands(field, lower, upper, requested) if from_points is None else (),
         dict(model.periodic),
         field.model,
     )
 
 
 def _bands(
-    field: FrozenField, lower: float, upper: float, asked: StateWindow
+    field: FrozenField, lower: float, upper: float, requested: StateWindow
 ) -> tuple[EquilibriumBand, ...]:
     from fastslow.diagrams.solve.equilibrium_sets import bands_of
 
-    return bands_of(field, lower, upper, asked)
+    return bands_of(field, lower, upper, requested)
 
 
-def _ending(
+def _outcome(
     name: str,
     full: bool,
     missed: Sequence[tuple[str, float]],
     continuation: Continuation,
     from_points: Sequence[Any] | None,
 ) -> Outcome:
-    """How the search for branches ended."""
+    """Return the outcome of the search for branches."""
     if full:
         return _too_many(continuation)
     if missed:
@@ -261,7 +262,7 @@ def _ending(
     return Outcome(
         "from points",
         f"only branches through the {count} given point{'s' if count > 1 else ''} were traced; "
-        "no others were looked for.",
+        "others were not searched for.",
         True,
     )
 
@@ -273,7 +274,7 @@ def _without_branches(
     continuation: Continuation,
     outcome: Outcome,
 ) -> Diagram:
-    """The diagram of a model in which no equilibrium is isolated, and its outcome."""
+    """Return the diagram of a model without isolated equilibria, with its outcome."""
     corrector = _Corrector(field)
     return Diagram(
         field.model.states,
@@ -298,7 +299,7 @@ def _continuum(name: str, missed: Sequence[tuple[str, float]]) -> Outcome:
     places = "; ".join(f"{name} = {value:.6g} in {region}" for region, value in missed)
     return Outcome(
         "continuum",
-        f"the equilibria form a continuum that no branch runs through: {places}.",
+        f"the equilibria form a continuum that is not on any branch: {places}.",
         False,
     )
 
@@ -306,21 +307,21 @@ def _continuum(name: str, missed: Sequence[tuple[str, float]]) -> Outcome:
 def _too_many(continuation: Continuation) -> Outcome:
     return Outcome(
         "too many branches",
-        f"{continuation.branches} branches were traced and there may be more; raise "
-        "Continuation(branches=…) to look for them.",
+        f"{continuation.branches} branches were traced and more may exist; increase "
+        "Continuation(branches=…) to trace them.",
         False,
     )
 
 
 @lru_cache(maxsize=64)
 def _field(model: Model | StoredModel, name: str) -> FrozenField:
-    """The field of a model, made once."""
+    """Return the frozen field of a model, cached."""
     return FrozenField(model.with_free(name), name)
 
 
 @lru_cache(maxsize=64)
 def _text(model: Model | StoredModel) -> str:
-    """The equations as they were written, printed once."""
+    """Return the equations as text, cached."""
     return model.equations
 
 
@@ -332,12 +333,12 @@ def _traced(
     continuation: Continuation,
     bounded: bool,
 ) -> EquilibriumCurve:
-    """The whole branch through a start."""
+    """Trace the whole branch through a starting point."""
     region = field.regions.index(start.region)
     u = np.append(window.states.shifted(start.state), value)
     tangent, _ = field.tangent(region, u, window.weight)
     if bounded and _along_interface(field, region, np.array([u]), window).any():
-        # rounding would end it everywhere: no side of the interface is left or entered
+        # along an interface rounding would end the branch anywhere
         curve = _traced(field, start, value, window, continuation, False)
         rows = np.concatenate([segment.u for segment in curve.segments])
         if _along_interface(field, region, rows, window).any():
@@ -354,7 +355,7 @@ def _traced(
 def _entering(
     field: FrozenField, starts: Starts | Seeds, window: Window
 ) -> Iterator[tuple[Equilibrium, float]]:
-    """Points in the window on branches that a start outside of it is on."""
+    """Yield points in the window on branches through starting points outside of it."""
     wide, outside = starts.outside
     around = replace(window, states=wide)
     coarse = Continuation(points=COARSE)
@@ -368,7 +369,7 @@ def _entering(
             ).segments:
                 states = window.states.shifted(segment.u[:, :-1])
                 inside = window.states.contains(states, window.scale[:-1])
-                # the middle of every part inside
+                # the middle row of each interval inside
                 edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
                 for first, last in zip(edges[::2], edges[1::2], strict=True):
                     row = segment.u[(first + last - 1) // 2]
@@ -376,7 +377,7 @@ def _entering(
 
 
 def _along_interface(field: FrozenField, region: int, rows: Array, window: Window) -> Array:
-    """Which of the interfaces that bound a region hold all of the points."""
+    """Return which interfaces of a region contain all of the points."""
     _, _, values, slopes = field.evaluate(region, rows)
     near = np.abs(values) < INSIDE * np.abs(slopes * window.scale).max(axis=-1)
     return near.all(axis=0) & (field.signs[region] != 0)
@@ -390,7 +391,7 @@ def _switched(
     marks: Sequence[float],
     admissible: bool,
 ) -> list[Branch]:
-    """Branches that cross another at a branch point and that no start has led to."""
+    """Trace crossing branches at branch points that were not found otherwise."""
     found: list[Branch] = []
     waiting = [p for b in branches if b.admissible == admissible for p in b.special("BP")]
     while waiting:
@@ -412,7 +413,9 @@ def _switched(
             if field.admissible(region, near.u, window.scale) != admissible:
                 continue
             start = point_at(field, region, near.u, admissible)
-            if any(_passes(field, b, start, value, window) for b in (*branches, *found)):
+            if any(
+                _contains_equilibrium(field, b, start, value, window) for b in (*branches, *found)
+            ):
                 continue
             curve = _traced(field, start, value, window, continuation, admissible)
             fresh = _branches(field, curve, window, marks, admissible)
@@ -428,7 +431,7 @@ def _branches(
     marks: Sequence[float],
     admissible: bool,
 ) -> list[Branch]:
-    """The branch of a curve; of a virtual one, its parts outside the region."""
+    """Return the branch of a curve; for a virtual one, its portions outside the region."""
     if admissible:
         return [branch_of(field, curve, window, marks, True)]
     found = []
@@ -441,10 +444,10 @@ def _branches(
         part = Segment(segment.region, segment.u[rows], segment.tangents[rows])
         first, last = curve.outcomes
         if rows[0] > 0:
-            part = _led_to_interface(field, part, segment.u[rows[0] - 1], 0, window)
+            part = _extended_to_interface(field, part, segment.u[rows[0] - 1], 0, window)
             first = ADMISSIBLE
         if rows[-1] < len(inside) - 1:
-            part = _led_to_interface(field, part, segment.u[rows[-1] + 1], -1, window)
+            part = _extended_to_interface(field, part, segment.u[rows[-1] + 1], -1, window)
             last = ADMISSIBLE
         cut = EquilibriumCurve(
             (part,), (), (first, last), (None, None), curve.closed and not len(edges)
@@ -453,10 +456,10 @@ def _branches(
     return found
 
 
-def _led_to_interface(
+def _extended_to_interface(
     field: FrozenField, part: Segment, inside: Array, end: int, window: Window
 ) -> Segment:
-    """A virtual segment with the boundary equilibrium added at which it ends."""
+    """Extend a virtual segment by the boundary equilibrium at its end."""
     outside = part.u[end]
     _, _, h0, _ = field.evaluate(part.region, outside)
     _, _, h1, _ = field.evaluate(part.region, inside)
@@ -473,27 +476,29 @@ def _led_to_interface(
     return part
 
 
-def _passes(
+def _contains_equilibrium(
     field: FrozenField, branch: Branch, start: Equilibrium, value: float, window: Window
 ) -> bool:
-    """Whether a branch goes through an equilibrium."""
+    """Return whether a branch contains an equilibrium."""
     if branch.admissible != start.admissible:
         return False
     rows = np.column_stack([branch.state, branch.parameter])
     if not field.periods.any():
-        return _holds(field, branch, rows, np.append(start.state, value), window)
+        return _contains(field, branch, rows, np.append(start.state, value), window)
     low, high = branch.state.min(axis=0), branch.state.max(axis=0)
     ways = [copies(*entry) for entry in zip(start.state, low, high, field.periods, strict=True)]
-    return any(_holds(field, branch, rows, np.array([*s, value]), window) for s in product(*ways))
+    return any(
+        _contains(field, branch, rows, np.array([*s, value]), window) for s in product(*ways)
+    )
 
 
-def _holds(field: FrozenField, branch: Branch, rows: Array, u: Array, window: Window) -> bool:
-    """Whether a branch goes through a point."""
+def _contains(field: FrozenField, branch: Branch, rows: Array, u: Array, window: Window) -> bool:
+    """Return whether a branch contains a point."""
     if len(rows) < 2:
-        # where the equations are singular all along a line, one point of it is enough
+        # where the equations are singular along a line, one of its points is sufficient
         apart = np.abs((rows[0] - u) / window.scale)
         return bool(apart[:-1].max() < 1e-6)
-    # far away the rows of a branch are as far apart as they are away
+    # the distance of rows grows with the distance from the origin
     scale = window.scale.copy()
     scale[:-1] = np.maximum(scale[:-1], FAR * np.abs(u[:-1]))
     chords, apart = np.empty(len(rows) - 1, dtype=np.int64), np.empty(len(rows) - 1)
@@ -504,7 +509,7 @@ def _holds(field: FrozenField, branch: Branch, rows: Array, u: Array, window: Wi
         near = rows[k] + part * (rows[k + 1] - rows[k])
         normal = chord / np.sqrt(length) / scale
         region = field.regions.index(str(branch.region[k]))
-        # in units of the point, in which Newton's last corrections far away are rounding
+        # in units of the point, so that Newton's last corrections far away are rounding errors
         found = field.refined(region, near, scale, normal=normal, point=u)
         if found.converged and np.abs((found.u - u) / scale).max() < 1e-6:
             return True
@@ -514,9 +519,9 @@ def _holds(field: FrozenField, branch: Branch, rows: Array, u: Array, window: Wi
 def _labelled(
     branches: list[Branch], name: str, window: Window, corrector: _Corrector
 ) -> tuple[Branch, ...]:
-    """The branches with their corrector and the labels of special points.
+    """Return the branches with their corrector and labelled special points.
 
-    Labels LP1, LP2, … in order along the branches; a shared branch point has one label.
+    Labels LP1, LP2, … are in order along the branches; a shared branch point has one label.
     """
 
     def near(one: SpecialPoint, other: SpecialPoint) -> bool:
@@ -544,13 +549,13 @@ def _labelled(
 
 @dataclass(frozen=True, eq=False)
 class _Corrector:
-    """A `Corrector` by the equations of a field."""
+    """A `Corrector` that uses the equations of a field."""
 
     field: FrozenField
 
     @property
     def stored(self) -> StoredModel:
-        """The model as it is kept with a diagram: with what its branches are traced by."""
+        """The model as stored with a diagram, with the data for tracing its branches."""
         source, model = self.field.source, self.field.model
         if isinstance(source, StoredFrozen):
             return source.model

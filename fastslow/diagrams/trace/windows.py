@@ -1,4 +1,4 @@
-"""Equilibria in a window of the states."""
+"""Restriction of equilibria to a window of the states."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from fastslow.results.points import Equilibrium
 
 Array = NDArray[np.float64]
 
-#: For each state, whether its lower and its upper bound are meant.
+#: For each state, whether its lower and its upper bound are selected.
 Sides = tuple[tuple[bool, bool], ...]
 
 
 def known(field: FrozenField, points: Sequence[Equilibrium]) -> np.ndarray:
-    """Which components of equilibria are more than rounding, shape (m, n)."""
+    """Return which components of equilibria exceed rounding errors, shape (m, n)."""
     found = np.reshape([np.abs(e.state) > 0 for e in points], (-1, field.n)).astype(bool)
-    # sliding along several interfaces is no mode of the field
+    # sliding along several interfaces is not a mode of the field
     rows = [k for k, e in enumerate(points) if e.region in field.regions]
     found[rows] = field.certain([_place(field, points[k]) for k in rows])
     return found
 
 
 def _place(field: FrozenField, point: Equilibrium) -> tuple[int, Array]:
-    """Number of the region, and the point u."""
+    """Return the number of the region and the point u."""
     value = point.parameters.get(field.parameter, 0.0)
     return field.regions.index(point.region), np.append(point.state, value)
 
 
 def size_of(field: FrozenField, points: Sequence[Equilibrium]) -> Array:
-    """Unit of each state by some equilibria, shape (n,)."""
+    """Return the unit of each state given some equilibria, shape (n,)."""
     return field.sizes([_place(field, e) for e in points])
 
 
 def within(
     field: FrozenField, window: StateWindow, points: Sequence[Equilibrium]
 ) -> list[Equilibrium]:
-    """Those equilibria that lie in a window.
+    """Return the equilibria in a window.
 
-    What is off an edge by rounding lies on it; it is judged by the size of the
-    state among these equilibria, by its natural unit where all are zero.
+    Equilibria on an edge up to rounding are included. Rounding is relative to the size of the
+    state among these equilibria, or to its natural unit if all are zero.
     """
     if not window.chosen:
         return list(points)
@@ -54,7 +54,7 @@ def within(
 
 
 def edges_left(window: StateWindow, branches: Sequence[Branch]) -> Sides:
-    """The bounds at which branches have left a window."""
+    """Return the bounds at which branches have left a window."""
     bounds = np.array([window.lower, window.upper]).T
     met = np.zeros(bounds.shape, dtype=bool)
     for branch in branches:
