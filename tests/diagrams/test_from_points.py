@@ -78,9 +78,7 @@ def test_a_virtual_point():
 
 
 def test_a_window_that_excludes_the_start(pitchfork):
-    with pytest.raises(
-        fs.ArgumentError, match=r"x = 0.5, y = 0.25 lies outside the window x in \["
-    ):
+    with pytest.raises(fs.ArgumentError, match=r"x = 0.5, y = 0.25 is outside the window x in \["):
         only(pitchfork, {x: 0.5, y: 0.25, p: 0.25}, window={x: (-1, 0)})
 
 

@@ -295,7 +295,7 @@ def test_a_closed_curve_of_folds():
 def test_bad_input(reactor):
     fold, end = reactor.folds[0], reactor.special("EP")[0]
     over = {"p1": (0, 0.3), "p2": (8, 20)}
-    with pytest.raises(fs.FastSlowError, match="EP starts no curve"):
+    with pytest.raises(fs.FastSlowError, match="EP cannot be continued"):
         fs.continue_points(end, ("p1", "p2"), over=over)
     with pytest.raises(fs.FastSlowError, match="unknown parameter 'p4'; did you mean"):
         fs.continue_points(fold, ("p1", "p4"), over={"p1": (0, 1), "p4": (0, 1)})
@@ -311,7 +311,7 @@ def test_bad_input(reactor):
         fs.continue_points(fold, ("p1", "p2"), over={"p1": (0, 0.01), "p2": (8, 20)})
     with pytest.raises(fs.FastSlowError, match="unknown curve from LP 'HB'"):
         fs.continue_points(fold, ("p1", "p2"), over=over, code="HB")
-    with pytest.raises(fs.FastSlowError, match="carries no model"):
+    with pytest.raises(fs.FastSlowError, match="has no model"):
         fs.continue_points(pickle.loads(pickle.dumps(fold)), ("p1", "p2"), over=over)
     curve = fs.continue_points(fold, ("p1", "p2"), over={"p1": (0.1, 0.11), "p2": (13, 15)})
     with pytest.raises(fs.FastSlowError, match="unknown column"):

@@ -7,7 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import fastslow as fs
-from fastslow.diagrams.curves.tangency_points import Contact
+from fastslow.diagrams.curves.tangency_points import TangencyEquations
 from fastslow.diagrams.modes import modes_of
 
 x, y, z, p, v, w = sp.symbols("x y z p v w")
@@ -149,7 +149,7 @@ def test_rounding_is_judged_alike_on_both_sides_of_zero():
 
 def _contact(model):
     region, across = (mode for mode in modes_of(model) if mode.sides is None)
-    return Contact(model, region, across, 0, {})
+    return TangencyEquations(model, region, across, 0, {})
 
 
 def test_no_interface_and_an_invariant_one():

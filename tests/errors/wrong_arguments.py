@@ -252,7 +252,7 @@ BY_FUNCTION = {
     "continue_points.point": a("SpecialPoint or Diagram"),
     "continue_points.window": [
         *WINDOW,
-        ({"x": (5, 6)}, Wrong, "lies outside the window x in [5, 6]; window= sets other bounds"),
+        ({"x": (5, 6)}, Wrong, "is outside the window x in [5, 6]; window= sets other bounds"),
     ],
     "delay_scaling.level": LEVEL,
     "delay_scaling.rates": [

@@ -1,9 +1,9 @@
 """Codimension-two points on curves of folds, Hopf points and boundary equilibria.
 
-Each has a test function that changes sign along the curve; the point itself is
-solved for as the curve's equations and the test together (Kuznetsov 2004,
-sections 8.7 and 10.3). Every test is a pure number: it does not change with the
-units of states and time, nor with the rates of states that do not take part.
+Each has a test function that changes sign along the curve; the point is located as a solution
+of the defining system of the curve together with the test (Kuznetsov 2004, sections 8.7 and
+10.3). All tests are dimensionless: they do not depend on the units of states and time, nor on
+the rates of uninvolved states.
 """
 
 from __future__ import annotations
@@ -42,37 +42,37 @@ from fastslow.diagrams.points.row_tests import pair_sums
 
 Array = NDArray[np.float64]
 
-#: A pair is imaginary where the product of both is more than this part of their sizes.
+#: A pair is imaginary if its product exceeds this fraction of the squared moduli.
 IMAGINARY = 1e-9
 
-#: Halvings of a bracket after which Newton's method is tried again.
+#: Numbers of bisections of a bracket after which Newton's method is tried.
 TRIALS = (0, 2, 5, 10, 20, 40)
 
-#: A test that is still this large after the last halvings jumps there and has no zero.
+#: A test that exceeds this after the last bisection is discontinuous, without a zero.
 JUMP = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Criterion:
-    """What is watched along a curve.
+    """A test function along a curve.
 
     Parameters
     ----------
     code : str
-        What its zero is.
+        Code of the point at its zero.
     value : callable
-        z to the test, which is smooth near its zeros, and the size of the terms that it
-        is the sum of: less than rounding of that size is zero.
+        Function of z that returns the test, smooth near its zeros, and the size of its terms,
+        by which rounding errors are judged.
     genuine : callable
-        Whether a zero at z is one of that kind.
+        Function of z, whether a zero is a point of that code.
     region : int
-        The region that it belongs to.
+        Region of the test.
     interface : int, optional
-        The interface it is about.
+        Interface of the test.
     beyond : int, optional
-        The region, or sliding motion, that meets the first one there.
+        The region, or sliding motion, on the other side.
     note : str
-        What else a reader should know.
+        Note on the point.
     """
 
     code: str
@@ -85,7 +85,7 @@ class Criterion:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Candidate:
     """A codimension-two point after a row of a curve."""
 
     row: int
@@ -97,8 +97,8 @@ class Found:
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """A traced curve: its equations, its rows, and how points between them are computed."""
+class TracedRows:
+    """A traced curve: defining system, rows, and computation of points between them."""
 
     system: DefiningSystem
     z: Array
@@ -106,7 +106,7 @@ class Rows:
     continuation: Continuation
 
     def between(self, row: int, part: float) -> Array | None:
-        """The point of the curve after a part of the step behind a row."""
+        """Solve for the point of the curve at a fraction of the step after a row."""
         a, b = self.z[row], self.z[row + 1]
         chord = b - a
         length = float(np.sqrt((chord**2) @ self.frame.weight))
@@ -117,7 +117,7 @@ class Rows:
         return None if found is None else found[0]
 
     def at(self, node: Node) -> Array:
-        """The point of a node, from the chord where the curve cannot be reached."""
+        """Return the point of a node; on the chord if Newton's method fails."""
         if node.part == 0.0:
             return np.asarray(self.z[node.row])
         z = self.between(node.row, node.part)
@@ -126,7 +126,7 @@ class Rows:
         return np.asarray(z)
 
     def solved(self, row: int, part: float, entry: int, value: float) -> Array | None:
-        """The point beside a part of the step behind a row at which an entry has a value."""
+        """Solve for the point near a fraction of a step at which an entry of z has a value."""
         guess = self.z[row]
         if part > 0:
             guess = guess + part * (self.z[row + 1] - guess)
@@ -143,7 +143,7 @@ class Rows:
         return self.system.renewed(z)
 
     def passes(self, u: Array) -> bool:
-        """Whether the curve goes through a point (states, parameters)."""
+        """Return whether the curve contains a point (states, parameters)."""
         scale = self.frame.scale[: self.frame.size]
         line, target = self.z[:, : self.frame.size] / scale, u / scale
         if len(line) < 2:
@@ -152,7 +152,7 @@ class Rows:
         lengths = np.maximum((chords**2).sum(axis=1), 1e-300)
         part = np.clip(((target - line[:-1]) * chords).sum(axis=1) / lengths, 0.0, 1.0)
         apart = np.linalg.norm(line[:-1] + part[:, None] * chords - target, axis=1)
-        # a chord leaves the curve by less than its length times the turn within it
+        # the distance of a chord from the curve is less than its length times the turning angle
         for row in np.flatnonzero(apart < 0.2 * np.sqrt(lengths) + SAME):
             z = self.between(int(row), float(part[row]))
             if z is not None and np.abs(z[: self.frame.size] / scale - target).max() < SAME:
@@ -160,22 +160,22 @@ class Rows:
         return False
 
 
-#: Points nearer to each other than this, in scaled units, are one.
+#: Points at a smaller distance, in scaled units, are identical.
 SAME = 1e-6
 
 
 def criteria(
     system: DefiningSystem, others: list[int], marks: Sequence[tuple[int, float]] = ()
 ) -> list[Criterion]:
-    """Give the tests for a curve of one kind.
+    """Return the test functions for a curve of one kind.
 
     Parameters
     ----------
     system : DefiningSystem
     others : list of int
-        For boundary equilibria the regions that meet there, else empty.
+        For boundary equilibria the adjacent regions, otherwise empty.
     marks : sequence of (int, float)
-        Number of a parameter, 0 or 1, and a value of it that is a point UZ.
+        Number of a parameter, 0 or 1, and its value at a point UZ.
     """
     at_marks = [_mark(system, k, value) for k, value in marks]
     if isinstance(system, OnInterface):
@@ -196,19 +196,19 @@ def _mark(system: DefiningSystem, k: int, value: float) -> Criterion:
     return Criterion("UZ", lambda z: (float(z[place] - value) / span, 1.0), _always, system.region)
 
 
-def search(rows: Rows, watched: list[Criterion]) -> Iterator[Found]:
-    """All points at which a test vanishes with a change of sign, solved for.
+def search(rows: TracedRows, watched: list[Criterion]) -> Iterator[Candidate]:
+    """Locate all points at which a test vanishes with a change of sign.
 
     Parameters
     ----------
-    rows : Rows
+    rows : TracedRows
     watched : list of Criterion
     """
     for criterion in watched:
         table = np.array([criterion.value(z) for z in rows.z])
         unit = _unit(table)
         if unit == 0.0:
-            # one that vanishes all along says nothing
+            # a test that vanishes identically is of no use
             continue
 
         def value(z: Array, criterion: Criterion = criterion, unit: float = unit) -> float:
@@ -226,25 +226,25 @@ def search(rows: Rows, watched: list[Criterion]) -> Iterator[Found]:
 
 
 def _unit(table: Array) -> float:
-    """Typical size of a test's terms along a curve; 0 where the test is rounding throughout."""
+    """Return the typical size of the terms of a test; 0 if the test is rounding errors only."""
     tests, sizes = table.T
     known = np.isfinite(tests) & np.isfinite(sizes)
     if not np.any(np.abs(tests[known]) > ROUNDING * sizes[known]):
         return 0.0
-    # the median, because some tests have poles
+    # the median, since some tests have poles
     return float(np.median(sizes[known])) or float(sizes[known].max())
 
 
 def _solved(
-    rows: Rows,
+    rows: TracedRows,
     bracket: Bracket,
     criterion: Criterion,
     unit: float,
     at: Callable[[int, float], float | None],
-) -> Found | None:
-    """The zero within a bracket, which is halved until Newton's method stays inside."""
+) -> Candidate | None:
+    """Locate the zero in a bracket, bisected until Newton's method stays inside."""
     low, high = bracket.before, bracket.after
-    first: Found | None = None
+    first: Candidate | None = None
     for halvings in range(TRIALS[-1] + 1):
         if halvings in TRIALS:
             found, inside = _newton(rows, low, high, criterion, unit)
@@ -262,15 +262,15 @@ def _solved(
         else:
             high = middle
     if first is None or min(abs(low.value), abs(high.value)) > JUMP:
-        # a pole, or a jump from one sign to the other
+        # a pole, or a discontinuity with a change of sign
         return None
     return replace(first, converged=False) if criterion.genuine(first.z) else None
 
 
 def _newton(
-    rows: Rows, low: Node, high: Node, criterion: Criterion, unit: float
-) -> tuple[Found, bool]:
-    """Newton's method from within a bracket of tests in some unit, and whether it stayed there."""
+    rows: TracedRows, low: Node, high: Node, criterion: Criterion, unit: float
+) -> tuple[Candidate, bool]:
+    """Apply Newton's method in a bracket; return its result and whether it stayed inside."""
     system, frame = rows.system, rows.frame
     a, b = rows.at(low), rows.at(high)
     share = low.value / (low.value - high.value)
@@ -283,14 +283,14 @@ def _newton(
 
     z, residual, converged, correction = newton(equations, guess, frame.scale)
     if not np.all(np.isfinite(z)):
-        return Found(low.row, criterion, guess, residual, False, correction), False
+        return Candidate(low.row, criterion, guess, residual, False, correction), False
     z = system.renewed(z)
     chord, gap = ((p - a)[: frame.size] / frame.scale[: frame.size] for p in (b, z))
     length = float(np.linalg.norm(chord))
     part = float(gap @ chord) / length**2 if length > 0 else 0.0
     aside = float(np.linalg.norm(gap - part * chord))
     inside = -0.05 <= part <= 1.05 and aside <= 0.5 * length + 1e-9
-    return Found(low.row, criterion, z, residual, converged, correction), inside
+    return Candidate(low.row, criterion, z, residual, converged, correction), inside
 
 
 def _always(_: Array) -> bool:
@@ -298,7 +298,7 @@ def _always(_: Array) -> bool:
 
 
 def _interface_tests(system: DefiningSystem) -> Iterator[Criterion]:
-    """Where folds and Hopf points meet an interface, or the edge of sliding along it."""
+    """Yield tests for folds and Hopf points on an interface or at the boundary of sliding."""
     field, region = system.field, system.region
     code = {"LP": "BF", "HB": "BH"}.get(system.code)
     if code is None:
@@ -318,19 +318,19 @@ def _interface_tests(system: DefiningSystem) -> Iterator[Criterion]:
         if sides is None or k < len(field.interfaces):
             yield Criterion(code, height, genuine, region, k, field.neighbour(region, k))
         else:
-            # the last two rows of a sliding motion are the drifts of both sides: where one
-            # vanishes the point is an equilibrium of that side, on the interface
+            # the last two rows of a sliding motion are the drifts of both sides: at a zero
+            # the point is an equilibrium of that side, on the interface
             side = sides.above if k == field.signs.shape[1] - 2 else sides.below
             yield Criterion(code, height, genuine, region, sides.interface, side)
 
 
 def left_null(slopes: Array, v: Array) -> Array:
-    """Left null vector of F_x, in a direction that is smooth along the curve.
+    """Left null vector of F_x, with a smooth orientation along the curve.
 
     Parameters
     ----------
     slopes : ndarray, shape (n, n + 2)
-        [F_x F_p], by which the rows are scaled, so that fast states do not blur it.
+        [F_x F_p], by which the rows are scaled, for accuracy with fast states.
     v : ndarray, shape (n,)
         The right null vector.
     """
@@ -338,27 +338,27 @@ def left_null(slopes: Array, v: Array) -> Array:
     matrix = slopes[:, : len(v)] / size[:, None]
     left, _, _ = np.linalg.svd(matrix)
     w = left[:, -1] / size
-    # bordering by the right null vector orients it: the determinant keeps its sign
+    # oriented by the sign of the determinant bordered with the right null vector
     bordered = np.block([[matrix, left[:, -1:]], [v[None, :], np.zeros((1, 1))]])
     side = np.linalg.slogdet(bordered)[0]
     return np.asarray(w / np.linalg.norm(w) * (side if side != 0 else 1.0))
 
 
 def smallest_sum(values: Vector) -> tuple[float, float]:
-    """`pair_sums` of some eigenvalues as the test of a criterion."""
+    """Return `pair_sums` of eigenvalues as the value of a criterion."""
     return float(pair_sums(values, rounding=0.0)), 1.0
 
 
 def smallest_value(matrix: Array, rate: Array | float = 0.0) -> float:
-    """The smallest singular value of a matrix with rows of length one, with its determinant's sign.
+    """Smallest singular value of a matrix with unit rows, with the sign of the determinant.
 
-    Rows far shorter than ``rate``, one number or one for each, stay short: in a plane that is
+    TracedRows far shorter than ``rate``, one number or one for each, stay short: in a plane that is
     invariant for all parameters the whole row of the state that leaves it vanishes.
 
     Parameters
     ----------
     matrix : ndarray, shape (n, n + 2)
-        [F_x F_p]; the determinant is that of F_x, a row's length that of all.
+        [F_x F_p]; the determinant is that of F_x, the length of a row includes F_p.
     """
     size = np.hypot(row_sizes(matrix), rate)
     inner = (matrix / size[:, None])[:, : len(matrix)]
@@ -464,7 +464,7 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
         other = beyond
 
         def bordered(z: Array) -> tuple[float, float]:
-            """[[F_x, E], [h_x, 0]] with the jump E: singular where pseudo-equilibria fold."""
+            """[[F_x, E], [h_x, 0]] with the jump E, singular at folds of pseudo-equilibria."""
             u = z[:width]
             here, _, _, gradients = field.evaluate(region, u)
             inner, jump = matrix(z), (field.residual_and_jacobian(other, u)[0] - here) / system.unit
@@ -488,7 +488,7 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
 
 
 def _sliding(field: FrozenField, region: int, beyond: int) -> int | None:
-    """The sliding motion between two regions, None where the field is continuous."""
+    """Return the sliding motion between two regions, None if the field is continuous."""
     pair = {region, beyond}
     for number, mode in enumerate(field.modes):
         if mode.sides is not None and {mode.sides.above, mode.sides.below} == pair:
@@ -497,7 +497,7 @@ def _sliding(field: FrozenField, region: int, beyond: int) -> int | None:
 
 
 def _imaginary(values: Vector) -> bool:
-    """Whether the pair with the smallest sum, in units of itself, is imaginary."""
+    """Return whether the pair with the smallest relative sum is imaginary."""
     first, second = (values[k] for k in np.triu_indices(len(values), 1))
     size = np.maximum(np.abs(first), np.abs(second))
     size[size == 0] = 1.0
@@ -505,8 +505,8 @@ def _imaginary(values: Vector) -> bool:
     return bool((first[k] * second[k]).real > IMAGINARY * size[k] ** 2)
 
 
-def coefficients(system: DefiningSystem, found: Found) -> dict[str, Any]:
-    """Normal-form data of a point, by the names of a special point's fields."""
+def coefficients(system: DefiningSystem, found: Candidate) -> dict[str, Any]:
+    """Return normal-form coefficients of a point, by field names of a special point."""
     n, w = system.n, system.width
     code, u, region = found.criterion.code, found.z[:w], found.criterion.region
     field = system.field
@@ -542,7 +542,7 @@ def coefficients(system: DefiningSystem, found: Found) -> dict[str, Any]:
 def _form(
     names: Sequence[str], compute: Callable[..., dict[str, float]], *given: Any
 ) -> dict[str, Any]:
-    """Coefficients of a normal form, and which of them are undefined and why."""
+    """Return coefficients of a normal form, with a note on undefined ones."""
     listed = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
     form: dict[str, float] = {}
     reason = ""
@@ -568,7 +568,7 @@ def _form(
 
 
 def along(system: DefiningSystem, rows: Array) -> Array:
-    """Coefficient at every row: a of folds, l₁ of Hopf points; NaN where there is none."""
+    """Return the coefficient at every row: a of folds, l₁ of Hopf points; otherwise NaN."""
     return np.array([_coefficient(system, z) for z in rows])
 
 
@@ -584,7 +584,7 @@ def _coefficient(system: DefiningSystem, z: Array) -> float:
 
 
 def _lyapunov(system: Pair, z: Array) -> tuple[float, float]:
-    """First Lyapunov coefficient and the size of its terms; NaN for neutral saddles."""
+    """Return the first Lyapunov coefficient and the size of its terms; NaN at neutral saddles."""
     w, region = system.width, system.region
     if not z[w] > 0:
         return np.nan, np.nan

@@ -1,4 +1,4 @@
-"""Why a curve of special points ended, in words."""
+"""Outcomes of curves of special points."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 def outcome_of(
     status: str, system: DefiningSystem, z: Array, names: tuple[str, str], window: StateWindow
 ) -> Outcome:
-    """What the status of a trace means, in words."""
+    """Return the outcome for the status of a trace."""
     plane = z[system.width - 2 : system.width]
     where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, plane, strict=True))
     if status == curves.RANGE:
@@ -30,21 +30,21 @@ def outcome_of(
             if abs(weight) <= ON:
                 reason = (
                     f"it is an equilibrium of region {system.field.regions[side]} there, and "
-                    "beyond it both fields point in one direction"
+                    "beyond it both fields point to the same side"
                 )
         return Outcome("left the region", f"the two-fold is at {where}; {reason}.", True)
     if status == curves.BOUND:
         return Outcome(
             "interfaces meet",
-            f"another interface of region {_region(system)} is met at {where}; beyond it other "
-            "regions join there.",
+            f"another interface of region {_region(system)} is reached at {where}; "
+            "beyond it other regions are adjacent.",
             True,
         )
     if status == curves.STOPPED and isinstance(system, Crossing):
         return Outcome(
             "no branch point",
-            f"branch points do not persist beyond {where}: the model has no symmetry that keeps "
-            "them, so they are isolated in this plane.",
+            f"branch points do not persist beyond {where}: without a symmetry of the model "
+            "they are isolated in this plane.",
             False,
         )
     if status == curves.STOPPED:
@@ -56,7 +56,7 @@ def outcome_of(
     if status == curves.FULL:
         return Outcome(
             "too many points",
-            f"the curve goes on at {where}; raise Continuation(points=…) or largest_step.",
+            f"the curve continues beyond {where}; increase Continuation(points=…) or largest_step.",
             False,
         )
     return Outcome(

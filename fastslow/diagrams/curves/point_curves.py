@@ -1,4 +1,4 @@
-"""Curves of special points in the plane of two parameters."""
+"""Two-parameter continuation of special points."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from fastslow.continuation import curves
 from fastslow.continuation.curves import Frame
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.curves.codimension_two import (
+    Candidate,
     Criterion,
-    Found,
-    Rows,
+    TracedRows,
     along,
     coefficients,
     criteria,
@@ -52,10 +52,10 @@ from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
 
-#: A branch point's β beyond this part of its unit: no symmetry keeps the branch point.
+#: Fraction of its unit above which β breaks a branch point: there is no symmetry.
 ISOLATED = 1e-7
 
-#: A component of a tangent below this, in scaled units, does not tell its direction.
+#: A component of a tangent below this, in scaled units, does not determine its orientation.
 LEVEL = 1e-3
 
 
@@ -106,46 +106,46 @@ def continue_points(
 ) -> PointBranch | PointCurves:
     """Trace a curve of special points in the plane of two parameters.
 
-    Folds, Hopf points, branch points (in models with a symmetry), boundary
-    equilibria and two-folds are followed as extended systems (Kuznetsov 2004, chapter 10);
-    codimension-two points on the way are solved for: CP, BT, GH, ZH, HH, BF
-    (the fold meets an interface) and BH (the Hopf point does).
+    Folds, Hopf points, branch points (in models with a symmetry), boundary equilibria and
+    two-folds are continued as solutions of extended systems (Kuznetsov 2004, chapter 10).
+    Codimension-two points are located: CP, BT, GH, ZH, HH, BF (boundary fold, on an
+    interface) and BH (boundary Hopf).
 
     Parameters
     ----------
     point : SpecialPoint or Diagram
-        A point of a diagram or of another such curve; of a diagram all its points, whose
-        curves are then traced, each once.
+        A point of a diagram or of another such curve; from a diagram all of its points, with
+        each curve traced once.
     parameters : sequence of two str or Symbol
     over : mapping
-        The range of both, in their own units.
+        Range of both parameters, in their own units.
     code : str, optional
-        Which curve to trace from a codimension-two point: ``"LP"`` or ``"HB"``
-        from BT and ZH, ``"BE"`` or ``"LP"`` from BF, ``"BE"`` or ``"HB"`` from BH;
-        of a diagram, the only kind of curves to trace.
+        Curve to trace from a codimension-two point: ``"LP"`` or ``"HB"`` from BT and ZH,
+        ``"BE"`` or ``"LP"`` from BF, ``"BE"`` or ``"HB"`` from BH. From a diagram, the only
+        kind of curves to trace.
     continuation : Continuation, optional
         Lengths in units of the ranges.
     virtual : bool
-        Whether the curve goes on beyond an interface as one of virtual points;
-        the rows say which they are.
+        Whether the curve continues beyond an interface with virtual points, which are marked
+        in its rows.
     window : mapping, optional
-        State to its range (low, high), as in `continue_equilibria`: a curve that leaves
-        it ends exactly on the edge. The default is the window of the point's diagram.
+        State to its range (low, high), as in `continue_equilibria`: a curve that leaves the
+        window ends on its edge. By default the window of the point's diagram.
     marks : mapping, optional
-        Parameter, one of both, to the values at which points UZ are wanted exactly.
+        Parameter to the values at which points UZ are computed.
 
     Returns
     -------
     PointBranch or PointCurves
-        The curve; of a diagram the tuple of its curves.
+        The curve; from a diagram the tuple of its curves.
 
     Raises
     ------
     ArgumentError
-        If the point has no model (it was read from a file), starts no curve, lies
-        outside the ranges, a mark does, or a range is empty.
+        If the point has no model (it was read from a file), is not on a curve in the plane or
+        is outside the ranges; if a mark is outside the ranges, or a range is empty.
     UnknownNameError
-        For a name that is no parameter.
+        For a name that is not a parameter.
 
     Examples
     --------
@@ -176,7 +176,7 @@ def continue_points(
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """Where and how curves are traced.
+    """The parameter plane and the settings of a trace.
 
     Parameters
     ----------
@@ -186,11 +186,11 @@ class Plane:
         Their ranges.
     continuation : Continuation
     virtual : bool
-        Whether curves go on beyond interfaces.
+        Whether curves continue beyond interfaces.
     window : mapping or None
-        Ranges of states that were asked for.
+        Requested ranges of states.
     marks : list of (int, float)
-        Number of a parameter, and a value of it.
+        Number of a parameter and its value.
     """
 
     names: tuple[str, str]
@@ -202,7 +202,7 @@ class Plane:
     marks: list[tuple[int, float]]
 
     def holds(self, point: SpecialPoint) -> bool:
-        """Whether a point is in the ranges of both parameters."""
+        """Return whether a point is in the ranges of both parameters."""
         at = np.array([point.parameters.get(name, np.nan) for name in self.names])
         return bool(np.all((at >= self.lower) & (at <= self.upper)))
 
@@ -213,7 +213,7 @@ class Plane:
 
 
 def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
-    """The curves of all points of a diagram, each once."""
+    """Trace the curves of all points of a diagram, each once."""
     kinds = {kind for one in POINT_TYPES.values() for kind in one.curves}
     if code is not None and code not in kinds:
         raise unknown_name("curve", code, sorted(kinds))
@@ -222,7 +222,7 @@ def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
             f"parameters={plane.names!r}: expected the diagram's parameter "
             f"{diagram.parameter} among them"
         )
-    found: list[tuple[PointBranch, Rows]] = []
+    found: list[tuple[PointBranch, TracedRows]] = []
     lost: list[SpecialPoint] = []
     starts = [
         (point, POINT_TYPES[point.code].curves[0])
@@ -249,8 +249,8 @@ def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
     return PointCurves((curve for curve, _ in found), plane.names, tuple(lost))
 
 
-def _passes(rows: Rows, point: SpecialPoint, code: str, plane: Plane) -> bool:
-    """Whether a curve that was traced goes through a point of the same kind."""
+def _passes(rows: TracedRows, point: SpecialPoint, code: str, plane: Plane) -> bool:
+    """Return whether a traced curve contains a point of the same kind."""
     system = rows.system
     field = system.field
     if system.code != code:
@@ -259,24 +259,24 @@ def _passes(rows: Rows, point: SpecialPoint, code: str, plane: Plane) -> bool:
         return False
     number = _region_of(field, point, code)
     if isinstance(system, OnInterface) and field.model.continuous[str(point.interface)]:
-        # the equilibria of both sides are the same on the interface
+        # on the interface the equilibria of both sides coincide
         beyond = field.neighbour(system.region, system.interface)
         if number not in (system.region, beyond):
             return False
-    elif number not in (system.region, _twin(field, system.region)):
+    elif number not in (system.region, _sliding_motion(field, system.region)):
         return False
     u = np.append(point.state, [point.parameters[name] for name in plane.names])
     return rows.passes(u)
 
 
-def _twin(field: FrozenField, region: int) -> int:
-    """The sliding motion with the same equations; of a region itself."""
+def _sliding_motion(field: FrozenField, region: int) -> int:
+    """Return the sliding motion with the same equations; a region itself."""
     sides = field.modes[region].sides
     return region if sides is None else region - 1 if sides.escaping else region + 1
 
 
-def _curve(point: SpecialPoint, plane: Plane, code: str) -> tuple[PointBranch, Rows]:
-    """The curve of one kind through a point, with its rows."""
+def _curve(point: SpecialPoint, plane: Plane, code: str) -> tuple[PointBranch, TracedRows]:
+    """Trace the curve of one kind through a point; return it with its rows."""
     names = plane.names
     model = _model(point, names)
     field = FrozenField(model, *names)
@@ -284,20 +284,20 @@ def _curve(point: SpecialPoint, plane: Plane, code: str) -> tuple[PointBranch, R
     u = np.append(point.state, [point.parameters[n] for n in names])
     if not plane.holds(point):
         raise ArgumentError(
-            f"the point {point.label} at {names[0]} = {u[-2]:g}, {names[1]} = {u[-1]:g} lies "
+            f"the point {point.label} at {names[0]} = {u[-2]:g}, {names[1]} = {u[-1]:g} is "
             f"outside over={plane.ranges}"
         )
     within = _window(point, plane.window)
     if not within.contains(point.state, point.source.unit):
         raise ArgumentError(
-            f"the point {point.label} lies outside the window {within}; window= sets other bounds"
+            f"the point {point.label} is outside the window {within}; window= sets other bounds"
         )
     system, start = _system(field, region, code, point, u, plane.upper - plane.lower)
     frame = _frame(system, start, (plane.lower, plane.upper), within)
     landing = curves.landed(system, start, frame)
     if landing is None:
         raise ArgumentError(
-            f"the point {point.label} does not lie on a curve of {code} points of region "
+            f"the point {point.label} is not on a curve of {code} points of region "
             f"{field.regions[region]}: Newton's method did not converge from it"
         )
     return _traced(system, landing, frame, point, plane, within)
@@ -327,7 +327,7 @@ def _ranges(names: tuple[str, str], over: Mapping[Any, tuple[float, float]]) -> 
 def _marks(
     given: Mapping[Any, Any] | None, names: tuple[str, str], lower: Array, upper: Array
 ) -> list[tuple[int, float]]:
-    """Number of the parameter and value of every mark."""
+    """Return number of the parameter and value of every mark."""
     found = []
     for key, values in (given or {}).items():
         name = str(key)
@@ -344,7 +344,7 @@ def _marks(
 
 
 def _window(point: SpecialPoint, given: Mapping[Any, Any] | None) -> StateWindow:
-    """The window asked for; where it has no bounds, those of the point's diagram."""
+    """Return the requested window, completed by that of the point's diagram."""
     known: StateWindow = point.source.window
     asked = state_window(known.states, given)
     lower, upper, meant = list(known.lower), list(known.upper), list(known.given)
@@ -360,7 +360,7 @@ def _curve_code(point: SpecialPoint, code: str | None) -> str:
     possible = known.curves if known else ()
     if not possible:
         raise ArgumentError(
-            f"a point {point.code} starts no curve in a parameter plane; expected one of "
+            f"a point {point.code} cannot be continued in two parameters; expected one of "
             f"{', '.join(c for c, known in POINT_TYPES.items() if known.curves)}"
         )
     if code is None:
@@ -373,8 +373,8 @@ def _curve_code(point: SpecialPoint, code: str | None) -> str:
 def _model(point: SpecialPoint, names: tuple[str, str]) -> Model:
     if point.source is None:
         raise ArgumentError(
-            f"the point {point.label} carries no model (it was read from a file or another "
-            "process); trace its diagram again and take the point from there"
+            f"the point {point.label} has no model (it was read from a file or another "
+            "process); trace its diagram again and use its point"
         )
     model: Model = point.source.model
     known = (*model.parameters, *model.free)
@@ -386,7 +386,7 @@ def _model(point: SpecialPoint, names: tuple[str, str]) -> Model:
 
 
 def _region_of(field: FrozenField, point: SpecialPoint, code: str) -> int:
-    """The region whose rates vanish; of a boundary equilibrium not the sliding motion."""
+    """Return the region whose rates vanish; at a boundary equilibrium not the sliding motion."""
     numbers = [field.regions.index(r) for r in point.regions if r in field.regions]
     plain = [k for k in numbers if field.modes[k].sides is None]
     return plain[0] if code == "BE" and plain else numbers[0]
@@ -395,7 +395,7 @@ def _region_of(field: FrozenField, point: SpecialPoint, code: str) -> int:
 def _system(
     field: FrozenField, region: int, code: str, point: SpecialPoint, u: Array, span: Array
 ) -> tuple[DefiningSystem, Array]:
-    """The defining system with its first z, the states in units of their diagram."""
+    """Return the defining system with its first z, with states in units of the diagram."""
     unit = np.maximum(np.abs(u[: field.n]), point.source.unit)
     if code == "LP":
         fold = Fold(field, region, unit, span)
@@ -411,7 +411,7 @@ def _system(
         two_fold = TwoFold(field, region, unit, span)
         return two_fold, two_fold.start(u)
     if point.interface not in field.interfaces:
-        raise ArgumentError(f"the point {point.label} lies on no interface of the model")
+        raise ArgumentError(f"the point {point.label} is not on an interface of the model")
     edge = OnInterface(field, region, unit, span, field.interfaces.index(point.interface))
     return edge, edge.start(u)
 
@@ -434,7 +434,7 @@ def _traced(
     point: SpecialPoint,
     plane: Plane,
     window: StateWindow,
-) -> tuple[PointBranch, Rows]:
+) -> tuple[PointBranch, TracedRows]:
     field, region, names = system.field, system.region, plane.names
     continuation, virtual = plane.continuation, plane.virtual
     inside = _inside(system, start)
@@ -462,13 +462,13 @@ def _traced(
         )
         rows = np.concatenate([back[:0:-1], rows])
         tangents = np.concatenate([-turned[:0:-1], tangents])
-    watched = criteria(system, _meeting(system), plane.marks)
+    watched = criteria(system, _adjacent_regions(system), plane.marks)
     coefficient = along(system, rows)
     found = sorted(
-        search(Rows(system, rows, frame, continuation), watched),
+        search(TracedRows(system, rows, frame, continuation), watched),
         key=lambda f: (f.row, float((f.z - rows[f.row]) * frame.weight @ tangents[f.row])),
     )
-    found = _told_apart(found, frame)
+    found = _distinct(found, frame)
     places = [f.row + 1 for f in found]
     if found:
         rows = np.insert(rows, places, [f.z for f in found], axis=0)
@@ -501,7 +501,7 @@ def _traced(
         _special(system, f, point, names, tangents[k], counts)
         for f, k in zip(found, spots, strict=True)
     ]
-    whole = Rows(system, rows, frame, continuation)
+    whole = TracedRows(system, rows, frame, continuation)
     curve = PointBranch(
         field.model.states,
         names,
@@ -529,7 +529,7 @@ def _traced(
     return curve, whole
 
 
-def _corrector(rows: Rows, point: SpecialPoint, names: tuple[str, str]) -> PointCorrector:
+def _corrector(rows: TracedRows, point: SpecialPoint, names: tuple[str, str]) -> PointCorrector:
     system = rows.system
     n = system.n
 
@@ -541,7 +541,7 @@ def _corrector(rows: Rows, point: SpecialPoint, names: tuple[str, str]) -> Point
         code = "NSD" if isinstance(system, Pair) and z[system.width] < 0 else system.code
         residual = float(np.abs(system.residual(z, z)).max())
         met = Criterion(code, lambda _: (0.0, 1.0), lambda _: True, system.region)
-        found = Found(row, met, z, residual, True, 0.0)
+        found = Candidate(row, met, z, residual, True, 0.0)
         made = _special(system, found, point, names, np.zeros(len(z)), {})
         lyapunov = along(system, z[None])[0] if code == "HB" else np.nan
         return replace(
@@ -556,7 +556,7 @@ def _corrector(rows: Rows, point: SpecialPoint, names: tuple[str, str]) -> Point
 
 
 def _oriented(direction: Array, frame: Frame) -> Array:
-    """The direction in which the first parameter rises, else the second, else the first state."""
+    """Orient by the first parameter, else by the second, else by the first state."""
     leading = (direction / frame.scale)[: frame.size]
     order = np.append(leading[-2:], leading[:-2])
     place = np.flatnonzero(np.abs(order) > LEVEL)
@@ -564,9 +564,9 @@ def _oriented(direction: Array, frame: Frame) -> Array:
 
 
 def _up_to_interfaces(
-    found: list[Found], spots: list[int], count: int, first: str, last: str
+    found: list[Candidate], spots: list[int], count: int, first: str, last: str
 ) -> slice:
-    """The rows up to the points on an interface beyond which a curve was stopped."""
+    """Return the rows up to the points on an interface at which a curve was stopped."""
     on = [k for f, k in zip(found, spots, strict=True) if f.criterion.code in ("BF", "BH")]
     start = on[0] if on and first == curves.STOPPED else 0
     stop = on[-1] + 1 if on and last == curves.STOPPED else count
@@ -574,13 +574,13 @@ def _up_to_interfaces(
 
 
 def _tangent_at(system: DefiningSystem, z: Array, before: Array, frame: Frame) -> Array:
-    """The tangent at a point between rows, in the direction of the row before."""
+    """Return the tangent at a point between rows, oriented as at the row before."""
     tangent = curves.tangent(system, z, frame)
     return tangent if (tangent * frame.weight) @ before >= 0 else -tangent
 
 
-def _two_interfaces(system: OnInterface, z: Array) -> Found:
-    """The end of a curve of boundary equilibria at which another interface is met."""
+def _two_interfaces(system: OnInterface, z: Array) -> Candidate:
+    """Return the end of a curve of boundary equilibria on a second interface."""
     field, region = system.field, system.region
     apart = np.abs(system.heights(z))
     apart[(field.signs[region] == 0) | (np.arange(len(apart)) == system.interface)] = np.inf
@@ -595,16 +595,16 @@ def _two_interfaces(system: OnInterface, z: Array) -> Found:
         f"on {field.interfaces[other]} as well",
     )
     residual = float(np.abs(np.append(system.residual(z, z), apart[other])).max())
-    return Found(0, met, z, residual, True, 0.0)
+    return Candidate(0, met, z, residual, True, 0.0)
 
 
 def _inside(system: DefiningSystem, z: Array) -> bool:
-    """Whether a point lies in the closure of its region; on its own interface it does."""
+    """Return whether a point is in the closure of its region, its own interface included."""
     return system.inside(z, system.interface if isinstance(system, OnInterface) else None)
 
 
-def _meeting(system: DefiningSystem) -> list[int]:
-    """Regions whose Jacobians matter on a curve: both sides of a continuous interface."""
+def _adjacent_regions(system: DefiningSystem) -> list[int]:
+    """Return the regions whose Jacobians are needed: both sides of a continuous interface."""
     if not isinstance(system, OnInterface):
         return []
     field, name = system.field, system.field.interfaces[system.interface]
@@ -614,9 +614,9 @@ def _meeting(system: DefiningSystem) -> list[int]:
     return [system.region, beyond]
 
 
-def _told_apart(found: list[Found], frame: Frame) -> list[Found]:
-    """Leave out a point that another criterion has found already, such as ZH at BT."""
-    kept: list[Found] = []
+def _distinct(found: list[Candidate], frame: Frame) -> list[Candidate]:
+    """Remove points already found by another criterion, such as ZH at BT."""
+    kept: list[Candidate] = []
     for point in found:
         width = frame.size
         near = any(
@@ -634,7 +634,7 @@ def _told_apart(found: list[Found], frame: Frame) -> list[Found]:
 
 def _special(
     system: DefiningSystem,
-    found: Found,
+    found: Candidate,
     point: SpecialPoint,
     names: tuple[str, str],
     tangent: Array,

@@ -1,4 +1,4 @@
-"""All points at which the fields of a frozen model are tangent to its interfaces."""
+"""Tangency points of the vector fields of a frozen model with its interfaces."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ from fastslow.symbolic.solving.elimination import eliminate
 
 Array = NDArray[np.float64]
 
-#: What counts as zero, relative to the size of the terms.
-SMALL = 1e-9
+#: Bound below which a function is zero, relative to its terms.
+ZERO = 1e-9
 
-#: How far, relative to the state, Newton's method may move a root of a polynomial.
+#: Largest correction of a root of a polynomial by Newton's method, relative to the state.
 MOVED = 1e-3
 
 
@@ -43,22 +43,21 @@ MOVED = 1e-3
 def tangencies(
     model: Model, values: Mapping[Any, float] | None = None, /, **named: float
 ) -> Tangencies:
-    """All tangency points of a frozen model: h = 0 and ∇h·f = 0 for the field of one side.
+    """Compute all tangency points of a frozen model: h = 0 and ∇h·f = 0 for one side.
 
-    In the plane they are isolated. With n > 2 states they form surfaces of n − 2
-    dimensions; as many states must be given values. Where both equations are
-    polynomials all solutions are found and the list's ``completeness`` is
-    ``"complete"``; else Newton's method from many starts, and it is ``"found"``.
-    An interface that a field is tangent to everywhere has no such points.
+    In the plane they are isolated. With n > 2 states they form surfaces of dimension n − 2, and
+    n − 2 states must be fixed. If both equations are polynomials all solutions are found, and
+    ``completeness`` is ``"complete"``; otherwise Newton's method is applied from many starting
+    points, and it is ``"found"``. Interfaces to which a field is tangent everywhere are omitted.
 
     Parameters
     ----------
     model : Model
         A frozen model.
     values : mapping, optional
-        Slow quantity, parameter, or state to be held (symbol or name) to its value.
+        Slow quantity, parameter, or fixed state (symbol or name) to its value.
     **named : float
-        The same by name.
+        The same by keyword.
 
     Returns
     -------
@@ -70,13 +69,13 @@ def tangencies(
     UnknownNameError
         For a name that is neither a parameter nor a state.
     ModelError
-        For a slow quantity without value.
+        For a slow quantity without a value.
     ArgumentError
-        If not exactly n − 2 states are held, or the model has one state only.
+        If not exactly n − 2 states are fixed, or the model has only one state.
 
     Examples
     --------
-    A belt at speed 1 drags a block by friction; tangencies bound where it sticks.
+    A block on a belt with speed 1 and dry friction; the tangencies bound the sticking set.
 
     >>> x, v = sp.symbols("x v")
     >>> block = Model({x: v, v: -x - sp.sign(v - 1) / 2})
@@ -87,7 +86,7 @@ def tangencies(
     """
     changes = {str(k): v for k, v in {**(values or {}), **named}.items()}
     held = {n: finite_number(f"state {n}", changes.pop(n)) for n in model.states if n in changes}
-    require_frozen(model, "look for the tangencies of")
+    require_frozen(model, "compute the tangencies of")
     given = model.with_parameters(changes)
     _check(given, held)
     modes = [mode for mode in modes_of(given) if mode.sides is None]
@@ -95,7 +94,7 @@ def tangencies(
     complete = True
     for k in range(len(given.interfaces)):
         for mode in modes:
-            contact = Contact(given, mode, _opposite(modes, mode, k), k, held)
+            contact = TangencyEquations(given, mode, _opposite(modes, mode, k), k, held)
             complete &= contact.solved[1]
             found += contact.points()
     return Tangencies(found, "complete" if complete else "found")
@@ -125,7 +124,7 @@ def _check(model: Model, held: Mapping[str, float]) -> None:
 
 
 def _opposite(modes: Sequence[Mode], mode: Mode, interface: int) -> Mode | None:
-    """The region across an interface."""
+    """Return the region across an interface."""
     for other in modes:
         pairs = zip(mode.signs, other.signs, strict=True)
         if [k for k, (s, o) in enumerate(pairs) if s != o] == [interface]:
@@ -134,8 +133,8 @@ def _opposite(modes: Sequence[Mode], mode: Mode, interface: int) -> Mode | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
-    """One interface seen from one region, with n − 2 states held.
+class TangencyEquations:
+    """Tangency equations of one interface and one region, with n − 2 fixed states.
 
     Parameters
     ----------
@@ -143,7 +142,7 @@ class Contact:
     mode : Mode
         The region.
     across : Mode, optional
-        The region beyond the interface.
+        The region across the interface.
     interface : int
     held : mapping
         State to its value.
@@ -157,13 +156,13 @@ class Contact:
 
     @cached_property
     def numbers(self) -> dict[sp.Symbol, sp.Rational]:
-        """Exact values of all parameters and held states."""
+        """Exact values of all parameters and fixed states."""
         both = {**self.model.parameters, **self.held}
         return {real(n): sp.Rational(v) for n, v in both.items()}
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """The two states to solve for."""
+        """The two unknown states."""
         return tuple(n for n in self.model.states if n not in self.held)
 
     @cached_property
@@ -176,7 +175,7 @@ class Contact:
 
     @cached_property
     def equations(self) -> tuple[sp.Expr, sp.Expr]:
-        """Functions h and L h of the two unknown states."""
+        """Functions h and L h (the Lie derivative) of the two unknown states."""
         h = self.mode.rows[self.interface]
         first = drift(h, self.model.states, self.mode.rates)
         return tuple(sp.expand(e.subs(self.numbers)) for e in (h, first))
@@ -199,7 +198,7 @@ class Contact:
 
     @cached_property
     def _jumps(self) -> bool:
-        """Whether the rates differ across the interface."""
+        """Whether the rates are discontinuous across the interface."""
         h, other = self.mode.rows[self.interface], self.across
         if other is None:
             return False
@@ -208,13 +207,13 @@ class Contact:
 
     @cached_property
     def solved(self) -> tuple[list[Array], bool]:
-        """Solutions for the unknown states, and whether these are sure to be all."""
+        """Return solutions for the unknown states, and whether they are provably all."""
         names, symbols = self.unknown, [real(n) for n in self.unknown]
         left = eliminate(dict(zip(names, self.equations, strict=True)), names)
         if any(e.is_number and e.is_nonzero for e in left.remaining):
             return [], True
         if left.unknowns and len(left.remaining) < len(left.unknowns):
-            # tangent along the whole interface
+            # tangent everywhere along the interface
             return [], True
         if not left.is_polynomial or left.divisors:
             return self._searched(), False
@@ -234,7 +233,7 @@ class Contact:
 
     @staticmethod
     def _roots(equation: sp.Expr, symbol: sp.Symbol) -> list[float] | None:
-        """Real roots of a polynomial; None where it is zero or its degree is too high."""
+        """Return real roots of a polynomial; None if it is zero or its degree is too high."""
         polynomial = sp.Poly(equation, symbol)
         if polynomial.is_zero or polynomial.degree() > DEGREE:
             return None
@@ -242,7 +241,7 @@ class Contact:
         return real_roots(np.array([float(c / first) for c in polynomial.all_coeffs()]))
 
     def _searched(self) -> list[Array]:
-        """From many states, a fixed sequence spread over several scales."""
+        """Search from a fixed sequence of states over several scales."""
         generator = np.random.default_rng(20231)
         spread = 10.0 ** generator.uniform(-2, 1.5, (STARTS, 1))
         starts = generator.standard_normal((STARTS, 2)) * spread * self.units
@@ -250,13 +249,13 @@ class Contact:
 
     @np.errstate(all="ignore")
     def _polished(self, guesses: Sequence[Array], reach: float) -> list[Array]:
-        """Newton's last digits; what leads away or nowhere was no solution."""
+        """Refine guesses by Newton's method; discard those that diverge or move away."""
         kept: list[Array] = []
         for guess in guesses:
             scale = np.maximum(self.units, np.abs(guess))
             state, _, _, size = newton(lambda z: self._values(z), guess, scale)
             near = bool(np.all(np.abs(state - guess) <= reach * scale))
-            # at a double root the last corrections stay near the root of the rounding
+            # at a double root the corrections stay near the square root of rounding
             if not (near and size < 1e-6 and self._holds(state)):
                 continue
             gaps = (np.abs(state - o) / np.maximum(self.units, np.abs(o)) for o in kept)
@@ -269,12 +268,12 @@ class Contact:
         return np.array(self._function(*state), dtype=float)
 
     def _holds(self, state: Array) -> bool:
-        """Whether both equations hold, up to rounding in their terms."""
+        """Return whether both equations are satisfied up to rounding in their terms."""
         terms = self._terms(self._function, state)
-        return bool(np.all(np.abs(self._values(state)) <= SMALL * terms))
+        return bool(np.all(np.abs(self._values(state)) <= ZERO * terms))
 
     def _terms(self, function: Any, state: Array) -> Array:
-        """What the terms of functions of the unknowns amount to at a state, by differences."""
+        """Return the size of the terms of functions at a state, by differences."""
         step = 1e-6 * np.maximum(self.units, np.abs(state))
         value = np.array(function(*state), dtype=float)
         moved = [np.array(function(*(state + step * e)), dtype=float) for e in np.eye(2)]
@@ -282,13 +281,13 @@ class Contact:
 
     @np.errstate(all="ignore")
     def points(self) -> list[Tangency]:
-        """The solutions in the closure of the region, with what they are."""
+        """Return the solutions in the closure of the region as Tangency objects."""
         found = []
         for state in self.solved[0]:
             second, other, *heights = np.array(self._details(*state), dtype=float)
             size = self._terms(self._details, state)
             bounds = np.array(self.mode.signs[: len(heights)]) * np.array(heights)
-            outside = bounds < -SMALL * size[2:]
+            outside = bounds < -ZERO * size[2:]
             if np.any(np.delete(outside, self.interface)):
                 continue
             bends = self.mode.signs[self.interface] * second
@@ -301,8 +300,8 @@ class Contact:
                     np.array([place[name] for name in self.model.states]),
                     dict(self.model.parameters),
                     float(second),
-                    bool(bends > 0) if abs(bends) > SMALL * size[0] else None,
-                    self._jumps and abs(float(other)) <= SMALL * size[1],
+                    bool(bends > 0) if abs(bends) > ZERO * size[0] else None,
+                    self._jumps and abs(float(other)) <= ZERO * size[1],
                     float(np.abs(self._values(state)).max()),
                 )
             )

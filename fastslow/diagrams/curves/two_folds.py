@@ -1,8 +1,8 @@
-"""Two-folds, at which a branch of pseudo-equilibria ends: both fields are tangent there.
+"""Two-folds, at which branches of pseudo-equilibria end: both fields are tangent.
 
-The sliding field is 0/0 at a = b = 0. Without division the point solves
-(1 − α) f₁ + α f₂ = 0, h = 0, a = b for (states, α, parameter), which is regular;
-over two parameters the same equations define a curve (`defining.TwoFold`).
+The sliding vector field is 0/0 at a = b = 0. The system (1 − α) f₁ + α f₂ = 0, h = 0, a = b for
+(states, α, parameter) has no division and is regular; over two parameters it defines a curve
+(`defining.TwoFold`).
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from fastslow.diagrams.field import FrozenField
 
 Array = NDArray[np.float64]
 
-#: Farthest, in scaled units, that a two-fold lies from where steps became too small.
+#: Largest distance, in scaled units, of a two-fold from the point where steps became too small.
 NEAR = 1e-3
 
-#: Rows nearer to the two-fold than this are lost in the rounding of 0/0.
+#: Rows closer to the two-fold are inaccurate because of 0/0.
 BLURRED = 1e-6
 
 
 def two_fold_ahead(field: FrozenField, region: int, u: Array, scale: Array) -> Array | None:
-    """The two-fold that the last step of a sliding motion's branch reached or passed.
+    """Locate a two-fold reached or passed by the last step of a branch of a sliding motion.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def two_fold_ahead(field: FrozenField, region: int, u: Array, scale: Array) -> A
     Returns
     -------
     ndarray or None
-        The point u, solved for to rounding.
+        The point u, to rounding.
     """
     sides = field.modes[region].sides
     if sides is None or len(u) < 2:
@@ -62,7 +62,7 @@ def two_fold_ahead(field: FrozenField, region: int, u: Array, scale: Array) -> A
 
 
 def cut_at_two_fold(u: Array, tangents: Array, end: Array, scale: Array) -> tuple[Array, Array]:
-    """The rows before a two-fold, then the two-fold itself."""
+    """Replace the rows after a two-fold by the two-fold itself."""
     apart = np.linalg.norm((u - end) / scale, axis=1)
     ahead = ((end - u) / scale**2 * tangents).sum(axis=1)
     keep = (apart > BLURRED) & (ahead > 0)
@@ -73,19 +73,19 @@ def cut_at_two_fold(u: Array, tangents: Array, end: Array, scale: Array) -> tupl
     length = float(np.linalg.norm(chord))
     last = tangents[-1] / scale
     if length > 0:
-        # the direction at the other end of a circle's arc
+        # the direction at the other end of a circular arc
         chord = chord / length
         last = 2.0 * (last @ chord) * chord - last
     return np.vstack([u, end]), np.vstack([tangents, last * scale])
 
 
 def two_fold_residual(field: FrozenField, region: int, u: Array) -> float:
-    """What is left of the equations of a two-fold at a point, with the best weight α."""
+    """Residual of the equations of a two-fold at a point, with the best weight α."""
     return float(np.abs(_regular(field, region, u, weight_of(field, region, u))).max())
 
 
 def weight_of(field: FrozenField, region: int, u: Array) -> float:
-    """The weight α that makes (1 − α) f₁ + α f₂ smallest at a point."""
+    """Weight α that minimizes (1 − α) f₁ + α f₂ at a point."""
     sides = field.modes[region].sides
     assert sides is not None
     above, below = (

@@ -1,4 +1,4 @@
-"""Where test functions vanish between the rows of a segment, pairs within one step included."""
+"""Location of zeros of test functions on a segment, including pairs within one step."""
 
 from __future__ import annotations
 
@@ -15,24 +15,22 @@ from fastslow.diagrams.trace.across_regions import Segment, Window, on_normal_pl
 
 Array = NDArray[np.float64]
 
-#: Steps by which a bracket is narrowed, beyond which it is at rounding.
+#: Narrowings after which a bracket is at rounding.
 NARROWINGS = 80
 
-#: Newton's method is tried after each of so many narrowings, and then after twice as many as the
-#: last time, as it costs more than they do.
-TRIED_EACH = 4
+#: Narrowings before a trial of Newton's method, doubled after each trial because of its cost.
+NARROWINGS_PER_TRIAL = 4
 
-#: A minimum is computed where less than this fraction of the smallest value may be left.
-DIP = 0.5
+#: A minimum is computed if it may be below this fraction of the smallest value.
+MINIMUM_RATIO = 0.5
 
-#: Evaluations spent on one minimum of a test function.
+#: Evaluations for one minimum of a test function.
 EVALUATIONS = 40
 
-#: A minimum is known well enough at this fraction of the step: the test is above its minimum
-#: by the square of it.
-SETTLED = 1e-8
+#: Tolerance of a minimum as a fraction of the step; the error of the test is its square.
+MINIMUM_TOLERANCE = 1e-8
 
-#: The golden section, by which a minimum is bracketed where no parabola helps.
+#: Golden section, for bracketing a minimum where parabolic interpolation fails.
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
@@ -57,7 +55,7 @@ class Search:
     steps : ndarray, shape (N - 1,)
         Lengths of the steps between the rows, in units of the window.
     at : callable
-        A point u and the direction along the segment to the test there.
+        Function of a point u and the direction along the segment that returns the test.
     """
 
     field: FrozenField
@@ -67,7 +65,7 @@ class Search:
     at: Callable[[Array, Array], float]
 
     def between(self, a: Array, b: Array, part: float) -> tuple[Array, float] | None:
-        """The point of the curve above a part of a chord, with its test."""
+        """Return the point of the curve at a fraction of a chord, with its test."""
         chord = b - a
         guess = a + part * chord
         found = on_normal_plane(
@@ -76,15 +74,15 @@ class Search:
         return (found.u, self.at(found.u, chord)) if found.converged else None
 
     def brackets(self, test: Array) -> Iterator[Bracket]:
-        """Changes of sign between rows next to each other but for one zero, and within dips."""
+        """Yield changes of sign between neighbouring rows (or across a zero), and around minima."""
         u = self.segment.u
         for before, after in sign_changes(test):
             yield Bracket(before, (u[before], u[after]), (test[before], test[after]))
-        for row in _dips(test, self.steps):
-            yield from self._dip(row, test)
+        for row in _minima(test, self.steps):
+            yield from self._around_minimum(row, test)
 
-    def _dip(self, row: int, test: Array) -> Iterator[Bracket]:
-        """Two changes of sign around a minimum of the modulus after a row, if there are."""
+    def _around_minimum(self, row: int, test: Array) -> Iterator[Bracket]:
+        """Yield two changes of sign around a minimum of the modulus after a row, if any."""
         a, b, sign = self.segment.u[row], self.segment.u[row + 1], float(np.sign(test[row]))
 
         def value(part: float) -> tuple[Array, float] | None:
@@ -100,22 +98,22 @@ class Search:
     def solve(
         self, bracket: Bracket, locate: Callable[[Array], Located], *, narrowings: int = 0
     ) -> Located | None:
-        """The special point within a bracket, which is narrowed until Newton's method stays in it.
+        """Locate the special point in a bracket, narrowed until Newton's method stays inside.
 
-        Where Newton's method never does, the bracket itself is narrowed to rounding.
+        If Newton's method always fails, the bracket is narrowed to rounding.
 
         Parameters
         ----------
         bracket : Bracket
         locate : callable
-            Newton's method for the point from a start u.
+            Newton's method for the point, from a starting point u.
         narrowings : int
-            How often the bracket is narrowed before the first attempt.
+            Narrowings before the first attempt.
 
         Returns
         -------
         Located or None
-            None where the test jumps from one sign to the other and does not vanish.
+            None if the test changes sign by a discontinuity.
         """
         (a, b), (f, g) = bracket.u, bracket.values
         size = min(abs(f), abs(g))
@@ -126,11 +124,11 @@ class Search:
             part = weight_a * f / (weight_a * f - weight_b * g)
             tried = count - narrowings
             if tried >= 0:
-                if tried < TRIED_EACH or tried.bit_count() == 1:
+                if tried < NARROWINGS_PER_TRIAL or tried.bit_count() == 1:
                     located = locate(a + part * (b - a))
                     if located.converged and self._inside(located.u, a, b):
                         return located
-                # regula falsi may hold on to one end
+                # regula falsi may retain one end
                 part = 0.5 if count % 2 else part
             found = self.between(a, b, part)
             if found is None:
@@ -152,7 +150,7 @@ class Search:
         return self._narrowed(a, b, f, g, size)
 
     def _narrowed(self, a: Array, b: Array, f: float, g: float, size: float) -> Located | None:
-        """The middle of a bracket narrowed to rounding; None if the test jumps across it."""
+        """Return the middle of a bracket at rounding; None if the test is discontinuous in it."""
         length = float(np.abs((b - a) / self.window.scale).max())
         if length > 1e-9 or min(abs(f), abs(g)) > 1e-3 * size:
             return None
@@ -174,7 +172,7 @@ class Search:
 
 
 def sign_changes(test: Array) -> list[tuple[int, int]]:
-    """Rows before and after every change of sign, at most one zero between them.
+    """Return the rows before and after every change of sign, with at most one zero between.
 
     Examples
     --------
@@ -188,10 +186,10 @@ def sign_changes(test: Array) -> list[tuple[int, int]]:
     return [(before, after) for before, after in pairs if after - before <= 2]
 
 
-def _dips(test: Array, steps: Array) -> list[int]:
-    """Rows after which a test that keeps its sign may reach zero and turn back."""
+def _minima(test: Array, steps: Array) -> list[int]:
+    """Return rows after which a test without a change of sign may touch zero."""
     found = np.empty(len(steps), dtype=np.int64)
-    count = loop("dips")(writeable(test), steps, DIP, found)
+    count = loop("dips")(writeable(test), steps, MINIMUM_RATIO, found)
     rows: list[int] = found[:count].tolist()
     return rows
 
@@ -199,13 +197,13 @@ def _dips(test: Array, steps: Array) -> list[int]:
 def _negative(
     value: Callable[[float], tuple[Array, float] | None], left: float, right: float
 ) -> tuple[Array, float] | None:
-    """A point between 0 and 1 at which a function with positive values there is negative.
+    """Find a point between 0 and 1 at which a function with positive end values is negative.
 
-    Brent's minimization (1973, chapter 5), ended as soon as the function is
-    negative, or its minimum is known well enough and is not.
+    Brent's minimization (1973, chapter 5), stopped as soon as the function is negative or its
+    minimum is known to be positive.
     """
     low, high = 0.0, 1.0
-    # best, second and third best place so far, with their values
+    # best, second and third best argument so far, with their values
     second, third = ((low, left), (high, right))[:: 1 if left <= right else -1]
     best = (float("nan"), np.inf)
     step = earlier = np.inf
@@ -228,7 +226,9 @@ def _negative(
                 third = here
         x, f = best
         vertex, least = _parabola(best, second, third)
-        if (count > 0 and abs(vertex - x) < SETTLED) or (count > 2 and least > DIP * f):
+        if (count > 0 and abs(vertex - x) < MINIMUM_TOLERANCE) or (
+            count > 2 and least > MINIMUM_RATIO * f
+        ):
             return None
         aimed = vertex - x
         if not low < vertex < high or abs(aimed) > 0.5 * earlier:
@@ -236,13 +236,13 @@ def _negative(
             earlier = np.inf
         else:
             earlier = step
-        step = max(abs(aimed), SETTLED)
+        step = max(abs(aimed), MINIMUM_TOLERANCE)
         place = x + float(np.copysign(step, aimed))
     return None
 
 
 def _parabola(*points: tuple[float, float]) -> tuple[float, float]:
-    """Vertex of the parabola through three points, with its value there; (∞, −∞) for none."""
+    """Vertex of the parabola through three points and its value; (∞, −∞) if degenerate."""
     (x, f), (y, g), (z, h) = points
     if len({x, y, z}) < 3:
         return np.inf, -np.inf

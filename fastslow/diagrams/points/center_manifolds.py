@@ -2,7 +2,7 @@
 
 With critical eigenvectors q_i and amplitudes w_i the manifold is x = x₀ + Σ w_i q_i +
 Σ h_α w^α and the flow on it ẇ_i = λ_i w_i + Σ g_{i,α} w^α. The coefficients solve the
-homological equation F(x(w)) = x_w ẇ, degree by degree; g_{i,α} is kept where
+homological equation F(x(w)) = x_w ẇ, degree by degree; g_{i,α} is non-zero for
 λ·α = λ_i only (Kuznetsov 1999, 2004 section 8.7; Coullet and Spiegel 1983).
 """
 
@@ -24,29 +24,29 @@ Array = NDArray[np.float64]
 Power = tuple[int, ...]
 
 
-#: A combination of critical eigenvalues that is off another one by less, relative to them, is it.
+#: Relative difference below which a combination of critical eigenvalues is resonant.
 RESONANT = 1e-9
 
-#: A coefficient below this part of the largest one of its order is zero but for rounding.
+#: A coefficient below this fraction of the largest of its order is zero to rounding.
 VANISHING = 1e-10
 
 
 class NoNormalForm(Exception):
-    """Coefficients that are undefined at a point; says which and why."""
+    """Error for undefined coefficients, with the reason."""
 
 
 @dataclass(frozen=True, eq=False)
 class Manifold:
-    """Critical eigenvalues with their eigenvectors, and which monomials are resonant.
+    """Critical eigenvalues with their eigenvectors and resonant monomials.
 
     Parameters
     ----------
     values : ndarray, shape (m,)
     right, left : ndarray, shape (n, m)
-        Columns q_i of length one and p_i, ⟨p_i, q_j⟩ = δ_ij.
+        Unit columns q_i and p_i, ⟨p_i, q_j⟩ = δ_ij.
     resonant : callable
-        Exponents and the number of an amplitude to whether the monomial stays in its
-        equation.
+        Function of exponents and the number of an amplitude, whether the monomial is resonant
+        in its equation.
     """
 
     values: NDArray[np.complex128]
@@ -60,7 +60,7 @@ def generalized_hopf(
 ) -> dict[str, float]:
     """Second Lyapunov coefficient l₂ = Re c₂/ω of ẇ = iω w + c₁ w|w|² + c₂ w|w|⁴.
 
-    Kuznetsov (2004), section 8.3.2, for an eigenvector of length one.
+    Kuznetsov (2004), section 8.3.2, for a unit eigenvector.
     """
     manifold = _manifold(field, region, u, [1j * frequency, -1j * frequency], _hopf)
     g = _normal_form(field, region, u, manifold, 5)
@@ -72,11 +72,11 @@ def zero_hopf(
 ) -> dict[str, float]:
     """Coefficients s, θ and E of a zero-Hopf point.
 
-    Of ẋ = x² + s r², ṙ = θ x r + E x² r up to scaling (Kuznetsov 2004, section 8.5; E is that
-    of the amplitudes for eigenvectors of length one): s = sign(ab), θ = Re e/(2a) and
+    For ẋ = x² + s r², ṙ = θ x r + E x² r up to scaling (Kuznetsov 2004, section 8.5; E is that
+    of the amplitudes for unit eigenvectors): s = sign(ab), θ = Re e/(2a) and
     E = Re f + Re e (Re g/b + d/(2b) − 3c/(2a)) − a Re g/b in the Poincaré normal form
     ẇ₀ = a w₀² + b|w₁|² + c w₀³ + d w₀|w₁|², ẇ₁ = iω w₁ + e w₀w₁ + f w₀²w₁ + g w₁|w₁|².
-    ``unit`` is the size of every state. Raises NoNormalForm where a or b vanishes.
+    ``unit`` is the size of every state. Raises NoNormalForm if a or b vanishes.
     """
     manifold = _manifold(field, region, u, [0.0, 1j * frequency, -1j * frequency], _zero_hopf)
     zero, pair, _ = _normal_form(field, region, u, manifold, 3)
@@ -104,9 +104,9 @@ def double_hopf(
 ) -> dict[str, float]:
     """Coefficients p₁₁, p₁₂, p₂₁, p₂₂ with θ = p₁₂/p₂₂ and δ = p₂₁/p₁₁, faster pair first.
 
-    Of ṙ₁ = r₁ (p₁₁ r₁² + p₁₂ r₂²), ṙ₂ = r₂ (p₂₁ r₁² + p₂₂ r₂²) (Kuznetsov 2004,
-    section 8.6, equations 8.89 and 8.90), for eigenvectors of length one. Where p₁₁ or p₂₂
-    vanishes θ and δ are left out. ``unit`` is the size of every state.
+    For ṙ₁ = r₁ (p₁₁ r₁² + p₁₂ r₂²), ṙ₂ = r₂ (p₂₁ r₁² + p₂₂ r₂²) (Kuznetsov 2004,
+    section 8.6, equations 8.89 and 8.90), for unit eigenvectors. If p₁₁ or p₂₂ vanishes
+    θ and δ are omitted. ``unit`` is the size of every state.
     """
     fast, slow = sorted(frequencies, reverse=True)
     values = [1j * fast, -1j * fast, 1j * slow, -1j * slow]
@@ -129,7 +129,7 @@ def bogdanov_takens(
 
     a = ½ ⟨p₁, B(q₀, q₀)⟩, b = ⟨p₀, B(q₀, q₀)⟩ + ⟨p₁, B(q₀, q₁)⟩ with J q₀ = 0, J q₁ = q₀,
     Jᵀp₁ = 0, Jᵀp₀ = p₁, |q₀| = 1, ⟨q₀, q₁⟩ = 0, ⟨p₀, q₀⟩ = ⟨p₁, q₁⟩ = 1, ⟨p₀, q₁⟩ = 0
-    (Kuznetsov 2005). Both change their sign with the direction of q₀, whose largest
+    (Kuznetsov 2005). Both change sign with the orientation of q₀, whose largest
     component is positive. ``unit`` is the size of every state.
     """
     n = field.n
@@ -139,7 +139,7 @@ def bogdanov_takens(
     q1 = np.linalg.solve(bordered, np.append(q0, 0.0))[:n]
     p1 = left / (left @ q1)
     p0 = np.linalg.solve(bordered.T, np.append(p1, 0.0))[:n]
-    # up to multiples of p₁ the solution is free: ⟨p₀, q₁⟩ = 0 takes one
+    # the solution is determined up to multiples of p₁, fixed by ⟨p₀, q₁⟩ = 0
     p0 = p0 - (p0 @ q1) * p1
     space = JetSpace(2, 2)
     plane = np.outer(q0, space.variable(0)) + np.outer(q1, space.variable(1))
@@ -150,7 +150,7 @@ def bogdanov_takens(
 
 
 def zero_hopf_case(form: dict[str, float]) -> str:
-    """Signs of s and θ; tori branch off where they differ (Kuznetsov 2004, section 8.5.2)."""
+    """Describe the signs of s and θ; tori bifurcate if they differ (Kuznetsov 2004, sec. 8.5.2)."""
     if not form:
         return "resonant or degenerate"
     positive = form["theta"] > 0
@@ -159,7 +159,7 @@ def zero_hopf_case(form: dict[str, float]) -> str:
 
 
 def double_hopf_case(form: dict[str, float]) -> str:
-    """Simple (p₁₁p₂₂ > 0) or difficult, with the case of (θ, δ) in Kuznetsov 2004, section 8.6."""
+    """Classify as simple (p₁₁p₂₂ > 0) or difficult, with the case in Kuznetsov 2004, sec. 8.6."""
     if "theta" not in form:
         return "resonant or degenerate"
     high = max(form["theta"], form["delta"])
@@ -200,7 +200,7 @@ def _manifold(
     wanted: list[complex],
     resonant: Callable[[Power, int], bool],
 ) -> Manifold:
-    """Eigenvectors of the eigenvalues nearest to those wanted, the left ones dual to them."""
+    """Return right and dual left eigenvectors of the eigenvalues nearest to those wanted."""
     matrix = field.residual_and_jacobian(region, u)[1][:, : field.n]
     values, vectors = np.linalg.eig(matrix)
     duals, adjoint = np.linalg.eig(matrix.T)
@@ -220,9 +220,9 @@ def _manifold(
 def _normal_form(
     field: FrozenField, region: int, u: Array, manifold: Manifold, degree: int
 ) -> list[dict[Power, complex]]:
-    """Coefficients g_{i,α} of all resonant monomials up to a degree, for every amplitude.
+    """Return the coefficients g_{i,α} of all resonant monomials up to a degree.
 
-    Raises NoNormalForm where another eigenvalue is in resonance with the critical ones.
+    Raises NoNormalForm if another eigenvalue is in resonance with the critical ones.
     """
     n, m = manifold.right.shape
     space = JetSpace(m, degree)
@@ -230,7 +230,7 @@ def _normal_form(
     spectrum = np.linalg.eigvals(matrix)
     near = RESONANT * np.abs(manifold.values).max()
     amplitudes = np.array([space.variable(k) for k in range(m)])
-    # the manifold and the flow on it, as jets
+    # jets of the manifold and of the flow on it
     shape = manifold.right @ amplitudes
     flow = manifold.values[:, None] * amplitudes
     found: list[dict[Power, complex]] = [{} for _ in range(m)]
@@ -268,7 +268,7 @@ def _normal_form(
 def _image(
     field: FrozenField, region: int, u: Array, space: JetSpace, shape: NDArray[np.complex128]
 ) -> NDArray[np.complex128]:
-    """Jets of the rates where the states are those of u and jets added to them, (n, m)."""
+    """Return jets of the rates at u plus jets of the states, (n, m)."""
     n, model = field.n, field.model
     numbers = dict(model.parameters) | dict(zip(field.varying, u[n:].tolist(), strict=True))
     given: dict[sp.Symbol, Jet] = {real(k): space.constant(v) for k, v in numbers.items()}

@@ -1,4 +1,4 @@
-"""Equilibria solved for near given states, and what is known at them."""
+"""Computation of equilibria near given states by Newton's method."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from fastslow.results.points import Equilibrium
 
 Array = NDArray[np.float64]
 
-#: Residual of a rate at an equilibrium, relative to the size of its terms.
+#: Largest residual of a rate at an equilibrium, relative to its terms.
 RESIDUAL = 1e-9
 
-#: Where rounding of the state changes a rate by more than this part of its natural size, the state
-#: is on a pole.
+#: A state is on a pole if its rounding changes a rate by more than this fraction of its natural
+#: size.
 POLE = 1e-2
 
-#: Relative to its unit, what rounding in the rates may move the state of an equilibrium by.
+#: Largest displacement of an equilibrium by rounding in the rates, relative to its unit.
 UNCERTAIN = 1e-3
 
-#: Newton's method moves a solution that is proved by less, in units of its size.
+#: Largest correction of a proven solution by Newton's method, relative to its size.
 MOVED = 1e-6
 
-#: What plainly is an equilibrium; all else is looked at closely.
+#: Criteria of a clear equilibrium; other solutions are examined further.
 PLAIN = Limits(
     residual=RESIDUAL, correction=1e-6, pole=0.5 * POLE, moved=1e6, farthest=FARTHEST, beside=1e-12
 )
@@ -36,7 +36,7 @@ PLAIN = Limits(
 
 @dataclass(frozen=True, eq=False)
 class Corrections:
-    """Newton's method for the equilibria of one region, or of sliding, and what it is judged by.
+    """Newton's method for equilibria of one region or sliding motion, with its acceptance tests.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Corrections:
     region: int
 
     def unit(self, value: float) -> Array:
-        """Natural unit of each state where the parameter has a value."""
+        """Natural unit of each state at a parameter value."""
         return self.field.units_at(abs(value))[: self.field.n]
 
     @cached_property
@@ -57,27 +57,27 @@ class Corrections:
         return {}
 
     def _natural(self, value: float) -> Array:
-        """Size of each rate where the states have their natural units, kept for every value."""
+        """Size of each rate at the natural units of the states, cached by value."""
         if value not in self._naturally:
             self._naturally[value] = self._size(value, self.unit(value))
         return self._naturally[value]
 
     def _parameter_unit(self, value: float) -> float:
-        """Size of the parameter, its natural unit where it is zero."""
+        """Size of the parameter; its natural unit if it is zero."""
         return abs(value) or float(self.field.units[self.field.n])
 
     def _size(self, value: float, unit: Array) -> Array:
-        """Size of each rate where the states have their units."""
+        """Size of each rate at the units of the states."""
         rates, slopes = self.field.residual_and_jacobian(self.region, np.append(unit, value))
         with np.errstate(all="ignore"):
             size = np.abs(rates) + np.abs(slopes[:, :-1]) @ unit
         return np.where(np.isfinite(size), size, 0.0)
 
     def corrected(self, state: Array, value: float, *, proved: bool = False) -> Array | None:
-        """The equilibrium near a state at a parameter value, None without convergence.
+        """Return the equilibrium near a state at a parameter value, None without convergence.
 
-        Next to one that is proved the rates need not be small beside their slopes: near a pole
-        the terms of both cancel.
+        With ``proved`` the rates need not be small relative to their slopes: near a pole the
+        terms of both cancel.
         """
         solved = self._corrected(state, value, proved)
         return None if solved is None or self._at_two_fold(solved, value) else solved
@@ -90,17 +90,17 @@ class Corrections:
             return np.asarray(points[0, :-1])
         target = np.append(np.zeros(len(state)), 1.0)
         found = self.field.refined(self.region, u, scale, normal=target, point=value * target)
-        # at a double root Newton's last corrections stay near the root of the rounding
+        # at a double root the corrections stay near the square root of rounding
         if not (np.isfinite(found.residual) and found.correction < PLAIN.correction):
             return None
         solved = found.u[:-1]
         rates, slopes = self.field.residual_and_jacobian(self.region, found.u)
-        # not of the unit where a state is far below it: a slope that is large because another
-        # state is far away would forgive any residual
+        # not at the unit of a state far below it: a slope that is large because of another, large
+        # state would permit any residual
         terms = np.abs(slopes[:, :-1]) @ np.abs(solved)
         small = np.abs(rates) <= RESIDUAL * (natural + terms)
         if np.any(np.abs(rates) > RESIDUAL * natural):
-            # steep slopes forgive a residual only where they determine the state
+            # steep slopes permit a residual only if they determine the state
             small &= _determined(slopes[:, :-1], terms, scale[:-1])
         near = np.abs(solved - state) < PLAIN.moved * scale[:-1]
         within = np.abs(solved) <= PLAIN.farthest * scale[:-1]
@@ -113,9 +113,9 @@ class Corrections:
         return solved if there and good and near.all() and within.all() else None
 
     def corrected_many(self, states: Array, values: Array) -> Array:
-        """As `corrected` at many states (N, n) and values (N,), NaN without convergence.
+        """Return equilibria near states (N, n) at values (N,), NaN without convergence.
 
-        What is not plainly a solution is judged by itself.
+        Unclear solutions are examined one by one.
         """
         n, field = self.field.n, self.field
         units = np.array([self.unit(v) for v in values.tolist()])
@@ -134,7 +134,7 @@ class Corrections:
         return solved
 
     def _at_two_fold(self, solved: Array, value: float) -> bool:
-        """Whether a pseudo-equilibrium is a two-fold, where the sliding field is 0/0."""
+        """Return whether a pseudo-equilibrium is a two-fold, where the sliding field is 0/0."""
         if self.field.modes[self.region].sides is None:
             return False
         u = np.append(solved, value)
@@ -145,11 +145,11 @@ class Corrections:
 
 
 def _determined(slopes: Array, terms: Array, scale: Array) -> bool:
-    """Whether rounding in the terms of the rates leaves the solution of Newton's equations sure.
+    """Return whether the Newton equations determine the state in spite of rounding.
 
-    The bound is |J⁻¹| |J| |x| times the rounding unit (Skeel 1979). Where a factor such as
-    exp(100) multiplies a difference that rounding makes zero, the slopes of all rates are
-    parallel to rounding, and the other states are free.
+    The bound is |J⁻¹| |J| |x| times the rounding unit (Skeel 1979). If a factor such as exp(100)
+    multiplies a difference that is zero to rounding, the slopes of all rates are numerically
+    parallel, and the other states are undetermined.
     """
     matrix = slopes * scale / np.maximum(terms, np.finfo(float).tiny)[:, None]
     try:
@@ -161,14 +161,14 @@ def _determined(slopes: Array, terms: Array, scale: Array) -> bool:
 
 @lru_cache(maxsize=64)
 def corrections(field: FrozenField) -> tuple[Corrections, ...]:
-    """Those of every region, and of the sliding motions."""
+    """Return the corrections of every region and sliding motion."""
     return tuple(Corrections(field, number) for number in range(len(field.regions)))
 
 
 def point_at(
     field: FrozenField, region: int, u: Array, admissible: bool = True, continuum: bool = False
 ) -> Equilibrium:
-    """The equilibrium at a point u, with its eigenvalues."""
+    """Return the equilibrium at a point u, with its eigenvalues."""
     rates, _ = field.residual_and_jacobian(region, u)
     return Equilibrium(
         field.model.states,

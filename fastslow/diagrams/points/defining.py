@@ -1,10 +1,9 @@
-"""Equations that define folds, Hopf points, branch points, boundary equilibria and two-folds.
+"""Defining systems of folds, Hopf points, branch points, boundary equilibria and two-folds.
 
-In all of them z = (states, two parameters, extra unknowns), and each is a
-regular system at a generic point (Kuznetsov 2004, chapter 10). Rates and
-Jacobian are scaled by the units of the states and the spans of the parameters,
-so that what is left has no unit but that of time, in which the equations are
-homogeneous: neither the units of a model nor its time scale matter.
+The unknowns are z = (states, two parameters, extra unknowns), and each system is regular at a
+generic point (Kuznetsov 2004, chapter 10). Rates and Jacobian are scaled by the units of the
+states and the spans of the parameters; the only remaining unit is that of time, in which the
+equations are homogeneous. The results do not depend on the units of a model or its time scale.
 """
 
 from __future__ import annotations
@@ -22,13 +21,13 @@ from fastslow.diagrams.modes import Sides
 
 Array = NDArray[np.float64]
 
-#: A point this near to an interface, relative to the terms of its function, is on it.
+#: A point is on an interface if |h| is below this fraction of its terms.
 ON = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class DefiningSystem(ABC):
-    """What every kind of point has: a field with two varying parameters, a region, units.
+    """Base class: a field with two varying parameters, a region, and units.
 
     Parameters
     ----------
@@ -38,7 +37,7 @@ class DefiningSystem(ABC):
     unit : ndarray, shape (n,)
         Unit of every state.
     span : ndarray, shape (2,)
-        Length of the range of both parameters.
+        Lengths of the ranges of both parameters.
     """
 
     field: FrozenField
@@ -46,12 +45,12 @@ class DefiningSystem(ABC):
     unit: Array
     span: Array
 
-    #: What the points are.
+    #: Code of the points.
     code: ClassVar[str]
 
     @abstractmethod
     def start(self, u: Array) -> Array:
-        """Give z for a point u = (states, parameters)."""
+        """Return z for a point u = (states, parameters)."""
 
     @abstractmethod
     def residual(self, z: Array, guide: Array) -> Array:
@@ -72,11 +71,11 @@ class DefiningSystem(ABC):
         return np.append(self.unit, self.span)
 
     def extras(self, z: Array) -> Array:
-        """Units of the extra unknowns, by their values at a first point."""
+        """Units of the extra unknowns, given their values at a first point."""
         return np.ones(len(z) - self.width)
 
     def at(self, z: Array) -> tuple[Array, Array]:
-        """Rates and their derivatives in units of states and parameters, at z (…, N + 1)."""
+        """Scaled rates and derivatives at z (…, N + 1)."""
         u = z[..., : self.width]
         rows = u.reshape(-1, self.width)
         rates, slopes, _, _ = self.field.evaluate(self.region, rows)
@@ -85,11 +84,11 @@ class DefiningSystem(ABC):
         return (rates / self.unit).reshape(*lead, self.n), scaled.reshape(*lead, self.n, self.width)
 
     def jacobian(self, z: Array) -> Array:
-        """The state Jacobian in the units of the states, shape (…, n, n)."""
+        """State Jacobian in units of the states, shape (…, n, n)."""
         return self.at(z)[1][..., : self.n]
 
     def balanced(self, z: Array) -> Array:
-        """The state Jacobian at one point, every row in units of [F_x F_p]."""
+        """State Jacobian at one point, with rows scaled by those of [F_x F_p]."""
         slopes = self.at(z)[1]
         return np.asarray(slopes[:, : self.n] / row_sizes(slopes)[:, None])
 
@@ -97,10 +96,9 @@ class DefiningSystem(ABC):
         return z
 
     def inside(self, z: Array, but: int | None = None) -> bool:
-        """Whether a point lies in the closure of the region, one interface left aside.
+        """Return whether a point is in the closure of the region, disregarding one interface.
 
-        Of sliding, also where both fields point away from the interface: the
-        pseudo-equilibria of escaping are those of the same equations.
+        For sliding this includes escaping, whose pseudo-equilibria satisfy the same equations.
         """
         heights = self.heights(z)
         if but is not None:
@@ -112,7 +110,7 @@ class DefiningSystem(ABC):
         return bool(np.all(heights >= -ON))
 
     def heights(self, z: Array) -> Array:
-        """What bounds the region, positive inside and relative to its terms, at a point."""
+        """Bounds of the region at a point, positive inside and relative to their terms."""
         u = z[: self.width]
         _, _, h, gradients = self.field.evaluate(self.region, u)
         size = np.abs(gradients) @ np.maximum(np.abs(u), self.scales)
@@ -120,7 +118,7 @@ class DefiningSystem(ABC):
 
 
 def row_sizes(matrix: Array) -> Array:
-    """Length of every row, 1 where there is none: fast states are as long as slow ones then."""
+    """Length of every row, 1 for zero rows; scaling by it balances fast and slow states."""
     size = np.linalg.norm(matrix, axis=1)
     return np.where(size > 0, size, 1.0)
 
@@ -149,17 +147,16 @@ class Fold(DefiningSystem):
 class Pair(DefiningSystem):
     """F = 0, (J² + κ) v = 0, |v| = 1, ⟨c, v⟩ = 0: two eigenvalues with sum zero.
 
-    The extra unknowns are κ, v and c, a vector that completes v to the plane
-    of the two and is carried along as it is. κ > 0 is a Hopf point with
-    frequency √κ, κ < 0 a neutral saddle.
+    The extra unknowns are κ, v and c, a constant vector that with v spans the plane of both
+    eigenvectors. κ > 0 is a Hopf point with frequency √κ, κ < 0 a neutral saddle.
     """
 
     code: ClassVar[str] = "HB"
 
     def start(self, u: Array, squared: float | None = None) -> Array:
-        """Give z for a point, with the product of the pair.
+        """Return z for a point, given the product of the pair.
 
-        By default the pair is the one with the smallest sum in units of itself.
+        By default the pair is the one with the smallest relative sum.
         """
         if squared is None:
             values = np.linalg.eigvals(self.jacobian(u))
@@ -170,16 +167,16 @@ class Pair(DefiningSystem):
         return np.concatenate([u, [squared], plane[0], plane[1]])
 
     def _plane(self, z: Array, kappa: float) -> Array:
-        """Two vectors that span the null plane of J² + κ, shape (2, n)."""
+        """Return two vectors that span the null space of J² + κ, shape (2, n)."""
         matrix = self.jacobian(z)
         square = matrix @ matrix + kappa * np.eye(self.n)
-        # the rows in units of their terms, so that fast states do not blur the plane
+        # rows scaled by their terms, for accuracy with fast states
         size = (np.abs(matrix) @ np.abs(matrix)).sum(axis=1, keepdims=True) + abs(kappa)
         _, _, right = np.linalg.svd(square / np.where(size > 0, size, 1.0))
         return np.asarray(right[[-1, -2]])
 
     def rate(self, z: Array) -> float:
-        """How fast the pair is: the norm of the Jacobian in its plane, at least √|κ|."""
+        """Rate of the pair: the norm of the Jacobian in its plane, at least √|κ|."""
         plane = np.linalg.qr(self._plane(z[: self.width], float(z[self.width])).T)[0]
         inner = plane.T @ self.jacobian(z) @ plane
         return float(max(np.linalg.norm(inner), np.sqrt(abs(z[self.width]))))
@@ -206,7 +203,7 @@ class Pair(DefiningSystem):
         n, w = self.n, self.width
         u, kappa, v = z[:w], z[w], z[w + 1 : w + 1 + n]
         v = v / np.linalg.norm(v)
-        # the other direction of the null plane, at right angles to v
+        # the direction of the null space orthogonal to v
         plane = self._plane(u, kappa)
         plane = plane - np.outer(plane @ v, v)
         other = plane[np.argmax(np.linalg.norm(plane, axis=1))]
@@ -219,8 +216,8 @@ class Pair(DefiningSystem):
 class Crossing(DefiningSystem):
     """F + βψ = 0, [F_x F_p]ᵀψ = 0, |ψ| = 1: a branch point over the first parameter.
 
-    The extra unknowns are ψ and β. In a model without symmetry β does not stay
-    zero: branch points are then isolated in the parameter plane.
+    The extra unknowns are ψ and β. In a model without symmetry β does not
+    remain zero: branch points are then isolated in the parameter plane.
     """
 
     code: ClassVar[str] = "BP"
@@ -269,9 +266,9 @@ class OnInterface(DefiningSystem):
 class TwoFold(DefiningSystem):
     """(1 − α) f₁ + α f₂ = 0, h = 0, a = b: a pseudo-equilibrium at which both drifts vanish.
 
-    With the first equation a = ∇h·f₁ and b = ∇h·f₂ are both zero where they are equal. The extra
-    unknown is α; from 0 to 1 the fields point in opposite directions, and the point is one of
-    sliding. Its region is the sliding motion, whose own field is 0/0 there.
+    The first equation implies that the drifts a = ∇h·f₁ and b = ∇h·f₂ vanish if they are equal.
+    The extra unknown is α; for 0 ≤ α ≤ 1 the fields point in opposite directions, and the point
+    is on the boundary of sliding. Its region is the sliding motion, whose field is 0/0 there.
     """
 
     code: ClassVar[str] = "TF"
@@ -291,7 +288,7 @@ class TwoFold(DefiningSystem):
         above, _, h, gradients = self.field.evaluate(self.sides.above, u)
         below = self.field.evaluate(self.sides.below, u)[0]
         interface, n = self.sides.interface, self.n
-        # the gradient in units of its own length, so that no unit of h matters
+        # the gradient is normalized, for independence of the unit of h
         edge = gradients[:, interface] * self.scales
         size = np.linalg.norm(edge[:, :n], axis=1, keepdims=True)
         size = np.where(size > 0, size, 1.0)
@@ -303,10 +300,10 @@ class TwoFold(DefiningSystem):
         return both.reshape(*z.shape[:-1], self.n + 2)
 
     def edges(self, z: Array) -> Array:
-        """α, 1 − α and the heights of interfaces, positive where the point is one of sliding."""
+        """α, 1 − α and the bounds by interfaces, positive at points of sliding."""
         share = z[self.width]
         return np.append([share, 1.0 - share], self.heights(z)[: len(self.field.interfaces)])
 
     def inside(self, z: Array, but: int | None = None) -> bool:
-        """Whether the fields point in opposite directions, within all other interfaces."""
+        """Return whether the fields point in opposite directions, within all other interfaces."""
         return bool(np.all(self.edges(z) >= -ON))

@@ -1,4 +1,4 @@
-"""Special points between the rows of a segment, solved for to rounding."""
+"""Detection and location of special points on a segment."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from fastslow.results.point_types import POINT_TYPES
 
 Array = NDArray[np.float64]
 
-#: How often a bracket of a Hopf point is narrowed before Newton's method for it is tried,
-#: which costs as much as dozens of evaluations where there are many states.
+#: Narrowings of a bracket of a Hopf point before the first Newton iteration, which costs dozens
+#: of evaluations for many states.
 NARROWED_FIRST = 3
 
-#: How often the steps are divided whose special points do not explain how many eigenvalues are
-#: unstable: neutral saddles may hide a Hopf point among them.
+#: Divisions of steps whose special points do not explain the change of the number of unstable
+#: eigenvalues: neutral saddles may mask a Hopf point.
 DIVISIONS = 12
 
 
@@ -51,21 +51,21 @@ class Detected:
 def special_points(
     field: FrozenField, segment: Segment, window: Window, marks: Sequence[float]
 ) -> tuple[list[Detected], Segment, NDArray[np.complex128]]:
-    """All special points of a segment, in order along it.
+    """Locate all special points of a segment, in order along it.
 
     Returns
     -------
     found : list of Detected
     segment : Segment
-        The segment, with rows added where one step hid several points.
+        The segment, with rows added in steps that contain several points.
     eigenvalues : ndarray of complex
-        The finite ones of its rows.
+        Finite eigenvalues at its rows.
     """
     segment, tests = resolved(field, segment, window)
     found = _between_rows(field, segment, window, tests, marks)
     for _ in range(DIVISIONS):
         finer = segment
-        # from the last step on, so that the rows before it keep their numbers
+        # backwards, so that the numbers of the preceding rows do not change
         for first, last in reversed(_unexplained(tests, found)):
             finer = divided(field, finer, window, first, last)
         if len(finer.u) == len(segment.u):
@@ -76,10 +76,10 @@ def special_points(
 
 
 def _unexplained(tests: RowTests, found: Sequence[Detected]) -> list[tuple[int, int]]:
-    """Pairs of rows between which the number of unstable eigenvalues changes unexplained."""
+    """Return pairs of rows with an unexplained change of the number of unstable eigenvalues."""
     low, high = tests.unstable
     known = [d for d in found if POINT_TYPES[d.code].changes_stability]
-    # a row for every point, at which the number is undecided
+    # a row for every point, at which the number is undetermined
     places = [d.row + 1 for d in known]
     row_of = np.insert(np.arange(len(low)), places, -1)
     points = np.flatnonzero(row_of < 0).tolist()
@@ -91,7 +91,7 @@ def _unexplained(tests: RowTests, found: Sequence[Detected]) -> list[tuple[int, 
 def _between_rows(
     field: FrozenField, segment: Segment, window: Window, tests: RowTests, marks: Sequence[float]
 ) -> list[Detected]:
-    """All special points between the rows of a segment, in order along it."""
+    """Locate all special points between the rows of a segment, in order along it."""
     steps = segment.chords(window.scale)
     found = [
         *_folds(field, segment, window, steps, tests),
@@ -100,7 +100,7 @@ def _between_rows(
         *_marks(field, segment, window, steps, marks),
     ]
     found = [d for d in found if _between(d.located.u, segment, d.row, window)]
-    # where two branches cross the parameter may turn as well: that is no fold
+    # at a branch point the parameter may have an extremum without a fold
     crossings = [d.located.u for d in found if d.code == "BP"]
     found = [
         d
@@ -158,8 +158,8 @@ def _hopf_and_neutral_saddles(
     def curve(u: Array) -> tuple[Array, Array]:
         return field.residual_and_jacobian(region, u)
 
-    # a sum that is rounding at most rows, as that of a conservative oscillator, is left out; any
-    # other is near zero only beside the point that is looked for
+    # a sum that vanishes at most rows, as for a conservative oscillator, is left out; any other
+    # is small only near the point to be located
     lost = tests.pairs != pair_sums(tests.eigenvalues, rounding=0.0)
     rounding = ROUNDING if 2 * np.count_nonzero(lost) > len(lost) else 0.0
 
@@ -192,7 +192,7 @@ def _hopf_and_neutral_saddles(
 
 
 def _tangent(field: FrozenField, segment: Segment, u: Array, along: Array, window: Window) -> Array:
-    """The unit tangent at a point, in a direction along the segment."""
+    """Return the unit tangent at a point, oriented along the segment."""
     tangent, _ = field.tangent(segment.region, u, window.weight)
     return tangent if (tangent * window.weight) @ along >= 0 else -tangent
 
@@ -226,7 +226,7 @@ def _ahead(u: Array, segment: Segment, row: int, window: Window) -> float:
 
 
 def _between(u: Array, segment: Segment, row: int, window: Window) -> bool:
-    """Whether a solution stayed near the rows that bracketed it."""
+    """Return whether a solution is near the rows that bracket it."""
     if not np.all(np.isfinite(u)):
         return False
     here = segment.u[row]

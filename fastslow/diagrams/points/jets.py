@@ -1,7 +1,7 @@
 """Taylor polynomials of expressions in several variables, without symbolic derivatives.
 
-An expression is evaluated with truncated power series (jets) in place of numbers:
-sums and products of jets, and Taylor polynomials of functions of one argument.
+Expressions are evaluated with truncated power series (jets) instead of numbers: sums and
+products of jets, and Taylor polynomials of functions of one argument.
 """
 
 from __future__ import annotations
@@ -48,18 +48,18 @@ class JetSpace:
 
     @cached_property
     def powers(self) -> tuple[tuple[int, ...], ...]:
-        """Exponents of every coefficient, by their sum."""
+        """Exponents of every coefficient, ordered by total degree."""
         table = itertools.product(range(self.degree + 1), repeat=self.variables)
         return tuple(sorted((p for p in table if sum(p) <= self.degree), key=lambda p: (sum(p), p)))
 
     @cached_property
     def number(self) -> dict[tuple[int, ...], int]:
-        """Place of every power."""
+        """Index of every power."""
         return {power: k for k, power in enumerate(self.powers)}
 
     @cached_property
     def _pairs(self) -> NDArray[np.intp]:
-        """Places of two factors and of their product, shape (m, 3)."""
+        """Indices of two factors and of their product, shape (m, 3)."""
         found = []
         for (i, one), (j, other) in itertools.product(enumerate(self.powers), repeat=2):
             power = tuple(a + b for a, b in zip(one, other, strict=True))
@@ -84,7 +84,7 @@ class JetSpace:
         return result
 
     def derivative(self, jet: Jet, k: int) -> Jet:
-        """Derivative by a variable; the coefficients of the highest degree are lost."""
+        """Differentiate by a variable; the coefficients of the highest degree are lost."""
         result = np.zeros_like(jet)
         for power, value in zip(self.powers, jet, strict=True):
             if power[k]:
@@ -93,7 +93,7 @@ class JetSpace:
         return result
 
     def compose(self, derivatives: list[float], jet: Jet) -> Jet:
-        """A function with these derivatives at the value of a jet, of that jet."""
+        """Compose a function, given by its derivatives at the value of a jet, with the jet."""
         inner = jet.copy()
         inner[0] = 0.0
         result = self.constant(0.0)
@@ -103,12 +103,12 @@ class JetSpace:
         return result
 
     def evaluate(self, expression: sp.Expr, values: Mapping[sp.Symbol, Jet]) -> Jet:
-        """An expression with jets for its symbols.
+        """Evaluate an expression with jets for its symbols.
 
         Raises
         ------
         NotImplementedError
-            For a function of which several arguments vary.
+            For a function with several varying arguments.
         """
         known: dict[sp.Basic, Jet] = {}
 
@@ -141,7 +141,7 @@ class JetSpace:
             s = sp.Symbol("s")
             return self.evaluate(sp.exp(s), {s: self.product(jet(e.exp), jet(sp.log(e.base)))})
         if len(moving) > 1:
-            raise NotImplementedError(f"{e.func.__name__} of several arguments that vary")
+            raise NotImplementedError(f"{e.func.__name__} with several varying arguments")
         fixed = tuple(None if a in moving else complex(jet(a)[0]).real for a in e.args)
         place = fixed.index(None) if None in fixed else 0
         inner = jet(e.args[place])
@@ -151,7 +151,7 @@ class JetSpace:
 
 @lru_cache(maxsize=256)
 def _derivatives(function: Any, fixed: tuple[float | None, ...], place: int, degree: int) -> Any:
-    """Numbers to a function's value and derivatives by one argument, the others held."""
+    """Return a function that evaluates derivatives by one argument, the others fixed."""
     s = sp.Symbol("s", real=True)
     expression = function(*(s if k == place else sp.Float(f) for k, f in enumerate(fixed)))
     table = [expression]

@@ -16,25 +16,25 @@ Array = NDArray[np.float64]
 Vector = NDArray[Any]  # real or complex
 
 
-#: A column below this part of the rows of a singular matrix is zero but for rounding.
+#: A column below this fraction of the rows of a singular matrix is zero to rounding.
 SINGULAR = 1e-13
 
-#: Null vectors of length one with a smaller product are at right angles: the eigenvalue zero
-#: is double. Next to such a point the eigenvalues have half the digits, and the product has.
+#: Unit null vectors with a smaller product are orthogonal: the eigenvalue zero is double. Near
+#: such a point eigenvalues and product are accurate to half the digits.
 DOUBLE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class Multilinear:
-    """Derivatives of rates at one point, as multilinear forms, without those that vanish.
+    """Non-zero derivatives of rates at one point, as multilinear forms.
 
     Parameters
     ----------
     n : int
         Number of rates and states.
     terms : mapping of int to (ndarray, ndarray)
-        For k = 2, 3 the indices (i, j₁, …, jₖ), shape (m, k + 1), in every order of the
-        j, and the values of ∂ᵏF_i/∂x_j₁…∂x_jₖ, shape (m,).
+        For k = 2, 3 the indices (i, j₁, …, jₖ), shape (m, k + 1), for every permutation of
+        the j, and the values of ∂ᵏF_i/∂x_j₁…∂x_jₖ, shape (m,).
     """
 
     n: int
@@ -42,7 +42,7 @@ class Multilinear:
 
     @classmethod
     def dense(cls, *arrays: Array) -> Multilinear:
-        """Of whole arrays, shapes (n, n, n), (n, n, n, n) and so on."""
+        """Create from dense arrays, shapes (n, n, n), (n, n, n, n) and so on."""
         places = [np.argwhere(array) for array in arrays]
         terms = {
             array.ndim - 1: (at, array[tuple(at.T)])
@@ -51,7 +51,7 @@ class Multilinear:
         return cls(len(arrays[0]), terms)
 
     def form(self, *vectors: Vector) -> Vector:
-        """B(q, r), C(q, r, s), …, shape (n,)."""
+        """Evaluate B(q, r), C(q, r, s), …, shape (n,)."""
         indices, values = self.terms[len(vectors)]
         products: Vector = values
         for place, vector in enumerate(vectors, start=1):
@@ -62,7 +62,7 @@ class Multilinear:
 
 
 def forms_at(field: FrozenField, region: int, u: Array) -> Multilinear:
-    """Give the derivatives of a region's rates by the states at u = (states, parameters)."""
+    """Evaluate the derivatives of a region's rates by the states at u = (states, parameters)."""
     model, n = field.model, field.n
     entries, values = field.source.derivatives(region)
     fixed = [v for p, v in model.parameters.items() if p not in field.varying]
@@ -82,12 +82,12 @@ def forms_at(field: FrozenField, region: int, u: Array) -> Multilinear:
 def fold_form(forms: Multilinear, jacobian: Array, unit: Array | float = 1.0) -> float:
     """Quadratic coefficient a = ½⟨p, B(q, q)⟩ of a fold, |q| = 1, ⟨p, q⟩ = 1.
 
-    Kuznetsov (2004), equation 5.26. Its sign depends on the direction of q,
-    which is taken with its largest component positive. ``unit`` is the size of every state.
+    Kuznetsov (2004), equation 5.26. Its sign depends on the orientation of q,
+    whose largest component is positive. ``unit`` is the size of every state.
     """
     p, q = null_vectors(jacobian, unit)
     overlap = float(p @ q)
-    # at a Bogdanov-Takens point the two are at right angles
+    # p and q are orthogonal at a Bogdanov-Takens point
     return float(0.5 * (p @ forms.form(q, q)).real / overlap) if overlap else np.nan
 
 
@@ -95,7 +95,7 @@ def cusp_form(forms: Multilinear, jacobian: Array, unit: Array | float = 1.0) ->
     """Cubic coefficient c of a cusp, y' = β₁ + β₂ y + c y³, |q| = 1, ⟨p, q⟩ = 1.
 
     c = ⟨p, C(q, q, q) + 3 B(q, h)⟩ / 6 with J h = −B(q, q) + ⟨p, B(q, q)⟩ q,
-    ⟨p, h⟩ = 0 (Kuznetsov 2004, section 8.7.1). NaN where the eigenvalue zero is double.
+    ⟨p, h⟩ = 0 (Kuznetsov 2004, section 8.7.1). NaN if the eigenvalue zero is double.
     """
     p, q = null_vectors(jacobian, unit)
     overlap = float(p @ q)
@@ -112,10 +112,10 @@ def cusp_form(forms: Multilinear, jacobian: Array, unit: Array | float = 1.0) ->
 
 
 def null_vectors(jacobian: Array, unit: Array | float = 1.0) -> tuple[Array, Array]:
-    """Left and right null vectors of length one, the right one's largest component positive.
+    """Left and right unit null vectors; the largest component of the right one is positive.
 
-    The matrix is balanced first, so that the units of the states do not cost digits. An entry
-    that is rounding is told from others with the size of every state as its ``unit``.
+    The matrix is balanced first, for accuracy independent of the units of the states. ``unit``,
+    the size of every state, distinguishes rounding errors from small entries.
 
     Examples
     --------
@@ -131,7 +131,7 @@ def null_vectors(jacobian: Array, unit: Array | float = 1.0) -> tuple[Array, Arr
         size[size == 0] = 1.0
         matrix, rows = matrix / size[:, None], rows / size
         size = np.abs(matrix).max(axis=0)
-        # a column that is zero but for rounding is one at a fold, and stays one
+        # a column that is zero to rounding, as at a fold, is not scaled
         size[size < SINGULAR] = 1.0
         matrix, columns = matrix / size, columns / size
     left, _, right = np.linalg.svd(matrix)
@@ -145,7 +145,7 @@ def first_lyapunov(forms: Multilinear, jacobian: Array, frequency: float) -> flo
 
     Kuznetsov (2004), equation 5.34. In a plane with J = [[0, −ω], [ω, 0]] the
     coefficient a of Guckenheimer and Holmes (1983, equation 3.4.11) is ω l₁/2.
-    NaN where another eigenvalue is 0 or 2iω, so that the coefficient has a pole.
+    NaN if another eigenvalue is 0 or 2iω, a pole of the coefficient.
 
     Examples
     --------
@@ -156,12 +156,12 @@ def first_lyapunov(forms: Multilinear, jacobian: Array, frequency: float) -> flo
     -0.75
     """
     value, size = lyapunov_terms(forms, jacobian, frequency)
-    # what cancels to rounding is zero: the Hopf point is degenerate
+    # zero to rounding: the Hopf point is degenerate
     return 0.0 if abs(value) <= 1e-12 * size else value
 
 
 def lyapunov_terms(forms: Multilinear, jacobian: Array, frequency: float) -> tuple[float, float]:
-    """First Lyapunov coefficient as summed, and the sum of the absolute values of its terms."""
+    """First Lyapunov coefficient, and the sum of the absolute values of its terms."""
     n = len(jacobian)
     q = _eigenvector(jacobian, 1j * frequency)
     p = _eigenvector(jacobian.T, -1j * frequency)
@@ -182,7 +182,7 @@ def lyapunov_terms(forms: Multilinear, jacobian: Array, frequency: float) -> tup
 
 
 def _eigenvector(matrix: Array, value: complex) -> Vector:
-    """Give the eigenvector of length one that belongs to the eigenvalue nearest to a value."""
+    """Return the unit eigenvector of the eigenvalue nearest to a value."""
     values, vectors = np.linalg.eig(matrix)
     found: Vector = vectors[:, np.argmin(np.abs(values - value))]
     return found / np.linalg.norm(found)

@@ -1,7 +1,7 @@
-"""Test functions of special points at the rows of a segment, and steps that hide some of them.
+"""Test functions of special points at the rows of a segment, and division of steps.
 
-Every test is free of units: a pair sum is measured by its own pair, the distance
-of a matrix from the singular ones by the matrix's rows.
+All tests are dimensionless: a pair sum is relative to its pair, the distance of a matrix from
+singularity to its rows.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ Complex = NDArray[np.complex128]
 #: Rounding of an eigenvalue computed by LAPACK, in units of n times the largest modulus.
 ROUNDING = 4.0 * float(np.finfo(float).eps)
 
-#: A matrix with rows of length one is singular to rounding nearer to the singular ones than this.
+#: Distance from singularity below which a matrix with unit rows is singular to rounding.
 SINGULAR = 1e-14
 
-#: Rows that may be added to one segment, and the shortest step that is divided, in scaled units.
+#: Largest number of rows added to a segment, and shortest step divided, in scaled units.
 ADDED, SHORTEST = 400, 1e-10
 
 
@@ -35,23 +35,23 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     """Smallest relative sum of two eigenvalues, with the sign of the product of all sums.
 
     The product of λᵢ + λⱼ over i < j vanishes at Hopf points and neutral saddles
-    (Guckenheimer, Myers & Sturmfels 1997), but underflows for many eigenvalues and
-    loses small ones beside large ones. Its sign is that of the real sums alone,
-    those of complex pairs and of two real eigenvalues, and it vanishes where one of
-    them does. Here each is divided by |λᵢ| + |λⱼ|. A sum that is zero to rounding,
-    as that of a conservative oscillator, is left out.
+    (Guckenheimer, Myers & Sturmfels 1997), but underflows for many eigenvalues and is
+    inaccurate for small ones among large ones. Its sign is determined by the real sums, those
+    of complex pairs and of two real eigenvalues, and it vanishes if one of them does. Here each
+    is divided by |λᵢ| + |λⱼ|. Sums that are zero to rounding, as for a conservative oscillator,
+    are left out.
 
     Parameters
     ----------
     eigenvalues : ndarray of complex, shape (..., n)
     rounding : float
-        A sum below n times this part of the largest modulus is left out. With 0 none
-        is, so that the test is smooth at its zeros, as Newton's method needs it.
+        Sums below n times this fraction of the largest modulus are left out. With 0 the
+        test includes all sums and is smooth at its zeros, as Newton's method requires.
 
     Returns
     -------
     ndarray, shape (...)
-        From −1 to 1; 0 where no sum is left or an eigenvalue is not finite.
+        From −1 to 1; 0 if no sum remains or an eigenvalue is not finite.
 
     Examples
     --------
@@ -76,19 +76,19 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     modulus = np.abs(values)
     noise = rounding * n * modulus.max(axis=-1, keepdims=True)
 
-    # complex pairs, each by its upper member
+    # complex pairs, represented by the eigenvalue with positive imaginary part
     pair = (values.imag > 0) & (np.abs(values.real) >= noise)
     relative = np.where(pair, np.abs(values.real) / np.where(pair, modulus, 1.0), 1.0)
     negative = (pair & (values.real < 0)).sum(axis=-1)
 
-    # two real ones: in order of modulus, the sum has the sign of the second
+    # two real eigenvalues: in order of modulus the sum has the sign of the second
     size = np.where(values.imag == 0, modulus, np.inf)
     order = np.argsort(size, axis=-1, kind="stable")
     size = np.take_along_axis(size, order, axis=-1)
     below = np.take_along_axis(values.real < 0, order, axis=-1)
     real = np.isfinite(size)
     negative = negative + np.where(real & below, np.arange(n), 0).sum(axis=-1)
-    # the smallest relative sum is one of neighbours with opposite signs
+    # the smallest relative sum is one of neighbours of opposite signs
     one, other = np.where(real, size, 0.0)[..., :-1], np.where(real, size, 0.0)[..., 1:]
     both = real[..., 1:]
     opposite = both & (below[..., 1:] != below[..., :-1])
@@ -104,9 +104,9 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
 
 
 def product_of_pair(eigenvalues: Complex, rounding: float = ROUNDING) -> float:
-    """Product of the two eigenvalues that decide `pair_sums`, positive for a complex pair.
+    """Product of the two eigenvalues that determine `pair_sums`, positive for a complex pair.
 
-    NaN where no sum is left.
+    NaN if no sum remains.
 
     Examples
     --------
@@ -135,14 +135,14 @@ class RowTests:
     Parameters
     ----------
     turning : ndarray
-        The tangent's component along the parameter, zero at folds.
+        Parameter component of the tangent, zero at folds.
     branching : ndarray
-        Distance of [F_x F_p; tangent] from the singular matrices with the sign of its
-        determinant, zero at branch points.
+        Distance of [F_x F_p; tangent] from singularity with the sign of its determinant, zero
+        at branch points.
     pairs : ndarray
         `pair_sums`, zero at Hopf points and neutral saddles.
     eigenvalues : ndarray of complex, shape (N, n)
-        The finite ones.
+        Finite eigenvalues.
     """
 
     turning: Array
@@ -152,11 +152,11 @@ class RowTests:
 
     @cached_property
     def unstable(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Least and largest number of unstable eigenvalues at the rows."""
+        """Return the smallest and largest number of unstable eigenvalues at the rows."""
         return unstable_range(self.eigenvalues)
 
     def inserted(self, place: int, other: RowTests) -> RowTests:
-        """With the rows of another before a place."""
+        """Insert the rows of another table before a row."""
         return RowTests(
             np.insert(self.turning, place, other.turning),
             np.insert(self.branching, place, other.branching),
@@ -166,7 +166,7 @@ class RowTests:
 
 
 def tests_at(field: FrozenField, segment: Segment, window: Window) -> RowTests:
-    """The tests at every row of a segment."""
+    """Evaluate the tests at every row of a segment."""
     turning, branching, eigenvalues = field.survey(
         segment.region, segment.u, segment.tangents, window.scale
     )
@@ -179,16 +179,15 @@ def tests_at(field: FrozenField, segment: Segment, window: Window) -> RowTests:
 
 
 def resolved(field: FrozenField, segment: Segment, window: Window) -> tuple[Segment, RowTests]:
-    """A segment with steps divided until the tests explain how many eigenvalues are unstable.
+    """Divide steps until the tests explain the number of unstable eigenvalues.
 
-    Between two rows that number changes by one at a fold or branch point and by
-    two at a Hopf point. Where the changes of sign between them allow no such
-    sum, some of them cancel within the step.
+    Between two rows this number changes by one at a fold or branch point and by two at a Hopf
+    point. If the changes of sign do not add up, some of them cancel within the step.
     """
     tests = tests_at(field, segment, window)
     low, high = tests.unstable
     known = np.flatnonzero(low == high)
-    # where nothing changes and the branch does not turn there is nothing to explain
+    # nothing to explain without changes and without folds
     turning = np.isin(
         np.arange(len(low)), [k for pair in sign_changes(tests.turning) for k in pair]
     )
@@ -210,7 +209,7 @@ def resolved(field: FrozenField, segment: Segment, window: Window) -> tuple[Segm
         tests = tests.inserted(place, new)
         low, high = np.insert(low, place, new.unstable[0]), np.insert(high, place, new.unstable[1])
         segment = _inserted(segment, place, extra)
-        # the pairs that wait lie after this one
+        # the remaining pairs are after this one
         waiting = [(a + 1, b + 1) for a, b in waiting]
         if low[place] == high[place]:
             waiting += [(place, last + 1), (first, place)]
@@ -220,7 +219,7 @@ def resolved(field: FrozenField, segment: Segment, window: Window) -> tuple[Segm
 
 
 def _explains(tests: RowTests, rows: slice, change: int) -> bool:
-    """Whether the changes of sign among some rows can sum up to a change of the number."""
+    """Return whether the changes of sign among rows can add up to a change of the number."""
     possible = {0}
     for test, steps in ((tests.turning, (-1, 1)), (tests.branching, (-1, 0, 1))):
         for _ in sign_changes(test[rows]):
@@ -231,7 +230,7 @@ def _explains(tests: RowTests, rows: slice, change: int) -> bool:
 
 
 def divided(field: FrozenField, segment: Segment, window: Window, first: int, last: int) -> Segment:
-    """With a row in the middle of the longest step between two rows, if one is found there."""
+    """Insert a row in the middle of the longest step between two rows, if one is found."""
     place, extra = _middle(field, segment, window, first, last)
     return segment if extra is None else _inserted(segment, place, extra)
 
@@ -247,9 +246,9 @@ def _inserted(segment: Segment, place: int, extra: Segment) -> Segment:
 def _middle(
     field: FrozenField, segment: Segment, window: Window, first: int, last: int
 ) -> tuple[int, Segment | None]:
-    """A row in the middle of the longest step between two, and the row before which it comes.
+    """Return a row in the middle of the longest step between two, and its index.
 
-    None where the step is too short or no point of the curve is found.
+    None if the step is too short or no point of the curve is found.
     """
     chords = np.linalg.norm(np.diff(segment.u[first : last + 1], axis=0) / window.scale, axis=1)
     before = first + int(np.argmax(chords))

@@ -198,7 +198,7 @@ class Seeds:
             )
         inside = [e for e in found if window.contains(window.shifted(e.state), np.abs(state))]
         if not inside:
-            raise ArgumentError(f"{name}: {where} lies outside the window {window}")
+            raise ArgumentError(f"{name}: {where} is outside the window {window}")
         return inside
 
     def _values(self, name: str, given: Mapping[Any, Any]) -> tuple[Array, float]:
