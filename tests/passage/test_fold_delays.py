@@ -125,7 +125,7 @@ def test_a_parameter_that_also_bends_the_fold():
 
 def test_a_point_from_a_file_needs_its_model(cusp, cusp_fold):
     stored = pickle.loads(pickle.dumps(cusp_fold))
-    with pytest.raises(fs.ArgumentError, match="has no model"):
+    with pytest.raises(fs.ArgumentError, match="carries no model"):
         fold_delay(stored, 1e-3)
     whole = fs.systems.cusp()
     for model in (cusp, whole):

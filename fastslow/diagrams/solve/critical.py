@@ -26,14 +26,14 @@ from fastslow.model.structure import real
 #: Degree in the unknown up to which discriminants and resultants are formed.
 DEGREE = 8
 
-#: Critical values closer than this fraction of the range are one.
+#: Critical values closer than this fraction of the range are identical.
 SHORTEST = 1e-8
 
-#: Size of a resultant up to which its discriminant is formed: its degrees in the unknown, twice,
-#: and in the parameter, times the bits of its coefficients. A few seconds at the most.
+#: Size of a resultant up to which its discriminant is formed: its squared degree in the unknown
+#: times its degree in the parameter times the bits of its coefficients. A few seconds at most.
 LARGEST = 400_000
 
-#: Halvings of the range until an interval around exact roots is narrow enough.
+#: Bisections of the range until an interval around exact roots is sufficiently narrow.
 HALVINGS = 30
 
 #: Highest degree of a discriminant or resultant in the parameter whose roots are trusted.
@@ -43,16 +43,16 @@ ROOTS = 12
 def critical_values(
     equations: RegionEquations, lower: float, upper: float, edges: Sequence[sp.Expr] = ()
 ) -> list[float] | None:
-    """Values between which a region's admissible equilibria move without meeting or leaving.
+    """Compute parameter values between which a region's equilibria neither collide nor leave.
 
-    These are the values at which two equilibria meet (the rates and the determinant of their
-    Jacobian vanish), at which one runs to infinity, and at which one meets an interface (for
-    sliding also where a drift vanishes, at boundary equilibria and two-folds). A start in every
-    interval between them is therefore a start on every branch.
+    These are the values at which two equilibria collide (the rates and the determinant of their
+    Jacobian vanish), at which one diverges to infinity, and at which one is on an interface (for
+    sliding also the zeros of a drift, at boundary equilibria and two-folds). A starting point in
+    every interval between them is therefore a starting point on every branch.
 
-    One polynomial of low degree in one unknown has its discriminant, leading coefficient
-    and resultants. For up to three unknowns the solutions of these polynomial systems in
-    unknowns and parameter are isolated (see `solve_polynomials`).
+    For one polynomial of low degree in one unknown they are zeros of the discriminant, the leading
+    coefficient and resultants. For up to three unknowns the solutions of these polynomial systems
+    in unknowns and parameter are isolated (see `solve_polynomials`).
 
     Parameters
     ----------
@@ -60,18 +60,18 @@ def critical_values(
     lower, upper : float
         Range of the parameter.
     edges : sequence of Expr
-        Further functions of the states at whose zeros a start is wanted on both sides.
+        Further functions of the states, whose zeros also separate starting points.
 
     Returns
     -------
     list of float or None
-        None where the region's equations are no polynomials in few unknowns and the
-        parameter, or too large, so that nothing is proved.
+        None if the region's equations are not polynomials in few unknowns and the parameter,
+        or are too large, so that completeness is not proved.
     """
     if equations.factors:
         values: set[float] = set()
         for one in equations.factors:
-            # equilibria with different factors meet where one has both
+            # equilibria of different factors collide where both factors vanish
             others = [e for other in equations.factors for e in other.chosen]
             apart = [e for e in dict.fromkeys(others) if e not in one.chosen]
             found = critical_values(one, lower, upper, [*edges, *apart])
@@ -101,7 +101,7 @@ def critical_values(
 
 
 def _in_parameter(terms: Terms) -> list[Fraction | int]:
-    """Coefficients of a polynomial in the parameter alone, the highest first."""
+    """Return coefficients of a polynomial in the parameter alone, the highest first."""
     powers = {e[-1]: c for e, c in terms.items()}
     return [powers.get(k, 0) for k in range(max(powers, default=-1), -1, -1)]
 
@@ -109,7 +109,7 @@ def _in_parameter(terms: Terms) -> list[Fraction | int]:
 def _values(
     conditions: Iterable[Sequence[Fraction | int]], lower: float, upper: float
 ) -> list[float] | None:
-    """Real roots in a range of polynomials in the parameter; None if one vanishes identically."""
+    """Return real roots in a range of polynomials; None if one vanishes identically."""
     values: set[float] = set()
     for condition in conditions:
         if not any(condition):
@@ -121,7 +121,7 @@ def _values(
 def _resultants(
     equations: RegionEquations, edges: Sequence[WholeTerms]
 ) -> list[list[Fraction | int]] | None:
-    """Polynomials in the parameter, for at most one unknown and a low degree."""
+    """Return polynomials in the parameter, for at most one unknown and a low degree."""
     if not equations.unknowns:
         return [_in_parameter(edge) for edge in edges]
     assert equations.polynomials is not None
@@ -145,13 +145,13 @@ def _resultants(
 def _isolated(
     equations: RegionEquations, bounds: Sequence[WholeTerms], lower: float, upper: float
 ) -> list[float] | None:
-    """Values at which systems in unknowns and parameter have solutions."""
+    """Return values at which systems in unknowns and parameter have solutions."""
     if not equations.isolated:
         return None
     unknowns = equations.unknowns
     symbols = [*unknowns, real(equations.field.parameter)]
     rates = [_polynomial(q, symbols).as_expr() for q in equations.polynomials or ()]
-    # as polynomials the determinant is expanded while it is formed
+    # with polynomials the determinant is expanded during its computation
     slopes = [[sp.Poly(r, *symbols).diff(x) for x in unknowns] for r in rates]
     values: set[float] = set()
     determinant = _determinant(slopes).as_expr()
@@ -167,7 +167,7 @@ def _isolated(
         values |= set(found)
     kept: list[float] = []
     for value in sorted(v for v in values if lower < v < upper):
-        # what runs to infinity gives several values that are nearly equal
+        # equilibria that diverge yield several nearly equal values
         if not kept or value - kept[-1] > SHORTEST * (upper - lower):
             kept.append(value)
     return kept
@@ -177,7 +177,7 @@ def _isolated(
 def _zeros_at_equilibria(
     equations: RegionEquations, condition: sp.Expr | None, lower: float, upper: float
 ) -> list[float] | None:
-    """Values at which a function vanishes at an equilibrium, or without one those at infinity."""
+    """Return values at which a function vanishes at an equilibrium, or one is at infinity."""
     unknowns, base = equations.unknowns, equations.polynomials
     p = real(equations.field.parameter)
     if base is None:
@@ -195,7 +195,7 @@ def _zeros_at_equilibria(
     values: set[float] = set()
     for system in systems:
         if len(system) == 1:
-            # in the parameter alone, with roots that nearly meet
+            # in the parameter alone, with nearly equal roots
             if not system[0]:
                 return None
             values |= set(_exact_roots([_polynomial(system[0], [p]).as_expr()], p, lower, upper))
@@ -204,19 +204,19 @@ def _zeros_at_equilibria(
         if not solved.complete:
             return None
         values |= {float(v) for v in solved.simple[:, -1]}
-        # on either side of what is not told apart
+        # on both sides of unresolved clusters
         values |= {float(v) for v in solved.clusters[:, :, -1].ravel()}
     return sorted(values)
 
 
 @lru_cache(maxsize=64)
 def _double_roots(equations: RegionEquations, lower: float, upper: float) -> list[float] | None:
-    """Values at which two equilibria in at most two unknowns meet, by exact elimination.
+    """Return values at which two equilibria in at most two unknowns collide, by elimination.
 
-    Where the determinant nearly vanishes along branches that run to infinity, folds are not
-    isolated there. Two equilibria that meet are a double root of the resultant R of both rates,
-    or of the only one: they are among the real roots of its discriminant, its leading
-    coefficient and its content.
+    Needed if the determinant nearly vanishes along branches that diverge, where folds cannot be
+    isolated. Colliding equilibria are a double root of the resultant R of both rates, or of the
+    only one: the values are among the real roots of its discriminant, leading coefficient and
+    content.
 
     Returns
     -------
@@ -255,12 +255,12 @@ def _double_roots(equations: RegionEquations, lower: float, upper: float) -> lis
 def _on_edge(
     equations: RegionEquations, edge: sp.Expr, lower: float, upper: float
 ) -> list[float] | None:
-    """Values at which an equilibrium is on an edge, by exact elimination.
+    """Return values at which an equilibrium is on an edge, by exact elimination.
 
     Returns
     -------
     list of float or None
-        None for more than two unknowns, or a function that is not linear in one of two.
+        None for more than two unknowns, or a function that is not linear in one of them.
     """
     unknowns, terms = equations.unknowns, equations.polynomials
     p = real(equations.field.parameter)
@@ -281,12 +281,12 @@ def _on_edge(
 
 
 def _bits(polynomial: sp.Poly) -> int:
-    """Length of the largest coefficient of a polynomial with integer ones, but for a factor."""
+    """Return the bits of the largest coefficient of a primitive integer polynomial."""
     return max(abs(int(c)).bit_length() for c in polynomial.primitive()[1].coeffs())
 
 
 def _polynomial(terms: Terms, symbols: Sequence[sp.Symbol]) -> sp.Poly:
-    """The polynomial with integer coefficients, up to a factor."""
+    """Return the polynomial with integer coefficients, up to a factor."""
     rational = {e: sp.Rational(c.numerator, c.denominator) for e, c in terms.items()}
     polynomial: sp.Poly = sp.Poly(rational, *symbols).clear_denoms(convert=True)[1]
     return polynomial
@@ -295,11 +295,11 @@ def _polynomial(terms: Terms, symbols: Sequence[sp.Symbol]) -> sp.Poly:
 def _exact_roots(
     conditions: Sequence[sp.Expr], p: sp.Symbol, lower: float, upper: float
 ) -> list[float]:
-    """Ends of intervals that hold the real roots, in a range, of exact polynomials.
+    """Return ends of intervals that contain the real roots of exact polynomials in a range.
 
-    Subdivision of Bernstein coefficients in integers: an interval in which they change sign
-    nowhere has no root (Descartes' rule; Lane & Riesenfeld 1981). Intervals that touch are one:
-    between neighbouring ones there is a value without a root.
+    Subdivision of integer Bernstein coefficients: an interval without a change of sign has no
+    root (Descartes' rule; Lane & Riesenfeld 1981). Adjacent intervals are merged, so that a value
+    without a root separates any two.
     """
     values: set[float] = set()
     for condition in conditions:
@@ -314,9 +314,9 @@ def _exact_roots(
 def _root_intervals(
     powers: Sequence[Fraction], lower: Fraction, upper: Fraction
 ) -> list[tuple[float, float]]:
-    """Intervals of a dyadic subdivision that may hold roots, from below, none touching."""
+    """Return disjoint intervals of a dyadic subdivision that may contain roots, ascending."""
     degree = len(powers) - 1
-    # over the unit interval: Horner's scheme in lower + t (upper − lower)
+    # on the unit interval: Horner's scheme in lower + t (upper − lower)
     shifted = [Fraction(0)]
     for power in reversed(powers):
         moved = [lower * c for c in shifted] + [Fraction(0)]
@@ -341,7 +341,7 @@ def _root_intervals(
         if level == HALVINGS or not changes:
             ends = [Fraction(number, 2**level), Fraction(number + 1, 2**level)]
             if not changes:
-                # a root at an end alone
+                # a root at an end only
                 ends = [e for e, c in zip(ends, coefficients[::degree], strict=True) if not c]
             if found and ends[0] <= found[-1][-1]:
                 found[-1][-1] = max(found[-1][-1], ends[-1])
@@ -363,7 +363,7 @@ def _root_intervals(
 def _at_infinity(
     rates: Sequence[Terms], ranges: dict[int, tuple[float, float]]
 ) -> list[list[Terms]]:
-    """Systems for the parameter at which an unknown has the largest size that is looked at."""
+    """Return systems for the parameter at which an unknown has the largest size considered."""
     count = len(rates)
     scales, _ = units(rates, ranges)
     return [

@@ -16,7 +16,7 @@ from fastslow.continuation.polynomial_systems import Terms, WholeTerms
 
 Array = NDArray[np.float64]
 
-#: Exponents of the kept symbols, those of the parameters, and a coefficient, for every term.
+#: Exponents of the kept symbols, of the parameters, and the coefficient of every term.
 Parts = tuple[tuple[tuple[int, ...], tuple[int, ...], int], ...]
 
 
@@ -35,7 +35,7 @@ class ParametricPolynomials:
     degrees: tuple[int, ...]
 
     def at(self, values: Sequence[Fraction]) -> list[WholeTerms]:
-        """At values of the parameters, all times the same positive number that makes them whole.
+        """Evaluate at parameter values; all are multiplied by a common factor to be integer.
 
         Examples
         --------
@@ -53,7 +53,7 @@ class ParametricPolynomials:
 def polynomials_of(
     expressions: Sequence[sp.Expr], kept: Sequence[sp.Symbol], parameters: Sequence[sp.Symbol]
 ) -> ParametricPolynomials | None:
-    """Polynomials in kept symbols and parameters; None if one is none with rational numbers."""
+    """Return polynomials in kept symbols and parameters; None if one is not rational."""
     symbols = [*kept, *parameters]
     read: list[list[tuple[tuple[int, ...], Fraction]]] = []
     for expression in expressions:
@@ -85,9 +85,9 @@ def _specialised(parts: Parts, powers: Sequence[Sequence[int]]) -> dict[tuple[in
 def terms_of(
     expressions: Sequence[sp.Expr], symbols: Sequence[sp.Symbol]
 ) -> list[WholeTerms] | None:
-    """Polynomials by exponents of symbols, each with whole coefficients up to a positive factor.
+    """Return polynomials by exponents, each with integer coefficients up to a positive factor.
 
-    None where one is no polynomial in the symbols.
+    None if one is not a polynomial in the symbols.
     """
     found: list[WholeTerms] = []
     for expression in expressions:
@@ -101,12 +101,12 @@ def terms_of(
 
 
 def numerator(expression: sp.Expr) -> sp.Expr:
-    """Of an expression over one denominator."""
+    """Return the numerator of an expression over a common denominator."""
     return sp.together(expression).as_numer_denom()[0]
 
 
 def values_at(polynomials: Sequence[WholeTerms], place: Sequence[Fraction]) -> list[int]:
-    """Values of polynomials at a place, all times the same positive number, whole."""
+    """Evaluate polynomials at a point; all are multiplied by a common factor to be integer."""
     powers = []
     for k, at in enumerate(place):
         most = max((e[k] for terms in polynomials for e in terms), default=0)
@@ -122,7 +122,7 @@ def values_at(polynomials: Sequence[WholeTerms], place: Sequence[Fraction]) -> l
 
 
 def coefficient_function(coefficient: sp.Expr, p: sp.Symbol) -> Callable[[float], Fraction]:
-    """A coefficient as a function of the parameter's value, exact where it is a polynomial."""
+    """Return a coefficient as a function of the parameter, exact if it is a polynomial."""
     if coefficient.is_Rational:
         number = Fraction(int(coefficient.p), int(coefficient.q))
         return lambda value: number
@@ -141,17 +141,17 @@ def coefficient_function(coefficient: sp.Expr, p: sp.Symbol) -> Callable[[float]
 
 
 def ratios(numbers: Sequence[Fraction | int]) -> Array:
-    """Numbers in units of the largest, each rounded once."""
+    """Return numbers relative to the largest, each rounded once."""
     largest = max((max(number, -number) for number in numbers), default=0) or 1
-    # a quotient of whole numbers, too, is rounded once
+    # a quotient of integers, too, is rounded once
     return np.array([float(number / largest) for number in numbers])
 
 
 def real_roots(coefficients: Array) -> list[float]:
-    """Real roots of a polynomial, highest coefficient first, double ones once or twice.
+    """Return real roots of a polynomial, highest coefficient first, double ones once or twice.
 
-    A root counts as real when its imaginary part is within the error that
-    rounding makes at a double root, relative to the largest root; Newton decides afterwards.
+    A root is real if its imaginary part is within the rounding error of a double root, relative
+    to the largest root; Newton's method decides afterwards.
 
     Examples
     --------
@@ -165,7 +165,7 @@ def real_roots(coefficients: Array) -> list[float]:
     if len(shares) < 3:
         return [0.0 - float(share) for share in shares[1:]]
     powers = np.arange(len(shares))
-    # Fujiwara's bound: in this unit no root is beyond two, and no coefficient beyond one
+    # Fujiwara's bound: in this unit no root exceeds two, and no coefficient one
     bounds = np.abs(shares[1:]) ** (1.0 / powers[1:])
     unit = float(bounds.max(initial=0.0)) or 1.0
     roots = np.roots(shares / unit**powers)
@@ -174,7 +174,7 @@ def real_roots(coefficients: Array) -> list[float]:
 
 
 def multiple_root(terms: Terms, near: float) -> float:
-    """The root of the derivative next to a multiple root, where it is simple and well known."""
+    """Return the root of the derivative near a multiple root, where it is simple."""
     powers = ratios([terms.get((k,), 0) for k in range(1 + max(e for (e,) in terms))])
     roots: NDArray[Any] = np.polynomial.Polynomial(powers).deriv().roots()
     roots = roots.real[np.abs(roots - near) < 1e-3 * abs(near)]
@@ -182,11 +182,11 @@ def multiple_root(terms: Terms, near: float) -> float:
 
 
 def _fraction(number: sp.Expr) -> Fraction:
-    """A number as a fraction, exact or to 40 digits."""
+    """Convert a number to a fraction, exact or to 40 digits."""
     rational = number if number.is_Rational else sp.Rational(sp.N(number, 40))
     return Fraction(int(rational.p), int(rational.q))
 
 
 def exactly(values: Mapping[sp.Symbol, sp.Rational]) -> list[Fraction]:
-    """Rational numbers of SymPy as those of Python."""
+    """Convert SymPy rationals to Python fractions."""
     return [Fraction(int(v.p), int(v.q)) for v in values.values()]

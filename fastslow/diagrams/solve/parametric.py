@@ -1,8 +1,8 @@
-"""Equilibrium equations of a region, eliminated once for all values of the other parameters.
+"""Elimination in the equilibrium equations of a region, with symbolic other parameters.
 
-Which states can be solved for depends on what vanishes. Where all such decisions are the same,
-what remains is the same polynomial in unknowns and parameters, and for other values only its
-coefficients are computed, exactly.
+The elimination depends on which coefficients vanish. For equal decisions the remaining polynomials
+in unknowns and parameters are the same, and for other values only their coefficients are
+computed, exactly.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ from fastslow.model.derived import once, partition_of
 from fastslow.model.model import Model
 from fastslow.symbolic.solving.elimination import Elimination
 
-#: States up to which equations are eliminated with symbols for the parameters.
+#: Largest number of states for elimination with symbolic parameters.
 STATES = 8
 
-#: Eliminations of one region that are kept, for different signs.
+#: Largest number of cached eliminations of a region, for different signs.
 KEPT = 16
 
 
 @dataclass(frozen=True, eq=False)
 class ParametricElimination:
-    """An elimination with polynomials in at most one unknown, for all values of parameters.
+    """An elimination to polynomials in at most one unknown, with symbolic parameters.
 
     Parameters
     ----------
     elimination : Elimination
-        With symbols for the parameters.
+        Elimination with symbols for the parameters.
     parameters : tuple of Symbol
     remaining, bounds : ParametricPolynomials
-        What remains, and what vanishes where an equilibrium leaves its region, in the
-        unknowns and the varying parameter.
+        Remaining equations, and bounds of the region at equilibria, in the unknowns and the
+        varying parameter.
     solved : tuple of ParametricPolynomials
-        Numerator and denominator of every state, in the same.
+        Numerator and denominator of every state, in the same variables.
     """
 
     elimination: Elimination
@@ -50,12 +50,12 @@ class ParametricElimination:
     solved: tuple[ParametricPolynomials, ...]
 
 
-#: The sign of polynomials in the parameters.
+#: Signs of polynomials in the parameters.
 Signs = dict[ParametricPolynomials, int]
 
 
 class Decisions:
-    """Whether expressions vanish at values of the parameters, and the signs that decide it."""
+    """Decisions whether expressions vanish at parameter values, with the signs used."""
 
     def __init__(self, values: Mapping[sp.Symbol, sp.Rational]) -> None:
         self.values = values
@@ -64,12 +64,12 @@ class Decisions:
         self.known = True
 
     def __call__(self, expression: sp.Expr) -> bool:
-        """Whether an expression is known not to vanish."""
+        """Return whether an expression is known not to vanish."""
         inside = expression.free_symbols & set(self.values)
         if inside:
             others = sorted(expression.free_symbols - inside, key=str)
             for part in sp.fraction(sp.together(expression)):
-                # one polynomial in the parameters for every product of the others
+                # one polynomial in the parameters for each monomial of the others
                 whole = polynomials_of([part], others, tuple(self.values))
                 if whole is None:
                     self.known = False
@@ -78,7 +78,7 @@ class Decisions:
         return bool(expression.subs(self.values).is_nonzero)
 
     def _note(self, polynomial: ParametricPolynomials) -> None:
-        """Keep the sign of every coefficient, which is a polynomial in the parameters."""
+        """Record the sign of every coefficient, a polynomial in the parameters."""
         coefficients: dict[tuple[int, ...], list[Any]] = {}
         for kept, powers, number in polynomial.parts[0]:
             coefficients.setdefault(kept, []).append(((), powers, number))
@@ -89,7 +89,7 @@ class Decisions:
 
 @dataclass
 class Eliminations:
-    """Eliminations of the equations of one region, each with the signs that decided its steps."""
+    """Eliminations of the equations of one region, each with the signs it depends on."""
 
     found: list[tuple[Signs, ParametricElimination | None]] = field(default_factory=list)
     lock: threading.Lock = field(default_factory=threading.Lock)
@@ -99,7 +99,7 @@ class Eliminations:
         values: Mapping[sp.Symbol, sp.Rational],
         derive: Callable[[Decisions], ParametricElimination | None],
     ) -> ParametricElimination | None:
-        """The elimination for some values; None where it has to be made for each of them."""
+        """Return the elimination for some values; None if it is needed for each value anew."""
         numbers = exactly(values)
         with self.lock:
             for signs, known in self.found:
@@ -115,12 +115,12 @@ class Eliminations:
 
 @once(partition_of)
 def eliminations_of(model: Model, *key: Hashable) -> Eliminations:
-    """What is known for a model's equations and further things that it depends on."""
+    """Return the cached eliminations for the equations of a model and further keys."""
     return Eliminations()
 
 
 def _sign(polynomial: ParametricPolynomials, numbers: Sequence[Fraction]) -> int:
-    """Sign of a polynomial in the parameters alone."""
+    """Return the sign of a polynomial in the parameters alone."""
     (terms,) = polynomial.at(numbers)
     value = terms.get((), 0)
     return (value > 0) - (value < 0)

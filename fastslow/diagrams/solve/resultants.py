@@ -1,8 +1,8 @@
-"""Resultants of polynomials in one unknown, over whole polynomials in a parameter.
+"""Resultants of polynomials in one unknown, over integer polynomials in a parameter.
 
-Determinants of Bézout's matrix, of whole numbers: the parameter is a power of two that is larger
-than twice any coefficient of the result, which is then read off as a number is written in that
-base (Kronecker 1882; von zur Gathen & Gerhard 2013, section 8.4).
+Integer determinants of the Bézout matrix by Kronecker substitution: the parameter is a power of two
+larger than twice any coefficient of the result, whose coefficients are the digits in that base
+(Kronecker 1882; von zur Gathen & Gerhard 2013, section 8.4).
 """
 
 from __future__ import annotations
@@ -11,19 +11,19 @@ from fastslow.continuation.polynomial_systems import WholeTerms
 
 
 def resultant(one: WholeTerms, other: WholeTerms) -> list[int]:
-    """Coefficients over the parameter, the highest first, of a resultant by the unknown.
+    """Return the coefficients in the parameter, highest first, of a resultant by the unknown.
 
     Up to its sign.
 
     Parameters
     ----------
     one, other : mapping
-        From exponents of the unknown and of the parameter to a coefficient. The unknown is in
-        both.
+        Exponents of the unknown and of the parameter to a coefficient; both contain the
+        unknown.
 
     Examples
     --------
-    Of x² − p and x − 2, which have a common root where 4 − p = 0:
+    For x² − p and x − 2, which have a common root if 4 − p = 0:
 
     >>> resultant({(2, 0): 1, (0, 1): -1}, {(1, 0): 1, (0, 0): -2})
     [1, -4]
@@ -36,11 +36,11 @@ def resultant(one: WholeTerms, other: WholeTerms) -> list[int]:
 
 
 def discriminant(polynomial: WholeTerms) -> list[int]:
-    """The same of a discriminant, for a degree of two at least.
+    """Return the coefficients of a discriminant, for a degree of at least two.
 
     Examples
     --------
-    Of x² + p x + 1:
+    For x² + p x + 1:
 
     >>> discriminant({(2, 0): 1, (1, 1): 1, (0, 0): 1})
     [1, 0, -4]
@@ -57,9 +57,9 @@ def _degree(terms: WholeTerms) -> int:
 
 
 def _bits(one: WholeTerms, other: WholeTerms) -> int:
-    """Digits in base two of twice a bound on the coefficients of the resultant.
+    """Return the bits of twice a bound on the coefficients of the resultant.
 
-    Every row of Sylvester's matrix has the coefficients of one of the polynomials.
+    Each row of the Sylvester matrix has the coefficients of one of the polynomials.
     """
     first, second = (sum(map(abs, terms.values())) for terms in (one, other))
     bound = first ** _degree(other) * second ** _degree(one)
@@ -67,7 +67,7 @@ def _bits(one: WholeTerms, other: WholeTerms) -> int:
 
 
 def _at_base(terms: WholeTerms, bits: int) -> list[int]:
-    """Coefficients over the unknown, the lowest first, where the parameter is a power of two."""
+    """Return coefficients in the unknown, lowest first, with a power of two as parameter."""
     found = [0] * (_degree(terms) + 1)
     for (i, k), c in terms.items():
         found[i] += c << bits * k
@@ -75,7 +75,7 @@ def _at_base(terms: WholeTerms, bits: int) -> list[int]:
 
 
 def _digits(number: int, bits: int) -> list[int]:
-    """Digits of a number, positive or negative, the highest first."""
+    """Return the signed digits of a number, highest first."""
     found, base = [], 1 << bits
     while number:
         digit = number & (base - 1)
@@ -86,7 +86,7 @@ def _digits(number: int, bits: int) -> list[int]:
 
 
 def _bezout(f: list[int], g: list[int]) -> list[list[int]]:
-    """Coefficients of (f(x) g(y) − f(y) g(x)) / (x − y), where g is of no higher degree."""
+    """Return coefficients of (f(x) g(y) − f(y) g(x)) / (x − y), with deg g ≤ deg f."""
     n = len(f) - 1
     g = [*g, *[0] * (len(f) - len(g))]
     matrix = [[0] * n for _ in range(n)]
@@ -98,7 +98,7 @@ def _bezout(f: list[int], g: list[int]) -> list[list[int]]:
 
 
 def _determinant(matrix: list[list[int]]) -> int:
-    """By elimination in which every division leaves no rest (Bareiss 1968)."""
+    """Compute a determinant by fraction-free elimination (Bareiss 1968)."""
     size, sign, last = len(matrix), 1, 1
     for k in range(size - 1):
         row = next((i for i in range(k, size) if matrix[i][k]), None)

@@ -1,4 +1,4 @@
-"""Given points of branches, from which alone these are traced."""
+"""Starting points given by the user."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ Array = NDArray[np.float64]
 #: Step from a special point onto the branches through it, in units of the window.
 ASIDE = 1e-3
 
-#: Rows of the branch by which its size is measured, and states taken of each of its segments.
+#: Largest number of rows of a branch that estimate its size, and states sampled from a segment.
 COARSE, SAMPLES = 2000, 25
 
-#: How far, in parts of its size, a point that claims to be an equilibrium may be from one.
+#: Largest distance of a given equilibrium from the computed one, relative to its size.
 NEAR = 1e-3
 
 
 class Seeds:
-    """Equilibria that a user gives, with the part of `Starts` in a diagram.
+    """Equilibria given by the user, with the interface of `Starts`.
 
     Parameters
     ----------
@@ -43,19 +43,19 @@ class Seeds:
     over : (float, float)
         Range of the parameter.
     points : sequence
-        Equilibrium, SpecialPoint, or a mapping of every state and the parameter to
-        its value, from which Newton's method leads to an equilibrium.
+        Equilibrium, SpecialPoint, or a mapping of every state and the parameter to values from
+        which Newton's method converges to an equilibrium.
     window : StateWindow
-        As it was asked for.
+        The requested window.
     virtual : bool
-        Whether virtual equilibria may be among them.
+        Whether virtual equilibria are accepted.
 
     Raises
     ------
     ArgumentError
-        For a point that is no equilibrium, or outside the range or the window.
+        For a point that is not an equilibrium, or is outside the range or the window.
     UnknownNameError
-        For a name that is no state and not the parameter.
+        For a name that is neither a state nor the parameter.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class Seeds:
         self._around = window.around(table, known(field, self._points))
 
     def values(self, branches: Sequence[Branch]) -> Iterable[float]:
-        """The values of the parameter at the given points."""
+        """Return the values of the parameter at the given points."""
         return list(dict.fromkeys(e.parameters[self._field.parameter] for e in self._points))
 
     def at(self, value: float, admissible: bool) -> list[Equilibrium]:
@@ -92,12 +92,12 @@ class Seeds:
         ]
 
     def prove(self, branches: Sequence[Branch]) -> bool:
-        """Nothing is said of branches through other points."""
+        """Return False: branches through other points may exist."""
         return False
 
     @property
     def outside(self) -> tuple[StateWindow, list[tuple[Equilibrium, float]]]:
-        """Nothing is looked for elsewhere."""
+        """Return no equilibria: there is no search outside the window."""
         return self._around, []
 
     def missed(self, branches: Sequence[Branch]) -> list[tuple[str, float]]:
@@ -113,7 +113,7 @@ class Seeds:
 
     @cached_property
     def _measured(self) -> tuple[StateWindow, Array]:
-        """The window and the units, from the branches themselves, traced once to measure them."""
+        """Window and units, from the branches themselves, traced once for this purpose."""
         least = size_of(self._field, self._points)
         length = self._over[1] - self._over[0]
         first = Window(*self._over, np.append(self._unit(least), length), self._around)
@@ -132,12 +132,12 @@ class Seeds:
         )
 
     def _unit(self, size: Array) -> Array:
-        """The size of each state, a radian of angles."""
+        """Return the size of each state; one radian for angles."""
         periods = self._field.periods
         return np.where(periods > 0, periods / (2.0 * np.pi), size)
 
     def _rows(self, point: Equilibrium, window: Window) -> Array:
-        """States of the branch through a point, evenly over the parameter; 0 for rounding."""
+        """Sample states of the branch through a point over the parameter; 0 for rounding errors."""
         field = self._field
         region = field.regions.index(point.region)
         state = self._around.shifted(point.state)
@@ -160,7 +160,7 @@ class Seeds:
         return np.array(samples)
 
     def _read(self, name: str, given: Any, window: StateWindow) -> list[Equilibrium]:
-        """The equilibria that one point stands for: of a branch point one on each branch."""
+        """Return the equilibria of one given point; for a branch point one on each branch."""
         if isinstance(given, SpecialPoint | Equilibrium):
             known_names = (*given.states, *given.parameters)
             if given.states != self._field.model.states or self._field.parameter not in known_names:
@@ -216,7 +216,7 @@ class Seeds:
     def _solved(
         self, regions: Sequence[str], state: Array, value: float, far: bool
     ) -> list[Equilibrium]:
-        """The equilibrium at a value, in the region whose rates have it nearest to a state."""
+        """Return the equilibrium at a value nearest to a state, among the regions."""
         best: tuple[bool, float, Equilibrium] | None = None
         for number, equations in enumerate(corrections(self._field)):
             if regions and self._field.regions[number] not in regions:
@@ -236,11 +236,11 @@ class Seeds:
         return [] if best is None else [best[2]]
 
     def _natural(self, value: float) -> Array:
-        """Natural unit of each state at a value of the parameter."""
+        """Return the natural unit of each state at a value of the parameter."""
         return self._field.units_at(abs(value))[: self._field.n]
 
     def _beside(self, point: SpecialPoint, state: Array, value: float) -> list[Equilibrium]:
-        """Equilibria just off a special point, one on each branch through it."""
+        """Return equilibria near a special point, one on each branch through it."""
         unit = np.maximum(np.abs(state), self._natural(value))
         if point.source is not None:
             unit = np.maximum(np.abs(state), point.source.unit)

@@ -1,4 +1,4 @@
-"""All equilibria of a frozen model at one parameter value."""
+"""Equilibria of a frozen model at one parameter value."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from fastslow.symbolic.closed_forms.symmetries import free_directions
 
 Array = NDArray[np.float64]
 
-#: Equilibria set the size of a state up to this multiple of its natural unit.
+#: Equilibria determine the size of a state up to this multiple of its natural unit.
 FAR = 1e3
 
 
@@ -38,17 +38,17 @@ def equilibria(
     window: Mapping[Any, tuple[float | None, float | None]] | None = None,
     **named: float,
 ) -> Equilibria:
-    """All equilibria of a frozen model at given values of its slow quantities.
+    """Compute all equilibria of a frozen model at given values of its slow quantities.
 
-    Where a region's equations reduce to one polynomial all its roots are
-    found, and the list's ``completeness`` is ``"complete"``; elsewhere Newton's
-    method from many starts, and it is ``"found"``. A continuum (the gap of a
-    backlash at zero load) is given by its ends, with ``continuum=True``.
+    If the equations of a region reduce to one polynomial all roots are found, and
+    ``completeness`` is ``"complete"``; otherwise Newton's method is applied from many starting
+    points, and it is ``"found"``. A continuum (the gap of a backlash at zero load) is represented
+    by its ends, with ``continuum=True``.
 
-    Where the rates jump across an interface, the pseudo-equilibria of the sliding
-    field along it are listed too, with the region ``"S1|S2"`` (Filippov 1988). A set of
-    them, such as the states at which dry friction holds a block, is in the
-    attribute ``sets``; in the list are its two ends or corners, with ``continuum=True``.
+    For discontinuous rates the pseudo-equilibria of the sliding vector field are included, with
+    the region ``"S1|S2"`` (Filippov 1988). Sets of pseudo-equilibria, such as the sticking states
+    of a block under dry friction, are in the attribute ``sets``; the list contains their two ends
+    or corners, with ``continuum=True``.
 
     Parameters
     ----------
@@ -57,12 +57,12 @@ def equilibria(
     values : mapping, optional
         Slow quantity or parameter (symbol or name) to its value.
     virtual : bool
-        Whether to add the virtual ones, which lie outside their region.
+        Whether to include virtual equilibria, which are outside their region.
     window : mapping, optional
-        State to its range (low, high), in its own units; None in place of an end
-        is no bound. Equilibria outside are left out, as negative concentrations.
+        State to its range (low, high), in its own units; None is no bound. Equilibria outside,
+        such as negative concentrations, are omitted.
     **named : float
-        The same by name.
+        The same by keyword.
 
     Returns
     -------
@@ -72,13 +72,12 @@ def equilibria(
     Raises
     ------
     UnknownNameError
-        For a name that is no parameter, or in the window no state.
+        For a name that is not a parameter, or in the window not a state.
     ModelError
-        For a slow quantity without value, or where a shift of the states leaves every
-        rate as it is or a combination of them never changes, so that no equilibrium is
-        isolated.
+        For a slow quantity without a value; if the rates are invariant under a shift of the
+        states or conserve a combination of them, so that equilibria are not isolated.
     ArgumentError
-        For a range in the window that is none.
+        For an invalid range in the window.
 
     Examples
     --------
@@ -101,7 +100,7 @@ def equilibria(
     value = given.parameters[name] if given.parameters else 0.0
     asked = state_window(model.states, window, model.periodic)
     field = FrozenField(given, name)
-    # sets may exist at this value of every parameter alone
+    # sets may exist only at these values of all parameters
     found = solve_at(field, value, virtual, FrozenField(given, IDLE))
     inside = [one for one in found.sets if asked.meets(one.lower, one.upper)]
     return Equilibria(within(field, asked, found), found.completeness, inside)
@@ -116,12 +115,12 @@ def solve_at(
     with_sets: bool = True,
     bounds: Mapping[str, float] | None = None,
 ) -> Equilibria:
-    """Equilibria of every region at a value of the field's parameter, and pseudo-equilibria.
+    """Compute equilibria of every region and pseudo-equilibria at a value of the parameter.
 
-    A virtual pseudo-equilibrium, where the flow crosses, is listed with the sliding motion.
-    Sets of equilibria are those of the field over its parameter, or of ``still``, in which
-    nothing varies; without ``with_sets`` what is in them is left out, and they are not listed.
-    With bounds on the modulus of states the list need not have what exceeds them.
+    Virtual pseudo-equilibria, in crossing regions, are listed with the sliding motion. Equilibrium
+    sets are those of the field over its parameter, or of ``still``, with all parameters fixed;
+    without ``with_sets`` sets and their elements are omitted. With bounds on the modulus of states
+    the list may lack equilibria beyond them.
     """
     along = field if still is None else still
     complete = True
@@ -134,7 +133,7 @@ def solve_at(
         complete &= sure
         solved.append((number, whole, states))
     known = [(number, np.append(s, value)) for number, _, states in solved for s in states]
-    # one equilibrium next to a pole, far from all others, would make any point admissible
+    # a single distant equilibrium near a pole would make any point admissible
     natural = field.units_at(abs(value))[: field.n]
     unit = np.append(np.minimum(field.sizes(known), FAR * natural), abs(value))
     found: list[Equilibrium] = []
@@ -160,10 +159,10 @@ def solve_at(
 
 
 def _distinct(points: list[Equilibrium], unit: Array, periods: Array) -> list[Equilibrium]:
-    """Each admissible state once: on an interface two regions share it; a continuum wins.
+    """Return each admissible state once: two regions share those on an interface.
 
-    Ends of a continuum of pseudo-equilibria that is no `EquilibriumSet` stand beside the
-    equilibria of the regions at the same states.
+    A continuum takes precedence, except that ends of a continuum of pseudo-equilibria that is not
+    an `EquilibriumSet` are listed in addition to the equilibria of the regions.
     """
     kept: list[Equilibrium] = []
     shared, count = np.empty((len(points), len(unit))), 0

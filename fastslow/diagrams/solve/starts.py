@@ -1,4 +1,4 @@
-"""Equilibria from which the branches of a diagram are traced."""
+"""Starting points from which the branches of a diagram are traced."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from fastslow.results.points import Equilibrium
 Array = NDArray[np.float64]
 
 
-#: Critical values nearer to each other than this part of the range are one, up to rounding.
+#: Critical values closer than this fraction of the range are identical up to rounding.
 SAME = 1e-10
 
-#: Where a state is typically below this part of its largest size, it is zero but at a few
-#: equilibria, and these set its unit.
+#: A state whose typical size is below this fraction of its largest one is zero except at a few
+#: equilibria, which determine its unit.
 FAINT = 1e-14
 
-#: Between critical values nearer than this equilibria may be far away, next to a pole. They
-#: do not count for the units and the window.
+#: Equilibria between critical values closer than this may be far away, near a pole, and are
+#: disregarded in the units and the window.
 NARROW = 1e-3
 
 
 class Starts:
-    """Equilibria from which branches are traced, solved for once at each value."""
+    """Starting points of branches, computed once at each parameter value."""
 
     def __init__(
         self, field: FrozenField, lower: float, upper: float, inside: int, window: StateWindow
@@ -45,10 +45,10 @@ class Starts:
         self._field = field
         self._over = (lower, upper)
         self._asked = window
-        # the golden ratio keeps the values clear of each other and of round numbers
+        # the golden ratio spreads the values and avoids round numbers
         parts = [(0.5 + k * 0.6180339887498949) % 1.0 for k in range(inside)]
         spread = [lower + p * (upper - lower) for p in parts]
-        # what is in exact sets of equilibria is found with them
+        # equilibria in exact sets are found with the sets
         sets = covered(field, lower, upper)
         equations = self._equations = tuple(
             e for e in dict.fromkeys(region_equations(field)) if e.region not in sets
@@ -78,44 +78,44 @@ class Starts:
         self._sure: dict[float, bool] = {}
 
     def at(self, value: float, admissible: bool) -> list[Equilibrium]:
-        """Equilibria in the window."""
+        """Return the equilibria in the window at a value."""
         unit = self.scale[:-1]
         if self._bounds and not self._sure.get(value, False):
-            # what runs to infinity beside a pole need not be decided
+            # equilibria that diverge near a pole need not be resolved
             self._solve(value, self._bounds)
         points = self._requested_at(value, admissible)
         return [e for e in points if self.window.contains(self.window.shifted(e.state), unit)]
 
     def _requested_at(self, value: float, admissible: bool) -> list[Equilibrium]:
-        """Equilibria within the bounds that were asked for."""
+        """Return the equilibria within the requested bounds."""
         if value not in self._found:
             self._solve(value, None)
         return [e for e in self._found[value] if e.admissible == admissible]
 
     def _solve(self, value: float, bounds: Mapping[str, float] | None) -> None:
-        """Solve for the equilibria at a value, all or those within bounds."""
+        """Compute the equilibria at a value, all or those within bounds."""
         solved = solve_at(self._field, value, virtual=True, with_sets=False, bounds=bounds)
         sure = solved.completeness == "complete"
         if bounds is None or sure:
             self._sure[value] = sure
-            # no branch runs through what is in a set of equilibria
+            # branches do not contain elements of equilibrium sets
             single = [e for e in solved if not e.continuum and e.region in self._field.regions]
             self._found[value] = within(self._field, self._asked, single)
 
     @cached_property
     def _bounds(self) -> dict[str, float]:
-        """The largest modulus in the window of every state that has one."""
+        """Largest modulus in the window of every bounded state."""
         window = self.window
         ends = {n: max(abs(low), abs(high)) for n in window.states for low, high in [window[n]]}
         return {n: (1.0 + ON_EDGE) * end for n, end in ends.items() if 0 < end < np.inf}
 
     @cached_property
     def outside(self) -> tuple[StateWindow, list[tuple[Equilibrium, float]]]:
-        """Admissible equilibria that the window asked for excludes, and a window about them.
+        """Return admissible equilibria outside the requested window, and a window around them.
 
-        Their branches may enter it between the values at which equilibria are looked
-        for. Where critical values are known there is a start in every such interval, and
-        nothing is listed.
+        Their branches may enter the requested window between the values at which equilibria
+        are computed. If critical values are known, every interval between them has a starting
+        point, and the list is empty.
         """
         if self.complete or not self._asked.chosen:
             return self._asked, []
@@ -129,7 +129,7 @@ class Starts:
 
     @cached_property
     def window(self) -> StateWindow:
-        """The window asked for, with defaults about the equilibria at the first values."""
+        """Return the requested window, with defaults around the equilibria at the first values."""
         for values, admissible in product((self._typical, self._first), (True, False)):
             points = [e for v in values for e in self._requested_at(v, admissible)]
             if points:
@@ -138,7 +138,7 @@ class Starts:
         return self._asked.around(states, known(self._field, points))
 
     def values(self, branches: Sequence[Branch]) -> Iterable[float]:
-        """The first values, then those between edges left and special points found so far."""
+        """Yield the first values, then those between exits and special points found so far."""
         yield from self._first
         done: set[float] = set()
         left = self._asked.given
@@ -157,17 +157,17 @@ class Starts:
             yield from fresh
 
     def prove(self, branches: Sequence[Branch]) -> bool:
-        """Whether these branches are sure to be all in the window."""
+        """Return whether these are provably all branches in the window."""
         provable, middles = self._beside_edges(edges_left(self.window, branches))
         return (
             self.complete and provable and all(self._sure.get(v) for v in (*self._first, *middles))
         )
 
     def _beside_edges(self, left: Sides) -> tuple[bool, list[float]]:
-        """Values between those at which an equilibrium is on an edge that a branch has left by.
+        """Return values between those with an equilibrium on an edge at which a branch has left.
 
-        A branch that leaves may come back between two values at which equilibria
-        are looked for. With them, whether there can be no others.
+        A branch that leaves may re-enter between two values at which equilibria are computed.
+        The flag is whether there can be no other values.
         """
         edges = tuple(e for e in edges_of(self.window, left) if e not in self._edges)
         if not edges:
@@ -178,9 +178,9 @@ class Starts:
         return all(b is not None for b in between), middles
 
     def missed(self, branches: Sequence[Branch]) -> list[tuple[str, float]]:
-        """Regions and values at which a continuum of equilibria is part of no branch."""
+        """Return regions and values at which a continuum of equilibria is not on any branch."""
         near = 1e-9 * (self._over[1] - self._over[0])
-        # most are seen at once to be part of a branch
+        # most are readily recognized as part of a branch
         return [
             (region, value)
             for region, value in self._continua
@@ -189,7 +189,7 @@ class Starts:
         ]
 
     def _lies_within(self, region: str, value: float) -> bool:
-        """Whether a continuum lies in its region, at least in part."""
+        """Return whether a continuum is in its region, at least in part."""
         return not self._field.interfaces or any(
             e.continuum and e.admissible and e.region == region
             for e in solve_at(self._field, value, virtual=True)
@@ -197,19 +197,19 @@ class Starts:
 
     @cached_property
     def scale(self) -> Array:
-        """Unit of each state, the size of its equilibria, and the length of the range."""
+        """Return the unit of each state, its size at equilibria, and the length of the range."""
         n = self._field.n
         both = [e for v in self._typical for k in (True, False) for e in self._requested_at(v, k)]
         table = np.reshape([e.state for e in both], (-1, n))
         inside = self.window.contains(self.window.shifted(table))
         states = table[inside]
         largest = size = size_of(self._field, [both[k] for k in np.flatnonzero(inside)])
-        # a few equilibria near a pole are far away and must not set the unit
+        # a few distant equilibria near a pole must not determine the unit
         wide = typical(states, ROUNDING * size)
         middle = np.median(states, axis=0) if len(states) else np.zeros(n)
         spread = np.minimum(np.ptp(states, axis=0) if len(states) else np.zeros(n), wide)
         size = np.minimum(size, np.abs(middle) + wide)
-        # far from zero it is the differences that count
+        # far from zero the differences determine the unit
         moved = np.where(spread > ROUNDING * size, np.maximum(spread, 1e-3 * size), size)
         size = np.where(size > FAINT * largest, moved, largest)
         # an angle is measured in radians
@@ -219,7 +219,7 @@ class Starts:
 
 
 def _upright(branch: Branch, value: float, near: float, scale: Array) -> bool:
-    """Whether a branch has a vertical segment at a parameter value."""
+    """Return whether a branch has a vertical segment at a parameter value."""
     step = np.abs(np.diff(branch.state, axis=0) / scale[:-1]).max(axis=1)
     there = np.abs(branch.parameter - value) < near
     return bool(np.any(there[1:] & there[:-1] & (step > 1e-6)))
@@ -229,12 +229,12 @@ def _upright(branch: Branch, value: float, near: float, scale: Array) -> bool:
 def starts_of(
     field: FrozenField, lower: float, upper: float, inside: int, window: StateWindow
 ) -> Starts:
-    """Where tracing starts, searched for once."""
+    """Return the starting points, cached."""
     return Starts(field, lower, upper, inside, window)
 
 
 def edges_of(window: StateWindow, sides: Sides) -> tuple[sp.Expr, ...]:
-    """Functions that vanish on the finite edges among some bounds of a window.
+    """Return functions that vanish on the finite edges among some bounds of a window.
 
     Examples
     --------
