@@ -255,7 +255,7 @@ def three_areas():
             y > 0.5 + 0.3 * np.sin(4 * x), "bilateral", np.where(x > 0.6, "new", "free")
         )
 
-    return fs.refined_map(label, {"x": (0, 1), "y": (0, 1)}, levels=4, tol=1e-6)
+    return fs.refined_map(label, {"x": (0, 1), "y": (0, 1)}, levels=4, resolution=1e-6)
 
 
 def results_by_name(diagram, lay):

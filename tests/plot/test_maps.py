@@ -25,7 +25,7 @@ def three():
             y > 0.5 + 0.3 * np.sin(4 * x), "bilateral", np.where(x > 0.6, "new", "free")
         )
 
-    return fs.refined_map(label, UNIT, levels=4, tol=1e-6)
+    return fs.refined_map(label, UNIT, levels=4, resolution=1e-6)
 
 
 def test_areas_fill_the_plane_and_lines_part_them(three):
