@@ -1,4 +1,4 @@
-"""Equilibrium equations of regions and of sliding motions, and their roots."""
+"""Equilibrium equations of regions and sliding motions, and their solutions."""
 
 from __future__ import annotations
 
@@ -55,49 +55,49 @@ from fastslow.symbolic.solving.lowering import lower_degrees
 
 Array = NDArray[np.float64]
 
-#: Starting states tried by Newton's method where a region has no univariate polynomial.
+#: Starting points of Newton's method for regions without a univariate polynomial.
 STARTS = 200
 
-#: Starts times the cube of the number of states, up to which all of them are tried.
+#: Product of starting points and the cube of the number of states up to which all are used.
 COST = 1.6e8
 
-#: Starts that are tried in any case.
+#: Smallest number of starting points.
 FEWEST = 10
 
-#: A condition on the parameter holds below this part of its terms: rounding of a value.
+#: A condition on the parameter is satisfied below this fraction of its terms (rounding).
 VANISHING = 1e-14
 
-#: Batches of starts, as long as each of them finds more.
+#: Largest number of batches of starting points, as long as each finds more equilibria.
 BATCHES = 100
 
-#: For every so many equilibria one more batch must find nothing until the search ends.
+#: The search ends after one unsuccessful batch for every so many equilibria.
 FEW = 10
 
 #: The search ends beyond this number of equilibria.
 MANY = 500
 
-#: States nearer to each other than this part of their size are one, as a double root may be off.
+#: States closer than this fraction of their size are identical: accuracy of a double root.
 SAME = 1e-8
 
-#: Stands for the weight of the field below in a sliding field.
+#: Name of the weight of the field below in a sliding vector field.
 SHARE = "(alpha)"
 
-#: Degree up to which the roots of a univariate polynomial are trusted to be complete.
+#: Degree up to which the computed roots of a univariate polynomial are considered complete.
 DEGREE = 60
 
-#: Unknowns up to which the roots of a polynomial system are isolated.
+#: Largest number of unknowns of a polynomial system whose roots are isolated.
 UNKNOWNS = 3
 
 #: Polynomials in the parameter.
 _RING = ring("p", ZZ)[0]
 
-#: Choices of a factor of every rate, up to which each is solved by itself.
+#: Largest number of choices of a factor of every rate that are solved separately.
 CHOICES = 32
 
 
 @dataclass(frozen=True, eq=False)
 class RegionEquations(Corrections):
-    """The equilibrium equations of one region, eliminated, at fixed other parameters.
+    """Eliminated equilibrium equations of one region, with fixed other parameters.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class RegionEquations(Corrections):
     region : int
         Number of the region.
     decisions : Decisions, optional
-        With it the other parameters are symbols, and this says which expressions vanish.
+        Decides which expressions vanish if the other parameters are symbols.
     """
 
     _: KW_ONLY
@@ -113,19 +113,19 @@ class RegionEquations(Corrections):
 
     @cached_property
     def numbers(self) -> dict[sp.Symbol, sp.Rational]:
-        """Exact value of every parameter but the one that varies."""
+        """Exact value of every parameter except the varying one."""
         values = self.field.model.parameters
         return {real(n): sp.Rational(v) for n, v in values.items() if n != self.field.parameter}
 
     @cached_property
     def equations(self) -> dict[str, sp.Expr]:
-        """What vanishes at an equilibrium, by unknown, with numbers for the other parameters."""
+        """Equations by unknown, with numbers for the other parameters."""
         states = self.field.model.states
         rates = [self._number(rate) for rate in self.field.modes[self.region].rates]
         return dict(zip(states, rates, strict=True))
 
     def _number(self, expression: sp.Expr) -> sp.Expr:
-        """An expression with exact numbers for the other parameters, or for those that are 0."""
+        """Substitute exact numbers for the other parameters, or for those that are 0."""
         if self.decisions is None:
             return exact(expression).subs(self.numbers)
         zero = {s: v for s, v in self.numbers.items() if v == 0}
@@ -133,9 +133,9 @@ class RegionEquations(Corrections):
 
     @cached_property
     def general(self) -> ParametricElimination | None:
-        """The elimination for all values of the other parameters, if one unknown is left at most.
+        """Elimination with symbolic other parameters, if at most one unknown remains.
 
-        Which one it is depends on these values alone, not on those that came before.
+        It depends on the present values only, not on previous ones.
         """
         moving = {s: v for s, v in self.numbers.items() if v != 0}
         if not moving or self.field.n > STATES:
@@ -146,7 +146,7 @@ class RegionEquations(Corrections):
         return known.at(moving, lambda a: kind(self.field, self.region, decisions=a)._parametric())
 
     def _parametric(self) -> ParametricElimination | None:
-        """The elimination with symbols for those parameters that are not 0, if it is of use."""
+        """Elimination with symbols for the non-zero parameters, if applicable."""
         assert self.decisions is not None
         left, parameters = self.elimination, tuple(self.decisions.values)
         symbols = [*left.unknowns, real(self.field.parameter)]
@@ -175,7 +175,7 @@ class RegionEquations(Corrections):
 
     @cached_property
     def elimination(self) -> Elimination:
-        """Of the rates with every other parameter a number, so that its sign is known."""
+        """Elimination with numbers for all other parameters, whose signs are known."""
         if self.decisions is None and self.general is not None:
             return self.general.elimination.at(self.numbers)
         return self._eliminated()
@@ -185,12 +185,12 @@ class RegionEquations(Corrections):
 
     @cached_property
     def unknowns(self) -> tuple[sp.Symbol, ...]:
-        """The states that were not solved for."""
+        """The states that were not eliminated."""
         return (self.general or self).elimination.unknowns
 
     @cached_property
     def polynomials(self) -> list[WholeTerms] | None:
-        """What remains, if it is polynomials in unknowns and parameter."""
+        """Remaining equations, if they are polynomials in unknowns and parameter."""
         if self.general is not None:
             return [terms for terms in self.general.remaining.at(self._values) if terms]
         return terms_of(self.elimination.remaining, self._symbols)
@@ -201,21 +201,21 @@ class RegionEquations(Corrections):
 
     @property
     def bounds(self) -> list[sp.Expr]:
-        """Functions one of which vanishes where an equilibrium leaves the region."""
+        """Functions of which one vanishes when an equilibrium leaves the region."""
         return [self._number(i.function) for i in self.field.model.interfaces.values()]
 
     @cached_property
     def edge_polynomials(self) -> list[WholeTerms] | None:
-        """The `bounds` along equilibria as polynomials in unknowns and parameter, if they are."""
+        """The `bounds` at equilibria, if they are polynomials in unknowns and parameter."""
         if self.general is not None:
             return self.general.bounds.at(self._values)
         return self.along(self.bounds)
 
     def along(self, functions: Sequence[sp.Expr]) -> list[WholeTerms] | None:
-        """Functions of the states along equilibria, over unknowns and parameter.
+        """Return functions of the states at equilibria as polynomials in unknowns and parameter.
 
-        None if one is no polynomial. A denominator has been shown not to vanish, or is a zero of
-        the rates' own.
+        None if one is not a polynomial. Denominators do not vanish, or are denominators of the
+        rates.
         """
         solved = {real(n): e for n, e in self.elimination.solved.items()}
         found = []
@@ -230,7 +230,7 @@ class RegionEquations(Corrections):
 
     @cached_property
     def univariate(self) -> bool:
-        """Whether one polynomial in one unknown remains, of a degree that can be trusted."""
+        """Whether one polynomial in one unknown remains, of sufficiently low degree."""
         if len(self.unknowns) != 1:
             return False
         if self.polynomials is not None:
@@ -243,7 +243,7 @@ class RegionEquations(Corrections):
 
     @cached_property
     def isolated(self) -> bool:
-        """Whether as many polynomials in few unknowns remain, so that all roots are found."""
+        """Whether as many polynomials as unknowns remain, so that all roots are found."""
         count = len(self.unknowns)
         if count == 1:
             return self.univariate
@@ -253,11 +253,11 @@ class RegionEquations(Corrections):
 
     @cached_property
     def factors(self) -> tuple[FactorEquations, ...]:
-        """The equations for each choice of a factor of every rate, where states are factors.
+        """Equations for each choice of a factor of every rate, if states are factors.
 
-        A rate x g(x, …) vanishes where x or g does. With several unknowns each choice is
-        solved by itself: of lower degree, and regular where two equilibria meet at x = 0.
-        Empty where there is one choice, or no finite number of solutions for one of them.
+        A rate x g(x, …) vanishes if x or g does. With several unknowns each choice is solved
+        separately: it has lower degree and is regular where two equilibria collide at x = 0.
+        Empty if there is only one choice, or not finitely many solutions for one of them.
         """
         if len(self.unknowns) < 2 or self.impossible:
             return ()
@@ -274,13 +274,13 @@ class RegionEquations(Corrections):
 
     @cached_property
     def _coefficients(self) -> list[list[tuple[tuple[int, ...], Any]]]:
-        """Exponents in every equation, and their coefficients over the parameter."""
+        """Exponents in every equation, with coefficients in the parameter."""
         p = real(self.field.parameter)
         system = [sp.Poly(e, *self.unknowns) for e in self.elimination.remaining]
         return [[(e, coefficient_function(c, p)) for e, c in q.terms()] for q in system]
 
     def _terms_at(self, value: float) -> list[Terms]:
-        """The polynomials in the unknowns at a value of the parameter."""
+        """Return the polynomials in the unknowns at a value of the parameter."""
         if self.polynomials is not None:
             count, at = len(self.unknowns), Fraction(value)
             return [at_value(q, count, at) for q in self.polynomials]
@@ -296,13 +296,13 @@ class RegionEquations(Corrections):
 
     @cached_property
     def _quotients(self) -> list[list[WholeTerms]] | None:
-        """Every state as a quotient of polynomials, if its denominator does not vanish."""
+        """Every state as a quotient of polynomials, if the denominators do not vanish."""
         if self.general is None:
             return None
         return [quotient.at(self._values) for quotient in self.general.solved]
 
     def _whole(self, value: float, *unknowns: float) -> list[Array]:
-        """The full state at values of the unknowns; none outside the domain of the formulas."""
+        """Return the full state at values of the unknowns; empty outside the domain."""
         try:
             if self._quotients is None:
                 return [np.array(self._formula(value, *unknowns), dtype=float)]
@@ -314,14 +314,14 @@ class RegionEquations(Corrections):
 
     @property
     def impossible(self) -> bool:
-        """Whether an equation without states can never hold, as where a rate is a constant."""
+        """Whether an equation without states has no solution, as for a constant rate."""
         if self.polynomials is not None:
             return any(len(q) == 1 and not any(next(iter(q))) for q in self.polynomials)
         return any(e.is_number and e.is_nonzero for e in self.elimination.remaining)
 
     @cached_property
     def _undetermined(self) -> bool:
-        """Whether equations without unknowns remain and nothing else: a continuum or nothing."""
+        """Whether only equations without unknowns remain: a continuum or no equilibria."""
         if not self.unknowns:
             return False
         if self.polynomials is not None:
@@ -331,9 +331,9 @@ class RegionEquations(Corrections):
     def solutions(
         self, value: float, bounds: Mapping[str, float] | None = None
     ) -> tuple[list[Array], bool]:
-        """Isolated equilibria of the region's rates at a value, and whether these are all.
+        """Return isolated equilibria of the rates at a value, and whether these are all.
 
-        Admissible or not; those in which the modulus of no state exceeds its bound.
+        Admissible or not; only equilibria within the bounds on the modulus of states.
         """
         if not self.factors:
             found, complete = self._known(value, bounds or {})
@@ -347,7 +347,7 @@ class RegionEquations(Corrections):
         return (found, True) if complete else (self._searched(value, found), False)
 
     def _known(self, value: float, bounds: Mapping[str, float]) -> tuple[list[Array], bool]:
-        """What is found without a search, and whether these are all."""
+        """Return equilibria found without a search, and whether these are all."""
         if not self.unknowns:
             states = self._whole(value) if self._conditions_hold(value) else []
             return self._polished(value, states), True
@@ -356,7 +356,7 @@ class RegionEquations(Corrections):
         return self._isolated(value, bounds) if self.isolated else ([], False)
 
     def _isolated(self, value: float, bounds: Mapping[str, float]) -> tuple[list[Array], bool]:
-        """All solutions of the system, and whether none is missing or undecided."""
+        """Return all solutions of the system, and whether none is missing or unresolved."""
         names = [str(x) for x in self.unknowns]
         try:
             terms = self._terms_at(value)
@@ -376,15 +376,15 @@ class RegionEquations(Corrections):
                 whole = self._whole(value, *root)
                 corrected = (self.corrected(w, value, proved=sure) for w in whole)
                 fresh = [s for s in corrected if s is not None]
-                # what is no equilibrium here is a zero of a denominator, or a two-fold
+                # other solutions are zeros of a denominator, or two-folds
                 complete &= bool(fresh) or (sure and not self._regular(value, whole))
                 states += [s for s in fresh if not any(self.same(s, o, value) for o in states)]
         return states, complete
 
     def _regular(self, value: float, states: Sequence[Array]) -> bool:
-        """Whether the rates are finite at states and an equilibrium should be there.
+        """Return whether the rates are finite at states, so that an equilibrium is expected.
 
-        A zero of the numerators on a pole is none of the rates: rounding of the state makes them.
+        Zeros of the numerators on a pole are not equilibria of the rates.
         """
         natural = self._natural(value)
         slopes = [
@@ -396,13 +396,13 @@ class RegionEquations(Corrections):
         return any(np.isfinite(t).all() and (eps * t <= POLE * natural).all() for t in terms)
 
     def continuum(self, value: float) -> bool:
-        """Whether the region's equilibria at this value form a continuum."""
+        """Return whether the equilibria of the region at this value form a continuum."""
         return self._undetermined and not self.impossible and self._conditions_hold(value)
 
     def _conditions_hold(self, value: float) -> bool:
-        """Whether equations in the parameter alone hold, up to rounding in their terms.
+        """Return whether equations in the parameter alone are satisfied up to rounding.
 
-        The terms are those at the parameter's natural unit where its value is below that.
+        The terms are evaluated at the natural unit of the parameter if its value is smaller.
         """
         p = real(self.field.parameter)
         largest = max(abs(value), self._parameter_unit(0.0))
@@ -412,7 +412,7 @@ class RegionEquations(Corrections):
                 moduli: WholeTerms = {e: abs(c) for e, c in over.items()}
                 (total,) = values_at([over], [at := Fraction(value)])
                 (size,) = values_at([moduli], [far := Fraction(largest)])
-                # both are whole, in units of a power of a denominator
+                # both are integers, in units of a power of a denominator
                 most = max((k for (k,) in over), default=0)
                 exact = Fraction(abs(total), at.denominator**most)
                 if exact > Fraction(VANISHING) * Fraction(size, far.denominator**most):
@@ -426,7 +426,7 @@ class RegionEquations(Corrections):
         return True
 
     def continua(self) -> list[float]:
-        """Parameter values at which the equilibria of the region form a continuum."""
+        """Return parameter values at which the equilibria of the region form a continuum."""
         if self.polynomials is None or not (self._undetermined or self.univariate):
             return []
         forms = list(self.polynomials)
@@ -435,7 +435,7 @@ class RegionEquations(Corrections):
             degrees = {e[0] for e in polynomial}
             forms = [{(k,): c for (i, k), c in polynomial.items() if i == j} for j in degrees]
         if any(len(form) == 1 and not next(iter(form))[-1] for form in forms):
-            # a number, which vanishes nowhere
+            # a non-zero number
             return []
         common = _RING.zero
         for form in forms:
@@ -445,7 +445,7 @@ class RegionEquations(Corrections):
         return real_roots(ratios([int(common.get((k,), 0)) for k in range(highest, -1, -1)]))
 
     def edges(self, value: float) -> list[Array]:
-        """Where a one-parameter continuum of equilibria meets an interface, or its middle."""
+        """Return the points of a one-parameter continuum on an interface, or its middle."""
         if len(self.unknowns) != 1:
             return self._whole(value, *([0.0] * len(self.unknowns)))
         ends = []
@@ -457,7 +457,7 @@ class RegionEquations(Corrections):
         return ends or self._whole(value, 0.0)
 
     def _lines(self, value: float) -> Iterator[Terms]:
-        """The `bounds` along equilibria at a value as polynomials in the unknown, if they are."""
+        """Yield the `bounds` at equilibria at a value, if they are polynomials in the unknown."""
         if self.edge_polynomials is not None:
             yield from (at_value(q, 1, Fraction(value)) for q in self.edge_polynomials)
             return
@@ -468,7 +468,7 @@ class RegionEquations(Corrections):
             yield from terms_of([line], list(self.unknowns)) or []
 
     def _polished(self, value: float, states: Sequence[Array]) -> list[Array]:
-        """Newton's last digits at fixed parameter; what does not converge was no root."""
+        """Refine states by Newton's method at a fixed parameter; discard those that diverge."""
         kept: list[Array] = []
         for state in states:
             solved = self.corrected(state, value)
@@ -478,15 +478,16 @@ class RegionEquations(Corrections):
         return kept
 
     def same(self, one: Array, other: Array, value: float) -> bool:
-        """Whether two states are equal, but for what a double root may be off."""
+        """Return whether two states are equal up to the accuracy of a double root."""
         return same(one, other, self.unit(value), self.field.periods)
 
     def _searched(self, value: float, known: Sequence[Array] = ()) -> list[Array]:
-        """Newton's method from many states, until no more equilibria are found or it takes long.
+        """Search by Newton's method from many states, until it finds no more or takes too long.
 
-        A fixed sequence, spread over several scales in natural units, then in units of what was
-        found. As long as that finds more, half of the next starts have each component from
-        another equilibrium: many equilibria are often nearly products of few values.
+        The starting points are a fixed sequence over several scales in natural units, then in
+        units of the equilibria found. While more are found, half of the next starting points
+        combine components of different equilibria: many equilibria are often nearly a
+        Cartesian product of few values.
         """
         field, n, unit = self.field, self.field.n, self.unit(value)
         count = starts_tried(n)
@@ -496,7 +497,7 @@ class RegionEquations(Corrections):
         for batch in range(max(2, min(BATCHES, int(COST / n**3) // count))):
             before = len(distinct)
             spread = 10.0 ** generator.uniform(-2, 1.5, (count, 1))
-            # the size of each state by itself, too
+            # also with the individual size of each state
             spread = np.where(
                 np.arange(count)[:, None] % 2,
                 spread,
@@ -527,14 +528,14 @@ class RegionEquations(Corrections):
             quiet = quiet + 1 if batch and len(distinct) == before else 0
             if quiet > len(distinct) / FEW or len(distinct) > MANY:
                 break
-            # once more in units of what was found
+            # again in units of the equilibria found
             sizes = np.abs(distinct).max(axis=0, initial=0.0)
             unit = np.where(sizes > 0, sizes, unit)
         return [distinct[k] for k in in_order(distinct, unit)]
 
 
 def starts_tried(states: int) -> int:
-    """How many starts of Newton's method are tried, fewer where each of them takes long.
+    """Return the number of starting points of Newton's method, smaller for many states.
 
     Examples
     --------
@@ -546,14 +547,14 @@ def starts_tried(states: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class FactorEquations(RegionEquations):
-    """The equations of a region for one factor of each rate.
+    """Equations of a region for one factor of each rate.
 
     Parameters
     ----------
     chosen : tuple of Expr
-        The factor of the rate of each state.
+        Factor of the rate of each state.
     lowered : tuple of Expr
-        Equations of lower degree that imply them.
+        Equivalent equations of lower degree.
     """
 
     chosen: tuple[sp.Expr, ...]
@@ -573,12 +574,12 @@ class FactorEquations(RegionEquations):
 
 
 def _finite(equations: RegionEquations) -> bool:
-    """Whether finitely many solutions can be isolated."""
+    """Return whether there are finitely many solutions, which can be isolated."""
     return equations.impossible or not equations.unknowns or equations.isolated
 
 
 def state_factors(rate: sp.Expr, states: Sequence[sp.Symbol]) -> list[sp.Expr]:
-    """States that are factors of a rate, and the factor without them.
+    """Return the states that are factors of a rate, and the remaining factor.
 
     Examples
     --------
@@ -594,11 +595,11 @@ def state_factors(rate: sp.Expr, states: Sequence[sp.Symbol]) -> list[sp.Expr]:
 
 @dataclass(frozen=True, eq=False)
 class SlidingEquations(RegionEquations):
-    """The equations of pseudo-equilibria, those of the sliding field on its interface.
+    """Equations of pseudo-equilibria, zeros of the sliding vector field on its interface.
 
-    Without division they are (1 − α) f₁ + α f₂ = 0 and h = 0 with one more unknown
-    α, or, where that leaves more than one polynomial, b f₁ − a f₂ = 0 and h = 0, of
-    which one equation depends on the others (a, b are the drifts of h).
+    Without division they are (1 − α) f₁ + α f₂ = 0 and h = 0 with the additional unknown α, or,
+    if that leaves more than one polynomial, b f₁ − a f₂ = 0 and h = 0, of which one equation is
+    redundant (a, b are the drifts of h).
     """
 
     def _eliminated(self) -> Elimination:
@@ -622,18 +623,18 @@ class SlidingEquations(RegionEquations):
 
     @property
     def _height(self) -> sp.Expr:
-        """The function h of the interface that is slid along."""
+        """Switching function h of the interface of the sliding motion."""
         return self._number(self.field.modes[self.region].rows[self._sides.interface])
 
     @property
     def _drifts(self) -> tuple[sp.Expr, sp.Expr]:
-        """The drifts a and b of h on both sides."""
+        """Drifts a and b of h on both sides."""
         a, b = self._sides.drifts
         return self._number(a), self._number(b)
 
     @property
     def _fields(self) -> list[tuple[sp.Expr, sp.Expr]]:
-        """The rates on both sides, state by state."""
+        """Rates on both sides, state by state."""
         modes, sides = self.field.modes, self._sides
         both = zip(modes[sides.above].rates, modes[sides.below].rates, strict=True)
         return [(self._number(f), self._number(g)) for f, g in both]
@@ -648,7 +649,7 @@ class SlidingEquations(RegionEquations):
         a, b = self._drifts
         crossed = [b * f - a * g for f, g in self._fields]
         for k, name in enumerate(states):
-            # sum of ∂h/∂x times these vanishes: one with ∂h/∂x ≠ 0 may be left out
+            # the sum of ∂h/∂x times these vanishes: one with ∂h/∂x ≠ 0 is redundant
             slope = h.diff(real(name))
             if slope.is_nonzero if self.decisions is None else self.decisions(slope):
                 crossed[k] = h
@@ -670,7 +671,7 @@ class SlidingEquations(RegionEquations):
 def _near(
     one: Array, others: Array, unit: Array, within: float, periods: ArrayLike
 ) -> NDArray[np.bool_]:
-    """Whether states, shape (..., n), agree with one modulo periods.
+    """Return whether states, shape (..., n), agree with one modulo periods.
 
     Relative to each component of the one, or to its unit.
     """
@@ -685,24 +686,24 @@ def among(
     periods: ArrayLike = 0.0,
     within: float = SAME,
 ) -> bool:
-    """Whether a state is one of some known ones, shape (m, n), to a part of its size."""
+    """Return whether a state is among known ones, shape (m, n), relative to its size."""
     return bool(_near(state, known, np.asarray(unit), within, periods).any())
 
 
 def same(one: Array, other: Array, unit: ArrayLike = 1.0, periods: ArrayLike = 0.0) -> bool:
-    """Whether two states are equal modulo periods, but for what a double root may be off."""
+    """Return whether two states agree modulo periods, to the accuracy of a double root."""
     return bool(_near(one, other, np.asarray(unit), SAME, periods))
 
 
 @lru_cache(maxsize=64)
 def region_equations(field: FrozenField) -> tuple[RegionEquations, ...]:
-    """The eliminated equations of every region, kept while the field is in use."""
+    """Return the eliminated equations of every region, cached with the field."""
     found: list[RegionEquations] = []
     for number, mode in enumerate(field.modes):
         if mode.sides is None:
             found.append(RegionEquations(field, number))
         elif mode.sides.escaping:
-            # the same equations as for sliding, which stands before
+            # the same equations as for sliding, the preceding mode
             found.append(found[-1])
         else:
             found.append(SlidingEquations(field, number))

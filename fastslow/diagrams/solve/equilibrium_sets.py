@@ -1,9 +1,8 @@
-"""Sets of equilibria within discontinuities: where 0 is in the convex hull of the fields.
+"""Equilibrium sets within discontinuities, where 0 is in the convex hull of the vector fields.
 
-On the interfaces that a sliding motion slides along, its rates and the weights s of the
-fields are functions of the states. Where the rates vanish all along, as v = 0 keeps a block
-with x' = v still, |s_i| ≤ 1 bounds a set of equilibria: an interval, or a polytope
-where everything is affine.
+On the interfaces of a sliding motion its rates and the weights s of the fields are functions of
+the states. If the rates vanish identically, as for a block with x' = v at v = 0, the conditions
+|s_i| ≤ 1 bound a set of equilibria: an interval, or a polytope if all functions are affine.
 """
 
 from __future__ import annotations
@@ -33,68 +32,68 @@ from fastslow.symbolic.closed_forms.equilibrium_sets import solved_along
 
 Array = NDArray[np.float64]
 
-#: A set followed over values of the parameter.
+#: A set continued over values of the parameter.
 Run = list[tuple[float, EquilibriumSet]]
 
-#: The sets at a value of the parameter.
+#: Function that returns the sets at a value of the parameter.
 SetsAt = Callable[[float], list[EquilibriumSet]]
 
-#: Values of the parameter at which a band is computed, besides its ends.
+#: Number of parameter values at which a band is computed, in addition to its ends.
 ROWS = 129
 
-#: The same for sets of more dimensions than one, each of whose ranges is a linear programme.
+#: The same for sets of dimension above one, each of whose ranges is a linear program.
 FEWER = 33
 
-#: Where ends are searched for in the free state if no polynomial gives them: from minus to
-#: plus this, in the natural unit of the state.
+#: Half-width of the interval of the free state, in natural units, in which ends are searched for
+#: if they are not roots of a polynomial.
 REACH = 10.0
 
-#: An unbounded interval is judged at a place this many natural units from its end.
+#: Distance, in natural units, from the end of an unbounded interval at which it is classified.
 FAR = 1e3
 
-#: Error of an end that is searched for, as a part of the range that is searched.
+#: Error of an end, as a fraction of the interval that is searched.
 XTOL = 1e-15
 
-#: Places in between at which functions that are no polynomials are looked at.
+#: Number of points in this interval at which non-polynomial functions are evaluated.
 PLACES = 1001
 
-#: Rows of a band between its end and the next of the other rows.
+#: Additional rows of a band near its ends.
 ROUND = 8
 
-#: How far a weight may exceed 1 on an edge that was solved for.
+#: Largest excess of a weight over 1 on a computed edge.
 EDGE = 1e-6
 
-#: What counts as zero, relative to the size of the terms.
+#: Bound below which a function is zero, relative to its terms.
 SMALL = 1e-9
 
-#: Places along each free state, by their number, of the grid on which a set is filled; odd,
-#: so that the first place is one of them.
+#: Grid points along each free state, by dimension, for flood-filling a set; odd, so that the
+#: starting point is one of them.
 FILLED = {2: 81, 3: 31}
 
-#: Half the width of the first of these grids, in units of the states; doubled up to `REACH`.
+#: Half-width of the first of these grids, in units of the states; doubled up to `REACH`.
 FIRST = 1e-3
 
-#: Copies of a set, shifted by whole periods, differ by less than this part of the period.
+#: Translates of a set by whole periods differ by less than this fraction of the period.
 COPY = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """The equilibria of one sliding motion as functions of free coordinates and the parameter.
+    """Equilibria of one sliding motion as functions of free coordinates and the parameter.
 
     Parameters
     ----------
     field : FrozenField
     motion : Motion
     free : tuple of Symbol
-        States that stay free, d of them.
+        States that are not determined, d of them.
     solved : tuple of sympy.Expr
         Every state as a function of these and the parameter.
     bounds : tuple of sympy.Expr
-        Functions that are not negative in the set: 1 ∓ sᵢ for every weight, and those of the
-        other interfaces with their signs.
+        Functions that are non-negative in the set: 1 ∓ sᵢ for every weight, and the switching
+        functions of the other interfaces with their signs.
     turned : sympy.Expr
-        Negative where the sliding motion attracts: b of a single interface, else −1.
+        Negative if the sliding motion is attracting: b of a single interface, otherwise −1.
     """
 
     field: FrozenField
@@ -136,7 +135,7 @@ class Family:
 
     @cached_property
     def _polynomials(self) -> tuple[Callable[..., Any], ...] | None:
-        """Coefficients of the bounds' numerators in the only free state, of polynomials."""
+        """Coefficients of the bounds' numerators in a single free state, if polynomials."""
         forms = [sp.together(e).as_numer_denom()[0] for e in self.bounds]
         if self.dimension != 1 or not all(e.is_polynomial(*self.free) for e in forms):
             return None
@@ -148,31 +147,31 @@ class Family:
 
     @property
     def exact(self) -> bool:
-        """Whether the set at a value is sure to be found whole."""
+        """Whether the computed sets are provably complete."""
         return self.affine or self._polynomials is not None
 
     def state(self, value: float, *free: float) -> Array:
         return np.array([float(s) for s in self._states(value, *free)])
 
     def values(self, value: float, *free: Any) -> Array:
-        """The bounds at one place or, of the only free state, at several, shape (bounds, …)."""
+        """Evaluate the bounds at one point or, for one free state, at several: (bounds, …)."""
         with np.errstate(all="ignore"):
             found = self._bounds(value, *free)
         return np.array(np.broadcast_arrays(*found, *free)[: len(found)], dtype=float)
 
     def _bound(self, value: float, number: int, free: float) -> float:
-        """One of the bounds at a value of the only free state."""
+        """Evaluate one of the bounds at a value of the single free state."""
         return float(self.values(value, free)[number])
 
     def _units(self, value: float) -> Array:
-        """Natural unit of each free state, shape (d,)."""
+        """Return the natural unit of each free state, shape (d,)."""
         names = self.field.model.states
         return self.field.units_at(abs(value))[[names.index(c.name) for c in self.free]]
 
     def sets(self, value: float) -> list[EquilibriumSet]:
-        """The sets at a value of the parameter, those of dimension 1 from below to above.
+        """Return the sets at a value of the parameter, those of dimension 1 in ascending order.
 
-        Of copies that are whole periods apart one, with its middle in the principal range.
+        Of translates by whole periods the one with its middle in the principal range.
         """
         periods = self.field.periods
         found = self._sets(value)
@@ -186,7 +185,7 @@ class Family:
         return kept
 
     def _sets(self, value: float) -> list[EquilibriumSet]:
-        """The sets at a value of the parameter, with copies."""
+        """Return the sets at a value of the parameter, including translates."""
         if self.dimension == 0:
             if not (self.values(value) >= -SMALL).all():
                 return []
@@ -200,7 +199,7 @@ class Family:
         return self._searched(value) if self.dimension == len(self.motion.slides) else []
 
     def _interval(self, value: float, low: float, high: float) -> EquilibriumSet:
-        """A set of dimension 1 between two values of the free state."""
+        """Return the set of dimension 1 between two values of the free state."""
         inside = np.linspace(low, high, 65) if np.isfinite(high - low) else np.array([low, high])
         with np.errstate(all="ignore"):
             table = np.array(np.broadcast_arrays(*self._states(value, inside), inside)[:-1]).T
@@ -233,13 +232,13 @@ class Family:
         )
 
     def _decays(self, finite: NDArray[np.complex128]) -> bool:
-        """Whether all eigenvalues but those along the set have a negative real part."""
+        """Return whether all eigenvalues transverse to the set have negative real parts."""
         real_parts = finite.real[np.argsort(np.abs(finite))][self.dimension :]
         least = SMALL * np.abs(finite).max(initial=0.0)
         return bool((real_parts < -least).all())
 
     def _finite(self, u: Array) -> NDArray[np.complex128]:
-        """Eigenvalues of the sliding motion along its interfaces at (states, parameter)."""
+        """Return the eigenvalues of the sliding motion along its interfaces at a point."""
         matrix, gradients = (np.array(m, dtype=float) for m in self._slopes(*u))
         if not (np.isfinite(matrix).all() and np.isfinite(gradients).all()):
             return np.full(len(u) - 1 - len(gradients), np.nan, dtype=complex)
@@ -256,12 +255,12 @@ class Family:
         return numpy_function([*names, real(self.field.parameter)], both)
 
     def _polytope(self, value: float) -> EquilibriumSet | None:
-        """Ranges of the states by linear programming, corners by solving for the weights."""
+        """Compute ranges of the states by linear programming, and corners from the weights."""
         from scipy.optimize import linprog
 
         d = self.dimension
         origin, base = self.values(value, *[0.0] * d), self.state(value, *[0.0] * d)
-        # one step is the natural unit of a free state
+        # in natural units of the free states
         units = self._units(value)
         rows = np.array([self.values(value, *step) - origin for step in np.diag(units)]).T
         moves = np.array([self.state(value, *step) - base for step in np.diag(units)]).T
@@ -290,11 +289,11 @@ class Family:
         return self._made(value, middle, lower, upper, np.array(states or [base]))
 
     def _corners(self, rows: Array, origin: Array) -> list[tuple[float, ...]]:
-        """Where every weight is ±1, if there are as many as free coordinates."""
+        """Return the points with all weights ±1, if there are as many as free coordinates."""
         m, found = len(self.motion.slides), []
         if m != self.dimension or np.linalg.matrix_rank(rows[: 2 * m : 2]) < m:
             return []
-        # the bounds come in pairs 1 - s, 1 + s
+        # the bounds are pairs 1 - s, 1 + s
         for side in product((0, 1), repeat=m):
             chosen = [2 * i + k for i, k in enumerate(side)]
             free = np.linalg.solve(rows[chosen], -origin[chosen])
@@ -303,7 +302,7 @@ class Family:
         return found
 
     def _pieces(self, value: float) -> list[tuple[float, float]]:
-        """Intervals of the free coordinate in which no bound is negative."""
+        """Return the intervals of the free coordinate in which no bound is negative."""
         from scipy.optimize import brentq
 
         ends: list[float] = []
@@ -314,7 +313,7 @@ class Family:
         else:
             from scipy.optimize import brentq
 
-            # a set with its middle in the principal range ends within a period of zero
+            # a set with its middle in the principal range is within one period of zero
             period = self.field.periods[self.field.model.states.index(self.free[0].name)]
             reach = float(period or REACH * self._units(value)[0])
             grid = np.linspace(-reach, reach, PLACES)
@@ -343,7 +342,7 @@ class Family:
 
     @cached_property
     def _weights(self) -> Callable[..., Any]:
-        """The weights and their derivatives by the free states, at places along a last axis."""
+        """Weights and their derivatives by the free states, with points along a last axis."""
         weights = sp.Matrix([1 - e for e in self.bounds[: 2 * len(self.motion.slides) : 2]])
         both = [list(weights), list(weights.jacobian(self.free))]
         return numpy_function(self._symbols, both)
@@ -351,7 +350,7 @@ class Family:
     def _newton(
         self, value: float, places: Array, targets: Array
     ) -> tuple[Array, NDArray[np.bool_]]:
-        """Places at which the weights have target values, both of shape (N, d), and whether."""
+        """Solve for points with given weights, both of shape (N, d), with convergence flags."""
         d = self.dimension
         with np.errstate(all="ignore"):
             for _ in range(12):
@@ -368,10 +367,10 @@ class Family:
         return places, np.logical_and(near, np.isfinite(places).all(axis=1))
 
     def _searched(self, value: float) -> list[EquilibriumSet]:
-        """Sets of several dimensions: from where all weights vanish to the faces of the cube.
+        """Compute sets of several dimensions, from zero weights to the faces of their cube.
 
-        The ranges are those of the places reached on a grid on the faces. Where the states
-        are no functions of the weights all the way, the set is filled on a grid instead.
+        The ranges are those of the points reached from a grid on the faces. If the states are
+        not functions of the weights throughout, the set is flood-filled on a grid.
         """
         d = self.dimension
         units = self._units(value)
@@ -418,7 +417,7 @@ class Family:
         return sets
 
     def _filled(self, value: float, middle: Array, units: Array) -> _Filled:
-        """The places of a grid around a place that are connected to it within the bounds."""
+        """Return the points of a grid that are connected to its middle within the bounds."""
         from scipy.ndimage import label
 
         count = FILLED[self.dimension]
@@ -437,7 +436,7 @@ class Family:
             half = np.where(touched, np.minimum(2.0 * half, most), half)
 
     def _polished(self, value: float, filled: _Filled) -> EquilibriumSet:
-        """The set whose places of a grid are given, its ranges and corners solved for."""
+        """Return the set of given grid points, with computed ranges and corners."""
         inside, cell = filled.places[filled.own], filled.cell
         given = self._states(value, *inside.T)
         states = np.stack(np.broadcast_arrays(*given, inside[:, 0])[:-1], axis=-1)
@@ -465,7 +464,7 @@ class Family:
         )
 
     def _least(self, value: float, k: int, sign: float, start: Array, cell: Array) -> float:
-        """The end of the range of a state in a set, from the place of a grid next to it."""
+        """Compute the end of the range of a state in a set, from the nearest grid point."""
         from scipy.optimize import minimize
 
         def height(steps: Array) -> float:
@@ -487,9 +486,9 @@ class Family:
         return sign * (min(height(found.x), still) if near else still)
 
     def contains(self, u: Array, unit: Array | float) -> bool:
-        """Whether a point (states, parameter) is in the set, its edges included.
+        """Return whether a point (states, parameter) is in the closed set.
 
-        ``unit`` is the size of every state, by which rounding is judged.
+        ``unit`` is the size of every state, the scale of rounding errors.
         """
         value = float(u[-1])
         names = self.field.model.states
@@ -503,7 +502,7 @@ class Family:
 
 @dataclass(frozen=True, eq=False)
 class _Filled:
-    """Places of a grid, shape (N, …, d), which of them are in a set, and where it goes on."""
+    """Points of a grid, shape (N, …, d), those in a set, and where the set exceeds the grid."""
 
     places: Array
     own: NDArray[np.bool_]
@@ -511,12 +510,12 @@ class _Filled:
 
     @property
     def cell(self) -> Array:
-        """Distance between neighbouring places, shape (d,)."""
+        """Grid spacing, shape (d,)."""
         flat = self.places.reshape(-1, self.places.shape[-1])
         return np.asarray(np.ptp(flat, axis=0) / (self.own.shape[0] - 1))
 
     def holds(self, place: Array) -> bool:
-        """Whether a place is nearest to one of the set."""
+        """Return whether the grid point nearest to a point is in the set."""
         first = self.places[(0,) * self.own.ndim]
         part = np.rint((place - first) / self.cell)
         if not ((part >= 0) & (part < self.own.shape[0])).all():
@@ -525,7 +524,7 @@ class _Filled:
 
 
 def _middle(one: EquilibriumSet) -> Array:
-    """The middle of the ranges, zero of those without both ends."""
+    """Return the middle of the ranges, zero for unbounded ones."""
     ends = np.isfinite(one.lower) & np.isfinite(one.upper)
     return np.where(ends, 0.5 * np.where(ends, one.lower, 0.0), 0.0) + np.where(
         ends, 0.5 * np.where(ends, one.upper, 0.0), 0.0
@@ -533,7 +532,7 @@ def _middle(one: EquilibriumSet) -> Array:
 
 
 def _aligned(one: EquilibriumSet, target: Array, periods: Array) -> EquilibriumSet:
-    """The copy of a set whose middle is nearest to a place; ranges without ends stay."""
+    """Return the translate of a set whose middle is nearest to a point."""
     middle = _middle(one)
     by = nearest_copy(middle, target, periods) - middle
     if not by.any():
@@ -542,7 +541,7 @@ def _aligned(one: EquilibriumSet, target: Array, periods: Array) -> EquilibriumS
 
 
 def _copies(one: EquilibriumSet, other: EquilibriumSet, periods: Array) -> bool:
-    """Whether two sets are whole periods apart, or none."""
+    """Return whether two sets are translates by whole periods, or identical."""
     if not np.array_equal(np.isfinite(one.lower), np.isfinite(other.lower)):
         return False
     away = apart(_middle(one), _middle(other), periods)
@@ -551,7 +550,7 @@ def _copies(one: EquilibriumSet, other: EquilibriumSet, periods: Array) -> bool:
 
 
 def _interval(origin: Array, slope: Array) -> tuple[float, float] | None:
-    """Where origin + slope c >= 0."""
+    """Return the interval of c with origin + slope c >= 0."""
     size = np.maximum(np.abs(origin), np.abs(slope))
     still = np.abs(slope) <= 1e-14 * size
     if (origin[still] < 0).any():
@@ -574,10 +573,9 @@ def _heights(field: FrozenField, motion: Motion) -> list[sp.Expr]:
 
 @lru_cache(maxsize=64)
 def families_of(field: FrozenField) -> tuple[Family, ...]:
-    """The families of equilibria of a field's sliding motions that are no isolated points.
+    """Return the families of non-isolated equilibria of the sliding motions of a field.
 
-    With sliding along several interfaces isolated equilibria too, which no branch
-    runs through.
+    For sliding along several interfaces isolated equilibria too, which are not on branches.
     """
     found = (_family(field, motion) for motion in motions_of(field.model).sliding)
     return tuple(family for family in found if family is not None)
@@ -597,7 +595,7 @@ def _family(field: FrozenField, motion: Motion) -> Family | None:
         sp.expand(sign * functions[j].subs(solved)) for j, sign in enumerate(motion.signs) if sign
     ]
     if any(h == 0 for h in others):
-        # the edge of a set within one more interface
+        # the edge of a set on a further interface
         return None
     turned = sp.Integer(-1)
     if len(motion.slides) == 1:
@@ -616,22 +614,22 @@ def _family(field: FrozenField, motion: Motion) -> Family | None:
 
 
 def sets_of(field: FrozenField, value: float) -> list[EquilibriumSet]:
-    """All sets of equilibria at a value of the field's parameter."""
+    """Return all equilibrium sets at a value of the parameter."""
     return [one for family in families_of(field) for one in family.sets(value)]
 
 
 def all_known(field: FrozenField) -> bool:
-    """Whether no equilibria along several interfaces at once are left out.
+    """Return whether the equilibria along several interfaces are provably complete.
 
-    Those of equations that stay implicit, sets with no way to their ranges, and those where
-    no sliding motion is derived are not looked for; sets that are not exact may not be all.
+    Not computed are those of implicit equations, sets whose ranges cannot be computed, and those
+    without a derived sliding motion; sets that are not exact may be incomplete.
     """
     return not _left_out(field) and all(f.exact for f in families_of(field))
 
 
 @lru_cache(maxsize=64)
 def _left_out(field: FrozenField) -> bool:
-    """Whether motions along several interfaces stay implicit, or are not derived."""
+    """Return whether motions along several interfaces are implicit, or not derived."""
     numbers = _numbers(field)
     motions = motions_of(field.model)
     if motions.undecided:
@@ -647,9 +645,9 @@ def _left_out(field: FrozenField) -> bool:
 
 
 def covered(field: FrozenField, lower: float, upper: float) -> set[int]:
-    """Numbers of the modes of a field whose equilibria are all in exact sets.
+    """Return the numbers of modes whose equilibria are all in exact sets.
 
-    Those of a region if it has one, in closed form, that is an edge of a set throughout.
+    A region is included if its single equilibrium, in closed form, is always an edge of a set.
     """
     names = {family.motion.name for family in families_of(field) if family.exact}
     if not names:
@@ -670,9 +668,9 @@ def covered(field: FrozenField, lower: float, upper: float) -> set[int]:
 
 
 def in_a_set(field: FrozenField, u: Array, unit: Array | float) -> bool:
-    """Whether a point (states, parameter) is in one of the sets of equilibria.
+    """Return whether a point (states, parameter) is in an equilibrium set.
 
-    ``unit`` is the size of every state, by which rounding is judged.
+    ``unit`` is the size of every state, the scale of rounding errors.
     """
     return any(family.contains(u, unit) for family in families_of(field))
 
@@ -680,10 +678,10 @@ def in_a_set(field: FrozenField, u: Array, unit: Array | float) -> bool:
 def bands_of(
     field: FrozenField, lower: float, upper: float, window: StateWindow
 ) -> tuple[EquilibriumBand, ...]:
-    """The bands that the sets of equilibria make over a range of the parameter.
+    """Compute the bands of equilibrium sets over a range of the parameter.
 
-    A band ends where its set leaves the window. Sets of several dimensions that are
-    searched for are too slow to follow: none of those.
+    A band ends where its set leaves the window. Sets of several dimensions that require a search
+    are omitted, since their continuation would take too long.
     """
     followed = (f for f in families_of(field) if f.exact or f.dimension < 2)
     return tuple(b for family in followed for b in _bands(family, lower, upper, window))
@@ -696,7 +694,7 @@ def _bands(
         return [one for one in family.sets(value) if window.meets(one.lower, one.upper)]
 
     def after(run: Run, one: EquilibriumSet) -> EquilibriumSet | None:
-        """The copy of a set that goes on with a run, None where it does not."""
+        """Return the translate of a set that continues a run, None if there is none."""
         last = run[-1][1]
         copy = _aligned(one, _middle(last), family.field.periods)
         return copy if _meet(last, copy) else None
@@ -726,7 +724,7 @@ def _bands(
 
 
 def _meet(one: EquilibriumSet, other: EquilibriumSet) -> bool:
-    """Whether the ranges of two sets at neighbouring values overlap, and their corners match."""
+    """Return whether two sets at neighbouring values overlap, with matching corners."""
     near = SMALL * np.nan_to_num(np.abs(one.lower) + np.abs(one.upper), posinf=0.0)
     over = (one.lower <= other.upper + near) & (other.lower <= one.upper + near)
     if one.dimension == 0:
@@ -739,7 +737,7 @@ def _change(
     before: tuple[float, list[EquilibriumSet]],
     after: tuple[float, list[EquilibriumSet]],
 ) -> list[tuple[float, list[EquilibriumSet]]]:
-    """Values to rounding between which the number of sets changes, and some beside them."""
+    """Locate values at which the number of sets changes, with additional nearby values."""
     first, last = before[0], after[0]
     for _ in range(60):
         middle = 0.5 * (before[0] + after[0])
@@ -750,7 +748,7 @@ def _change(
             before = now
         else:
             after = now
-    # closer and closer to the change, where an edge may turn round
+    # with decreasing distance from the change, where an edge may fold
     parts = [(k / ROUND) ** 2 for k in range(ROUND - 1, 0, -1)]
     left = [before[0] - part * (before[0] - first) for part in parts]
     right = [after[0] + part * (last - after[0]) for part in reversed(parts)]
