@@ -56,7 +56,7 @@ def test_curves_over_different_planes_are_refused(curves):
     model = fs.Model({x: p + q * x - x**3}, parameters={p: 0, q: 1})
     fold = fs.continue_equilibria(model, "p", (-1, 1)).folds[0]
     curve = fs.continue_points(fold, ("p", "q"), over={"p": (-1, 1), "q": (-1, 1)})
-    with pytest.raises(fs.FastSlowError, match="one plane, received p, q; w, A"):
+    with pytest.raises(fs.FastSlowError, match="the same two parameters, received p, q; w, A"):
         fs.plot.parameter_plane(curves[0], curve)
     with pytest.raises(fs.FastSlowError, match="received none"):
         fs.plot.parameter_plane()

@@ -78,7 +78,7 @@ def test_section_by_direction():
     with pytest.raises(fs.UnknownNameError, match="unknown column 'y'"):
         fs.plot.section(section, "y", "v")
     alone = Section("", ("x",), np.zeros(1), np.zeros((1, 1)), np.zeros(1, dtype=int))
-    with pytest.raises(fs.ArgumentError, match="no plane"):
+    with pytest.raises(fs.ArgumentError, match="with the single column"):
         fs.plot.section(alone)
     assert fs.plot.section(alone, "t", "x").legend is None
     nothing = Section("", ("x", "v"), np.zeros(0), np.zeros((2, 0)), np.zeros(0, dtype=int))
