@@ -1,4 +1,4 @@
-"""How the documentation is built: `sphinx-build -W --keep-going -n -q docs build/docs`."""
+"""Sphinx configuration; build with `sphinx-build -W --keep-going -n -q docs build/docs`."""
 
 import os
 import re
@@ -12,7 +12,7 @@ from sphinx.util.nodes import make_refnode
 
 ROOT = Path(__file__).parent.parent
 
-# the sources beside these pages are documented and run, whatever is installed
+# document and run the sources of this checkout, not an installed package
 sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
 
@@ -51,7 +51,7 @@ maximum_signature_line_length = 88
 napoleon_google_docstring = False
 napoleon_use_param = False
 napoleon_use_rtype = False
-# classes of these packages have pages of their own elsewhere, and nothing is fetched to link them
+# classes of these packages are documented elsewhere; no inventories are fetched
 nitpick_ignore_regex = [
     (r"py:.*", r"(abc|collections|enum|matplotlib|numpy|sympy|typing)\..*"),
     (r"py:class", r"Figure"),
@@ -59,7 +59,7 @@ nitpick_ignore_regex = [
 
 
 def prepare(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
-    """Make a docstring ready for reStructuredText: |x| is an absolute value in it."""
+    """Escape |x|, an absolute value in docstrings, for reStructuredText."""
     in_example = False
     for row, line in enumerate(lines):
         in_example = line.lstrip().startswith(">>>") or (in_example and bool(line.strip()))
@@ -69,11 +69,11 @@ def prepare(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: 
         lines[:0] = [
             "..",
             "",
-        ]  # an empty comment; else Napoleon takes words before a colon for a type
+        ]  # an empty comment; without it Napoleon reads text before a colon as a type
 
 
 def by_last_name(app: Sphinx, env: Any, node: Any, child: Any) -> Any:
-    """Resolve `Ensemble.regime` in a docstring of any module, a field by its class."""
+    """Resolve names such as `Ensemble.regime` in any docstring, fields by their class."""
     if node.get("refdomain") != "py":
         return None
     objects = env.get_domain("py").objects
@@ -93,7 +93,7 @@ def by_last_name(app: Sphinx, env: Any, node: Any, child: Any) -> Any:
 
 
 def describe_figures(app: Sphinx, doctree: Any) -> None:
-    """Name the call that draws a cell's figure as the figure's text for screen readers."""
+    """Add the plot call of a cell as the alternative text of its figure."""
     for cell in doctree.findall(
         lambda n: "cell" in getattr(n, "attributes", {}).get("classes", ())
     ):
@@ -105,7 +105,7 @@ def describe_figures(app: Sphinx, doctree: Any) -> None:
 
 
 def setup(app: Sphinx) -> None:
-    """Add what the pages need beside the extensions."""
+    """Connect the functions above to Sphinx events."""
     app.connect("autodoc-process-docstring", prepare, priority=400)  # before Napoleon
     app.connect("missing-reference", by_last_name)
     app.connect("doctree-read", describe_figures)

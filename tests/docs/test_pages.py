@@ -1,4 +1,4 @@
-"""The pages of the documentation: nothing is missing, all code is run, numbers in the text hold."""
+"""Documentation: complete reference, executed code, and correct numbers in the text."""
 
 import re
 from pathlib import Path
@@ -35,7 +35,7 @@ def test_every_public_name_is_in_the_reference_once():
 def test_all_python_of_a_page_is_run(page):
     text = page.read_text("utf-8")
     assert not re.search(r"^[`~:]{3,}\s*(\{code-block\}\s*)?(i?python|py)", text, re.MULTILINE)
-    # without this head the cells would be shown and not run
+    # without this header the cells would be displayed but not executed
     assert text.startswith(HEAD) == bool(CELL.search(text))
 
 
@@ -66,7 +66,7 @@ def test_the_readme_links_to_pages():
 
 
 def test_the_page_from_two_inertias_to_the_overlay(tmp_path, monkeypatch, capsys):
-    """Its cells run as they stand, and give what the text says about them."""
+    """The cells run unchanged and give the results stated in the text."""
     monkeypatch.chdir(tmp_path)
     names = {}
     for cell in CELL.findall((DOCS / "how-to" / "two-inertias.md").read_text("utf-8")):
@@ -88,7 +88,7 @@ def test_the_page_from_two_inertias_to_the_overlay(tmp_path, monkeypatch, capsys
 
 
 def test_the_tutorial(tmp_path, monkeypatch, capsys):
-    """Its cells run as they stand, and give what the text says about them."""
+    """The cells run unchanged and give the results stated in the text."""
     monkeypatch.chdir(tmp_path)
     names = {}
     for cell in CELL.findall((DOCS / "tutorial.md").read_text("utf-8")):
