@@ -1,4 +1,4 @@
-"""What holds for every curve of special points: its equations, traced once, values read off it."""
+"""Properties of all curves of special points: defining equations, uniqueness, lookup."""
 
 import numpy as np
 import pytest
@@ -180,7 +180,7 @@ def test_every_curve_is_there_once(traced):
                 assert "differ in" in str(error)  # noqa: PT017
 
 
-def test_two_traces_of_one_curve_do_not_meet(traced):
+def test_two_traces_of_one_curve_do_not_intersect(traced):
     _, diagram, curves, plane = traced
     seen = set()
     for point in diagram.special():
@@ -195,7 +195,7 @@ def test_two_traces_of_one_curve_do_not_meet(traced):
     assert seen
 
 
-def test_curves_over_each_other_are_not_called_one():
+def test_coinciding_projections_of_curves_are_distinguished():
     """Both edges of the gap are reached at p = 0 for every q, at x = D and x = −D."""
     model, over, plane = gear()
     corners = fs.continue_equilibria(model, "p", over["p"]).boundary_equilibria

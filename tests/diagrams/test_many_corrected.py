@@ -1,4 +1,4 @@
-"""Equilibria that are solved for at many values at once are those solved for one by one."""
+"""Equilibria computed at many values at once equal those computed one by one."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Curves of special points in two parameters, and what they meet, against closed forms."""
+"""Two-parameter curves of special points and codimension-two points against closed forms."""
 
 import pickle
 
@@ -25,7 +25,7 @@ def reactor():
 PLANE = {"p1": (0, 0.3), "p2": (8, 20)}
 
 
-def test_reactor_folds_meet_bogdanov_takens_and_cusp(reactor):
+def test_reactor_fold_curve_has_bogdanov_takens_and_cusp(reactor):
     """Closed form (mpmath): BT at p1 = e^(−3/2)/2, p2 = 13.5; CP at p1 = e^(−2), p2 = 12."""
     curve = fs.continue_points(reactor.folds[0], ("p1", "p2"), over=PLANE)
     (bt,), (cusp,) = curve.special("BT"), curve.special("CP")
@@ -86,7 +86,7 @@ def test_cusp_of_the_normal_form():
     assert "cusp" in repr(curve)
 
 
-def test_gear_folds_meet_the_interface(folded_gear):
+def test_gear_folds_reach_the_interface(folded_gear):
     """Folds of S1 in (w, A): fold meets x = D at A = −D², w = 0; virtual cusp at x = D/3."""
     diagram = fs.continue_equilibria(folded_gear.frozen(), "w", (-0.3, 0.3))
     fold = next(f for f in diagram.folds if f["x"] > 0)

@@ -1,4 +1,4 @@
-"""Curves of special points in a parameter plane, as figures."""
+"""Drawings of curves of special points in a parameter plane."""
 
 from dataclasses import replace
 

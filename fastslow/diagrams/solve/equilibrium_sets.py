@@ -387,7 +387,7 @@ class Family:
         sets: list[EquilibriumSet] = []
         filled: list[_Filled] = []
         for middle in (distinct[k] for k in in_order(np.reshape(distinct, (-1, d)), units)):
-            if any(one.holds(middle) for one in filled):
+            if any(one.contains(middle) for one in filled):
                 continue
             if not (self.values(value, *middle) >= 0).all():
                 continue
@@ -514,7 +514,7 @@ class _Filled:
         flat = self.places.reshape(-1, self.places.shape[-1])
         return np.asarray(np.ptp(flat, axis=0) / (self.own.shape[0] - 1))
 
-    def holds(self, place: Array) -> bool:
+    def contains(self, place: Array) -> bool:
         """Return whether the grid point nearest to a point is in the set."""
         first = self.places[(0,) * self.own.ndim]
         part = np.rint((place - first) / self.cell)
