@@ -1,4 +1,4 @@
-"""What an argument may be: a check for each kind, and the decorator that applies them."""
+"""Validation of arguments: one check for each kind, and the decorator that applies them."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from fastslow.errors import QUOTED, ArgumentError, OutOfRangeError, quoted, unkn
 P = ParamSpec("P")
 R = TypeVar("R")
 
-#: Takes the name of an argument and what was received; returns what the function is given.
+#: Maps the name of an argument and the value received to the validated value.
 Check = Callable[[str, Any], Any]
 
-#: Kinds of parameters that a value may be given for by its place.
-_BY_PLACE = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+#: Kinds of parameters that may be passed by position.
+_POSITIONAL = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 
-#: The kinds of arrays that hold real numbers; "O" may, and is tried.
+#: Kinds of arrays with real numbers; object arrays ("O") are converted if possible.
 _REAL = "iufO"
 
 
 def validated(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Check arguments before a function is entered.
+    """Validate the arguments of a function at the call.
 
-    An argument whose default is None may be None.
+    None is accepted where it is the default.
 
     Parameters
     ----------
     **checks : callable
-        Argument to its check; that of ``*args`` is applied to each of them, that of
-        ``**kwargs`` to all of them as one mapping.
+        The check of each argument by name; that of ``*args`` is applied to each of them,
+        that of ``**kwargs`` to all of them as one mapping.
 
     Examples
     --------
@@ -62,12 +62,12 @@ def validated(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
         kinds = {parameters[n].kind: n for n in checks}
         listed = kinds.get(inspect.Parameter.VAR_POSITIONAL)
         extra = kinds.get(inspect.Parameter.VAR_KEYWORD)
-        places = [n for n in names if parameters[n].kind in _BY_PLACE]
+        places = [n for n in names if parameters[n].kind in _POSITIONAL]
         open_ended = any(p.kind is inspect.Parameter.VAR_POSITIONAL for p in parameters.values())
 
         without_name, called = _without_name, _called
-        # what is not in the function's own globals has to be in the closure
-        refuse = raise_misfit
+        # names that are not globals of the function must be in the closure
+        refuse = raise_signature_error
 
         def checked(*args: Any, **kwargs: Any) -> Any:
             if len(args) > len(places) and not open_ended:
@@ -95,13 +95,13 @@ def validated(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
 
 def settings(cls: type[R]) -> type[R]:
-    """A dataclass whose arguments, where they do not fit, are answered like those of a function."""
+    """Class decorator: report invalid arguments of a dataclass as those of a function."""
     cls.__init__ = validated()(cls.__init__)  # type: ignore[method-assign]
     return cls
 
 
 def _called(function: Callable[..., Any], args: Sequence[Any]) -> str:
-    """What a caller wrote to have a function called."""
+    """Return the name under which a function is called: that of the class for ``__init__``."""
     name = function.__name__
     return type(args[0]).__name__ if name == "__init__" and args else name
 
@@ -109,7 +109,7 @@ def _called(function: Callable[..., Any], args: Sequence[Any]) -> str:
 def _without_name(
     function: str, parameters: Mapping[str, inspect.Parameter], args: tuple[Any, ...], value: Any
 ) -> ArgumentError:
-    """The error for a value without the name that it needs, to be raised."""
+    """Return the error for a positional value that must be passed by keyword."""
     if any(p.kind is inspect.Parameter.VAR_KEYWORD for p in parameters.values()):
         owner = args[0] if "self" in parameters else None
         names = (getattr(owner, n, None) for n in ("parameter_name", "parameter"))
@@ -123,18 +123,18 @@ def _without_name(
 
 
 def like(function: Callable[P, R], wrapper: Callable[..., Any]) -> Callable[P, R]:
-    """A wrapper that looks like the function it calls; what it uses must be in its closure."""
-    # with the function's own globals, by which doctest knows where an example belongs
+    """Return a wrapper with the metadata of its function; its names must be in its closure."""
+    # the function's own globals, by which doctest finds the module of an example
     own = FunctionType(
         wrapper.__code__, function.__globals__, function.__name__, None, wrapper.__closure__
     )
     return wraps(function)(own)
 
 
-def raise_misfit(function: Callable[..., Any], args: Sequence[Any], kwargs: Any) -> None:
-    """Raise TypeError where arguments do not fit a signature, in the words of the caller.
+def raise_signature_error(function: Callable[..., Any], args: Sequence[Any], kwargs: Any) -> None:
+    """Raise TypeError for arguments that do not match a signature.
 
-    Python names the class in which a method is written; its callers know that of the object.
+    Python names the class that defines a method; this message names the class of the object.
     """
     signature = inspect.signature(function)
     try:
@@ -154,7 +154,7 @@ def raise_misfit(function: Callable[..., Any], args: Sequence[Any], kwargs: Any)
 
 
 def shown(value: object) -> str:
-    """What was received, as an error quotes it: a short value itself, else what it is.
+    """Describe a received value in an error message: short values literally, others by class.
 
     Examples
     --------
@@ -170,7 +170,7 @@ def shown(value: object) -> str:
 
 
 def class_of(value: object) -> str:
-    """The class of a value, as an error names it.
+    """Return the class name of a value with its article, for error messages.
 
     Examples
     --------
@@ -181,17 +181,17 @@ def class_of(value: object) -> str:
 
 
 def with_article(noun: str) -> str:
-    """A noun with its indefinite article."""
+    """Return a noun with its indefinite article."""
     return f"an {noun}" if noun[:1].lower() in "aeio" or noun == "ndarray" else f"a {noun}"
 
 
 def refusal(name: str, value: object, expected: str) -> ArgumentError:
-    """The error for an argument, to be raised."""
+    """Return the error for an invalid argument."""
     return ArgumentError(f"{name} = {shown(value)}; expected {expected}")
 
 
 def real_number(value: object) -> float | None:
-    """A real number as a float, None for anything else: text, a truth value, an array.
+    """Return a real number as a float, None for anything else: text, a bool, an array.
 
     Examples
     --------
@@ -214,7 +214,7 @@ def real_number(value: object) -> float | None:
 
 
 def finite(name: str, value: Any, expected: str = "a finite number") -> float:
-    """One finite number."""
+    """Accept a finite number."""
     result = real_number(value)
     if result is None or not math.isfinite(result):
         raise refusal(name, value, expected)
@@ -222,7 +222,7 @@ def finite(name: str, value: Any, expected: str = "a finite number") -> float:
 
 
 def within(low: float, high: float) -> Check:
-    """One number between bounds, these included."""
+    """Accept a number in a closed interval."""
 
     def check(name: str, value: Any) -> float:
         expected = f"a number from {low:g} to {high:g}"
@@ -235,7 +235,7 @@ def within(low: float, high: float) -> Check:
 
 
 def positive(name: str, value: Any) -> float:
-    """One finite number above zero."""
+    """Accept a positive finite number."""
     result = finite(name, value, "a positive number")
     if result <= 0:
         raise refusal(name, value, "a positive number")
@@ -243,22 +243,22 @@ def positive(name: str, value: Any) -> float:
 
 
 def whole(least: int, most: int = 2**62) -> Check:
-    """A whole number within bounds."""
+    """Accept an integer within bounds."""
 
     def check(name: str, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int | np.integer):
-            raise refusal(name, value, "a whole number")
+            raise refusal(name, value, "an integer")
         if value < least or value > most:
-            # a bound that only keeps memory and time within reason is named when it is met
+            # a large bound, which only limits memory and time, is named when it is exceeded
             upper = f" to {most}" if value > most or most <= 1000 else ""
-            raise refusal(name, value, f"a whole number from {least}{upper}")
+            raise refusal(name, value, f"an integer from {least}{upper}")
         return int(value)
 
     return check
 
 
 def tolerance(name: str, value: Any) -> float:
-    """A tolerance between rounding and 0.1."""
+    """Accept an error tolerance, from rounding to 0.1."""
     result = positive(name, value)
     if not 1e-16 <= result <= 0.1:
         raise refusal(name, value, "a number from 1e-16 to 0.1")
@@ -266,7 +266,7 @@ def tolerance(name: str, value: Any) -> float:
 
 
 def among(*values: Any) -> Check:
-    """One of some numbers, or None where it is among them."""
+    """Accept one of the given integers, or None if it is given."""
     expected = ", ".join(map(repr, values[:-1])) + f" or {values[-1]!r}"
 
     def check(name: str, value: Any) -> Any:
@@ -279,28 +279,28 @@ def among(*values: Any) -> Check:
 
 
 def flag(name: str, value: Any) -> bool:
-    """True or False."""
+    """Accept a bool."""
     if not isinstance(value, bool | np.bool_):
         raise refusal(name, value, "True or False")
     return bool(value)
 
 
 def text(name: str, value: Any) -> str:
-    """A string."""
+    """Accept a string."""
     if not isinstance(value, str):
         raise refusal(name, value, "text")
     return value
 
 
 def formula(name: str, value: Any) -> Any:
-    """A name or an expression: text, or what SymPy makes of it."""
+    """Accept a name or an expression, as text or as a SymPy object."""
     if not isinstance(value, str) and not hasattr(value, "free_symbols"):
         raise refusal(name, value, "a name or an expression, as text or in SymPy")
     return value
 
 
 def word(kind: str, valid: Iterable[str]) -> Check:
-    """One of some words."""
+    """Accept one of the given strings."""
     known = tuple(valid)
 
     def check(name: str, value: Any) -> str:
@@ -311,12 +311,12 @@ def word(kind: str, valid: Iterable[str]) -> Check:
     return check
 
 
-#: Ends of a range may be this large: products of some lengths must not overflow.
+#: Largest modulus of the ends of a range: products of several lengths must not overflow.
 LARGEST = 1e100
 
 
 def interval(name: str, value: Any) -> tuple[float, float]:
-    """Two finite numbers, the lower one first."""
+    """Accept two finite numbers, the lower one first."""
     expected = "two finite numbers, the lower one first"
     try:
         if isinstance(value, str | bytes | Set | Mapping):
@@ -335,12 +335,12 @@ def interval(name: str, value: Any) -> tuple[float, float]:
 
 
 def position(key: Any, count: int, what: str) -> int:
-    """A place in a sequence by its number, counted from the end where it is negative.
+    """Return the index of an item in a sequence; a negative one counts from the end.
 
     Raises
     ------
     OutOfRangeError
-        For a place that there is not.
+        For an index out of range.
     """
     place = int(key)
     if not -count <= place < count:
@@ -349,12 +349,12 @@ def position(key: Any, count: int, what: str) -> int:
     return place % count
 
 
-#: What is no number, though NumPy would make one of it.
+#: Types that NumPy converts to numbers, but that are not accepted as such.
 _NO_NUMBER = (bool, str, bytes)
 
 
 def numbers(name: str, value: Any) -> NDArray[np.float64]:
-    """An array of real numbers, of any shape; they need not be finite."""
+    """Accept an array of real numbers of any shape; they need not be finite."""
     try:
         raw = np.asarray(value)
         kind = raw.dtype.kind
@@ -366,7 +366,7 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
 
 
 def finite_numbers(name: str, value: Any) -> NDArray[np.float64]:
-    """An array of finite numbers, of any shape."""
+    """Accept an array of finite numbers of any shape."""
     values = numbers(name, value)
     if not np.isfinite(values).all():
         raise refusal(name, value, "finite numbers")
@@ -374,21 +374,21 @@ def finite_numbers(name: str, value: Any) -> NDArray[np.float64]:
 
 
 def mapping(name: str, value: Any) -> Any:
-    """A mapping, such as a dict."""
+    """Accept a mapping, such as a dict."""
     if not isinstance(value, Mapping):
         raise refusal(name, value, "a mapping, such as {name: value}")
     return value
 
 
 def function(name: str, value: Any) -> Any:
-    """Something that can be called."""
+    """Accept a callable."""
     if not callable(value):
         raise refusal(name, value, "a function")
     return value
 
 
 def path(name: str, value: Any) -> Any:
-    """Where a file is: text or a path."""
+    """Accept the path of a file."""
     plain = os.fspath(value) if isinstance(value, str | os.PathLike) else None
     if not isinstance(plain, str) or not plain or "\0" in plain:
         raise refusal(name, value, "the path of a file")
@@ -396,7 +396,7 @@ def path(name: str, value: Any) -> Any:
 
 
 def instance(*kinds: type) -> Check:
-    """An object of one of some classes."""
+    """Accept an instance of one of the given classes."""
     names = " or ".join(kind.__name__ for kind in kinds)
 
     def check(name: str, value: Any) -> Any:
@@ -413,7 +413,7 @@ def instance(*kinds: type) -> Check:
 
 
 def items(check: Check | None = None) -> Check:
-    """Several, each of one kind where a check says which."""
+    """Accept a sequence, whose items pass a check if one is given."""
 
     def checked(name: str, value: Any) -> tuple[Any, ...]:
         if isinstance(value, str | bytes | Set | Mapping) or not isinstance(value, Iterable):
@@ -421,7 +421,7 @@ def items(check: Check | None = None) -> Check:
         try:
             found = tuple(value)
         except TypeError:
-            # an array without dimension says that it can be iterated over
+            # a zero-dimensional array is Iterable but cannot be iterated over
             raise refusal(name, value, "a sequence") from None
         if check is None:
             return found
@@ -431,7 +431,7 @@ def items(check: Check | None = None) -> Check:
 
 
 def either(*checks: Check) -> Check:
-    """What one of several checks accepts; otherwise the error of the last."""
+    """Accept a value that passes one of several checks; else raise the error of the last."""
 
     def checked(name: str, value: Any) -> Any:
         for check in checks[:-1]:

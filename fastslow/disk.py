@@ -1,15 +1,16 @@
-"""Files written whole or not at all, and read without waiting: the only place that opens them.
+"""Atomic writing and non-blocking reading of files; no other module opens files.
 
-The rules of writing, the same for every file of the package:
+Every file of the package is written by the same rules:
 
-- The new content is written beside the file and then takes its name in one step. When the disk
-  is full or fails, the old file is as it was, and nothing is left beside it. (A process that
-  is killed meanwhile may leave a file ``.fastslow-*`` there; it can be removed.)
-- A symbolic link is followed: the file that it names is written, also where there is none yet,
-  and the link stays. Another hard link to the file keeps the old content.
-- A file that exists keeps its permission bits and, where the system allows that, its owner. One
-  that may not be written is not replaced.
-- Only regular files are written and read: no folder, no pipe, no device.
+- The new content is written to a temporary file in the same directory, which then replaces the
+  old file atomically. If the disk is full or fails, the old file is unchanged and the temporary
+  one is removed. (A process killed meanwhile may leave a file ``.fastslow-*``, which can be
+  deleted.)
+- A symbolic link is followed: its target is written, or created if missing, and the link is
+  preserved. Other hard links to the file keep the old content.
+- An existing file keeps its permission bits and, where the system allows it, its owner. A
+  read-only file is not replaced.
+- Only regular files are written and read, not directories, pipes or devices.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from fastslow.errors import FileError, raised_by_handler
 
 
 def write_file(path: str | os.PathLike[str], content: bytes) -> None:
-    """Write a file, whole or not at all.
+    """Write a file atomically.
 
     Parameters
     ----------
@@ -35,7 +36,7 @@ def write_file(path: str | os.PathLike[str], content: bytes) -> None:
     Raises
     ------
     FileError
-        When it cannot be written, with the reason.
+        If it cannot be written, with the reason.
 
     Examples
     --------
@@ -53,7 +54,7 @@ def write_file(path: str | os.PathLike[str], content: bytes) -> None:
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write a file of text in UTF-8, whole or not at all; errors as for `write_file`."""
+    """Write a text file in UTF-8 atomically; errors as for `write_file`."""
     try:
         content = text.encode("utf-8")
     except UnicodeEncodeError as error:
@@ -62,12 +63,12 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 
 def read_file(path: str | os.PathLike[str]) -> bytes:
-    """Read a regular file; nothing else is opened, so that no pipe or device can block.
+    """Read a regular file; other files are not opened, because a pipe or device may block.
 
     Raises
     ------
     FileError
-        When it cannot be read, with the reason.
+        If it cannot be read, with the reason.
 
     Examples
     --------
@@ -78,7 +79,7 @@ def read_file(path: str | os.PathLike[str]) -> bytes:
     """
     try:
         _check_regular(Path(path).stat())
-        # in the meantime it may have become a pipe
+        # the file may have been replaced by a pipe since
         flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
         with os.fdopen(os.open(path, flags), "rb") as file:
             _check_regular(os.fstat(file.fileno()))
@@ -90,12 +91,12 @@ def read_file(path: str | os.PathLike[str]) -> bytes:
 
 
 def reason(error: BaseException) -> str:
-    """What went wrong, in the words of the system where it has some."""
+    """Return the reason of an error, as given by the operating system if it gives one."""
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 
 def _replace(target: Path, content: bytes) -> None:
-    """Put new content in the place of a file; what is still a link leads in a circle."""
+    """Replace the content of a file; a target that is still a link is a circular one."""
     old: os.stat_result | None = None
     with contextlib.suppress(FileNotFoundError):
         old = target.stat()
@@ -121,7 +122,7 @@ def _replace(target: Path, content: bytes) -> None:
 
 
 def _keep_access(path: Path, old: os.stat_result) -> None:
-    """Give a file the owner, where that is allowed, and the permission bits of another."""
+    """Copy the permission bits of another file and, where that is allowed, its owner."""
     new = path.stat()
     if (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
         with contextlib.suppress(OSError):
@@ -130,7 +131,7 @@ def _keep_access(path: Path, old: os.stat_result) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make a new name last a power failure, where the system can."""
+    """Flush a directory to disk where the system can, so that a rename survives power loss."""
     try:
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -138,7 +139,7 @@ def _sync_folder(folder: Path) -> None:
         finally:
             os.close(handle)
     except OSError as error:
-        # a TimeoutError is one of these
+        # TimeoutError is a subclass of OSError
         if raised_by_handler(error):
             raise
 

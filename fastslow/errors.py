@@ -1,4 +1,4 @@
-"""What goes wrong, in words: every error of the package, and the nearest valid name."""
+"""Exceptions and warnings of the package, with suggestions for misspelled names."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ class FastSlowError(Exception):
 
 
 class ModelError(FastSlowError, ValueError):
-    """The model as written cannot be read: a symbol, a value or a region is wrong."""
+    """A model definition is invalid: a symbol, a value or a region is wrong."""
 
 
 class UnknownNameError(FastSlowError, KeyError):
-    """A name that is not one of the valid ones."""
+    """A name is not among the valid ones."""
 
     def __str__(self) -> str:
         return str(self.args[0]) if self.args else ""
@@ -27,27 +27,27 @@ class ArgumentError(FastSlowError, ValueError):
 
 
 class OutOfRangeError(FastSlowError, IndexError):
-    """A number in a sequence that there is not: of a branch, a row, a special point."""
+    """An index of a branch, a row or a special point is out of range."""
 
 
 class IncompleteWarning(UserWarning):
-    """An answer may lack something, because what it was read from was cut short."""
+    """A result may be incomplete, because it is based on a computation that was cut short."""
 
 
 class FileError(FastSlowError, OSError):
-    """A file cannot be written or read: it is missing, cut short, foreign or newer."""
+    """A file cannot be written or read: missing, truncated, of another format or newer."""
 
 
 class MissingPackageError(FastSlowError, ImportError):
-    """A package of an extra is needed that is not installed."""
+    """A required package of an optional extra is not installed."""
 
 
-#: The longest text that an error repeats.
+#: Maximal length of a text quoted in an error message.
 QUOTED = 60
 
 
 def quoted(text: str) -> str:
-    """A text as an error repeats it, a long one cut short.
+    """Quote a text for an error message, truncated if it is long.
 
     Examples
     --------
@@ -60,21 +60,21 @@ def quoted(text: str) -> str:
 
 
 def _encodable(text: str) -> bool:
-    """Whether a text can be printed: it holds no half of a pair of surrogates."""
+    """Return True if a text can be printed: it contains no unpaired surrogate."""
     return text.isascii() or not any("\ud800" <= c <= "\udfff" for c in text)
 
 
 def unknown_name(kind: str, name: object, valid: Iterable[object]) -> UnknownNameError:
-    """Build the error for a name that is not valid, with the nearest valid one.
+    """Return the error for an invalid name, with the nearest valid one as a suggestion.
 
     Parameters
     ----------
     kind : str
-        What the name was taken for, for instance ``"parameter"``.
+        The expected kind of name, for instance ``"parameter"``.
     name : object
-        The name received (a symbol counts by what it prints).
+        The name received; a symbol is identified by its printed form.
     valid : iterable of object
-        The names that would have been accepted.
+        The accepted names.
 
     Returns
     -------
@@ -97,9 +97,9 @@ def unknown_name(kind: str, name: object, valid: Iterable[object]) -> UnknownNam
 
 
 def raised_by_handler(error: BaseException) -> bool:
-    """Whether the handler of a signal raised an exception, and so nothing that was called.
+    """Return True if an exception was raised by a signal handler, not by the code it interrupted.
 
-    Such an exception passes through whatever deals with those of the same class.
+    Such an exception must propagate through handlers for other exceptions of its class.
 
     Examples
     --------

@@ -61,6 +61,7 @@ def export(
 
     Examples
     --------
+    >>> import sympy as sp
     >>> x, k = sp.symbols("x k")
     >>> decay = Model({x: -k * x}, parameters={k: 2})
     >>> print(export(decay, "xpp")["S1.ode"])

@@ -1,18 +1,18 @@
-"""The one reader of formulas given as text: equations, conditions, queries, sections and axes.
+"""The parser of all formulas given as text: equations, conditions, queries, sections and axes.
 
-A formula holds
+A formula consists of
 
-- names: identifiers of any script, compared as Python compares them (NFKC: ``ℌ`` is ``H``);
-  a name that is no identifier, such as ``x - D``, is read only where it stands alone;
+- names: identifiers of any script, normalised as in Python (NFKC: ``ℌ`` is ``H``); a name
+  that is not an identifier, such as ``x - D``, is recognised only as a whole formula;
 - decimal numbers: ``2``, ``.5``, ``1e-3``;
-- ``+``, ``-``, ``*``, ``/`` and the power ``**``, which bind as in Python;
-- functions by their names in SymPy, and ``abs``, ``max``, ``arctan`` and the like;
-- within ``Piecewise((value, condition), …)`` and where a condition is expected, comparisons
-  (chained ones too), ``&``, ``|``, ``~``, ``and``, ``or``, ``not``, ``True`` and ``False``.
+- ``+``, ``-``, ``*``, ``/`` and the power ``**``, with the precedence of Python;
+- functions by their names in SymPy, and aliases such as ``abs``, ``max`` and ``arctan``;
+- in ``Piecewise((value, condition), …)`` and conditions, comparisons (also chained), ``&``,
+  ``|``, ``~``, ``and``, ``or``, ``not``, ``True`` and ``False``.
 
-Everything else is refused: strings, attributes, subscripts, assignments, keyword arguments,
+All other syntax is rejected: strings, attributes, subscripts, assignments, keyword arguments,
 comprehensions, ``lambda``, comments, complex, hexadecimal and underscored numbers, ``//``,
-``%`` and ``^``. Nothing is ever run: the text becomes a tree of the few nodes in
-`fastslow.formulas.grammar`, and NumPy, SymPy and the labels of axes see that tree alone. The
+``%`` and ``^``. No text is ever executed: it is parsed to a tree of the nodes in
+`fastslow.formulas.grammar`, from which values, SymPy expressions and labels are built. The
 limits on length, nesting, numbers and exponents are in `fastslow.formulas.limits`.
 """

@@ -1,4 +1,4 @@
-"""Values of formulas: numbers and arrays by name."""
+"""Evaluation of formulas on numbers and arrays."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from fastslow.formulas.grammar import (
 
 Array = NDArray[np.float64]
 
-#: What an unknown name is called in an error.
+#: Description of an unknown name in an error.
 KIND = "name in an expression"
 
 _COMPARED: dict[str, Callable[[Any, Any], Any]] = {
@@ -49,14 +49,14 @@ _COMPARED: dict[str, Callable[[Any, Any], Any]] = {
 
 
 def written_formula(given: object, instead: str = "") -> str:
-    """What a name or an expression is as text: itself, or what SymPy prints.
+    """Return a name or an expression as text; SymPy objects are printed.
 
-    ``instead`` says in the error what else to write.
+    ``instead`` is an alternative proposed in the error.
 
     Raises
     ------
     ArgumentError
-        For a number or anything else that is neither.
+        For a number or any other object.
 
     Examples
     --------
@@ -75,22 +75,22 @@ or in SymPy, received 5.0
 
 
 def read(expression: object, valid: Iterable[str], kind: str = KIND) -> tuple[Node, dict[str, str]]:
-    """The tree of an expression in given names, and the given name of each in it.
+    """Parse an expression in given names; return its tree and the given form of each name.
 
     Parameters
     ----------
     expression : str or Expr
     valid : iterable of str
-        The names that may stand in it.
+        The accepted names.
     kind : str
-        What the names are, for the error.
+        Description of the names in errors.
 
     Raises
     ------
     UnknownNameError
-        For a name that is none of them.
+        For an unknown name.
     ArgumentError
-        For anything else that is no expression.
+        For text that is not an expression.
     """
     text, names = written_formula(expression), list(valid)
     tree = parse(text, names)
@@ -108,7 +108,7 @@ def read(expression: object, valid: Iterable[str], kind: str = KIND) -> tuple[No
 
 
 def by_value(name: str, key: object) -> str:
-    """What to write for the rows at a number, which is no key.
+    """Return the hint for a number in place of a key: the query by value.
 
     Examples
     --------
@@ -120,22 +120,22 @@ def by_value(name: str, key: object) -> str:
 
 
 def evaluated(expression: object, values: Mapping[str, Any], instead: str = "") -> Array:
-    """An expression of named columns, element by element.
+    """Evaluate an expression of named columns elementwise.
 
     Parameters
     ----------
     expression : str or Expr
     values : mapping
-        Name to number or array.
+        Numbers or arrays by name.
     instead : str
-        What to write where the expression is no text, for the error.
+        Alternative proposed in the error for an expression that is not text.
 
     Raises
     ------
     UnknownNameError
-        For a name that has no values.
+        For a name without values.
     ArgumentError
-        For anything that is no expression.
+        For an invalid expression.
 
     Examples
     --------
@@ -144,7 +144,7 @@ def evaluated(expression: object, values: Mapping[str, Any], instead: str = "") 
     >>> evaluated("__import__('os')", {"x": 1.0})  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
-    fastslow.errors.ArgumentError: "__import__('os')" is no expression in x: unknown function ...
+    fastslow.errors.ArgumentError: "__import__('os')" is not an expression in x: unknown ...
     """
     text = written_formula(expression, instead)
     if text in values:  # a name need not be an identifier
@@ -160,18 +160,18 @@ def column(
     n: int,
     instead: str = "",
 ) -> Array:
-    """A column by name, or an expression in columns and constants.
+    """Return a column by name, or evaluate an expression in columns and constants.
 
     Parameters
     ----------
     key : str or Expr
     columns : mapping
-        Name to a function that gives the column, shape (n,).
+        Functions that return columns of shape (n,), by name.
     constants : mapping
-        Names with one value throughout.
+        Constants by name.
     n : int
     instead : str
-        What to write where a key is no text, for the error.
+        Alternative proposed in the error for a key that is not text.
 
     Returns
     -------
@@ -181,9 +181,9 @@ def column(
     Raises
     ------
     UnknownNameError
-        For a name that is neither.
+        For a name that is neither a column nor a constant.
     ArgumentError
-        For text that is no expression.
+        For text that is not an expression.
 
     Examples
     --------
@@ -205,7 +205,7 @@ def column(
 
 
 def names_in(expression: object, valid: Mapping[str, Any]) -> frozenset[str]:
-    """The names that an expression uses.
+    """Return the names in an expression.
 
     Examples
     --------
@@ -216,13 +216,13 @@ def names_in(expression: object, valid: Mapping[str, Any]) -> frozenset[str]:
 
 
 def computed(tree: Node, values: Mapping[str, Any]) -> Array:
-    """The value of a tree, NaN where it has none that is real.
+    """Evaluate a tree, with NaN where it has no real value.
 
     Parameters
     ----------
     tree : Node
     values : mapping
-        Normalised name to number or array.
+        Numbers or arrays by normalised name.
     """
     with np.errstate(all="ignore"):
         return np.asarray(_value(tree, values), dtype=float)
@@ -260,7 +260,7 @@ def _value(node: Node, values: Mapping[str, Any]) -> Any:
 
 
 def _piecewise(pieces: Iterable[Node], values: Mapping[str, Any]) -> Any:
-    """The value of the first piece whose condition holds, NaN where none does."""
+    """Evaluate the first piece whose condition is true, NaN without any."""
     conditions, found = [], []
     for piece in pieces:
         assert isinstance(piece, Pair)

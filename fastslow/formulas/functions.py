@@ -1,4 +1,4 @@
-"""The functions that a formula may use: names, numbers of arguments, values."""
+"""Functions of formulas: names, numbers of arguments and values."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Function:
     Parameters
     ----------
     symbolic : str
-        Its name in SymPy.
+        The name in SymPy.
     values : callable, optional
-        Its values from arrays, element by element; none for those that SymPy alone knows.
+        Elementwise evaluation on arrays; none for functions evaluated by SymPy only.
     least, most : int
         Number of arguments.
     """
@@ -91,7 +91,7 @@ _ELEMENTARY: dict[str, Callable[[Any], Any]] = {
     "tanh": np.tanh,
 }
 
-#: Special functions that equations may hold, with their numbers of arguments.
+#: Special functions accepted in equations, with their numbers of arguments.
 SPECIAL: dict[str, tuple[int, int]] = {
     "Chi": (1, 1),
     "Ci": (1, 1),
@@ -134,13 +134,13 @@ _NAMED: dict[str, Function] = {
     "Max": Function("Max", _folded(np.maximum), 2, ARGUMENTS),
     "Min": Function("Min", _folded(np.minimum), 2, ARGUMENTS),
     "Mod": Function("Mod", np.mod, 2, 2),
-    # its arguments are pairs, which every use reads itself
+    # its arguments are pairs, evaluated separately by each consumer
     "Piecewise": Function("Piecewise", None, 1, PIECES),
     "atan2": Function("atan2", np.arctan2, 2, 2),
     "log": Function("log", lambda x, base=np.e: np.log(x) / np.log(base), 1, 2),
 }
 
-#: Names of NumPy and Python by those of SymPy.
+#: Names in NumPy and Python, mapped to those in SymPy.
 _ALIASES = {
     "abs": "Abs",
     "arccos": "acos",
@@ -155,9 +155,9 @@ FUNCTIONS: dict[str, Function] = {
     **{name: _NAMED[meant] for name, meant in _ALIASES.items()},
 }
 
-#: Conditions that SymPy prints as functions, by their operators.
+#: Operators of conditions that SymPy prints as functions.
 RELATIONS = {"Eq": "==", "Ne": "!=", "Gt": ">", "Ge": ">=", "Lt": "<", "Le": "<="}
 CONNECTIVES = {"And": "and", "Or": "or", "Not": "not"}
 
-#: Constants, where no name of the model hides them.
+#: Constants, unless shadowed by a name of the model.
 CONSTANTS = {"pi": math.pi, "E": math.e}

@@ -1,4 +1,4 @@
-"""From text to a tree of a few kinds of nodes, or one error."""
+"""The grammar of formulas: a parser from text to a tree of nodes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastslow.formulas.limits import DEPTH, DIGITS, LENGTH, PIECES
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A decimal number as it was written."""
+    """A decimal number in its original form."""
 
     text: str
 
@@ -42,21 +42,21 @@ class Negative:
 
 @dataclass(frozen=True, slots=True)
 class Sum:
-    """Terms from left to right; the sign of each is a part of it."""
+    """A sum of signed terms, from left to right."""
 
     terms: tuple[tuple[str, Node], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Product:
-    """Factors and divisors from left to right."""
+    """A product of factors and divisors, from left to right."""
 
     factors: tuple[tuple[str, Node], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Power:
-    """A base to an exponent."""
+    """A power: base and exponent."""
 
     base: Node
     exponent: Node
@@ -64,7 +64,7 @@ class Power:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A function of arguments; those of Piecewise are pairs."""
+    """A function call; the arguments of Piecewise are pairs."""
 
     function: str
     arguments: tuple[Node, ...]
@@ -72,7 +72,7 @@ class Call:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """A value and the condition under which it is taken."""
+    """A value of Piecewise with its condition."""
 
     value: Node
     condition: Node
@@ -80,7 +80,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Neighbouring operands compared, one operator fewer than operands."""
+    """A chained comparison, with one operator fewer than operands."""
 
     operators: tuple[str, ...]
     operands: tuple[Node, ...]
@@ -105,7 +105,7 @@ Node = Number | Name | Negative | Sum | Product | Power | Call | Pair | Comparis
 
 CONDITIONS = (Comparison, Logic, Truth)
 
-#: How tightly operators bind, as in Python.
+#: Precedence of operators, as in Python.
 PRECEDENCE = {
     **dict.fromkeys(["or"], 1),
     **dict.fromkeys(["and"], 2),
@@ -117,13 +117,13 @@ PRECEDENCE = {
 }
 NOT, COMPARED, SIGN = 3, 4, 9
 
-#: Operators of conditions by the word for them.
+#: Logical operations by their operators.
 WORDS = {"&": "and", "|": "or", "and": "and", "or": "or"}
 
-#: Names that are none.
+#: Reserved words.
 RESERVED = ("and", "or", "not", "True", "False")
 
-#: What to write instead of a character that is none of ours.
+#: Alternatives to unsupported characters.
 INSTEAD = {
     "^": "a power is written **",
     "%": "a remainder is written Mod(a, b)",
@@ -154,11 +154,11 @@ _SPACE = re.compile(r"[ \t\r\n]*")
 
 
 class _Refused(ValueError):
-    """A reason why a text is no formula."""
+    """The reason why a text is not a formula."""
 
 
 def normalised(name: str) -> str:
-    """A name as Python would keep it: an identifier in the form NFKC, anything else unchanged.
+    """Normalise an identifier to NFKC, as Python does; other names are unchanged.
 
     Examples
     --------
@@ -177,13 +177,12 @@ def parse(text: str, valid: Iterable[str] | None = None) -> Node:
     ----------
     text : str
     valid : iterable of str, optional
-        Names that may stand in it, for the errors. Whether a name is one of them is not
-        looked at here, see `check_names`.
+        The accepted names, for errors; the names in the formula are not checked here.
 
     Raises
     ------
     ArgumentError
-        For what is none, with the reason.
+        For text that is not a formula, with the reason.
 
     Examples
     --------
@@ -193,7 +192,7 @@ def parse(text: str, valid: Iterable[str] | None = None) -> Node:
     >>> parse("x.real")
     Traceback (most recent call last):
     ...
-    fastslow.errors.ArgumentError: 'x.real' is no expression: cannot read '.' after 'x': \
+    fastslow.errors.ArgumentError: 'x.real' is not an expression: cannot read '.' after 'x': \
 attributes cannot be read
     """
     found = _parsed(str(text))
@@ -203,9 +202,9 @@ attributes cannot be read
 
 
 def refused(text: str, reason: str, valid: Iterable[str] | None = None) -> ArgumentError:
-    """The error for a text that is no formula, to be raised."""
+    """Return the error for a text that is not a formula."""
     names = "" if valid is None else f" in {_listed(valid)}"
-    return ArgumentError(f"{quoted(text)} is no expression{names}: {reason}")
+    return ArgumentError(f"{quoted(text)} is not an expression{names}: {reason}")
 
 
 def _listed(names: Iterable[str]) -> str:
@@ -216,7 +215,7 @@ def _listed(names: Iterable[str]) -> str:
 
 @lru_cache(maxsize=1024)
 def _parsed(text: str) -> Node | str:
-    """The tree of a text, or why there is none."""
+    """Return the tree of a text, or the reason why it cannot be parsed."""
     if len(text) > LENGTH:
         return f"{len(text)} characters; expected at most {LENGTH}"
     try:
@@ -226,7 +225,7 @@ def _parsed(text: str) -> Node | str:
 
 
 def nodes(tree: Node) -> Iterator[Node]:
-    """Every node of a tree."""
+    """Yield every node of a tree."""
     waiting = [tree]
     while waiting:
         node = waiting.pop()
@@ -235,7 +234,7 @@ def nodes(tree: Node) -> Iterator[Node]:
 
 
 def parts(node: Node) -> tuple[Node, ...]:
-    """The nodes directly below one."""
+    """Return the children of a node."""
     match node:
         case Negative(operand):
             return (operand,)
@@ -253,12 +252,12 @@ def parts(node: Node) -> tuple[Node, ...]:
 
 
 def names_of(tree: Node) -> tuple[str, ...]:
-    """The names in a tree, each once."""
+    """Return the names in a tree, each once."""
     return tuple(dict.fromkeys(node.name for node in nodes(tree) if isinstance(node, Name)))
 
 
 def text_of(node: Node) -> str:
-    """A tree as text, which is read as the same tree.
+    """Return a tree as text, from which the same tree is parsed.
 
     Examples
     --------
@@ -274,7 +273,7 @@ def _written(node: Node, least: int) -> str:
 
 
 def _level(node: Node) -> tuple[str, int]:
-    """Text of a node, and how tightly it binds."""
+    """Return the text of a node and its precedence."""
     match node:
         case Number(text):
             return text, 11
@@ -309,7 +308,7 @@ def _level(node: Node) -> tuple[str, int]:
 
 
 class _Parser:
-    """Precedence climbing: one method for all binary operators."""
+    """Parser by precedence climbing, with one method for all binary operators."""
 
     def __init__(self, text: str) -> None:
         self.tokens = list(_tokens(text))
@@ -353,7 +352,7 @@ class _Parser:
         )
 
     def expression(self, least: int) -> Node:
-        """What binds at least as tightly as a level."""
+        """Parse an expression with operators of at least a given precedence."""
         self.depth += 1
         if self.depth > DEPTH:
             raise _Refused(f"nested more than {DEPTH} levels deep; expected fewer")
@@ -367,7 +366,7 @@ class _Parser:
         return left
 
     def operation(self, left: Node, level: int) -> Node:
-        """All operators of one level in a row, as one node."""
+        """Parse consecutive operators of equal precedence as one node."""
         operators, operands = [], [left]
         while self.now[0] == "sign" and PRECEDENCE.get(self.now[1]) == level:
             operators.append(self.take())
@@ -382,7 +381,7 @@ class _Parser:
         return Product(tuple(zip(("*", *operators), values, strict=True)))
 
     def operand(self) -> Node:
-        """What stands between two binary operators, with its signs and exponent."""
+        """Parse an operand with its signs and exponent."""
         negative = signed = False
         while self.now in (("sign", "-"), ("sign", "+")):
             negative ^= self.take() == "-"
@@ -394,7 +393,7 @@ class _Parser:
             return Logic("not", (_condition(self.expression(level)),))
         base = self.atom()
         if self.accept("**"):
-            # to the right, and looser than the sign of the exponent
+            # right-associative, with lower precedence than the sign of the exponent
             base = Power(_value(base), _value(self.expression(SIGN)))
         if signed:
             base = _value(base)
@@ -441,7 +440,7 @@ class _Parser:
 
 
 def _called(name: str, arguments: list[Node]) -> Node:
-    """A function with as many arguments of the right kind as it takes."""
+    """Return a function call after checking the number and kind of its arguments."""
     if name in RELATIONS:
         _check_count(name, 2, 2, len(arguments))
         return Comparison((RELATIONS[name],), tuple(map(_value, arguments)))
@@ -464,7 +463,7 @@ def _check_count(name: str, least: int, most: int, count: int) -> None:
 
 
 def _value(node: Node) -> Node:
-    """A node that has a value."""
+    """Return a node if it is a value."""
     if isinstance(node, CONDITIONS):
         raise _Refused(f"{quoted(text_of(node))} is a condition; expected a value")
     if isinstance(node, Pair):
@@ -473,14 +472,14 @@ def _value(node: Node) -> Node:
 
 
 def _condition(node: Node) -> Node:
-    """A node that is true or false."""
+    """Return a node if it is a condition."""
     if not isinstance(node, CONDITIONS):
         raise _Refused(f"{quoted(text_of(node))} is a value; expected a condition such as (x > 0)")
     return node
 
 
 def _tokens(text: str) -> Iterator[tuple[str, str]]:
-    """Kinds and texts of tokens, with one of kind "end" behind the last."""
+    """Yield kind and text of each token, followed by one of kind "end"."""
     at = _SPACE.match(text).end()  # type: ignore[union-attr]
     while at < len(text):
         found = _TOKEN.match(text, at)

@@ -1,13 +1,13 @@
-"""How large a formula may be, with the reason for each limit."""
+"""Limits on the size of formulas, with the reason for each."""
 
 from __future__ import annotations
 
-#: Characters of a formula. Derived expressions that SymPy prints reach some ten thousand; a
-#: text of this length is read in a fraction of a second.
+#: Characters of a formula. Derived expressions printed by SymPy reach some ten thousand; a
+#: text of this length is parsed in a fraction of a second.
 LENGTH = 20_000
 
-#: Levels of nesting; a bracket, a function, and an operator that binds more tightly than the
-#: one before it open one each. Python's own stack, of 1000 calls, is safe in every use.
+#: Levels of nesting: brackets, functions and operators of higher precedence than the previous
+#: one. Python's recursion limit of 1000 is not reached.
 DEPTH = 64
 
 #: Characters of a number. Exact numbers of SymPy have some hundreds of digits.
@@ -16,15 +16,14 @@ DIGITS = 400
 #: Pieces of a Piecewise.
 PIECES = 32
 
-#: Arguments of Max and Min, which SymPy compares with one another, pair by pair.
+#: Arguments of Max and Min, which SymPy compares pairwise.
 ARGUMENTS = 12
 
-#: Size of an exponent without names, and the degree of powers of powers, where SymPy is to
-#: expand a formula.
+#: Size of a numerical exponent, and degree of nested powers, in formulas expanded by SymPy.
 EXPONENT = 64
 
-#: Size of a number that a special function is given, where SymPy would write its value out.
+#: Size of a numerical argument of a special function that SymPy would evaluate exactly.
 ARGUMENT = 64.0
 
-#: Total degree of a polynomial along the steps of a run, each of which is a polynomial itself.
+#: Total degree of a polynomial in columns along the steps of a run.
 DEGREE = 8

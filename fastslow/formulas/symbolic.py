@@ -1,4 +1,4 @@
-"""Formulas as SymPy expressions. SymPy sees only the tree, and nothing that it would write out."""
+"""Conversion of formulas to SymPy expressions, without unbounded evaluation."""
 
 from __future__ import annotations
 
@@ -45,7 +45,8 @@ _COMPARED: dict[str, Any] = {
 _JOINED: dict[str, Any] = {"and": sp.And, "or": sp.Or, "not": sp.Not}
 _CONSTANTS: dict[str, sp.Expr] = {"pi": sp.pi, "E": sp.E}
 
-#: Factors that are multiplied one by one, as Python does; more at once, for the time it takes.
+#: Number of factors up to which they are multiplied one by one, as in Python; longer products
+#: are built at once, to save time.
 ONE_BY_ONE = 50
 
 
@@ -58,12 +59,12 @@ def read(
     ----------
     text : str
     symbol : callable
-        Gives the symbol of a name.
+        Returns the symbol of a name.
     known : collection of str
-        Names that are not constants, should they be pi or E. One that is no identifier is
-        read where it stands alone.
+        Names of the model, which shadow the constants pi and E. One that is not an
+        identifier is recognised only as a whole formula.
     exact : bool
-        Whether decimal numbers become fractions.
+        Whether to convert decimal numbers to fractions.
 
     Returns
     -------
@@ -72,8 +73,8 @@ def read(
     Raises
     ------
     ArgumentError
-        For what is no formula; for powers that are too large, and numbers and constant parts
-        that are not finite and real.
+        For text that is not a formula, powers that are too large, and numbers or constant
+        subexpressions that are not finite and real.
 
     Examples
     --------
@@ -84,8 +85,8 @@ def read(
     >>> read("10**10**10", sp.Symbol)
     Traceback (most recent call last):
     ...
-    fastslow.errors.ArgumentError: '10**10**10' is no expression: the exponent 10**10 is larger \
-than 64 in size
+    fastslow.errors.ArgumentError: '10**10**10' is not an expression: the exponent 10**10 is \
+larger than 64 in size
     """
     if text in known:
         return symbol(text)
@@ -106,7 +107,7 @@ than 64 in size
 
 
 class _Bounds:
-    """A check of everything that SymPy would compute or expand."""
+    """Validation of everything that SymPy would evaluate or expand."""
 
     def __init__(self, text: str, known: Collection[str]) -> None:
         self.text, self.known = text, known
@@ -121,7 +122,7 @@ class _Bounds:
         return number
 
     def of(self, node: Node) -> tuple[float | None, int]:
-        """The value of a part without names, None for others, and its total degree."""
+        """Return the value of a subexpression, None if it contains names, and its total degree."""
         found = [self.of(part) for part in parts(node)]
         values = [value for value, _ in found]
         degrees = [degree for _, degree in found]
@@ -159,7 +160,7 @@ class _Bounds:
         pairs: Sequence[tuple[str, Node]],
         values: Sequence[float | None],
     ) -> float | None:
-        """The value of all terms or factors without names, which SymPy joins."""
+        """Return the value of all numerical terms or factors, which SymPy combines."""
         total = np.float64(first == "*")
         join = {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
         for (sign, _), value in zip(pairs, values, strict=True):
@@ -203,7 +204,7 @@ class _Bounds:
 
 
 def _made(node: Node, named: Callable[[str], sp.Expr], exact: bool) -> Any:
-    """The SymPy expression of a checked tree."""
+    """Return the SymPy expression of a validated tree."""
     match node:
         case Number(text):
             if text.isdecimal():

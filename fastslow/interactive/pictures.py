@@ -122,10 +122,10 @@ class Picture:
         for artist in (*figure.texts, *figure.artists):
             artist.remove()
         words = plain("  ".join(str(outcome) for outcome in view.outcomes))
-        notice = figure.text(0.01, 0.012, words, fontsize=SMALL, color=VERMILION, wrap=True)
+        said = figure.text(0.01, 0.012, words, fontsize=SMALL, color=VERMILION, wrap=True)
         shown = [ax for ax in self._axes if ax.axison]
         framing = [part for ax in shown for part in (ax.patch, ax.xaxis, ax.yaxis)]
-        still: list[Artist] = [*framing, *figure.legends, notice]
+        still: list[Artist] = [*framing, *figure.legends, said]
         for part in still:
             part.set_visible(not moving)
         if moving:

@@ -42,7 +42,7 @@ class DiagramDrawing(Drawing):
     markers : tuple of Line2D
         One for each code of special points.
     labels : tuple of Annotation
-        LP1, BE1, … at the points.
+        LP1, BE1, … beside the points.
     bands : Bands
         Interfaces and regions.
     legend : Legend or None
@@ -125,7 +125,7 @@ def diagram(
     width : str or float
         Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
-        Whether to write LP1, BE1, … at special points and the names of the regions.
+        Whether to write LP1, BE1, … beside special points and the names of the regions.
     legend : bool, optional
         Whether to draw a legend; by default as ``label``.
     virtual : bool

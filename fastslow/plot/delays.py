@@ -87,7 +87,7 @@ def delay_scaling(
     width : str or float
         Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
-        Whether to write the slope at its triangle.
+        Whether to write the slope beside its triangle.
     legend : bool, optional
         Whether to draw a legend, with the fitted exponent; by default as ``label``.
     **style

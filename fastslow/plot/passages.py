@@ -141,7 +141,7 @@ def overlay(
     width : str or float
         Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
-        Whether to write LP1, BE1, … at special points and the names of the regions.
+        Whether to write LP1, BE1, … beside special points and the names of the regions.
     legend : bool, optional
         Whether to draw a legend; by default as ``label``.
     crossings : bool

@@ -52,7 +52,7 @@ class PlaneDrawing(Drawing):
     markers : tuple of Line2D
         One for each code of codimension-two points.
     labels : tuple of Annotation
-        CP1, BT1, … at the points.
+        CP1, BT1, … beside the points.
     legend : Legend or None
     x, y, z : str
         Quantities on the axes; ``z`` is empty in the plane.
@@ -120,7 +120,7 @@ def parameter_plane(
     width : str or float
         Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
     label : bool
-        Whether to write CP1, BT1, … at codimension-two points.
+        Whether to write CP1, BT1, … beside codimension-two points.
     legend : bool, optional
         Whether to draw a legend; by default as ``label``.
     virtual : bool
@@ -242,7 +242,7 @@ def _special_points(
     names = curves[0].parameter_names
     spans = np.ptp(np.concatenate([c.parameter for c in curves]), axis=0) + 1e-300
     for code in POINT_TYPES:
-        selected: list[SpecialPoint] = []
+        met: list[SpecialPoint] = []
         seen: list[NDArray[np.float64]] = []
         for point in (p for curve in curves for p in curve.special(code)):
             at = np.array([point.parameters[n] for n in names])
@@ -251,11 +251,11 @@ def _special_points(
             if again or not (point.admissible or virtual):
                 continue
             seen.append(at)
-            selected.append(point)
-        if not selected:
+            met.append(point)
+        if not met:
             continue
-        places = np.column_stack(at_points(selected, *shown))
-        solved = np.array([point.converged for point in selected])
+        places = np.column_stack(at_points(met, *shown))
+        solved = np.array([point.converged for point in met])
         look = {"zorder": 5, **dot_look(code, 5.0), "label": POINT_TYPES[code].title}
         hollow = {
             "markerfacecolor": "white",

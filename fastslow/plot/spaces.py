@@ -52,7 +52,7 @@ class SpaceDrawing(Drawing):
         The trajectory.
     legend : Legend or None
     labels : tuple of Annotation
-        LP1, BE1, … at the points.
+        LP1, BE1, … beside the points.
     arrows : tuple of Annotation
         Direction of motion.
     along : str

@@ -1,4 +1,4 @@
-"""States modulo a period: the principal range, and differences between copies."""
+"""Periodic states: principal range, nearest copies and differences modulo a period."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ Array = NDArray[np.float64]
 
 
 def periods_of(states: Sequence[str], periods: Mapping[str, float]) -> Array:
-    """The period of every state, 0 where it has none, shape (n,)."""
+    """Return the period of every state, 0 without one, shape (n,)."""
     return np.array([float(periods.get(name, 0.0)) for name in states])
 
 
 def principal(values: ArrayLike, periods: ArrayLike) -> Array:
-    """Values in the principal range (−P/2, P/2] of their period; a period 0 changes nothing.
+    """Reduce values to the principal range (−P/2, P/2]; a period of 0 leaves them unchanged.
 
     Examples
     --------
@@ -29,7 +29,7 @@ def principal(values: ArrayLike, periods: ArrayLike) -> Array:
 
 
 def nearest_copy(values: ArrayLike, target: ArrayLike, periods: ArrayLike) -> Array:
-    """The copies of values, shifted by whole periods, that are nearest to a target.
+    """Shift values by whole periods to the copies nearest to a target.
 
     Examples
     --------
@@ -42,13 +42,13 @@ def nearest_copy(values: ArrayLike, target: ArrayLike, periods: ArrayLike) -> Ar
 
 
 def apart(one: ArrayLike, other: ArrayLike, periods: ArrayLike) -> Array:
-    """Difference of two states, modulo the periods."""
+    """Return the difference of two states modulo the periods."""
     difference = np.asarray(one, dtype=float) - np.asarray(other, dtype=float)
     return nearest_copy(difference, 0.0, periods) if np.any(periods) else difference
 
 
 def copies(value: float, low: float, high: float, period: float) -> list[float]:
-    """The copies of a value within a range, and one more on either side.
+    """Return the copies of a value within a range, and one more on either side.
 
     Examples
     --------

@@ -9,16 +9,16 @@ from types import MappingProxyType
 
 @dataclass(frozen=True, kw_only=True)
 class PointType:
-    """What is known about all points of one code.
+    """The properties common to all special points of one code.
 
     Parameters
     ----------
     code : str
         The code, such as ``"LP"``.
     name : str
-        The name of the field, such as ``"fold"``.
+        The usual name, such as ``"fold"``.
     summary : str
-        One sentence that defines it, for the documentation.
+        A one-sentence definition for the documentation.
     codimension : int
         0 for points that mark a row, 1 for points of a branch over one parameter, 2
         for points of a curve in a parameter plane.
@@ -26,22 +26,22 @@ class PointType:
         The eigenvalues that define it: ``"zero"``, ``"imaginary pair"``,
         ``"opposite pair"`` (two real eigenvalues with sum zero), or ``""``.
     unstable : int, optional
-        By how much the number of eigenvalues with positive real part changes at a
-        generic point of this code; None where it may change by any number.
+        The change of the number of eigenvalues with positive real part at a generic
+        point of this code; None for any number.
     two_rows : bool
-        Whether it takes two rows of a branch, one in each of two regions.
+        True for points with two rows of a branch, one in each of two regions.
     law : str
-        The law of delay in slow passage: ``"fold"``, ``"boundary"``,
-        ``"entry-exit"``, or ``""`` where there is none.
+        The delay law of slow passage: ``"fold"``, ``"boundary"``, ``"entry-exit"``,
+        or ``""`` for none.
     curves : tuple of str
-        Codes of the curves that can be continued from it in two parameters, the usual
-        one first.
+        Codes of the curves that can be continued from the point in two parameters, the
+        usual one first.
     auto : tuple of int
-        Numbers of the type in files of AUTO-07p.
+        Type numbers in files of AUTO-07p.
     marker : str
-        Marker of Matplotlib in figures.
+        Matplotlib marker in figures.
     colour : str
-        Name of a colour of the palette in `fastslow.plot.layout.style`.
+        Colour in the palette of `fastslow.plot.layout.style`.
     line : tuple, optional
         Matplotlib's line style and width of a curve of such points.
 
@@ -67,12 +67,12 @@ class PointType:
 
     @property
     def changes_stability(self) -> bool:
-        """Whether a branch may gain, lose or end its stability there."""
+        """True if the stability of a branch may change at such a point."""
         return self.unstable != 0
 
     @property
     def title(self) -> str:
-        """Code and name, as legends show them."""
+        """Code and name, for legends."""
         return f"{self.code} {self.name}"
 
 
@@ -98,7 +98,7 @@ _ALL = (
     PointType(
         code="LP",
         name="fold",
-        summary="Saddle-node or limit point: the branch turns in the parameter.",
+        summary="Saddle-node (limit point): the branch has an extremum of the parameter.",
         codimension=1,
         event="zero",
         unstable=1,
@@ -126,7 +126,7 @@ _ALL = (
     PointType(
         code="BP",
         name="branch point",
-        summary="Two branches cross, as at transcritical and pitchfork bifurcations.",
+        summary="Two branches intersect: transcritical and pitchfork bifurcations.",
         codimension=1,
         event="zero",
         unstable=1,
@@ -151,7 +151,7 @@ _ALL = (
     PointType(
         code="BE",
         name="boundary equilibrium",
-        summary="An equilibrium meets an interface.",
+        summary="An equilibrium reaches an interface.",
         codimension=1,
         unstable=None,
         two_rows=True,
@@ -164,7 +164,7 @@ _ALL = (
     PointType(
         code="TF",
         name="two-fold",
-        summary="A pseudo-equilibrium meets a point where both fields are tangent to the "
+        summary="A pseudo-equilibrium reaches a point where both fields are tangent to the "
         "interface; its branch ends there.",
         codimension=1,
         unstable=None,
@@ -176,7 +176,7 @@ _ALL = (
     PointType(
         code="CP",
         name="cusp",
-        summary="Two folds meet.",
+        summary="Two folds collide.",
         codimension=2,
         unstable=None,
         curves=("LP",),
@@ -226,7 +226,7 @@ _ALL = (
     PointType(
         code="BF",
         name="fold on an interface",
-        summary="A fold meets an interface.",
+        summary="A fold reaches an interface.",
         codimension=2,
         unstable=None,
         curves=("BE", "LP"),
@@ -236,7 +236,7 @@ _ALL = (
     PointType(
         code="BH",
         name="Hopf on an interface",
-        summary="A Hopf point meets an interface.",
+        summary="A Hopf point reaches an interface.",
         codimension=2,
         unstable=None,
         curves=("BE", "HB"),
@@ -246,7 +246,7 @@ _ALL = (
     PointType(
         code="BB",
         name="boundary equilibrium on two interfaces",
-        summary="A boundary equilibrium meets another interface.",
+        summary="A boundary equilibrium reaches a second interface.",
         codimension=2,
         unstable=None,
         curves=("BE",),
@@ -255,12 +255,12 @@ _ALL = (
     ),
 )
 
-#: The types by code, in the order of legends.
+#: All point types by code, in the order of legends.
 POINT_TYPES: Mapping[str, PointType] = MappingProxyType({one.code: one for one in _ALL})
 
 
 def point_name(code: str) -> str:
-    """Name of a code; the code itself where it is of a later version.
+    """Return the name of a code; an unknown code, from a later version, is returned itself.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Single points: an equilibrium, and a located special point of a branch."""
+"""Equilibria and special points."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from fastslow.results.point_types import POINT_TYPES, point_name
 if TYPE_CHECKING:
     from fastslow.results.branch.equilibrium_sets import EquilibriumSet
 
-#: An eigenvalue counts as zero when its real part is below this times the largest modulus.
+#: A real part below this fraction of the largest modulus counts as zero.
 NEUTRAL = 1e-10
 
 
 def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
-    """Stable, unstable or neutral, for eigenvalues of shape (..., n).
+    """Return the linear stability for eigenvalues of shape (..., n).
 
     Neutral means that no real part is positive and at least one vanishes to
-    rounding: linear theory does not decide. An infinite eigenvalue (across the
-    interface at a pseudo-equilibrium) counts by its sign.
+    rounding, so that the linearisation does not decide. An infinite eigenvalue
+    (transverse to the interface at a pseudo-equilibrium) counts by its sign.
 
     Examples
     --------
@@ -48,11 +48,11 @@ def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
 
 
 def type_of(eigenvalues: ArrayLike) -> str:
-    """Node, focus, saddle, saddle-focus, or non-hyperbolic, of one equilibrium.
+    """Return the type of an equilibrium: node, focus, saddle, saddle-focus or non-hyperbolic.
 
-    For n > 2 the name node or focus follows the leading eigenvalue, the one
-    nearest the imaginary axis. With an infinite eigenvalue, which counts by its
-    sign, they are pseudo-nodes and so on (Kuznetsov, Rinaldi and Gragnani 2003).
+    For n > 2 the leading eigenvalue, the one nearest to the imaginary axis, decides
+    between node and focus. With an infinite eigenvalue, which counts by its sign, the
+    type is pseudo-node and so on (Kuznetsov, Rinaldi and Gragnani 2003).
 
     Examples
     --------
@@ -67,15 +67,15 @@ def type_of(eigenvalues: ArrayLike) -> str:
     if np.isnan(scale) or np.any(np.abs(values.real) <= NEUTRAL * scale):
         return "non-hyperbolic"
     pseudo = "pseudo-" if infinite.any() else ""
-    turning = np.abs(values.imag) > 1e-8 * scale
+    complex_pairs = np.abs(values.imag) > 1e-8 * scale
     if np.any(values.real > 0) and np.any(values.real < 0):
-        return f"{pseudo}saddle-focus" if turning.any() else f"{pseudo}saddle"
+        return f"{pseudo}saddle-focus" if complex_pairs.any() else f"{pseudo}saddle"
     leading = int(np.argmin(np.abs(values.real)))
-    return f"{pseudo}focus" if turning[leading] else f"{pseudo}node"
+    return f"{pseudo}focus" if complex_pairs[leading] else f"{pseudo}node"
 
 
 class _Point(Result):
-    """What every point has: names for its numbers."""
+    """Base class of points, with access to states and parameters by name."""
 
     states: tuple[str, ...]
     state: NDArray[np.float64]
@@ -104,24 +104,24 @@ class Equilibrium(_Point):
     state : ndarray, shape (n,)
         The equilibrium.
     parameters : mapping
-        Every parameter value at which it was found.
+        All parameter values.
     region : str
-        The region whose rates vanish here; ``"S1|S2"`` where the sliding field
-        between two does (a pseudo-equilibrium), ``"S1|S2 (escaping)"`` where both
+        The region whose vector field vanishes; ``"S1|S2"`` for the sliding field
+        between two (a pseudo-equilibrium), ``"S1|S2 (escaping)"`` if both vector
         fields point away from the interface.
     admissible : bool
-        Whether the point lies in the closure of that region; otherwise it is virtual.
+        True for a point in the closure of that region, False for a virtual one.
     eigenvalues : ndarray of complex, shape (n,)
-        Of the region's Jacobian. Of a pseudo-equilibrium those of the sliding field
-        along the interface, and last −∞ (+∞ where the fields point away).
+        Of the Jacobian in the region. For a pseudo-equilibrium those of the sliding
+        field along the interface, followed by −∞ (+∞ in an escaping region).
     residual : float
-        Largest rate left over at the point.
+        Largest modulus of the rates at the point.
     continuum : bool
-        Whether it is one of a continuum (its equilibrium is not isolated).
+        True for a point of a continuum of equilibria, which is not isolated.
     interpolated : bool
-        Whether it was read between stored points instead of solved for.
+        True for a point interpolated between rows instead of solved for.
     known_stability : str, optional
-        Its stability where the eigenvalues are not known, as in files of AUTO-07p.
+        The stability where the eigenvalues are unknown, as in files of AUTO-07p.
     """
 
     states: tuple[str, ...]
@@ -146,7 +146,7 @@ class Equilibrium(_Point):
 
     @property
     def pseudo(self) -> bool:
-        """Whether it is a pseudo-equilibrium, of a sliding field."""
+        """True for a pseudo-equilibrium, an equilibrium of a sliding field."""
         return bool(np.isinf(self.eigenvalues.real).any())
 
     @property
@@ -160,37 +160,36 @@ class Equilibrium(_Point):
         kind = {"non-hyperbolic": "non-hyperbolic", "unknown": self.stability}.get(
             self.type, f"{self.stability} {self.type}"
         )
-        seat = "in" if self.admissible else "virtual, of"
+        location = "in" if self.admissible else "virtual, of"
         more = ", one of a continuum" if self.continuum else ""
         more += ", interpolated" if self.interpolated else ""
-        return f"Equilibrium({self._values()}; {seat} {self.region}; {kind}{more})"
+        return f"Equilibrium({self._values()}; {location} {self.region}; {kind}{more})"
 
 
-#: Solves for the equilibrium of a region near a state: (region, state, value) -> Equilibrium.
 class Corrector(Protocol):
-    """Solves for equilibria of a diagram's model near states, at values of its parameter."""
+    """Solves for equilibria near given states, at values of the parameter of a diagram."""
 
     def __call__(
         self, region: str, state: NDArray[np.float64], value: float, /
     ) -> Equilibrium | None:
-        """The equilibrium near a state, None without convergence."""
+        """Return the equilibrium of a region near a state, None without convergence."""
 
     def many(
         self, region: str, states: NDArray[np.float64], values: NDArray[np.float64], /
     ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-        """Equilibria (N, n) near states and their eigenvalues (N, n), NaN without convergence."""
+        """Return equilibria and their eigenvalues, each (N, n), NaN without convergence."""
 
 
 class Equilibria(ImmutableSequence, tuple[Equilibrium, ...]):
-    """The equilibria at one value, as a tuple that says how sure it is.
+    """The equilibria at given parameter values, as a tuple.
 
     Attributes
     ----------
     completeness : str
-        ``"complete"`` when the tuple is proved to hold all of them, else ``"found"``.
+        ``"complete"`` if it is proved that these are all equilibria, else ``"found"``.
     sets : tuple of EquilibriumSet
-        Sets of equilibria within discontinuities (a block that sticks by dry friction);
-        their corners are in the tuple, with ``continuum=True``.
+        Sets of equilibria on discontinuities (a block held by dry friction); their
+        corners are items of the tuple, with ``continuum=True``.
     """
 
     completeness: str
@@ -215,8 +214,8 @@ class Equilibria(ImmutableSequence, tuple[Equilibrium, ...]):
 class ClarkePath(Immutable):
     """The convex path q J₁ + (1 − q) J₂ between the Jacobians at a boundary equilibrium.
 
-    Leine and Nijmeijer (2004): the eigenvalues of this path say what a
-    continuous piecewise-smooth system does at the interface.
+    The eigenvalues along this path determine the bifurcation of a continuous
+    piecewise-smooth system at the interface (Leine and Nijmeijer 2004).
 
     Parameters
     ----------
@@ -242,7 +241,7 @@ class ClarkePath(Immutable):
 
     @property
     def q_zero(self) -> float | None:
-        """Where the determinant of the path crosses zero inside (0, 1), if it does."""
+        """The q in (0, 1) at which the determinant changes sign, None if there is none."""
         first, second = self.determinants
         if first * second >= 0:
             return None
@@ -250,7 +249,7 @@ class ClarkePath(Immutable):
 
     @property
     def q_hopf(self) -> float | None:
-        """Planar systems: where the trace vanishes in (0, 1) with positive determinant."""
+        """The q in (0, 1) with zero trace and positive determinant, for planar systems."""
         if self.jacobians.shape[-1] != 2:
             return None
         first, second = np.trace(self.jacobians, axis1=1, axis2=2)
@@ -264,13 +263,13 @@ class ClarkePath(Immutable):
         return weight * self.jacobians[0] + (1.0 - weight) * self.jacobians[1]
 
     def path(self, q: ArrayLike) -> NDArray[np.complex128]:
-        """Eigenvalues along the path, shape (..., n) for q of shape (...)."""
+        """Return the eigenvalues along the path, shape (..., n) for q of shape (...)."""
         return np.linalg.eigvals(self._matrix(q)).astype(complex)
 
 
 @dataclass(frozen=True, eq=False)
 class SpecialPoint(_Point):
-    """A located point of a branch: what it is and how well it is known.
+    """A located special point of a branch: its type, its properties and its accuracy.
 
     Parameters
     ----------
@@ -278,56 +277,55 @@ class SpecialPoint(_Point):
         LP, HB, BP, NSD, BE, TF, UZ or EP; on a curve of such points CP, BT, GH, ZH,
         HH, BF or BH (see ``fastslow.results.point_types``).
     label : str
-        The code with its number along the diagram, such as ``"BE2"``.
+        The code with a number that is unique in the diagram, such as ``"BE2"``.
     states, state, parameters
         As for an equilibrium.
     regions : tuple of str
-        The region it lies in; for a boundary equilibrium the two it joins.
+        The region of the point; for a boundary equilibrium the two adjacent regions.
     eigenvalues : ndarray of complex, shape (n,)
         Of the Jacobian in ``regions[0]``.
     tangent : ndarray, shape (n + 1,)
         Unit tangent of the branch, (states, parameter), in the direction of tracing;
         on a curve of points (states, two parameters), shape (n + 2,).
     residual : float
-        Largest component of the defining equations that is left.
+        Largest residual of the defining equations.
     converged : bool
         Whether the defining equations were solved to rounding.
     interface : str, optional
-        The interface a boundary equilibrium lies on.
+        The interface of a boundary equilibrium.
     subtype : str, optional
-        Of a boundary equilibrium ``"persistence"``, ``"non-smooth fold"`` or
-        ``"degenerate"``; of ZH and HH the case that the normal form decides; of an end
-        point the code of the branch's outcome, where that is no success.
+        For a boundary equilibrium ``"persistence"``, ``"non-smooth fold"`` or
+        ``"degenerate"``; for ZH and HH the case of the normal form; for an end point
+        the code of an unsuccessful outcome of the branch.
     clarke : ClarkePath, optional
-        For boundary equilibria of a continuous field.
+        For boundary equilibria of a continuous vector field.
     coefficient : float, optional
-        Normal-form coefficient: of a fold a in y' = β + a y² (Kuznetsov 2004, eq.
-        5.26), of a cusp c in y' = β₁ + β₂ y + c y³ (eq. 8.131), both for a null
+        Normal-form coefficient: for a fold a in y' = β + a y² (Kuznetsov 2004, eq.
+        5.26), for a cusp c in y' = β₁ + β₂ y + c y³ (eq. 8.131), both with a null
         vector of length one.
     frequency : float, optional
-        Angular frequency at a Hopf point; at a double Hopf point of the pair that
-        the curve does not follow.
+        Angular frequency at a Hopf point; at a double Hopf point that of the second
+        pair, which does not define the curve.
     lyapunov : float, optional
         First Lyapunov coefficient l₁ of a Hopf point (Kuznetsov 2004, eq. 5.34),
-        for an eigenvector of length one.
+        with an eigenvector of length one.
     normal_form : mapping
         Coefficients on the center manifold of a codimension-two point, for eigenvectors
         of length one (Kuznetsov 2004, sections 8.3 to 8.7): a and b of BT, l2 of GH, s,
-        theta and E of ZH, p11, p12, p21, p22, theta and delta of HH; without those that
-        ``degeneracy`` says are undefined.
+        theta and E of ZH, p11, p12, p21, p22, theta and delta of HH; undefined ones are
+        omitted and listed in ``degeneracy``.
     degeneracy : str
-        Which coefficients of the normal form are undefined, and why.
+        The undefined coefficients of the normal form, with the reason.
     switch : ndarray, shape (n + 1,), optional
-        At a branch point the unit tangent of the other branch.
+        At a branch point, the unit tangent of the other branch.
     accuracy : float, optional
-        Newton's last correction in units of the branch's scales: how well the
-        point is known.
+        Last Newton correction in units of the branch's scales, an estimate of the error.
     admissible : bool
-        Whether it lies in its region; otherwise it is virtual.
+        False for a virtual point, outside its region.
     note : str
-        What else a reader should know, e.g. why an end point is one.
+        Further information, e.g. the reason for an end point.
     source : object, optional
-        The frozen model and units of its states, for `continue_points`; not kept in a file.
+        The frozen model and units of its states, for `continue_points`; not saved to files.
     """
 
     code: str
@@ -356,7 +354,7 @@ class SpecialPoint(_Point):
 
     @property
     def criticality(self) -> str | None:
-        """Of a Hopf point: ``"supercritical"`` (l₁ < 0), ``"subcritical"`` or ``"degenerate"``."""
+        """``"supercritical"`` (l₁ < 0), ``"subcritical"`` or ``"degenerate"``; for Hopf points."""
         if self.code != "HB" or self.lyapunov is None:
             return None
         if self.lyapunov == 0:
@@ -365,7 +363,7 @@ class SpecialPoint(_Point):
 
     @property
     def kind(self) -> str:
-        """What it is, in words."""
+        """The type of the point as text."""
         kind = point_name(self.code)
         if self.subtype or self.criticality:
             kind += f", {self.subtype or self.criticality}"
@@ -377,7 +375,7 @@ class SpecialPoint(_Point):
 
     @property
     def description(self) -> str:
-        """What it is and where, in words."""
+        """The type and the coordinates of the point as text."""
         on = f" on {self.interface}" if self.interface else ""
         degenerate = f"; degenerate: {self.degeneracy}" if self.degeneracy else ""
         return f"{self.kind}{on}; {self._values()}{degenerate}"
@@ -387,9 +385,10 @@ class SpecialPoint(_Point):
 
 
 class SpecialPoints(Table, Saved, ImmutableSequence, tuple[SpecialPoint, ...]):
-    """Special points in order along a branch or diagram; called with a code, those of that code.
+    """Special points in order along a branch or diagram.
 
-    ``points["w"]`` is the column of a state or parameter, ``points[0]`` a point.
+    ``points("LP")`` selects one code, ``points["w"]`` is the column of a state or
+    parameter, and ``points[0]`` a point.
 
     Examples
     --------
@@ -400,14 +399,20 @@ class SpecialPoints(Table, Saved, ImmutableSequence, tuple[SpecialPoint, ...]):
     _row = "point"
 
     def __call__(self, code: str | None = None) -> SpecialPoints:
-        """Those of one code, without one all; UnknownNameError for a code that there is not."""
+        """Select the points of one code, by default all.
+
+        Raises
+        ------
+        UnknownNameError
+            For an unknown code.
+        """
         if code is None:
             return self
         word("special point code", POINT_TYPES)("code", code)
         return SpecialPoints(point for point in self if point.code == code)
 
     def __getitem__(self, key: Any) -> Any:
-        """A point by number, some by a slice, or a column by the name of a state or parameter."""
+        """Return a point by index, several by a slice, or the column of a state or parameter."""
         if isinstance(key, slice):
             return SpecialPoints(tuple.__getitem__(self, key))
         if isinstance(key, int | np.integer) and not isinstance(key, bool):
@@ -415,7 +420,7 @@ class SpecialPoints(Table, Saved, ImmutableSequence, tuple[SpecialPoint, ...]):
         return np.array([point[key] for point in self], dtype=float)
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Label, code, subtype, interface, regions, states, parameters, and how well known."""
+        """Return label, code, subtype, interface, regions, states, parameters and accuracy."""
         return columns_of_points(self)
 
     def _repr_html_(self) -> str:

@@ -1,1 +1,1 @@
-"""Many points of a parameter plane, of which only those are computed that matter."""
+"""Adaptive maps of outcomes over a plane of two parameters."""

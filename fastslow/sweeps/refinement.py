@@ -1,4 +1,4 @@
-"""Maps over two parameters, divided only where the outcome changes."""
+"""Adaptive maps of the outcome in two parameters, refined at its boundaries."""
 
 from __future__ import annotations
 
@@ -41,33 +41,33 @@ def refined_map(
     resolution: float | None = None,
     progress: bool = False,
 ) -> RefinedMap:
-    """Find where in a plane of two parameters which outcome occurs.
+    """Compute an adaptive map of an outcome over a plane of two parameters.
 
-    The plane is divided into equal cells. A cell at whose corners outcomes
-    differ is halved both ways, and so are its neighbours, level by level; all
-    new corners of a level are evaluated in one call, and none twice. The work
-    grows with the length of the boundaries, not with the area. What is smaller
-    than a cell of the first level, and lies inside one, is not seen.
+    The plane is divided into equal cells. A cell whose corners differ in outcome
+    is halved along both axes, and so are its neighbours, level by level; all new
+    corners of a level are evaluated in one call, each once. The cost grows with
+    the length of the boundaries, not with the area. A feature inside a single
+    cell of the first level is not detected.
 
     Parameters
     ----------
     function : callable
-        Two arrays of shape (m,), the parameters, to m labels: strings, bools or
-        counts. None, NaN, an exception or an `Outcome` without success, in the
-        place of a label, is a failure of that point. Where the function raises,
-        its points are tried one by one, and those that raise are failures.
+        Maps two arrays of shape (m,), the parameters, to m labels: strings, bools or
+        counts. None, NaN, an exception or an unsuccessful `Outcome` in place of a
+        label marks that point as failed. If the function raises, its points are
+        evaluated in smaller groups, and those that raise alone are marked as failed.
     over : mapping
-        Names of the two parameters, each with its range (low, high).
+        The two parameters by name, each with its range (low, high).
     cells : (int, int)
-        Cells of the first level along each axis.
+        Number of cells of the first level along each axis.
     levels : int
-        How often a cell may be halved.
+        Largest number of times a cell is halved.
     guard : int
-        How many rings of neighbours are halved with a cell; 0 halves only cells
-        that differ, and may lose the thin tip of a tongue.
+        Number of rings of neighbours that are halved with a cell; with 0 only cells
+        whose corners differ are halved, and the thin tip of a tongue may be missed.
     resolution : float, optional
-        Narrow each point of a boundary by bisection along its cell's side to this
-        part of the axis.
+        Locate each point of a boundary by bisection along the side of its cell to
+        this fraction of the axis.
     progress : bool
         Whether to show a progress bar.
 
@@ -78,11 +78,11 @@ def refined_map(
     Raises
     ------
     ArgumentError
-        For ranges that are empty, not two, or not finite, for a wrong number of
-        cells or levels, or labels of another kind or number.
+        If the ranges are empty or not finite, or not two; for an invalid number of
+        cells or levels; for labels of an unsupported type or wrong number.
     Exception
-        Whatever the function raises at every point of the first level, or the handler of a
-        signal at any time.
+        Any exception that the function raises at every point of the first level, or a
+        signal handler at any time.
 
     Examples
     --------
@@ -103,7 +103,9 @@ def refined_map(
     size = 2**levels
     shape = (first[0] * size, first[1] * size)
     if math.prod(shape) > 2**60:
-        raise ArgumentError(f"levels = {levels}; expected fewer, the finest cells are countless")
+        raise ArgumentError(
+            f"levels = {levels}; expected fewer: too many cells at the finest level"
+        )
     with _bar(progress) as bar:
         points = _Points(function, ranges, shape, bar.update)
         tiling = _Tiling(points, shape, size, guard)
@@ -139,7 +141,7 @@ def _ranges(
 
 def _count(what: str, given: Any, least: int) -> tuple[int, int]:
     if not isinstance(given, Sequence | np.ndarray) or len(given) != 2:
-        raise refusal(what, given, "two whole numbers")
+        raise refusal(what, given, "two integers")
     one, other = given
     check = whole(least, 2**30)
     return check(what, one), check(what, other)
@@ -152,7 +154,7 @@ def _bar(shown: bool) -> Any:
 
 
 def _coded(found: Sequence[Label]) -> tuple[tuple[Label, ...], NDArray[np.int64]]:
-    """The labels in order, failures last, and which of them each point has."""
+    """Return the labels in order, failures last, and the index of each point's label."""
     kinds = {type(label) for label in found}
     if {bool, int} <= kinds:
         raise ArgumentError("some labels are bools, some counts; expected one or the other")
@@ -179,18 +181,18 @@ class _Points:
         self.failures: list[tuple[tuple[float, float], str]] = []
         self.count = 0
 
-    def learn(self, wanted: Iterable[Position]) -> list[Position]:
-        """Evaluate the points that are not known yet, and return them."""
+    def evaluate_new(self, wanted: Iterable[Position]) -> list[Position]:
+        """Evaluate the points that have no label yet, and return them."""
         new = sorted({p for p in wanted if p not in self.known})
         self.known.update(zip(new, self.evaluate(np.array(new, dtype=float)), strict=True))
         return new
 
     def evaluate(self, positions: Floats) -> list[Label]:
-        """Labels at positions of shape (m, 2), in finest cells."""
+        """Return the labels at positions of shape (m, 2), in units of the finest cells."""
         if not len(positions):
             return []
-        part = positions / self.shape
-        points = self.low * (1.0 - part) + self.high * part
+        fraction = positions / self.shape
+        points = self.low * (1.0 - fraction) + self.high * fraction
         raised: list[Exception] = []
         values = self._values(points, raised)
         if not self.count and len(raised) == len(points):
@@ -205,13 +207,13 @@ class _Points:
         return labels
 
     def _values(self, points: Floats, raised: list[Exception]) -> list[Any]:
-        """What the function returns, or raises, at each point."""
+        """Return the label, or the exception, at each point."""
         try:
             values = self.function(points[:, 0].copy(), points[:, 1].copy())
         except Exception as error:
             if raised_by_handler(error):
                 raise
-            # one of them, whichever it is, loses none of the others
+            # bisect, so that a point that raises does not affect the others
             if len(points) > 1:
                 half = len(points) // 2
                 return self._values(points[:half], raised) + self._values(points[half:], raised)
@@ -228,13 +230,13 @@ class _Points:
 
 
 class _Tiling:
-    """The cells, divided until each that differs is one of the finest."""
+    """The cells, halved until every cell with different corners is one of the finest."""
 
     def __init__(self, points: _Points, shape: Position, size: int, guard: int) -> None:
         self.points, self.shape, self.size = points, shape, size
         coarse = [(i, j) for i in range(0, shape[0], size) for j in range(0, shape[1], size)]
         self.leaves: dict[Position, int] = dict.fromkeys(coarse, size)
-        points.learn((i + a, j + b) for i, j in coarse for a in (0, size) for b in (0, size))
+        points.evaluate_new((i + a, j + b) for i, j in coarse for a in (0, size) for b in (0, size))
         waiting = {(*at, size) for at in coarse if self._differs((*at, size))}
         while waiting := {c for c in waiting if c[2] > 1 and self.leaves.get(c[:2]) == c[2]}:
             divided = set(waiting)
@@ -243,12 +245,12 @@ class _Tiling:
             waiting = self._divide(divided)
 
     def _divide(self, cells: set[Cell]) -> set[Cell]:
-        """Halve cells both ways; return the cells that are seen to differ by it."""
+        """Halve cells along both axes; return cells now known to have different labels."""
         wanted = []
         for i, j, size in cells:
             half = size // 2
             wanted += [(i + a, j + b) for a in (0, half, size) for b in (0, half, size)]
-        new = self.points.learn(wanted)
+        new = self.points.evaluate_new(wanted)
         differing = set()
         for i, j, size in cells:
             half = size // 2
@@ -257,15 +259,15 @@ class _Tiling:
                 if self._differs((*child, half)):
                     differing.add((*child, half))
         for i, j in new:
-            # a new point may lie on the side of a larger cell beside those divided
-            for cell in {self._holding(i - a, j - b) for a in (0, 1) for b in (0, 1)} - {None}:
+            # a new point may lie on the side of a larger neighbour
+            for cell in {self._cell_at(i - a, j - b) for a in (0, 1) for b in (0, 1)} - {None}:
                 assert cell is not None
                 if self.points.known[i, j] != self.points.known[cell[:2]]:
                     differing.add(cell)
         return differing
 
     def _differs(self, cell: Cell) -> bool:
-        """Whether the points known on the rim of a cell have more than one label."""
+        """Return True if the evaluated points on the sides of a cell differ in label."""
         i, j, size = cell
         around = [(i, j), (i + size, j), (i + size, j + size), (i, j + size)]
         known = self.points.known
@@ -277,15 +279,15 @@ class _Tiling:
         )
 
     def _between(self, one: Position, other: Position) -> Iterator[Position]:
-        """Points known on a side, found by halving."""
+        """Yield the evaluated points on a side, found by bisection."""
         middle = ((one[0] + other[0]) // 2, (one[1] + other[1]) // 2)
         if middle not in (one, other) and middle in self.points.known:
             yield middle
             yield from self._between(one, middle)
             yield from self._between(middle, other)
 
-    def _holding(self, i: int, j: int) -> Cell | None:
-        """The cell that holds a finest cell, None outside the plane."""
+    def _cell_at(self, i: int, j: int) -> Cell | None:
+        """Return the cell that contains a finest cell, None outside the plane."""
         if 0 <= i < self.shape[0] and 0 <= j < self.shape[1]:
             size = self.size
             while size:
@@ -296,14 +298,14 @@ class _Tiling:
         return None
 
     def _neighbours(self, cell: Cell, rings: int) -> set[Cell]:
-        """Cells around one that are not smaller than it, as far as so many rings."""
+        """Return a cell and its neighbours that are not smaller, within so many rings."""
         found, rim = {cell}, {cell}
         for _ in range(rings):
             beside = set()
             for i, j, size in rim:
                 for a in (i - 1, i, i + size):
                     for b in (j - 1, j, j + size):
-                        other = self._holding(a, b)
+                        other = self._cell_at(a, b)
                         if other is not None and other[2] >= cell[2]:
                             beside.add(other)
             rim = beside - found
@@ -314,7 +316,7 @@ class _Tiling:
 def _narrowed(
     points: _Points, leaves: Mapping[Position, int], resolution: float | None
 ) -> tuple[NDArray[np.int64], Floats]:
-    """Sides of finest cells whose ends differ, and where along them the label changes."""
+    """Return the sides of finest cells whose ends differ, and brackets of the change."""
     known = points.known
     places = set()
     for (i, j), size in leaves.items():

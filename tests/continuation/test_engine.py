@@ -158,7 +158,7 @@ def test_transcritical_branch_point():
     [
         ({"step": 0}, "step = 0; expected a positive"),
         ({"largest_turn": -1}, "largest_turn = -1; expected a positive"),
-        ({"starts": -1}, "starts = -1; expected a whole number from 0"),
+        ({"starts": -1}, "starts = -1; expected an integer from 0"),
         ({"step": 1.0}, "smallest_step ≤ step ≤ largest_step"),
     ],
 )

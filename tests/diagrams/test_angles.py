@@ -1,4 +1,4 @@
-"""States modulo a period: the pendulum in closed form, and results with periods."""
+"""States modulo a period: the pendulum in closed form, and what knows of the period."""
 
 import matplotlib as mpl
 import numpy as np
@@ -63,7 +63,7 @@ def test_periods_as_they_are_written(period):
         (sp.sin(theta), sp.oo, "period of theta: expected a positive number"),
     ],
 )
-def test_models_that_are_not_periodic(rate, period, words):
+def test_what_does_not_repeat(rate, period, words):
     with pytest.raises(fs.ModelError, match=words):
         fs.Model({theta: rate}, periodic={theta: period})
 
@@ -73,7 +73,7 @@ def test_an_interface_that_does_not_repeat():
         fs.Model({theta: sp.sin(theta)}, interfaces={"edge": theta - 1}, periodic=TURN)
 
 
-def test_a_name_that_is_not_a_state():
+def test_a_name_that_is_no_state():
     with pytest.raises(fs.UnknownNameError, match="unknown state in periodic 'thet'"):
         fs.Model({theta: sp.sin(theta)}, periodic={"thet": 2 * sp.pi})
 
@@ -307,7 +307,7 @@ def test_a_rotation_repeats(rotating):
     assert steady.period == pytest.approx(times[-1] - times[-2], rel=1e-6)
 
 
-def test_the_nearest_state_modulo_the_period(rotating):
+def test_the_nearest_moment_modulo_the_period(rotating):
     found = rotating.nearest(theta=1000.3, omega=3.0)
     away = (found["theta"] - 1000.3 + np.pi) % (2 * np.pi) - np.pi
     assert abs(away) < 1.0

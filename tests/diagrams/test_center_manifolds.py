@@ -179,7 +179,7 @@ def test_a_resonance_leaves_no_second_lyapunov_coefficient_and_says_so():
 
 
 @pytest.mark.parametrize("ratio", [2, 3])
-def test_a_resonant_double_hopf_point_is_reported(ratio):
+def test_a_double_hopf_point_in_resonance_says_so(ratio):
     field = _field([*_pair(u[0], u[1], ratio, -1), *_pair(u[2], u[3], 1, -1)])
     names = ("p11", "p12", "p21", "p22", "theta", "delta")
     found = _form(names, double_hopf, field, 0, origin(field), (float(ratio), 1.0))
@@ -200,7 +200,7 @@ def test_a_linear_oscillator_leaves_theta_and_delta_undefined(unit):
     assert found["degeneracy"] == "theta and delta undefined because p11 or p22 vanishes"
 
 
-def test_undefined_coefficients_of_a_hopf_pitchfork_point():
+def test_a_hopf_pitchfork_point_says_what_is_undefined():
     """z = 0 is invariant: the quadratic terms of the zero-Hopf form vanish by symmetry."""
     x, y, z = sp.symbols("x y z")
     square = x**2 + y**2

@@ -116,7 +116,7 @@ def test_a_tiny_loop_is_found_because_its_critical_values_are_known():
     )
 
 
-def test_completeness_is_claimed_only_if_proved(reactor):
+def test_coverage_is_claimed_only_where_it_is_proved(reactor):
     assert fs.continue_equilibria(reactor, p1, (0, 0.2)).completeness == "found"
     cut = fs.continue_equilibria(
         fs.Model({x: p - x}, parameters={p: 0}), p, (0, 1), continuation=fs.Continuation(points=10)
@@ -151,7 +151,7 @@ def test_persistence_and_planar_clarke_hopf():
 
 
 @pytest.mark.parametrize(("sign", "kind"), [(1, "persistence"), (-1, "non-smooth fold")])
-def test_filippov_branches_continue_as_pseudo_equilibria(sign, kind):
+def test_filippov_branches_go_on_as_pseudo_equilibria(sign, kind):
     """x' = p − x ∓ sgn x: at p = ±1 the equilibrium meets the sliding segment."""
     model = fs.Model({x: p - x - sign * sp.sign(x)}, parameters={p: 0})
     assert not model.continuous["x"]

@@ -1,4 +1,4 @@
-"""Properties of all curves of special points: defining equations, uniqueness, lookup."""
+"""What holds for every curve of special points: its equations, traced once, values read off it."""
 
 import numpy as np
 import pytest
@@ -180,7 +180,7 @@ def test_every_curve_is_there_once(traced):
                 assert "differ in" in str(error)  # noqa: PT017
 
 
-def test_two_traces_of_one_curve_do_not_intersect(traced):
+def test_two_traces_of_one_curve_do_not_meet(traced):
     _, diagram, curves, plane = traced
     seen = set()
     for point in diagram.special():
@@ -195,7 +195,7 @@ def test_two_traces_of_one_curve_do_not_intersect(traced):
     assert seen
 
 
-def test_coinciding_projections_of_curves_are_distinguished():
+def test_curves_over_each_other_are_not_called_one():
     """Both edges of the gap are reached at p = 0 for every q, at x = D and x = −D."""
     model, over, plane = gear()
     corners = fs.continue_equilibria(model, "p", over["p"]).boundary_equilibria
@@ -203,7 +203,7 @@ def test_coinciding_projections_of_curves_are_distinguished():
         fs.continue_points(next(c for c in corners if c["x"] * sign > 0), ("p", "q"), over=plane)
         for sign in (1, -1)
     )
-    with pytest.raises(fs.ArgumentError, match="plane of p and q: they differ in x alone"):
+    with pytest.raises(fs.ArgumentError, match="plane of p and q: they differ only in x"):
         upper.intersections(lower)
     assert upper.intersections(lower, "x", "q").shape == (0, 2)
 

@@ -146,7 +146,7 @@ def listed(curve):
         ((1e-3, 1e5, 1e-6, 1e2), 1e-3),
     ],
 )
-def test_results_do_not_depend_on_units_of_time_and_states(circulation, factors, rate):
+def test_units_of_time_and_states_do_not_matter(circulation, factors, rate):
     model, points, curves = circulation
     other = model.with_parameters(
         tau=rate, **{str(s): f for s, f in zip(sizes, factors, strict=True)}
@@ -175,7 +175,7 @@ def test_points_have_the_eigenvalues_that_define_them(circulation):
 
 
 @pytest.mark.parametrize("fast", [1.0, 1e3, 1e6])
-def test_fast_passive_states_do_not_mask_points(fast):
+def test_fast_passive_states_hide_no_point(fast):
     """A double Hopf point at p = q = 0, beside two states that follow at any rate."""
     z, v, s1, s2, k = sp.symbols("z v s1 s2 k")
     a, b = x**2 + y**2, z**2 + v**2

@@ -42,7 +42,7 @@ def test_every_curve_of_a_diagram_is_traced_once(reactor, curves):
     assert repr(again) == repr(curves)
 
 
-def test_points_without_a_curve_are_reported():
+def test_points_without_a_curve_are_said():
     model = fs.Model({x: p + q * x - x**3}, parameters={p: 0, q: 1})
     diagram = fs.continue_equilibria(model, "q", (-1, 1))
     found = fs.continue_points(diagram, ("q", "p"), over={"q": (-1, 1), "p": (-1, 1)})
@@ -82,7 +82,7 @@ def test_values_of_a_curve(curves):
         folds.at()
 
 
-def test_two_solutions_within_one_step():
+def test_a_value_passed_twice_within_one_step():
     """The folds x = 0, p = q² are lowest between two rows."""
     model = fs.Model({x: p - q**2 + x**2}, parameters={p: -0.1, q: 0.3})
     fold = fs.continue_equilibria(model, "p", (-1, 1)).folds[0]
@@ -92,7 +92,7 @@ def test_two_solutions_within_one_step():
         assert np.sort(found["q"]) == pytest.approx([-np.sqrt(value), np.sqrt(value)], rel=1e-7)
 
 
-def test_marks_are_exact(curves):
+def test_marks_are_met_exactly(curves):
     marks = curves[0].special("UZ")
     assert marks["p2"].tolist() == [16, 16]
     with pytest.raises(fs.ArgumentError, match="mark p2 = 30 is outside the range"):

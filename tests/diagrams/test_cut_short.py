@@ -1,4 +1,4 @@
-"""Reports of incomplete results and of unexplained changes of stability."""
+"""What was cut short, and what no special point explains, is said wherever it can mislead."""
 
 import warnings
 from dataclasses import replace
@@ -30,7 +30,7 @@ def short(cusp):
     return fs.continue_equilibria(cusp, "p", (-1, 1), continuation=fs.Continuation(points=5))
 
 
-def test_a_complete_diagram_has_no_warning(whole):
+def test_a_whole_diagram_says_nothing(whole):
     assert whole.outcome
     assert whole.completeness == "complete"
     assert "too many" not in repr(whole)
@@ -40,7 +40,7 @@ def test_a_complete_diagram_has_no_warning(whole):
         assert whole.bistable().shape == (1, 2)
 
 
-def test_an_incomplete_diagram_is_reported(short):
+def test_a_diagram_cut_short_says_so(short):
     assert not short.outcome
     assert short.outcome.code == "cut short"
     count = sum(any(not o.success for o in b.outcomes) for b in short.branches)
@@ -65,7 +65,7 @@ def test_figures_name_the_reason_at_an_end_that_was_cut_short(whole, short):
     [lambda d: d.at(p=0.0), lambda d: d.bistable(), lambda d: d.nearest(p=0.0, x=0.0)],
     ids=["at", "bistable", "nearest"],
 )
-def test_queries_of_an_incomplete_diagram_warn(short, query):
+def test_queries_that_it_can_make_wrong_warn(short, query):
     with pytest.warns(IncompleteWarning, match="branches were cut short"):
         query(short)
 
@@ -170,7 +170,7 @@ def test_random_polynomials_leave_nothing_unexplained():
 
 
 @pytest.mark.parametrize("half", [1e-2, 1e-4, 1e-6])
-def test_two_nearby_hopf_points_are_distinguished(half):
+def test_two_hopf_points_are_told_apart_however_near(half):
     """Growth (p − 1/7)² − d²: a pair of Hopf points at 1/7 ± d."""
     d = sp.Symbol("d")
     growth = (p - sp.Rational(1, 7)) ** 2 - d**2 - x**2 - y**2

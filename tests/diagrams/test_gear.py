@@ -132,7 +132,7 @@ def test_at_zero_load_the_two_ends_of_the_continuum(diagram):
     assert all(e.continuum for e in found)
 
 
-def test_at_filters_and_rejects(diagram):
+def test_at_filters_and_refuses(diagram):
     (point,) = diagram.at(w=1.0, stable=True)
     assert point.region == "S1"
     assert point.type == "focus"
@@ -143,7 +143,7 @@ def test_at_filters_and_rejects(diagram):
         diagram.at(ww=1)
 
 
-def test_marks_are_located_exactly(gear):
+def test_marks_are_hit_exactly(gear):
     diagram = fs.continue_equilibria(gear.frozen(), "w", (-1, 1), marks=[0.1, 0.2])
     assert [p["w"] for p in diagram.special("UZ")] == pytest.approx([0.1, 0.2], abs=1e-15)
     with pytest.raises(fs.FastSlowError, match=r"mark w = 3 is outside the range \[-1, 1\]"):

@@ -1,4 +1,4 @@
-"""Equilibria computed at many values at once equal those computed one by one."""
+"""Equilibria that are solved for at many values at once are those solved for one by one."""
 
 import numpy as np
 import pytest

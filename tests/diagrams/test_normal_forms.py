@@ -107,7 +107,7 @@ def test_the_sign_does_not_depend_on_coordinates(a, b, omega, unit, seed):
     )
 
 
-def test_a_degenerate_hopf_point_is_reported():
+def test_a_degenerate_hopf_point_says_so():
     """r' = p r − r⁵: the cubic terms vanish."""
     r2 = x**2 + y**2
     model = fs.Model({x: (p - r2**2) * x - y, y: x + (p - r2**2) * y}, parameters={p: 0})

@@ -1,4 +1,4 @@
-"""Elimination with symbolic parameters against elimination at each value."""
+"""Equations eliminated once for all values of the parameters, beside those of each value."""
 
 from fractions import Fraction
 
@@ -109,7 +109,7 @@ def test_results_do_not_depend_on_what_was_computed_before():
             assert states(here) == expected
 
 
-def test_an_invalid_decision_is_repeated():
+def test_a_choice_that_no_longer_holds_is_made_again():
     """With k = 0 no state follows from the first equation, and with a = b not from both."""
     model = fs.Model(
         {x: (a - b) * y + x - w, y: k * x - y + x**3},

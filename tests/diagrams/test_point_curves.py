@@ -1,4 +1,4 @@
-"""Two-parameter curves of special points and codimension-two points against closed forms."""
+"""Curves of special points in two parameters, and what they meet, against closed forms."""
 
 import pickle
 
@@ -25,7 +25,7 @@ def reactor():
 PLANE = {"p1": (0, 0.3), "p2": (8, 20)}
 
 
-def test_reactor_fold_curve_has_bogdanov_takens_and_cusp(reactor):
+def test_reactor_folds_meet_bogdanov_takens_and_cusp(reactor):
     """Closed form (mpmath): BT at p1 = e^(−3/2)/2, p2 = 13.5; CP at p1 = e^(−2), p2 = 12."""
     curve = fs.continue_points(reactor.folds[0], ("p1", "p2"), over=PLANE)
     (bt,), (cusp,) = curve.special("BT"), curve.special("CP")
@@ -86,7 +86,7 @@ def test_cusp_of_the_normal_form():
     assert "cusp" in repr(curve)
 
 
-def test_gear_folds_reach_the_interface(folded_gear):
+def test_gear_folds_meet_the_interface(folded_gear):
     """Folds of S1 in (w, A): fold meets x = D at A = −D², w = 0; virtual cusp at x = D/3."""
     diagram = fs.continue_equilibria(folded_gear.frozen(), "w", (-0.3, 0.3))
     fold = next(f for f in diagram.folds if f["x"] > 0)
@@ -307,7 +307,7 @@ def test_bad_input(reactor):
         fs.continue_points(fold, ("p1", "p2"), over={**over, "p5": (0, 1)})
     with pytest.raises(fs.FastSlowError, match="expected two finite numbers, the lower one first"):
         fs.continue_points(fold, ("p1", "p2"), over={"p1": (1, 0), "p2": (8, 20)})
-    with pytest.raises(fs.FastSlowError, match="lies outside over"):
+    with pytest.raises(fs.FastSlowError, match="is outside over"):
         fs.continue_points(fold, ("p1", "p2"), over={"p1": (0, 0.01), "p2": (8, 20)})
     with pytest.raises(fs.FastSlowError, match="unknown curve from LP 'HB'"):
         fs.continue_points(fold, ("p1", "p2"), over=over, code="HB")

@@ -1,4 +1,4 @@
-"""Polynomial systems in several unknowns: all equilibria, and completeness."""
+"""Polynomial regions in several unknowns: every equilibrium, and what is said about it."""
 
 import itertools
 import random
@@ -145,7 +145,7 @@ def test_planar_diagrams_with_poles_are_complete_and_have_each_branch_once(rates
             assert (np.abs(drawn - state) / size).max(axis=1).min() < 1e-9
 
 
-def test_a_hyperbola_and_a_circle_intersect_between_two_critical_values():
+def test_a_hyperbola_and_a_circle_meet_between_two_critical_values():
     """x y = p touches x² + y² = 4 at p = ±2, and meets it in four points between."""
     model = fs.Model({x: x**2 + y**2 - 4, y: x * y - p}, parameters={p: 0})
     (equations,) = region_equations(FrozenField(model, "p"))
@@ -154,7 +154,7 @@ def test_a_hyperbola_and_a_circle_intersect_between_two_critical_values():
     assert critical_values(equations, -1, 1) == []
 
 
-def test_nearly_equal_exact_roots_are_in_different_intervals():
+def test_exact_roots_that_nearly_meet_are_in_different_intervals():
     near = sp.Rational(1, 3) + sp.Rational(1, 10**6)
     polynomial = sp.expand((p - 1) * (p + 1) ** 2 * (3 * p - 1) * (p - near))
     ends = np.array(_exact_roots([polynomial], p, -2.0, 2.0))

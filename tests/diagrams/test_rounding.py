@@ -1,4 +1,4 @@
-"""States of equilibria that exceed rounding errors, individually and vectorized."""
+"""Which states of equilibria are more than rounding, one by one and many at once."""
 
 import numpy as np
 import sympy as sp
@@ -9,7 +9,7 @@ from fastslow.diagrams.field import FrozenField
 x, y, w = sp.symbols("x y w")
 
 
-def test_equilibria_of_several_regions_are_classified_individually():
+def test_equilibria_of_several_regions_are_judged_as_each_by_itself():
     model = fs.Model({x: w - sp.Abs(x - 1) * x, y: x - y}, parameters={w: 0.3})
     field = FrozenField(model, "w")
     points = [

@@ -189,7 +189,7 @@ def test_random_models(first, second, tmp_path_factory):
     assert same(traced(fs.load(path).model), diagram)
 
 
-def test_functions_that_need_equations_raise(kept):
+def test_what_takes_equations_is_refused(kept):
     stored = fs.load(kept["power"][1]).model
     start = {"x": 1.0, "p": 1.0}
     with pytest.raises(fs.ModelError, match="without the equations from which equilibria"):
@@ -309,7 +309,7 @@ def test_a_forged_field_is_refused(change, tree_and_arrays, tmp_path):
         fs.load(tmp_path / "model.npz")
 
 
-def test_a_diagram_without_a_storable_model_is_saved(monkeypatch, tmp_path):
+def test_a_diagram_without_a_model_to_keep_is_kept(monkeypatch, tmp_path):
     diagram = fs.continue_equilibria(MODELS["folds"][0], "p", (-1, 1))
 
     def fails(self):

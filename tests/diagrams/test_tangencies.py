@@ -92,7 +92,7 @@ def test_a_polynomial_of_a_high_degree_is_searched(degree, completeness):
     assert [t["y"] for t in found] == pytest.approx(real, abs=1e-12)
 
 
-def test_fixed_states():
+def test_held_states():
     """x' = y z − 2 and y z = 2 on a curve: with z held there is one point."""
     model = switched(x, (y * z - 2, 1, y), (1, 1, 1))
     (point,) = fs.tangencies(model, z=4)

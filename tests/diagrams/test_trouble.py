@@ -1,4 +1,4 @@
-"""Errors and early ends, with partial results."""
+"""What cannot go on ends with a sentence, and what was computed stays."""
 
 import numpy as np
 import pytest
@@ -78,13 +78,13 @@ def test_a_pole():
         assert "window=" in branch.outcome.message
 
 
-def test_too_many_points_are_reported(line):
+def test_too_many_points_are_said(line):
     diagram = fs.continue_equilibria(line, p, (0, 1), continuation=fs.Continuation(points=10))
     assert diagram.branches[0].outcome.code == "too many points"
     assert "Continuation(points" in diagram.branches[0].outcome.message
 
 
-def test_an_equilibrium_at_the_intersection_of_two_interfaces():
+def test_an_equilibrium_where_two_interfaces_meet():
     bend = sp.Abs(x) + sp.Abs(y)
     model = fs.Model({x: p - x - bend / 4, y: p - y + bend / 4}, parameters={p: 0})
     diagram = fs.continue_equilibria(model, p, (-1, 1))
@@ -118,7 +118,7 @@ def test_a_double_root_is_one_equilibrium():
     assert found[0].stability == "neutral"
 
 
-def test_too_many_branches_are_reported():
+def test_too_many_branches_are_said():
     """sin x = p has a branch for every half turn of x that the search meets."""
     model = fs.Model({x: p - sp.sin(x)}, parameters={p: 0})
     diagram = fs.continue_equilibria(

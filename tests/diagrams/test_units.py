@@ -126,7 +126,7 @@ def test_natural_units_of_a_saturated_rate():
     assert found["x"] == 2.0 ** round(np.log2(expected)) == 128.0
 
 
-def test_an_undetermined_zero_is_not_an_equilibrium():
+def test_what_rounding_cannot_decide_is_no_equilibrium():
     """At x = 1 to rounding, y < −20, the factor exp(100) hides that no rate vanishes."""
     (system,) = (s for s in SYSTEMS if s.name == "stirred tank")
     low, high = system.range()
@@ -160,7 +160,7 @@ def test_points_are_in_order_up_to_rounding():
 
 
 @pytest.mark.parametrize("speed", [1e-12, 1.0, 1e12])
-def test_no_branch_point_without_an_intersection(speed):
+def test_no_branch_point_where_branches_do_not_meet(speed):
     """x' = p x − x³ + e has one where e = 0 only, however slow it is."""
 
     def curve(e):

@@ -122,7 +122,7 @@ def test_random_cubics_with_poles(seed):
         np.testing.assert_allclose(found, real[(real >= low) & (real <= high)], rtol=1e-6)
 
 
-def test_branches_that_re_enter_are_traced():
+def test_what_comes_back_is_traced():
     """x = 1/((p − 1/4)² + 10⁻⁹) − 1/((p + 1/4)² + 10⁻⁹): both peaks are beyond the window."""
     tiny = sp.Rational(1, 10**9)
     first, second = (p - sp.Rational(1, 4)) ** 2 + tiny, (p + sp.Rational(1, 4)) ** 2 + tiny

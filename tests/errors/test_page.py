@@ -1,4 +1,4 @@
-"""The page on errors and endings: what it lists is real, and no class and no outcome is missing."""
+"""The page on errors and outcomes lists every class and every outcome, and no others."""
 
 import ast
 import re
@@ -22,7 +22,7 @@ TEXTS = {
     if isinstance(node, ast.Constant) and isinstance(node.value, str)
 }
 
-#: What the errors of the wrong arguments are known to say.
+#: Messages of the errors of wrong arguments.
 TRIED = {
     words for rows in (*BY_PARAMETER.values(), *BY_FUNCTION.values(), SAVE) for _, _, words in rows
 }
@@ -40,14 +40,14 @@ def outcomes():
 
 
 def first_cells(begin, end):
-    """What stands in the first column of the tables between two headings, mark by mark."""
+    """The code spans in the first column of the tables between two headings."""
     part = PAGE[PAGE.index(begin) : PAGE.index(end) if end else len(PAGE)]
     rows = re.findall(r"^\| (`.*?) \|", part, flags=re.M)
     return [text for row in rows for text in re.findall(r"`([^`]+)`", row)]
 
 
 def test_every_outcome_is_explained():
-    assert set(first_cells("## Endings of a run", None)) == outcomes()
+    assert set(first_cells("## Outcomes of a run", None)) == outcomes()
 
 
 def test_every_class_is_explained():
@@ -63,7 +63,7 @@ def test_every_class_is_explained():
         assert base in {kind.__name__ for kind in getattr(errors, name).__mro__}
 
 
-@pytest.mark.parametrize("message", first_cells("## Arguments", "## Endings of a run"))
+@pytest.mark.parametrize("message", first_cells("## Arguments", "## Outcomes of a run"))
 def test_the_messages_are_real(message):
-    if message != "No such file":  # said by the system
+    if message != "No such file":  # from the operating system
         assert any(message in text for text in TEXTS | TRIED), message

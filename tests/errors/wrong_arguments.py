@@ -151,7 +151,7 @@ BY_FUNCTION = {
         ({}, BadModel, "at least one state"),
         ({"x": "omga"}, BadModel, "rate of x: unknown symbol 'omga'"),
         ({"x": None}, BadModel, "rate of x: expected an expression, received None"),
-        ({"x": "x +"}, BadModel, "rate of x: 'x +' is no expression: it ends after '+'"),
+        ({"x": "x +"}, BadModel, "rate of x: 'x +' is not an expression: it ends after '+'"),
     ],
     "Model.frozen.slow": [
         *MAPPING,
@@ -212,7 +212,7 @@ BY_FUNCTION = {
     "Trajectory.spectrum.name": NAME,
     "Trajectory.spectrum.samples": [
         *COUNT,
-        (2, Wrong, "samples = 2; expected a whole number from 8"),
+        (2, Wrong, "samples = 2; expected an integer from 8"),
     ],
     "Trajectory.regimes.tol": POSITIVE,
     "Trajectory.periodicity.tol": POSITIVE,
@@ -235,7 +235,7 @@ BY_FUNCTION = {
         ({"p": (-1, 1), "q": (1, 1)}, Wrong, "over['q'] = (1, 1); expected two finite numbers"),
         ({"p": (-1, 1)}, Wrong, "over has no range for 'q'"),
         ({"p": (-1, 1), "r": (0, 1)}, Unknown, "unknown parameter in over 'r'"),
-        ({"p": (5, 6), "q": (5, 6)}, Wrong, "lies outside over="),
+        ({"p": (5, 6), "q": (5, 6)}, Wrong, "is outside over="),
     ],
     "continue_points.parameters": [
         (("p", "p"), Wrong, "expected two different parameters"),
@@ -303,7 +303,7 @@ BY_FUNCTION = {
     "reduce_states.conserved": MAPPING,
     "refined_map.levels": [
         *COUNT,
-        (100, Wrong, "levels = 100; expected a whole number from 0 to 60"),
+        (100, Wrong, "levels = 100; expected an integer from 0 to 60"),
     ],
     "refined_map.over": PLANE,
     "refined_map.resolution": POSITIVE,
@@ -311,7 +311,7 @@ BY_FUNCTION = {
     "regime_map.parameters": [
         (3, Wrong, "parameters = 3; expected a mapping"),
         ({"E": "C"}, Unknown, "unknown parameter 'E'"),
-        ({"B": "C +"}, Wrong, "'C +' is no expression"),
+        ({"B": "C +"}, Wrong, "'C +' is not an expression"),
         (lambda a, b: 3, Wrong, "what parameters returns = 3; expected a mapping"),
     ],
     "classify_regime.integration": INTEGRATION,

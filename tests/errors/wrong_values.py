@@ -23,9 +23,9 @@ POSITIVE = [
 TOLERANCE = [*POSITIVE, (1.0, Wrong, "1.0; expected a number from 1e-16 to 0.1")]
 COUNT = [
     (-1, Wrong, "-1; expected"),
-    (1.5, Wrong, "1.5; expected a whole number"),
-    (True, Wrong, "True; expected a whole number"),
-    ("3", Wrong, "'3'; expected a whole number"),
+    (1.5, Wrong, "1.5; expected an integer"),
+    (True, Wrong, "True; expected an integer"),
+    ("3", Wrong, "'3'; expected an integer"),
 ]
 TEXT = [(3, Wrong, "3; expected text")]
 SYMBOL = [(2.5, Wrong, "2.5; expected a name or an expression")]
@@ -58,7 +58,7 @@ PLANE = [
     ({"C": (0, 1)}, Wrong, "over"),
     ({"C": (1, 0), "D": (0, 1)}, Wrong, "over"),
 ]
-COLUMN = [("omga", Unknown, "omga"), ("x +", Wrong, "'x +' is no expression")]
+COLUMN = [("omga", Unknown, "omga"), ("x +", Wrong, "'x +' is not an expression")]
 NAME = [("omga", Unknown, "unknown"), (None, Unknown, "None")]
 
 

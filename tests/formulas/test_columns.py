@@ -54,7 +54,7 @@ def test_a_name_need_not_be_an_identifier():
     ],
 )
 def test_what_is_no_expression_is_refused(text):
-    with pytest.raises(ArgumentError, match="is no expression in x, v, k"):
+    with pytest.raises(ArgumentError, match="is not an expression in x, v, k"):
         evaluated(text, VALUES)
 
 

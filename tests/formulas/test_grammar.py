@@ -89,7 +89,7 @@ def test_what_is_read(text, written):
 def test_what_is_refused(text, reason):
     with pytest.raises(fs.ArgumentError, match=reason) as caught:
         parse(text)
-    assert "is no expression: " in str(caught.value)
+    assert "is not an expression: " in str(caught.value)
     # the error can be printed, and does not repeat a long text
     assert len(str(caught.value).encode()) < 300
 

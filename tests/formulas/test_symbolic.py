@@ -110,7 +110,7 @@ def test_equations_as_text():
 )
 def test_text_is_never_run(call, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(fs.ModelError, match="is no expression"):
+    with pytest.raises(fs.ModelError, match="is not an expression"):
         call("open('canary', 'w')")
     assert list(tmp_path.iterdir()) == []
 

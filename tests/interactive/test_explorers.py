@@ -33,7 +33,7 @@ def test_set_shows_other_values(explorer):
     np.testing.assert_array_equal(pixels(explorer.figure), before)
 
 
-def test_a_slider_does_not_recompile(explorer, monkeypatch):
+def test_nothing_is_compiled_anew_by_a_slider(explorer, monkeypatch):
     explorer.set(D=0.4)
     from fastslow.kernels.cache import store
 
@@ -51,7 +51,7 @@ def test_threads_take_turns(explorer):
     np.testing.assert_array_equal(pixels(explorer.figure), shown)
 
 
-def test_unknown_names_and_invalid_numbers(explorer):
+def test_unknown_names_and_numbers_that_are_none(explorer):
     with pytest.raises(fs.UnknownNameError, match="unknown parameter or state 'Dd'"):
         explorer.set(Dd=1)
     with pytest.raises(fs.ModelError, match="finite"):
@@ -90,7 +90,7 @@ def test_a_gap_of_no_width_is_shown(explorer):
     exec(explorer.call(), {"fs": fs, "model": explorer.model})
 
 
-def test_a_failure_is_shown_below_the_figure(explorer):
+def test_a_failure_stands_below_the_figure(explorer):
     explorer.set(omega=0)
     assert explorer.view.run is None
     assert any("common period" in text.get_text() for text in explorer.figure.texts)
@@ -111,7 +111,7 @@ def test_a_click_selects_a_point_and_prints_the_call(explorer, mouse, capsys):
     assert names["point"].state.tolist() == fold.state.tolist()
 
 
-def test_the_run_is_drawn_over_the_diagram_and_in_the_other_axes(explorer, mouse):
+def test_the_run_is_laid_over_the_diagram_and_stands_beside_it(explorer, mouse):
     run, lay = explorer.view.run, explorer.view.overlay
     (main,) = [ax for ax in explorer.figure.axes if ax.get_xlabel() == "$w$"]
     (series,) = [ax for ax in explorer.figure.axes if ax.get_xlabel() == "$t$"]
@@ -164,7 +164,7 @@ def test_widgets_move_the_figure(explorer):
 
 
 @IPYMPL
-def test_the_overlay_is_computed_after_a_slider_has_stopped(explorer):
+def test_a_slider_that_moves_is_followed_at_once_and_measured_when_it_rests(explorer):
     explorer.widget  # noqa: B018
     slider = explorer._widget.sliders["D"]
     seen = []
@@ -183,7 +183,7 @@ def test_the_overlay_is_computed_after_a_slider_has_stopped(explorer):
 
 
 @IPYMPL
-def test_the_value_of_the_model_is_on_a_step(folded):
+def test_the_value_of_the_model_lies_on_a_step(folded):
     explorer = fs.explore(folded, periods=1, sliders={"D": (0.1, 0.5), "C": (-1, 1)})
     explorer.widget  # noqa: B018
     for slider in explorer._widget.sliders.values():
@@ -202,7 +202,7 @@ def test_set_moves_the_widgets(explorer):
 
 
 @IPYMPL
-def test_a_click_in_the_widget_shows_the_point(explorer, mouse, capsys):
+def test_a_click_in_the_widget_is_told_there(explorer, mouse, capsys):
     words = explorer.widget.children[2]
     fold = explorer.view.diagram.folds[0]
     (main,) = [ax for ax in explorer.figure.axes if ax.get_xlabel() == "$w$"]

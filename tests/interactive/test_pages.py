@@ -138,7 +138,7 @@ def test_a_slider_draws_the_run_of_its_value(folded, page_file, open_page):
     )
 
 
-def test_hover_describes_a_point_and_a_click_shows_its_call(folded, page_file, open_page):
+def test_hover_says_what_is_there_and_a_click_how_to_get_it(folded, page_file, open_page):
     opened = open_page(page_file)
     opened.move(0, 1)
     diagram, run = direct(folded, D=0.4)
@@ -173,7 +173,7 @@ def test_hover_describes_a_point_and_a_click_shows_its_call(folded, page_file, o
     np.testing.assert_allclose(run(shown), names["point"], atol=1e-3)
 
 
-def test_a_failed_frame_shows_its_reason_and_other_results(folded, page_file, open_page):
+def test_a_failed_frame_says_why_and_shows_the_rest(folded, page_file, open_page):
     opened = open_page(page_file)
     opened.move(1, -1)
     assert "common period" in opened.text("outcomes")
@@ -233,7 +233,7 @@ def test_frames_share_what_does_not_change(explorer):
     assert len(two["arrays"]) == len(one["arrays"]) + 1
 
 
-def test_nan_is_preserved():
+def test_numbers_that_are_none_survive():
     store = Store()
     store.add(np.array([[np.inf, 1.0, 100.0], [-np.inf, np.nan, 101.0]]))
     assert store.arrays[0]["first"] == [0.0, 0.0, 100.0]
@@ -261,12 +261,12 @@ def test_wrong_values_raise_before_anything_is_computed(explorer, tmp_path, slid
         explorer.export(tmp_path / "page.html", sliders=sliders)
 
 
-def test_a_missing_folder(explorer, tmp_path):
+def test_a_folder_that_is_not_there(explorer, tmp_path):
     with pytest.raises(fs.FileError, match="cannot be written"):
         explorer.export(tmp_path / "none" / "page.html", sliders={"D": [0.25]}, progress=False)
 
 
-def test_a_shared_branch_point_is_labelled_once():
+def test_branches_that_cross_name_their_branch_point_once():
     x, w, t = sp.symbols("x w t")
     model = fs.Model({x: x * (w - x)}, forcing={w: sp.sin(t / 10)})
     data = page_data(fs.explore(model, over=(-1, 1.3), start=[1]), {})

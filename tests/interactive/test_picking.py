@@ -1,4 +1,4 @@
-"""Picking in figures, with mouse events of Matplotlib."""
+"""Hover and click on figures, by Matplotlib's own mouse events."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def given(lay, call):
     return eval(call, {"np": np, "lay": lay, "diagram": lay.diagram, "run": lay.run})
 
 
-def test_a_click_near_a_branch_returns_the_equilibrium(lay, mouse):
+def test_a_click_beside_a_branch_gives_the_equilibrium_there(lay, mouse):
     drawing = drawn(lay.diagram)
     picks = []
     pointer = fs.pick(drawing, lay.diagram, on_click=picks.append)
@@ -64,7 +64,7 @@ def test_a_click_in_axes_of_expressions_and_functions(lay, mouse):
         fs.pick(fs.plot.phase_portrait(lay.run, z="t"), lay.run)
 
 
-def test_a_marker_takes_precedence_over_its_line(lay, mouse):
+def test_a_marker_goes_before_the_line_it_lies_on(lay, mouse):
     drawing = drawn(lay.diagram)
     pointer = fs.pick(drawing, lay.diagram)
     fold = lay.diagram.folds[0]
@@ -75,7 +75,7 @@ def test_a_marker_takes_precedence_over_its_line(lay, mouse):
     assert pointer.near.text.splitlines()[:2] == [f"{fold.label}, fold", f"w = {fold['w']:.6g}"]
 
 
-def test_hover_shows_and_removes_a_tooltip(lay, mouse):
+def test_hover_shows_a_box_and_takes_it_away(lay, mouse):
     drawing = drawn(lay.diagram)
     drawing.figure.canvas.draw()
     clean = np.array(drawing.figure.canvas.buffer_rgba())
@@ -95,7 +95,7 @@ def test_hover_shows_and_removes_a_tooltip(lay, mouse):
     np.testing.assert_array_equal(np.array(drawing.figure.canvas.buffer_rgba()), clean)
 
 
-def test_nothing_is_picked_far_from_all_curves(lay, mouse):
+def test_far_from_everything_nothing_is_meant(lay, mouse):
     drawing = drawn(lay.diagram)
     pointer = fs.pick(drawing, lay.diagram)
     mouse("button_press_event", drawing.ax, -0.4, 0.9)
@@ -103,20 +103,20 @@ def test_nothing_is_picked_far_from_all_curves(lay, mouse):
     assert pointer.selected is None
 
 
-def test_picking_in_all_axes_of_a_panel(lay, panel, mouse):
+def test_every_part_of_a_panel_answers(lay, panel, mouse):
     pointer = fs.pick(panel, lay)
     run = lay.run
     time = 0.37 * run.span[1]
     mouse("button_press_event", panel.time_series.ax, time, run(time)[0])
-    point = pointer.selected.point
-    assert point.time == pytest.approx(time, rel=2e-3)
-    np.testing.assert_array_equal(point.state, run(point.time))
-    np.testing.assert_array_equal(given(lay, pointer.selected.call).state, point.state)
-    assert point.slow["w"] == pytest.approx(0.4 * np.sin(0.02 * point.time), abs=1e-9)
+    moment = pointer.selected.point
+    assert moment.time == pytest.approx(time, rel=2e-3)
+    np.testing.assert_array_equal(moment.state, run(moment.time))
+    np.testing.assert_array_equal(given(lay, pointer.selected.call).state, moment.state)
+    assert moment.slow["w"] == pytest.approx(0.4 * np.sin(0.02 * moment.time), abs=1e-9)
     again = fs.simulate(
         fs.systems.harmonic_gear(A=-0.6, B=0.0, C=0.4, omega=0.02),
-        point.state,
-        t=(point.time, run.span[1]),
+        moment.state,
+        t=(moment.time, run.span[1]),
     )
     np.testing.assert_allclose(again.end, run.end, atol=1e-7)
 
@@ -130,7 +130,7 @@ def test_picking_in_all_axes_of_a_panel(lay, panel, mouse):
     assert pointer.selected.text.startswith(change.kind)
 
 
-def test_crossings_are_returned(lay, panel, mouse):
+def test_crossings_are_given_back(lay, panel, mouse):
     pointer = fs.pick(panel, lay)
     crossing = run_crossing = lay.run.crossings[0]
     mouse("button_press_event", panel.phase_portrait.ax, *crossing.state)
@@ -141,19 +141,19 @@ def test_crossings_are_returned(lay, panel, mouse):
     assert "→" in pointer.selected.text
 
 
-def test_a_run_without_series_is_interpolated(folded, mouse):
+def test_a_run_without_series_is_read_between_its_samples(folded, mouse):
     run = fs.simulate(folded, [0, 0], periods=1, dense=False, samples=400)
     drawing = fs.plot.time_series(run, "v", crossings=False)
     pointer = fs.pick(drawing, run)
     mouse("button_press_event", drawing.ax, run.t[200], run["v"][200])
-    point = pointer.selected.point
-    expected = [np.interp(point.time, run.t, run[name]) for name in run.states]
-    np.testing.assert_allclose(point.state, expected, rtol=1e-12)
-    assert point.interpolated
-    np.testing.assert_array_equal(eval(pointer.selected.call, {"run": run}).state, point.state)
+    moment = pointer.selected.point
+    expected = [np.interp(moment.time, run.t, run[name]) for name in run.states]
+    np.testing.assert_allclose(moment.state, expected, rtol=1e-12)
+    assert moment.interpolated
+    np.testing.assert_array_equal(eval(pointer.selected.call, {"run": run}).state, moment.state)
 
 
-def test_picking_in_a_diagram_from_a_file(lay, tmp_path, mouse):
+def test_a_diagram_from_a_file_answers(lay, tmp_path, mouse):
     lay.diagram.save(tmp_path / "gear.npz")
     loaded = fs.load(tmp_path / "gear.npz")
     drawing = drawn(loaded, "x - 0.1")
@@ -165,7 +165,7 @@ def test_picking_in_a_diagram_from_a_file(lay, tmp_path, mouse):
     assert found["x"] == pytest.approx(exact["x"], abs=1e-4)
 
 
-def test_a_drawing_of_another_result_is_rejected(lay):
+def test_what_does_not_belong_together_is_refused(lay):
     with pytest.raises(fs.ArgumentError, match="DiagramDrawing of a Trajectory"):
         fs.pick(fs.plot.diagram(lay.diagram), lay.run)
 

@@ -1,4 +1,4 @@
-"""The figure of an explorer after a slider has moved equals that of a new one."""
+"""What an explorer shows after a slider has moved is what a new one shows."""
 
 import numpy as np
 import pytest
@@ -41,14 +41,14 @@ def axis_draws(monkeypatch):
     return met
 
 
-def test_a_settled_picture_is_that_of_a_new_explorer(folded, explorer):
+def test_at_rest_the_picture_is_that_of_a_new_explorer(folded, explorer):
     for changes in ({"D": 0.4}, {"D": 0.4, "C": 0.7}, {"D": 0.12, "C": 0.4}, {"D": 0.25, "C": 0.4}):
         explorer.glance(changes)
         explorer.set(changes)
         np.testing.assert_array_equal(shown(explorer), shown(new(folded, **changes)))
 
 
-def test_a_view_without_a_run_removes_the_previous_one(folded, explorer):
+def test_a_view_without_a_run_leaves_nothing_of_the_one_before(folded, explorer):
     explorer.glance({"omega": 0.0})
     explorer.set(omega=0.0)
     other = fs.explore(folded, over=OVER, periods=1, sliders={})
@@ -61,7 +61,7 @@ def test_a_view_without_a_run_removes_the_previous_one(folded, explorer):
     np.testing.assert_array_equal(shown(explorer), shown(new(folded)))
 
 
-def test_axes_with_unchanged_limits_are_not_redrawn(explorer, axis_draws):
+def test_within_their_limits_no_axis_is_drawn_anew(explorer, axis_draws):
     explorer.glance({"D": 0.25})
     axis_draws.clear()
     for value in (0.251, 0.252, 0.249):
@@ -69,7 +69,7 @@ def test_axes_with_unchanged_limits_are_not_redrawn(explorer, axis_draws):
     assert axis_draws == []
 
 
-def test_a_moving_picture_equals_a_full_drawing(explorer, tmp_path):
+def test_a_moving_picture_shows_what_a_whole_drawing_shows(explorer, tmp_path):
     for value in (0.25, 0.26, 0.24):
         explorer.glance({"D": value})
         moving = shown(explorer)
@@ -84,7 +84,7 @@ def test_a_moving_picture_equals_a_full_drawing(explorer, tmp_path):
 
 
 @pytest.mark.parametrize("value", [0.5, 0.1])
-def test_limits_contain_all_data(explorer, value):
+def test_limits_hold_all_that_moves(explorer, value):
     for part in np.linspace(0.0, 1.0, 12):
         explorer.glance({"D": 0.25 + part * (value - 0.25)})
         for ax in explorer.figure.axes[:2]:
@@ -94,7 +94,7 @@ def test_limits_contain_all_data(explorer, value):
             assert box.height > 0.5 * (high - low)
 
 
-def test_limits_change_rarely_during_a_long_movement(explorer, axis_draws):
+def test_few_frames_of_a_long_way_change_the_limits(explorer, axis_draws):
     changed = 0
     for value in np.linspace(0.1, 0.5, 41):
         axis_draws.clear()
@@ -103,7 +103,7 @@ def test_limits_change_rarely_during_a_long_movement(explorer, axis_draws):
     assert changed < 14
 
 
-def test_a_draw_by_another_caller_keeps_the_moving_artists(explorer, tmp_path):
+def test_a_drawing_by_another_keeps_what_moves(explorer, tmp_path):
     """As after a window was uncovered, or a zoom of the toolbar; and a file has all of it."""
     explorer.glance({"D": 0.26})
     before = shown(explorer)
@@ -118,7 +118,7 @@ def test_a_draw_by_another_caller_keeps_the_moving_artists(explorer, tmp_path):
     assert explorer.figure.axes[0].get_xlim()[1] > 300.0
 
 
-def test_a_draw_without_output_is_not_stored(explorer):
+def test_a_drawing_without_output_is_not_kept(explorer):
     explorer.glance({"D": 0.25})
     before = shown(explorer)
     explorer._picture._backdrop._seen = []
@@ -137,7 +137,7 @@ def test_a_file_of_another_format_has_the_axes_too(explorer, tmp_path):
         assert moving.count(f'<g id="{name}') == resting.count(f'<g id="{name}') > 0
 
 
-def test_the_tooltip_is_drawn_over_the_moving_picture(explorer, mouse):
+def test_the_pointer_lays_its_box_over_the_moving_picture(explorer, mouse):
     explorer.glance({"D": 0.25})
     explorer.glance({"D": 0.26})
     before = shown(explorer)
@@ -149,14 +149,14 @@ def test_the_tooltip_is_drawn_over_the_moving_picture(explorer, mouse):
     np.testing.assert_array_equal(shown(explorer), before)
 
 
-def test_a_cleared_figure_is_redrawn(folded, explorer):
+def test_a_figure_that_was_cleared_is_drawn_anew(folded, explorer):
     explorer.figure.clear()
     explorer.glance({"D": 0.3})
     explorer.set(D=0.3)
     np.testing.assert_array_equal(shown(explorer), shown(new(folded, D=0.3)))
 
 
-def test_notices_are_removed_with_their_view(folded, explorer):
+def test_what_was_written_on_the_figure_goes_with_the_view(folded, explorer):
     explorer.figure.text(0.5, 0.5, "stale")
     explorer.figure.axes[0].axhline(0.1)
     explorer.set(D=0.3)

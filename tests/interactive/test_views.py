@@ -1,4 +1,4 @@
-"""A view has the same results as the functions in its call."""
+"""What a view computes is what the functions compute that its call names."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_the_call_reproduces_the_view(folded):
     assert np.abs(view.diagram.folds["w"]).tolist() == pytest.approx([abs(expected)] * 2, abs=1e-12)
 
 
-def test_the_diagram_extends_beyond_the_range_of_the_load(folded):
+def test_the_diagram_goes_beyond_what_the_load_covers(folded):
     view = view_of(folded, setup_of(folded, periods=1))
     low, high = view.diagram.over
     assert low < -0.4
@@ -38,7 +38,7 @@ def test_the_diagram_extends_beyond_the_range_of_the_load(folded):
     assert view.overlay.outcome
 
 
-def test_the_diagram_is_over_a_slow_state():
+def test_a_slow_state_is_what_the_diagram_is_over():
     model = fs.systems.van_der_pol_relaxation()
     view = view_of(model, setup_of(model, t=(0, 300), start={"x": 2, "y": 0}))
     assert view.diagram.parameter == "y"
@@ -70,7 +70,7 @@ def test_without_slow_quantity_and_parameter_there_is_a_run_alone():
     assert "diagram" not in executed(view, model)
 
 
-def test_failures_are_reported_with_the_other_results(folded):
+def test_what_fails_is_said_and_the_rest_is_there(folded):
     setup = setup_of(folded, over=(-0.5, 0.5), periods=1)
     view = view_of(folded, setup, {"omega": 0.0})
     assert view.run is None
@@ -93,7 +93,7 @@ def test_time_in_a_rate_leaves_the_trajectory():
     assert view.call().splitlines()[-1].startswith("# no diagram")
 
 
-def test_a_diverging_run_is_reported():
+def test_a_run_that_grows_without_bound_says_so():
     x, k = sp.symbols("x k")
     model = fs.Model({x: k * x**2}, parameters={k: 1.0})
     view = view_of(model, setup_of(model, t=(0, 5), start=[1]))
@@ -101,7 +101,7 @@ def test_a_diverging_run_is_reported():
     assert not view.outcomes[0]
 
 
-def test_a_second_slow_quantity_is_frozen():
+def test_a_second_slow_quantity_is_held():
     x, y, u, w, t = sp.symbols("x y u w t")
     model = fs.Model(
         {x: u - x, y: w + x - y}, forcing={u: 1 + sp.sin(0.1 * t), w: 3 + sp.cos(0.1 * t)}
@@ -131,6 +131,6 @@ def test_wrong_settings_raise_at_once(folded, settings, message):
 
 
 @pytest.mark.parametrize("value", [float("nan"), "much"])
-def test_a_value_that_is_not_a_number_raises(folded, value):
+def test_a_value_that_is_no_number_raises(folded, value):
     with pytest.raises(fs.ModelError, match="parameter D: expected a finite number"):
         view_of(folded, setup_of(folded, periods=1), {"D": value})

@@ -1,4 +1,4 @@
-"""Small results for figures: a synthetic S-shaped branch, and the gears."""
+"""Small results for figures: a hand-made S-shaped branch, and the gears."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Arrow heads along a curve: positions and directions."""
+"""Heads along a curve: where they are, and which way they point."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ def test_length_is_counted_in_pixels_and_not_across_gaps():
     np.testing.assert_allclose(length_along(line) / one, [0, 1, 1, 1, 3], atol=1e-9)
 
 
-def test_heads_are_drawn_before_the_limits_are_set():
+def test_heads_are_drawn_before_the_axes_know_their_limits():
     """A curve that was just drawn lies inside of the axes, though no limit has been set."""
     ax = Figure().add_subplot()
     (line,) = ax.plot(np.linspace(100, 300, 201), np.linspace(-7, -5, 201))

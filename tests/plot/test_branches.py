@@ -1,4 +1,4 @@
-"""Drawings of bifurcation diagrams."""
+"""The equilibrium diagram as drawn."""
 
 import matplotlib as mpl
 import numpy as np
@@ -28,7 +28,7 @@ def test_runs_of_constant_stability():
     assert found[2][1].stop == len(branch)
 
 
-def test_repr_of_a_drawing_has_no_addresses(s_curve):
+def test_a_drawing_prints_as_what_it_shows_without_addresses(s_curve):
     drawn = fs.plot.diagram(s_curve, "x**2")
     assert "0x" not in repr(drawn)
     y = drawn.ax.get_ylabel().strip("$")
@@ -77,7 +77,7 @@ def test_virtual_branches_are_dotted_and_faint():
     assert len(fs.plot.diagram(source, virtual=False).lines) == 3
 
 
-def test_an_early_end_of_a_branch_is_marked():
+def test_an_end_that_was_not_meant_is_marked():
     good = Outcome("end of range", "reached the end of the range.", True)
     bad = Outcome("step too small", "the step became too small.", False)
     drawn = fs.plot.diagram(diagram_of(cubic((good, bad))))
@@ -151,7 +151,7 @@ def test_unknown_state(gear_diagram):
         fs.plot.diagram(gear_diagram, "vv")
 
 
-def test_bands_are_named_by_the_region_of_their_points(gear):
+def test_bands_are_named_by_what_lies_in_them(gear):
     # an interface given the other way round turns the order of the regions
     written = dict(zip(gear.states, gear.rates.values(), strict=True))
     turned = fs.Model(
@@ -167,7 +167,7 @@ def test_bands_are_named_by_the_region_of_their_points(gear):
     assert sorted(names) == ["S1", "S2", "S3"]
 
 
-def test_a_shared_branch_point_is_labelled_once():
+def test_branches_that_cross_name_their_branch_point_once():
     x, w = sp.symbols("x w")
     model = fs.Model({x: x * (w - x)}, parameters={w: 1})
     drawn = fs.plot.diagram(fs.continue_equilibria(model, "w", over=(-1, 1.3)))

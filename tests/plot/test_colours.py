@@ -1,4 +1,4 @@
-"""Contrast of adjacent colours in normal and deficient colour vision, and in grey."""
+"""Colours that stand beside each other, as they are seen without red or green cones, or in grey."""
 
 from itertools import combinations
 
@@ -72,7 +72,7 @@ def test_black_and_white_are_a_hundred_apart():
     ],
     ids=["regions", "regimes", "other labels", "phases"],
 )
-def test_neighbouring_areas_differ_for_every_kind_of_vision(colours, sight):
+def test_neighbouring_areas_differ_to_every_eye(colours, sight):
     """A difference of 2.3 is just noticeable (Mahy et al. 1994); twice that for any two areas."""
     least = min(difference(*pair, sight) for pair in combinations(colours, 2))
     assert least > 4.5
@@ -80,7 +80,7 @@ def test_neighbouring_areas_differ_for_every_kind_of_vision(colours, sight):
 
 @pytest.mark.parametrize("sight", SIGHTS)
 @pytest.mark.parametrize("ground", [*style.BANDS, "white"])
-def test_lines_and_texts_contrast_with_every_region(ground, sight):
+def test_lines_and_words_stand_out_from_every_region(ground, sight):
     for colour in (style.BRANCH, style.MOTION, style.VERMILION, style.DARK):
         assert difference(colour, ground, sight) > 30.0
     assert difference(style.MOTION, style.BRANCH, sight) > 30.0

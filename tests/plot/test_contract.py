@@ -1,4 +1,4 @@
-"""Common properties of all plot functions, for the calls in ``cases.py``."""
+"""What every plot function promises, function by function: the table in ``cases.py``."""
 
 import dataclasses
 import inspect
@@ -100,7 +100,7 @@ def test_draws_into_given_axes_and_returns_what_it_drew(name, results):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_returns_the_plotted_data(name, results):
+def test_hands_over_the_data_drawn(name, results):
     data = call(name, results).data
     assert data
     for curves in data.values():
@@ -126,7 +126,7 @@ def test_without_labels_there_is_no_text_and_no_legend(name, own, results):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_legend_overrides_label(name, results):
+def test_the_legend_has_its_own_word(name, results):
     assert call(name, results, legend=False).legend is None
     assert call(name, results, label=False, legend=True).legend is not None
     entries = [t.get_text() for t in call(name, results, legend=True).legend.get_texts()]
@@ -134,7 +134,7 @@ def test_legend_overrides_label(name, results):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_style_is_applied_without_global_settings(name, results, tmp_path):
+def test_style_is_obeyed_and_nothing_global_is_touched(name, results, tmp_path):
     case = CASES[name]
     before = dict(mpl.rcParams)
     drawn = call(name, results, **case.style)
@@ -257,7 +257,7 @@ def test_in_space(name, results, tmp_path):
 
 
 @pytest.mark.parametrize("width", ["line", 10, np.nan])
-def test_invalid_widths(width, s_curve):
+def test_widths_that_are_none(width, s_curve):
     with pytest.raises(fs.FastSlowError, match="width"):
         fs.plot.diagram(s_curve, width=width)
 
@@ -320,7 +320,7 @@ def test_symbols_and_parameters_along_the_axes(results):
     assert marks.get_ydata() == pytest.approx([p["w"] for p in folds], abs=1e-14)
 
 
-def test_errors_of_functions(results):
+def test_functions_say_what_is_wrong_with_them(results):
     crowd = results["crowd"]
     with pytest.raises(fs.UnknownNameError, match="unknown column 'y'"):
         fs.plot.diagram(crowd, lambda c: c["y"])
@@ -336,6 +336,6 @@ def test_a_branch_of_one_point_is_a_branch(results):
     assert len(fs.plot.diagram(diagram).lines) == 1
 
 
-def test_an_invalid_quantity(s_curve):
+def test_an_axis_that_is_no_quantity(s_curve):
     with pytest.raises(fs.ArgumentError, match="y = 3; expected a name or an expression"):
         fs.plot.diagram(s_curve, 3)

@@ -1,4 +1,4 @@
-"""Drawings of delays over the rate."""
+"""Delays over rates."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -67,7 +67,7 @@ def drawn(line):
     return np.column_stack([line.get_xdata(), line.get_ydata()])
 
 
-def test_measured_and_predicted_delays_are_drawn():
+def test_measured_and_predicted_stand_side_by_side():
     measured = 2.02 * EPS ** (2 / 3) + EPS
     drawing = fs.plot.delay_scaling(folded(measured))
     assert isinstance(drawing, DelayDrawing)
@@ -81,7 +81,7 @@ def test_measured_and_predicted_delays_are_drawn():
     assert "0.667\\pm0.010" in words[0]
 
 
-def test_the_triangle_has_the_predicted_slope_and_covers_nothing():
+def test_the_triangle_has_the_slope_of_the_law_and_hides_nothing():
     drawing = fs.plot.delay_scaling(folded(2 * EPS ** (2 / 3) + EPS))
     corners = np.log10(drawn(drawing.triangle))
     rise, run = corners[2] - corners[1], corners[1] - corners[0]

@@ -52,7 +52,7 @@ def test_hopf_points_are_marked_on_the_imaginary_axis():
     assert np.abs(found[np.abs(found.imag) > 0.1]) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_pair_that_becomes_real_collides_on_the_axis(folded_lay):
+def test_a_pair_that_becomes_real_meets_on_the_axis(folded_lay):
     """Trace −1 throughout: two real eigenvalues and a pair go over into each other at −1/2."""
     found = values(fs.plot.eigenvalue_path(folded_lay))
     off = found[(np.abs(found.imag) > 1e-9)]

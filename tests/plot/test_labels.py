@@ -1,4 +1,4 @@
-"""Placement of labels, legends and names of regions, also after changes of the axes."""
+"""Labels, legends and the names of regions find their places, and find them again."""
 
 import dataclasses
 from io import BytesIO
@@ -95,7 +95,7 @@ def test_logarithmic_axes():
     assert not any(box.overlaps(Text.get_window_extent(t)) for t in shown)
 
 
-def test_two_drawings_in_the_same_axes_do_not_overlap():
+def test_two_drawings_in_the_same_axes_know_of_each_other():
     first = fs.plot.diagram(crowd(), legend=False)
     second = fs.plot.diagram(crowd(0.9), ax=first.ax, color="#0072B2", legend=False)
     shown, _ = clear(second, [*first.labels, *second.labels])
@@ -111,7 +111,7 @@ def test_limits_set_before_are_kept(s_curve):
     assert ax.get_ylim() == (-3.0, 2.0)
 
 
-def test_a_distant_label_has_a_leader_line():
+def test_a_label_far_from_its_point_is_joined_to_it():
     figure = Figure((3, 2), dpi=100)
     ax = figure.add_axes((0, 0, 1, 1))
     ax.set(xlim=(0, 1), ylim=(0, 1))
@@ -151,7 +151,7 @@ def test_regions_on_a_logarithmic_axis():
     assert ax.get_ylim() == (1, 1000)
 
 
-def test_limits_are_raised_for_a_legend_without_a_free_position():
+def test_room_is_made_for_a_legend_where_the_curves_leave_none():
     ax = Figure((2.2, 2.0), dpi=150, layout="constrained").add_subplot()
     drawn = fs.plot.sweep(swept(), ax=ax)
     ax.figure.draw_without_rendering()
@@ -160,7 +160,7 @@ def test_limits_are_raised_for_a_legend_without_a_free_position():
         assert not any(box.contains(*at) for at in ax.transData.transform(line.get_xydata()))
 
 
-def test_a_legend_without_a_free_position(gear_lay):
+def test_a_legend_without_any_room(gear_lay):
     """Below the axes where a layout makes room, else left out; its entries are handed over."""
     small = Figure((1.7, 1.5), dpi=150).add_subplot()
     drawn = fs.plot.overlay(gear_lay, ax=small)

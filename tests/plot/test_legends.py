@@ -1,4 +1,4 @@
-"""Legends: one for each figure, in as many columns as fit."""
+"""Legends that fit: one of them, in as many columns as have room."""
 
 import pytest
 from matplotlib.figure import Figure
@@ -16,7 +16,7 @@ def handles(count, words):
     ("count", "words", "columns"),
     [(1, "a", 1), (4, "a", 4), (6, "a", 6), (3, "w" * 40, 1)],
 )
-def test_one_legend_below_in_as_many_columns_as_fit(count, words, columns):
+def test_one_legend_below_in_as_many_columns_as_have_room(count, words, columns):
     figure = Figure(figsize=(5, 3), dpi=100)
     legend = legend_below(figure.add_subplot(), handles(count, words))
     assert figure.legends == [legend]

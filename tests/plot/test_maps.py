@@ -1,4 +1,4 @@
-"""Drawings of adaptive maps: areas, boundaries, names, and curves over them."""
+"""Refined maps as figures: areas, boundaries, names that fit, and what is laid over."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def three():
     return fs.refined_map(label, UNIT, levels=4, resolution=1e-6)
 
 
-def test_areas_cover_the_plane_and_are_separated_by_boundaries(three):
+def test_areas_fill_the_plane_and_lines_part_them(three):
     drawn = fs.plot.regime_map(three)
     areas = {word: drawn_area(fill) for word, fill in drawn.fills.items()}
     assert sum(areas.values()) == pytest.approx(1, abs=1e-12)
@@ -44,7 +44,7 @@ def test_areas_cover_the_plane_and_are_separated_by_boundaries(three):
     assert len(colours) == 3
 
 
-def test_names_are_inside_their_areas(three):
+def test_names_stand_within_their_areas(three):
     drawn = fs.plot.regime_map(three, marks={"here": (0.3, 0.9)})
     assert set(drawn.names) == {"bilateral", "free", "new"}
     inverse = drawn.ax.transData.inverted()

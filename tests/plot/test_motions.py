@@ -1,4 +1,4 @@
-"""Drawings of time series and phase portraits."""
+"""Time series and phase portraits as drawn."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ def test_any_plane(gear_run):
     assert drawn.ax.get_xlabel() == "$w$"
 
 
-def test_one_state_is_drawn_over_its_slow_quantity():
+def test_one_state_stands_over_its_slow_quantity():
     x, p, t = sp.symbols("x p t")
     run = fs.simulate(fs.Model({x: p - x}, forcing={p: sp.sin(t)}), [0], periods=1)
     drawn = fs.plot.phase_portrait(run)

@@ -1,4 +1,4 @@
-"""Drawings of overlays and panels."""
+"""The overlay and the panel as drawn."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def test_overlay_is_drawn_above_the_branches(gear_lay):
     assert len(drawn.crossings.get_xdata()) == len(gear_lay.run.crossings)
 
 
-def test_a_jump_is_distinguished_from_a_gap_crossing(gear_lay, folded_lay):
+def test_a_jump_is_told_apart_from_a_passage_of_the_gap(gear_lay, folded_lay):
     (passage,) = fs.plot.overlay(gear_lay).transitions
     (jump,) = fs.plot.overlay(folded_lay).transitions
     assert passage.get_label() == "gap crossing"
@@ -27,7 +27,7 @@ def test_a_jump_is_distinguished_from_a_gap_crossing(gear_lay, folded_lay):
     assert len(jump.get_xdata()) == len(folded_lay.transitions)
 
 
-def test_crossings_are_on_the_trajectory(gear_lay):
+def test_crossings_lie_on_the_trajectory(gear_lay):
     drawn = fs.plot.overlay(gear_lay)
     times = np.array([c.time for c in gear_lay.run.crossings])
     load = 2.372 + 3.546 * np.sin(0.01 * times)
@@ -120,7 +120,7 @@ def test_in_space(folded_lay):
         fs.plot.overlay(folded_lay, "x", "v", ax=Figure().add_subplot())
 
 
-def test_the_phases_are_drawn_above_the_time_series(folded_lay):
+def test_the_phases_stand_above_the_time_series(folded_lay):
     drawn = fs.plot.panel(folded_lay)
     strip = drawn.time_series.phases
     assert [box.get_x() for box in strip] == [p.start for p in folded_lay.phases]
@@ -153,7 +153,7 @@ def test_a_panel_shows_a_state(gear_lay):
         fs.plot.panel(gear_lay, "w")
 
 
-def test_the_figure_of_an_incomplete_overlay_has_a_note():
+def test_what_an_overlay_does_not_tell_is_in_its_figure():
     x, w, t = sp.symbols("x w t")
     model = fs.Model({x: w - x}, forcing={w: sp.sin(t / 100)})
     run = fs.simulate(model, [0.0], t=(0, 628))

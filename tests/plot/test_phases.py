@@ -9,7 +9,7 @@ import fastslow as fs
 from fastslow.results.overlay.transitions import Phase
 
 
-def test_a_new_figure_shows_names_that_fit(folded_lay):
+def test_a_figure_of_its_own_names_what_has_room(folded_lay):
     run, phases = folded_lay.run, folded_lay.phases
     drawn = fs.plot.time_series(run, phases=phases)
     assert len(drawn.phases) == len(drawn.words) == len(phases)
@@ -20,7 +20,7 @@ def test_a_new_figure_shows_names_that_fit(folded_lay):
         assert word.get_visible() == (word.get_window_extent().width <= room)
 
 
-def test_names_that_do_not_fit_remain_hidden_when_redrawn(folded_lay):
+def test_what_has_no_room_stays_hidden_when_drawn_again(folded_lay):
     start, end = folded_lay.run.span
     half = 0.5 * (start + end)
     phases = [
@@ -34,7 +34,7 @@ def test_names_that_do_not_fit_remain_hidden_when_redrawn(folded_lay):
 
 
 @pytest.mark.parametrize("dpi", [40, 72, 300, 600])
-def test_names_that_do_not_fit_remain_hidden_at_another_resolution(folded_lay, dpi):
+def test_what_has_no_room_stays_hidden_at_another_resolution(folded_lay, dpi):
     start, end = folded_lay.run.span
     part = 0.02 * (end - start)
     phases = [
@@ -59,7 +59,7 @@ def test_names_that_do_not_fit_remain_hidden_at_another_resolution(folded_lay, d
         (Phase(0, 100, "jump", ("S1",)), ""),
     ],
 )
-def test_names_of_phases(folded_lay, phase, text):
+def test_what_a_phase_is_called(folded_lay, phase, text):
     drawn = fs.plot.time_series(folded_lay.run, phases=[phase])
     assert drawn.words[0].get_text() == text
 

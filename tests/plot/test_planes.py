@@ -1,4 +1,4 @@
-"""Drawings of curves of special points in a parameter plane."""
+"""Curves of special points in a parameter plane, as figures."""
 
 from dataclasses import replace
 

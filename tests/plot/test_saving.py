@@ -1,4 +1,4 @@
-"""Saving: one layout and one draw for each file, without changes of the figure."""
+"""A file is laid out for its format and drawn once; the figure stays as it was."""
 
 import pytest
 from matplotlib.axes import Axes
@@ -54,7 +54,7 @@ def test_a_figure_that_cannot_be_drawn_stays_as_it_was(tmp_path):
     assert (figure.get_layout_engine(), figure.canvas, figure.dpi) == before
 
 
-def test_a_font_is_embedded_once(gear_lay, tmp_path):
+def test_a_font_stands_in_a_file_once(gear_lay, tmp_path):
     """With the minus signs, which Matplotlib may put into a font of their own."""
     text = fs.plot.panel(gear_lay).save(tmp_path / "a.pdf").read_bytes()
     assert text.count(b"/FontFile2") == 2

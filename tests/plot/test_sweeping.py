@@ -1,4 +1,4 @@
-"""Drawings of sweeps, sections and spectra."""
+"""Sweeps, sections and spectra as drawn."""
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ def test_one_pass_into_given_axes():
     assert drawn.down.get_color() == "red"
 
 
-def test_hysteresis_is_visible_in_the_points(swept):
+def test_hysteresis_is_read_off_the_points(swept):
     # the passes have the same points at neither value, and none at the failed one
     assert swept.hysteresis().tolist() == [[1.0, 2.0]]
     assert swept.hysteresis(resolution=1.0).shape == (0, 2)
@@ -85,7 +85,7 @@ def test_section_by_direction():
     assert fs.plot.section(nothing).points == ()
 
 
-def test_limits_do_not_magnify_rounding_errors():
+def test_points_that_agree_do_not_show_their_rounding():
     table = np.array([[2.0, 2.0 + 1e-12], [1.0, 3.0]])
     section = Section("every 1", ("x", "v"), np.arange(2.0), table, np.zeros(2, dtype=int))
     drawn = fs.plot.section(section)
@@ -109,7 +109,7 @@ def test_spectrum_marks_its_lines():
 
 @pytest.mark.parametrize("height", [40, 54, 90])
 @pytest.mark.parametrize("bins", [(1, 3), (40, 2000), (1, 1999)])
-def test_frequency_labels_are_inside_the_axes(height, bins):
+def test_frequencies_stand_within_the_axes(height, bins):
     # lines at the edges of the axes, as in runs that are very slow
     frequency = np.linspace(0.0, 100.0, 2001)
     amplitude = np.full_like(frequency, 1e-5)

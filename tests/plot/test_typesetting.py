@@ -1,4 +1,4 @@
-"""Typesetting of names and expressions, with unusual names in every figure."""
+"""Names of any kind in every figure, and how names and expressions are written."""
 
 import pytest
 import sympy as sp
@@ -47,7 +47,7 @@ def test_conditions_can_be_drawn():
     drawn(written("Piecewise((x, (x > D) & ~(v <= 0) | (x == 1)), (-x, True))"))
 
 
-def test_formulas_in_user_texts_are_kept():
+def test_mathematics_of_the_user_stays():
     assert as_given(r"at $\omega = 2$") == r"at $\omega = 2$"
     assert as_given("two\nlines") == "two\nlines"
 
@@ -71,7 +71,7 @@ def odd():
     return model, diagram, run, fs.overlay(diagram, run)
 
 
-def test_every_figure_accepts_unusual_names(odd):
+def test_every_figure_survives_its_names(odd):
     model, diagram, run, lay = odd
     fold = diagram.special("BE")[0]
     curve = fs.continue_points(fold, ("$", "x^2"), over={"$": (-2, 6), "x^2": (-1, 1)})
@@ -113,7 +113,7 @@ def test_latex_of_every_name(odd):
         assert "$" not in text.replace(r"\$", "")
 
 
-def test_unusual_names_in_reprs_and_files(odd, tmp_path):
+def test_what_is_printed_and_saved(odd, tmp_path):
     _, diagram, run, lay = odd
     for result in (diagram, run, lay):
         assert result._repr_html_() if hasattr(result, "_repr_html_") else repr(result)

@@ -43,7 +43,7 @@ def test_what_is_in_the_file(fhn):
     assert [p.label for p in fhn.special if p.code != "UZ"] == ["EP1", "HB1", "LP1", "LP2", "HB2"]
     assert [p["w"] for p in fhn.special("UZ")] == [0.25, 0.25, 0.25, 3.0]
     assert fhn.outcome.message == (
-        "read 1 curve of equilibria from b.fhn, a file of AUTO-07p; left out: periodic solutions "
+        "read 1 curve of equilibria from b.fhn, a file of AUTO-07p; omitted: periodic solutions "
         "(IPS = 2), curves in two parameters (ISW = 2)."
     )
 
@@ -142,7 +142,7 @@ def test_what_cannot_be_read(tmp_path, fhn):
     text = (DATA / "b.fhn").read_text()
     with pytest.raises(fs.FileError, match=r"b\.none cannot be read: No such file"):
         fs.read_auto(tmp_path / "b.none")
-    with pytest.raises(fs.FileError, match="holds no curve"):
+    with pytest.raises(fs.FileError, match="contains no curve"):
         fs.read_auto(written(""))
     with pytest.raises(fs.FileError, match="numbers without a header"):
         fs.read_auto(written("1 2 3 4 5 6"))

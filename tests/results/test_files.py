@@ -405,7 +405,7 @@ def test_netcdf_made_by_hand_is_not_read_beyond_its_size(tmp_path):
 def test_newer_and_wrong_contents(tmp_path):
     path = tmp_path / "x.npz"
     newer = {"format": files.FORMAT + 1, "library": "9.9"}
-    read(archive(path, tree=newer), r"was written by fastslow 9\.9 in format 3; .* upgrade it")
+    read(archive(path, tree=newer), r"was written by fastslow 9\.9 in format 4; .* upgrade it")
     read(archive(path, tree={"format": 1}), r"in format 1; this is .* reads format 3$")
     read(archive(path, text="{"), "not written by fastslow")
     read(archive(path, text="[]"), "not written by fastslow")

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import fastslow as fs
 from fastslow.results.base.outcome import Outcome
-from fastslow.results.branch.curve_intersections import _met, _overlapping
+from fastslow.results.branch.curve_intersections import _chord_intersections, _overlapping
 from fastslow.results.points import SpecialPoints
 
 END = Outcome("end of range", "reached the end of the range.", True)
@@ -47,7 +47,7 @@ def test_curves_that_do_not_meet(branch):
     with pytest.raises(fs.ArgumentError, match="one curve, traced twice"):
         line(1.0, 0.0).intersections(line(1.0, 0.0), "p", "x")
     assert line(1.0, 0.0, 2)[:1].intersections(branch, "p", "x").shape == (0, 2)
-    with pytest.raises(fs.ArgumentError, match="expected another curve"):
+    with pytest.raises(fs.ArgumentError, match="expected two different curves"):
         branch.intersections(branch, "p", "x")
     with pytest.raises(fs.ArgumentError, match="two different columns"):
         branch.intersections(line(1, 0), "p", "p")
@@ -60,9 +60,9 @@ def test_intersections_are_found_as_by_trying_every_pair(seed, sizes):
     random = np.random.default_rng(seed)
     one, other = (random.normal(size=(n, 2)).cumsum(axis=0) for n in sizes)
     i, j = (k.reshape(-1) for k in np.indices((sizes[0] - 1, sizes[1] - 1)))
-    _, meet = _met(one, other, i, j)
+    _, meet = _chord_intersections(one, other, i, j)
     near_i, near_j = _overlapping(one, other)
-    _, found = _met(one, other, near_i, near_j)
+    _, found = _chord_intersections(one, other, near_i, near_j)
     assert set(zip(near_i[found], near_j[found], strict=True)) == set(
         zip(i[meet], j[meet], strict=True)
     )

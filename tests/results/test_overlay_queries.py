@@ -77,7 +77,7 @@ def test_samples_by_number(lay):
     assert lay[-1].time == lay.time[-1]
     with pytest.raises(fs.OutOfRangeError, match="no sample"):
         lay[len(lay)]
-    with pytest.raises(fs.ArgumentError, match="an overlay is cut with a step of 1"):
+    with pytest.raises(fs.ArgumentError, match="an overlay is sliced with a step of 1"):
         lay[::-1]
 
 

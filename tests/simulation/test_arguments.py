@@ -65,11 +65,11 @@ def test_span_and_settings(gear, keywords, message):
     [
         ({"rtol": 0}, "rtol = 0; expected a positive number"),
         ({"rtol": 1}, "rtol = 1; expected a number from 1e-16 to 0.1"),
-        ({"order": 2}, "order = 2; expected a whole number from 4 to 40"),
-        ({"order": 8.5}, "order = 8.5; expected a whole number"),
+        ({"order": 2}, "order = 2; expected an integer from 4 to 40"),
+        ({"order": 8.5}, "order = 8.5; expected an integer"),
         ({"implicit": 1}, "implicit = 1; expected True or False"),
         ({"max_steps": 0}, "max_steps = 0"),
-        ({"max_crossings": None}, "max_crossings = None; expected a whole number"),
+        ({"max_crossings": None}, "max_crossings = None; expected an integer"),
     ],
 )
 def test_settings(keywords, message):

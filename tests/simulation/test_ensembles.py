@@ -193,7 +193,7 @@ def test_one_that_fails_stops_no_other():
     assert np.isfinite(many["x"][1:]).all()
     assert many.hits.shape == (3, 0, 2)
     assert set(many.regime) == {""}
-    assert "2 of 3 reached the end of time" in repr(many)
+    assert "2 of 3 reached the end of the time span" in repr(many)
     assert "trajectory 0: the state grew" in repr(many)
     whole = simulate_many(Model({x: x**2}), [[1], [-1], [0.1]], t=(0, 3))
     assert whole.maximum[0, 0] > 1e6
@@ -291,7 +291,7 @@ def test_progress_and_pickle(gear, swept, capsys):
             {"states": np.zeros((3, 2)), "parameters": {"D": [1, 2]}},
             r"broadcast to one length: received states \(3, 2\), D \(2,\)",
         ),
-        ({"threads": 0}, "threads = 0; expected a whole number from 1"),
+        ({"threads": 0}, "threads = 0; expected an integer from 1"),
         ({"threads": 1.5}, "threads = 1.5"),
         ({"t": None}, "received neither"),
         ({"periods": 1}, "received both"),
@@ -299,7 +299,7 @@ def test_progress_and_pickle(gear, swept, capsys):
         ({"settle": 1}, "settle = 1 leaves nothing of the run"),
         ({"settle": -1}, "settle = -1; expected a number from 0"),
         ({"period": [1, 2, 3]}, r"period has shape \(3,\)"),
-        ({"samples": 1}, "samples = 1; expected a whole number from 2"),
+        ({"samples": 1}, "samples = 1; expected an integer from 2"),
         ({"samples": [0, 2]}, "samples from 0 to 2 leave the runs"),
         ({"integration": 1e-9}, "integration: expected an Integration, received a float"),
     ],
@@ -317,7 +317,7 @@ def test_wrong_names(gear, swept):
         simulate_many(gear, {"x": 0, "y": 0}, t=(0, 1))
     with pytest.raises(UnknownNameError, match="unknown region 'G'"):
         simulate_many(gear, [0, 0], t=(0, 1), gap="G")
-    with pytest.raises(ArgumentError, match="kept no samples"):
+    with pytest.raises(ArgumentError, match="has no samples"):
         swept["x"]
     with pytest.raises(UnknownNameError, match="unknown column 'z'"):
         swept["z"]

@@ -190,7 +190,7 @@ def test_a_linear_growth_returns_from_1e_58():
     run = simulate(model, [1e-3], t=(0, 1000))
     assert run(500.0)[0] == pytest.approx(1e-3 * math.exp(-125), rel=1e-8)
     assert run.end[1] == pytest.approx(1e-3, rel=1e-8)
-    assert str(run.outcome) == "reached t = 1000, the end of the time asked for."
+    assert str(run.outcome) == "reached t = 1000, the end of the time span."
     # 1e-3 exp(−800) is no number any more
     deep = simulate(model, [1e-3], t=(-1100, 2100))
     assert deep.end[1] == 0

@@ -195,7 +195,7 @@ def test_the_slow_quantity_of_a_frozen_model_is_swept():
         ({"column": "z"}, fs.UnknownNameError, "unknown column 'z'"),
         ({"state": [1]}, fs.ArgumentError, "expected 2 values"),
         ({"keep": 0}, fs.ArgumentError, "keep = 0"),
-        ({"settle": 1.5}, fs.ArgumentError, "whole number"),
+        ({"settle": 1.5}, fs.ArgumentError, "integer"),
         ({"what": "extreme"}, fs.UnknownNameError, "did you mean 'extremes'"),
         ({"what": "section"}, fs.ArgumentError, "needs it"),
         ({"section": "v"}, fs.ArgumentError, "goes with"),

@@ -352,8 +352,8 @@ def smallest_sum(values: Vector) -> tuple[float, float]:
 def smallest_value(matrix: Array, rate: Array | float = 0.0) -> float:
     """Smallest singular value of a matrix with unit rows, with the sign of the determinant.
 
-    Rows far shorter than ``rate`` (a number, or one for each row) are not scaled to unit length:
-    in a plane that is invariant for all parameters the row of the transverse state vanishes.
+    TracedRows far shorter than ``rate``, one number or one for each, stay short: in a plane that is
+    invariant for all parameters the whole row of the state that leaves it vanishes.
 
     Parameters
     ----------

@@ -201,7 +201,7 @@ class Plane:
     window: Mapping[Any, Any] | None
     marks: list[tuple[int, float]]
 
-    def contains(self, point: SpecialPoint) -> bool:
+    def holds(self, point: SpecialPoint) -> bool:
         """Return whether a point is in the ranges of both parameters."""
         at = np.array([point.parameters.get(name, np.nan) for name in self.names])
         return bool(np.all((at >= self.lower) & (at <= self.upper)))
@@ -231,7 +231,7 @@ def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
         if point.code in POINT_TYPES and POINT_TYPES[point.code].curves
     ]
     for point, kind in starts:
-        if (code is not None and kind != code) or not plane.contains(point):
+        if (code is not None and kind != code) or not plane.holds(point):
             continue
         if any(_passes(rows, point, kind, plane) for _, rows in found):
             continue
@@ -282,7 +282,7 @@ def _curve(point: SpecialPoint, plane: Plane, code: str) -> tuple[PointBranch, T
     field = FrozenField(model, *names)
     region = _region_of(field, point, code)
     u = np.append(point.state, [point.parameters[n] for n in names])
-    if not plane.contains(point):
+    if not plane.holds(point):
         raise ArgumentError(
             f"the point {point.label} at {names[0]} = {u[-2]:g}, {names[1]} = {u[-1]:g} is "
             f"outside over={plane.ranges}"
@@ -346,11 +346,11 @@ def _marks(
 def _window(point: SpecialPoint, given: Mapping[Any, Any] | None) -> StateWindow:
     """Return the requested window, completed by that of the point's diagram."""
     known: StateWindow = point.source.window
-    requested = state_window(known.states, given)
+    asked = state_window(known.states, given)
     lower, upper, meant = list(known.lower), list(known.upper), list(known.given)
-    for k, (low, high) in enumerate(requested.given):
-        lower[k] = requested.lower[k] if low else lower[k]
-        upper[k] = requested.upper[k] if high else upper[k]
+    for k, (low, high) in enumerate(asked.given):
+        lower[k] = asked.lower[k] if low else lower[k]
+        upper[k] = asked.upper[k] if high else upper[k]
         meant[k] = (low or meant[k][0], high or meant[k][1])
     return replace(known, lower=tuple(lower), upper=tuple(upper), given=tuple(meant))
 

@@ -74,10 +74,10 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     finite = np.isfinite(values).all(axis=-1)
     values = np.where(finite[..., None], values, 1.0)
     modulus = np.abs(values)
-    error = rounding * n * modulus.max(axis=-1, keepdims=True)
+    noise = rounding * n * modulus.max(axis=-1, keepdims=True)
 
     # complex pairs, represented by the eigenvalue with positive imaginary part
-    pair = (values.imag > 0) & (np.abs(values.real) >= error)
+    pair = (values.imag > 0) & (np.abs(values.real) >= noise)
     relative = np.where(pair, np.abs(values.real) / np.where(pair, modulus, 1.0), 1.0)
     negative = (pair & (values.real < 0)).sum(axis=-1)
 
@@ -92,7 +92,7 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     one, other = np.where(real, size, 0.0)[..., :-1], np.where(real, size, 0.0)[..., 1:]
     both = real[..., 1:]
     opposite = both & (below[..., 1:] != below[..., :-1])
-    left_out = (opposite & (other - one < error)) | (both & (other < error))
+    left_out = (opposite & (other - one < noise)) | (both & (other < noise))
     negative = negative - (left_out & below[..., 1:]).sum(axis=-1)
     opposite &= ~left_out
     apart = np.where(opposite, (other - one) / np.where(opposite, other + one, 1.0), 1.0)
@@ -118,8 +118,8 @@ def product_of_pair(eigenvalues: Complex, rounding: float = ROUNDING) -> float:
         return np.nan
     first, second = np.triu_indices(len(values), 1)
     sums = values[first] + values[second]
-    error = rounding * len(values) * np.abs(values).max()
-    kept = (sums.imag == 0) & (np.abs(sums.real) >= error)
+    noise = rounding * len(values) * np.abs(values).max()
+    kept = (sums.imag == 0) & (np.abs(sums.real) >= noise)
     if not kept.any():
         return np.nan
     first, second, sums = first[kept], second[kept], sums[kept]

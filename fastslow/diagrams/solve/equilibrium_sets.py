@@ -387,7 +387,7 @@ class Family:
         sets: list[EquilibriumSet] = []
         filled: list[_Filled] = []
         for middle in (distinct[k] for k in in_order(np.reshape(distinct, (-1, d)), units)):
-            if any(one.contains(middle) for one in filled):
+            if any(one.holds(middle) for one in filled):
                 continue
             if not (self.values(value, *middle) >= 0).all():
                 continue
@@ -514,7 +514,7 @@ class _Filled:
         flat = self.places.reshape(-1, self.places.shape[-1])
         return np.asarray(np.ptp(flat, axis=0) / (self.own.shape[0] - 1))
 
-    def contains(self, place: Array) -> bool:
+    def holds(self, place: Array) -> bool:
         """Return whether the grid point nearest to a point is in the set."""
         first = self.places[(0,) * self.own.ndim]
         part = np.rint((place - first) / self.cell)
@@ -691,7 +691,7 @@ def _bands(
     family: Family, lower: float, upper: float, window: StateWindow
 ) -> list[EquilibriumBand]:
     def sets_at(value: float) -> list[EquilibriumSet]:
-        return [one for one in family.sets(value) if window.meets(one.lower, one.upper)]
+        return [one for one in family.sets(value) if window.intersects(one.lower, one.upper)]
 
     def after(run: Run, one: EquilibriumSet) -> EquilibriumSet | None:
         """Return the translate of a set that continues a run, None if there is none."""

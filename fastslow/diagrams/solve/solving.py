@@ -98,12 +98,12 @@ def equilibria(
         raise ModelError(f"the equilibria are not isolated; {free[0]}")
     name = next(iter(given.parameters), IDLE)
     value = given.parameters[name] if given.parameters else 0.0
-    requested = state_window(model.states, window, model.periodic)
+    asked = state_window(model.states, window, model.periodic)
     field = FrozenField(given, name)
     # sets may exist only at these values of all parameters
     found = solve_at(field, value, virtual, FrozenField(given, IDLE))
-    inside = [one for one in found.sets if requested.meets(one.lower, one.upper)]
-    return Equilibria(within(field, requested, found), found.completeness, inside)
+    inside = [one for one in found.sets if asked.intersects(one.lower, one.upper)]
+    return Equilibria(within(field, asked, found), found.completeness, inside)
 
 
 def solve_at(

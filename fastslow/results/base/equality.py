@@ -1,4 +1,4 @@
-"""Equality of results by content: arrays number by number, NaN equal to itself."""
+"""Equality of results by content: arrays elementwise, NaN equal to NaN."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 
 def equal(one: Any, other: Any) -> bool:
-    """Whether two values have the same content.
+    """Return True if two values have the same content.
 
     Examples
     --------
@@ -39,7 +39,7 @@ def _equal_with_nan(one: Any, other: Any) -> bool:
 
 
 def content_hash(value: Any) -> int:
-    """A hash that is the same for equal content; of arrays the shape alone counts."""
+    """Return a hash that agrees for equal content; arrays are hashed by shape alone."""
     if isinstance(value, np.ndarray):
         return hash(value.shape)
     if isinstance(value, float | complex) and value != value:

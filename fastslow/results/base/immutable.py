@@ -1,8 +1,8 @@
-"""Results cannot be changed: arrays are read-only, mappings and sequences too.
+"""Immutability of results: arrays, mappings and sequences are read-only.
 
-An array that is put into a result is copied, unless nothing can write to it: what its
-maker does with it later does not reach the result. NumPy lets the owner of an array make
-it writeable again (``array.flags.writeable = True``); who does so means to.
+An array stored in a result is copied unless it is read-only already, so that later changes
+of the original do not affect the result. NumPy lets the owner of an array make it writeable
+again (``array.flags.writeable = True``); this is not prevented.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from fastslow.arguments import like
 from fastslow.results.base.equality import content_hash, equal
 from fastslow.results.base.named_mapping import NamedMapping
 
-#: What cannot be changed anyway.
+#: Immutable types, stored as they are.
 PLAIN = frozenset({float, int, bool, str, type(None)})
 
-#: What is in the annotation of a method that hands out arrays.
+#: Names in the return annotation of a method that returns arrays.
 ARRAYS = ("Array", "Floats", "Integers", "Bits", "Any")
 
 
 def fixed(name: str, value: Any) -> Any:
-    """A value of a field as it is kept: read-only, and nobody else's to write to.
+    """Return the value of a field as stored: read-only and not shared with a writable array.
 
     Examples
     --------
@@ -62,7 +62,7 @@ def fixed(name: str, value: Any) -> Any:
 
 
 def _out_of_reach(array: np.ndarray[Any, Any]) -> bool:
-    """Whether an array is read-only, and all that it is a view of."""
+    """Return True if an array and every array it is a view of are read-only."""
     part: Any = array
     while isinstance(part, np.ndarray):
         if part.flags.writeable:
@@ -72,7 +72,7 @@ def _out_of_reach(array: np.ndarray[Any, Any]) -> bool:
 
 
 def read_only(value: Any) -> Any:
-    """A value just computed, with its arrays (and those in tuples and mappings) read-only."""
+    """Make the arrays of a new value (also those in tuples and mappings) read-only."""
     if isinstance(value, np.ndarray):
         value.flags.writeable = False
     elif isinstance(value, Mapping):
@@ -85,7 +85,7 @@ def read_only(value: Any) -> Any:
 
 
 class ReadOnly:
-    """Hands out read-only arrays alone: from every method and property that is annotated so."""
+    """Base class whose methods and properties annotated with arrays return them read-only."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -114,10 +114,10 @@ def _closed(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Immutable(ReadOnly):
-    """A frozen dataclass with read-only content, equal to others with the same.
+    """A frozen dataclass with read-only content, compared by content.
 
-    What lives only in this process (the model behind a diagram) is not compared, and not
-    pickled. A copy of what cannot be changed is itself.
+    Fields that exist only in this process (the model behind a diagram) are neither compared
+    nor pickled. A copy is the object itself.
     """
 
     def __post_init__(self) -> None:
@@ -140,7 +140,7 @@ class Immutable(ReadOnly):
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        # neither what was computed from the fields, nor what lives only in this process
+        # neither cached properties nor fields that exist only in this process
         known = {entry.name: entry for entry in fields(self)}  # type: ignore[arg-type]
         return {
             name: None if known[name].metadata.get("live") else value

@@ -1,4 +1,4 @@
-"""A small immutable mapping whose keys are names, and symbols by their names."""
+"""An immutable mapping with names, or symbols identified by their names, as keys."""
 
 from __future__ import annotations
 
@@ -15,14 +15,13 @@ V = TypeVar("V")
 class NamedMapping(Mapping[str, V], Generic[V]):
     """An ordered, immutable mapping from names to values.
 
-    A key may be a name or anything that prints as one (a SymPy symbol); identifiers
-    are compared as Python compares them. An unknown key raises an error that suggests
-    the nearest name.
+    A key is a name or an object that prints as one (a SymPy symbol); identifiers are
+    normalised as in Python. An unknown key raises an error that suggests the nearest name.
 
     Parameters
     ----------
     kind : str
-        What the entries are, used in error messages.
+        The kind of the entries, used in error messages.
     items : mapping or iterable of (name, value)
         The entries.
 
@@ -66,11 +65,11 @@ class NamedMapping(Mapping[str, V], Generic[V]):
             raise unknown_name(self.kind, key, self._items) from None
 
     def items(self) -> ItemsView[str, V]:
-        """Names and values in order."""
+        """Return names and values in order."""
         return self._items.items()
 
     def get(self, key: object, default: V | None = None) -> V | None:  # type: ignore[override]
-        """The value of a name, or the default."""
+        """Return the value of a name, or the default."""
         return self._items.get(normalised(str(key)), default)
 
     def __contains__(self, key: object) -> bool:
@@ -99,10 +98,10 @@ class NamedMapping(Mapping[str, V], Generic[V]):
         return content_hash(self._items)
 
     def index(self, key: object) -> int:
-        """Position of a name among the keys."""
+        """Return the position of a name among the keys."""
         self[key]
         return list(self._items).index(normalised(str(key)))
 
 
-# the slots themselves, past __setattr__
+# the descriptors of the slots, which bypass __setattr__
 _set_kind, _set_items = (vars(NamedMapping)[name].__set__ for name in ("kind", "_items"))

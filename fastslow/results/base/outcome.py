@@ -1,4 +1,4 @@
-"""How a computation ended, as data that reads as a sentence."""
+"""The outcome of a computation: a code, a message and a flag for success."""
 
 from __future__ import annotations
 
@@ -10,27 +10,28 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fastslow.results.trajectory.trajectory import Trajectory
 
-#: Codes of ends at which a branch goes on, though its tracing does not.
+#: Codes of ends at which the tracing stopped, though the branch continues.
 CUT_SHORT = ("too many points", "step too small")
 
-#: Codes of ends that the model has, to which every branch there can be followed.
+#: Codes of ends that belong to the model, so that the branch was traced completely.
 ENDS_OF_MODEL = ("left the window",)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The way a branch or a trajectory ended.
+    """The outcome at an end of a branch or a trajectory.
 
     Parameters
     ----------
     code : str
-        Short stable name that programs can compare, e.g. ``"end of range"``.
+        Short stable name for use in programs, e.g. ``"end of range"``.
     message : str
-        One sentence: what happened and, where something can be done, what to try.
+        One sentence with the cause and, where there is one, a remedy.
     success : bool
-        Whether the computation reached what it was asked for.
+        Whether the requested end was reached.
     notes : tuple of str
-        What of the message warns of a doubtful result, such as states whose noise decides.
+        Sentences of the message that warn of a doubtful result, such as one decided by
+        rounding.
 
     Examples
     --------
@@ -51,7 +52,7 @@ class Outcome:
 
 
 def with_notes(outcome: Outcome, notes: Sequence[str]) -> Outcome:
-    """The outcome with sentences of warning that it does not have yet.
+    """Return the outcome with further sentences of warning, each once.
 
     Examples
     --------
@@ -65,19 +66,19 @@ def with_notes(outcome: Outcome, notes: Sequence[str]) -> Outcome:
 
 
 def stopped_early(run: Trajectory) -> str:
-    """What a result read off a run adds when the run stopped before its end, else nothing."""
+    """Return a sentence for results of a run that ended early, else empty text."""
     return "" if run.outcome.success else f" The run ended early: {run.outcome}"
 
 
 def early_end(run: Trajectory) -> str:
-    """The code of the outcome of a run that ended early, else empty."""
+    """Return the code of the outcome of a run that ended early, else empty text."""
     return "" if run.outcome.success else run.outcome.code
 
 
 def with_ends(
     search: Outcome, ends: Sequence[tuple[Outcome, Outcome]], unexplained: int
 ) -> Outcome:
-    """How the search for branches ended, and how many of them ended before their time.
+    """Return the outcome of a search for branches, with the number of incomplete branches.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What every result can do: be pickled and saved, without what lives only in this process."""
+"""Base classes of results: immutable, compared by content, saved to files."""
 
 from __future__ import annotations
 
@@ -7,40 +7,39 @@ import os
 from fastslow.arguments import path, validated
 from fastslow.results.base.immutable import Immutable
 
-#: Metadata of a field that lives only in this process, such as a model: dropped when kept.
+#: Metadata of a field that exists only in this process, such as a model: not saved.
 LIVE = {"live": True}
 
-#: The same of one that files keep in another form, its own attribute ``stored``.
+#: Metadata of such a field that is saved in another form, its attribute ``stored``.
 STORED = {"live": True, "stored": True}
 
 
 class Saved:
-    """What can be kept in a file."""
+    """Mixin of objects that can be saved to a file."""
 
     @validated(path=path)
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write this to a file that `fastslow.load` reads back bit for bit.
+        """Save to a file, from which `fastslow.load` restores every bit.
 
-        The file is written whole or not at all; a symbolic link is followed, and a
-        file that exists keeps its permission bits. A checksum of the content is at
-        its end. The model of a trajectory or a diagram is kept as a `StoredModel`. What
-        lives only in this process (what corrects points between the rows of a diagram) is
-        not kept.
+        The file is written atomically and ends with a checksum of its content; a symbolic
+        link is followed, and an existing file keeps its permission bits. The model of a
+        trajectory or a diagram is stored as a `StoredModel`. Objects that exist only in
+        this process (the corrector of points between the rows of a diagram) are not saved.
 
         Parameters
         ----------
         path : str or path
-            Ends in ``.npz``, or in ``.nc`` for NetCDF (extra ``data``), in small or
-            capital letters.
+            With the extension ``.npz``, or ``.nc`` for NetCDF (extra ``data``), in lower
+            or upper case.
 
         Raises
         ------
         ArgumentError
-            For another ending.
+            For another extension.
         FileError
-            When the file cannot be written.
+            If the file cannot be written.
         MissingPackageError
-            For ``.nc`` without the extra ``data``.
+            For ``.nc`` if the extra ``data`` is not installed.
 
         Examples
         --------
@@ -58,4 +57,4 @@ class Saved:
 
 
 class Result(Immutable, Saved):
-    """A result: it cannot be changed, is equal to others with its content, and can be saved."""
+    """A result: immutable, compared by content, and saved by `save`."""

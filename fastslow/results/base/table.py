@@ -1,4 +1,4 @@
-"""Results as tables: plain arrays, data frames, labelled arrays."""
+"""Results as tables: conversion to arrays, data frames and labelled arrays."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 
 def extra(name: str, group: str = "data") -> Any:
-    """A package of an extra, imported late.
+    """Import a package of an optional extra.
 
     Raises
     ------
     MissingPackageError
-        When it is not installed.
+        If it is not installed.
     """
     try:
         return import_module(name)
@@ -34,18 +34,18 @@ def extra(name: str, group: str = "data") -> Any:
 
 
 class Table(ABC):
-    """A result that reads as columns of equal length."""
+    """A result with columns of equal length."""
 
-    #: What one row is, and the columns that say where it is.
+    #: The name of one row, and the columns that are its coordinates.
     _row: ClassVar[str] = "row"
     _places: tuple[str, ...] = ()
 
     @abstractmethod
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Every column as a plain (read-only) array, by name, all of one length."""
+        """Return every column by name as a read-only array, all of equal length."""
 
     def to_frame(self) -> pandas.DataFrame:
-        """A copy of the columns of `to_dict` as a pandas data frame (extra ``data``).
+        """Return a copy of the columns of `to_dict` as a pandas data frame (extra ``data``).
 
         Raises
         ------
@@ -57,7 +57,7 @@ class Table(ABC):
         return frame
 
     def to_xarray(self) -> xarray.Dataset:
-        """A copy of the columns of `to_dict` as an xarray dataset (extra ``data``).
+        """Return a copy of the columns of `to_dict` as an xarray dataset (extra ``data``).
 
         Raises
         ------
@@ -69,11 +69,11 @@ class Table(ABC):
         return extra("xarray").Dataset(columns, places, self._about())
 
     def _copied(self) -> dict[str, NDArray[Any]]:
-        """The columns, the reader's own to change."""
+        """Return writable copies of the columns."""
         return {name: np.array(values) for name, values in self.to_dict().items()}
 
     def _about(self) -> dict[str, Any]:
-        """What holds for all rows: the equations, and the values of parameters."""
+        """Return metadata common to all rows: the equations and the parameter values."""
         about: dict[str, Any] = {"result": type(self).__name__}
         if getattr(self, "equations", ""):
             about["equations"] = self.equations  # type: ignore[attr-defined]
@@ -84,5 +84,5 @@ class Table(ABC):
 
 
 def numbered(name: str, values: NDArray[Any]) -> dict[str, NDArray[Any]]:
-    """Name an array's columns name_1, name_2 and so on, for shape (N, k)."""
+    """Return the columns of an array of shape (N, k) named name_1, name_2 and so on."""
     return {f"{name}_{k + 1}": values[:, k] for k in range(values.shape[1])}

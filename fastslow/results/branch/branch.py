@@ -1,4 +1,4 @@
-"""A branch of equilibria as a table."""
+"""A branch of equilibria, stored as a table."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ from fastslow.results.points import Corrector, Equilibrium, SpecialPoints, stabi
 
 @dataclass(frozen=True)
 class Sheet:
-    """A run of a branch over which the parameter is strictly monotone and the region one.
+    """A range of rows of a branch with strictly monotone parameter in a single region.
 
     Parameters
     ----------
     start, stop : int
         Rows ``start`` to ``stop - 1`` of the branch.
     region : str
-        The region of all its rows.
+        The region of these rows.
     """
 
     start: int
@@ -52,15 +52,15 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False)
 class Branch(Table, Result):
-    """A curve of equilibria, row by row along its arclength.
+    """A curve of equilibria, with one row for each computed point along its arclength.
 
-    At an interface the boundary equilibrium stands twice, once as the last row
-    of the region left and once as the first row of the region entered, so that
-    every row's eigenvalues belong to its own region.
+    A boundary equilibrium has two rows, the last one of the region left and the
+    first one of the region entered, so that the eigenvalues of every row belong to
+    its own region.
 
     ``branch["x"]`` is a column and ``branch["x**2 + v"]`` an expression in states
-    and parameters; ``branch[3]`` and iteration give the equilibria of rows, and
-    ``branch[10:50]`` is the branch of those rows, with its special points.
+    and parameters; ``branch[3]`` and iteration return the equilibria of rows, and
+    ``branch[10:50]`` returns the branch of those rows, with its special points.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Branch(Table, Result):
     parameter_name : str
         The continuation parameter.
     state : ndarray, shape (N, n)
-        States, row by row.
+        The states of each row.
     parameter : ndarray, shape (N,)
         Parameter values.
     tangent : ndarray, shape (N, n + 1)
@@ -79,26 +79,26 @@ class Branch(Table, Result):
     region : ndarray of str, shape (N,)
         The region whose rates vanish.
     special : SpecialPoints
-        In order along the branch; ``branch.special("LP")`` gives those of one code.
+        In order along the branch; ``branch.special("LP")`` selects one code.
     special_rows : tuple of int
         The row of each special point (of a boundary equilibrium, the first of its two).
     outcomes : tuple of Outcome
-        Why the branch stopped at its first and its last row.
+        The outcomes at the first and the last row.
     closed : bool
-        Whether the last row is the first again (an isolated loop).
+        True for a closed curve, whose last row repeats the first.
     admissible : bool
         False for a branch of virtual equilibria.
     parameters : mapping
         The values of all other parameters.
     known_stability : ndarray of str, shape (N,), optional
-        Stability where the eigenvalues are not known, as in files of AUTO-07p.
+        The stability where the eigenvalues are unknown, as in files of AUTO-07p.
     corrector : callable, optional
-        Solves for an equilibrium read between rows; not kept in a file.
+        Solves for equilibria between rows; not saved to files.
     periods : mapping
-        The period of every state that has one. The columns go on beyond the
-        principal range (−period/2, period/2] without a jump, and the last row of a
-        closed branch may be whole periods from the first; equilibria and special
-        points are given in the principal range.
+        The period of each periodic state. Its column is unwrapped, that is,
+        continuous beyond the principal range (−period/2, period/2], and the last row
+        of a closed branch may differ from the first by whole periods; equilibria and
+        special points are reduced to the principal range.
 
     Examples
     --------
@@ -138,12 +138,12 @@ class Branch(Table, Result):
 
     @cached_property
     def stable(self) -> NDArray[np.bool_]:
-        """Whether each row is stable, shape (N,)."""
+        """True for stable rows, shape (N,)."""
         return self.stability == "stable"
 
     @property
     def outcome(self) -> Outcome:
-        """How the tracing ended: the first unsuccessful end, else the last one."""
+        """The outcome of the tracing: the first unsuccessful one, else that at the last row."""
         return next((o for o in self.outcomes if not o.success), self.outcomes[-1])
 
     @cached_property
@@ -164,14 +164,14 @@ class Branch(Table, Result):
     @overload
     def __getitem__(self, key: str) -> NDArray[np.float64]: ...
     def __getitem__(self, key: object) -> Branch | Equilibrium | NDArray[np.float64]:
-        """A column or expression, shape (N,); the equilibrium of a row; the branch of some rows.
+        """Return a column or expression, the equilibrium of a row, or the branch of some rows.
 
         Raises
         ------
         UnknownNameError
-            For a name that is no state and no parameter.
+            For a name that is neither a state nor a parameter.
         ArgumentError
-            For text that is no expression, or a slice that holds no row or leaves some out.
+            For text that is not an expression, or a slice that is empty or has a step.
         OutOfRangeError
             For a row that there is not.
         """
@@ -188,12 +188,12 @@ class Branch(Table, Result):
 
     @cached_property
     def monotone_runs(self) -> MonotoneRuns:
-        """Runs of rows over which the parameter does not turn."""
+        """Ranges of rows with monotone parameter."""
         return monotone_runs(self.parameter)
 
     @cached_property
     def regions(self) -> tuple[str, ...]:
-        """The regions gone through, each once, in order."""
+        """The regions along the branch, each once, in order."""
         starts = np.flatnonzero(np.append(True, self.region[1:] != self.region[:-1]))
         return tuple(dict.fromkeys(self.region[starts].tolist()))
 
@@ -206,7 +206,7 @@ class Branch(Table, Result):
     def at(
         self, *, stable: bool | None = None, region: str | None = None, **value: float
     ) -> list[Equilibrium]:
-        """Equilibria at one value of the parameter, one per passage; see `Diagram.at`.
+        """Return the equilibria at one value of the parameter; see `Diagram.at`.
 
         Parameters
         ----------
@@ -223,9 +223,10 @@ class Branch(Table, Result):
         Raises
         ------
         UnknownNameError
-            If the name is not the branch's parameter, or the region not one of its own.
+            If the name is not the parameter of the branch, or the region not one of its
+            regions.
         ArgumentError
-            If the branch does not reach the value.
+            If the value is outside the range of the branch.
         """
         where = validate_value(self.parameter_name, self.range, "branch", value)
         found = passages(self, where, self.parameters, self.corrector)
@@ -240,18 +241,18 @@ class Branch(Table, Result):
         code: str | None = None,
         between: tuple[float, float] | None = None,
     ) -> tuple[Branch, ...]:
-        """The parts of the branch whose rows all fulfil the conditions, in order.
+        """Return the slices of the branch whose rows satisfy all conditions, in order.
 
         Parameters
         ----------
         stable : bool, optional
-            Rows that are stable (or not).
+            Select rows that are stable, or those that are not.
         region : str, optional
-            Rows of one region.
+            Select rows in one region.
         code : str, optional
-            Parts with a special point of this code.
+            Select slices with a special point of this code.
         between : (float, float), optional
-            Rows with the parameter in this range, ends included.
+            Select rows with the parameter in this closed interval.
 
         Returns
         -------
@@ -260,19 +261,19 @@ class Branch(Table, Result):
         Raises
         ------
         UnknownNameError
-            For a region or code that there is not.
+            For an unknown region or code.
         ArgumentError
-            For a range that is none.
+            For an invalid interval.
         """
         if region is not None and region not in self.regions:
             raise unknown_name("region", region, self.regions)
         return slicing.parts_of(self, stable, region, code, between)
 
     def stable_intervals(self) -> NDArray[np.float64]:
-        """Intervals of the parameter over which the branch is stable, shape (k, 2).
+        """Return the intervals of the parameter over which the branch is stable, shape (k, 2).
 
-        One for each stable stretch along the branch, in order; where a special
-        point ends it, the interval ends exactly there.
+        One interval for each stable slice of the branch, in order. An interval
+        bounded by a special point ends exactly there.
         """
         return self._stable_intervals
 
@@ -281,11 +282,10 @@ class Branch(Table, Result):
         return stability_intervals.stable_intervals(self)
 
     def nearest(self, **values: float) -> Equilibrium:
-        """The point of the branch nearest to some values of states and the parameter.
+        """Return the point of the branch nearest to given values of states and parameter.
 
-        Distances are measured in units of each column's range. Between rows the
-        point is interpolated, and corrected at its parameter value where the
-        model is attached.
+        Distances are measured in units of each column's range. A point between rows
+        is interpolated and, if the model is attached, corrected at its parameter value.
 
         Parameters
         ----------
@@ -299,38 +299,38 @@ class Branch(Table, Result):
         Raises
         ------
         UnknownNameError
-            For a name that is no state and not the parameter.
+            For a name that is neither a state nor the parameter.
         ArgumentError
-            For a number that is not finite, or none at all.
+            For a number that is not finite, or without any value.
         """
         return nearest_of([self], self.parameters, values, self.corrector)
 
     @validated(x=formula, y=formula)
     def intersections(self, other: Branch, x: str, y: str) -> NDArray[np.float64]:
-        """Where two branches meet in the plane of two columns, shape (k, 2).
+        """Compute the intersections of two branches in the plane of two columns, shape (k, 2).
 
-        Both curves are interpolated by cubics with their tangents. In a plane of
-        two of more columns a meeting need not be a common equilibrium.
+        Both curves are interpolated by cubics with their tangents. An intersection in
+        a plane need not be a common equilibrium if there are more columns.
 
         Parameters
         ----------
         other : Branch
             Over the same parameter.
         x, y : str
-            Two of the states and the parameter.
+            Two of the columns: states and the parameter.
 
         Returns
         -------
         ndarray
-            Values of x and y, in order along this branch. Curves that run
-            along each other meet nowhere.
+            Values of x and y, in order along this branch. Overlapping segments of
+            both curves have no intersections.
 
         Raises
         ------
         UnknownNameError
-            For a name that is no column of both.
+            For a name that is not a column of both branches.
         ArgumentError
-            For a branch with itself.
+            If both branches are the same.
         """
         return intersections(self, other, (str(x), str(y)))
 
@@ -341,11 +341,11 @@ class Branch(Table, Result):
 
     @property
     def point_names(self) -> tuple[str, ...]:
-        """The columns of `points`."""
+        """The names of the columns of `points`."""
         return (*self.states, self.parameter_name)
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Parameter, states, region, stability, eigenvalues and labels of special points."""
+        """Return parameter, states, region, stability, eigenvalues and labels of special points."""
         return {
             self.parameter_name: self.parameter,
             **{name: self.state[:, k] for k, name in enumerate(self.states)},
@@ -356,9 +356,9 @@ class Branch(Table, Result):
         }
 
     def sheets(self) -> Iterator[Sheet]:
-        """Split into runs of one region and strictly monotone parameter.
+        """Yield the ranges of rows in one region with strictly monotone parameter.
 
-        Vertical segments, where the parameter does not change, are no sheets.
+        Vertical segments, where the parameter is constant, are omitted.
         """
         change = np.diff(self.parameter)
         step = np.sign(change)

@@ -1,4 +1,4 @@
-"""Where two curves meet in the plane of two columns."""
+"""Intersections of two curves in the plane of two columns."""
 
 from __future__ import annotations
 
@@ -12,32 +12,33 @@ from fastslow.errors import ArgumentError, unknown_name
 
 Array = NDArray[np.float64]
 
-#: A row nearer to the other curve than this part of the extent of both is on it, and
-#: meetings nearer to each other are one.
+#: Distance, as a fraction of the extent of both curves, below which a row is on the other
+#: curve and two intersections are the same.
 ON = 1e-6
 
-#: Rows in turn on the other curve from which on both run along each other; curves that cross
-#: have one at most, and curves that touch few.
+#: Number of consecutive rows on the other curve from which both curves overlap; curves that
+#: cross have at most one, and curves that touch have few.
 ALONG = 5
 
-#: A curve of which more than this part of the steps run along another one is that curve.
+#: Two curves are the same if more than this fraction of the steps overlap.
 MOST = 0.9
 
-#: Rows by which curves that run along each other are told apart.
+#: Number of rows by which overlapping curves are compared in other columns.
 SAMPLED = 25
 
-#: Sine of the angle from which straight lines meet where the curves do.
+#: Sine of the angle from which the intersection of chords implies one of the curves.
 WIDE = 0.2
 
-#: A column with less than this part of its movement in the direction of its tangents is rounding.
+#: A column is constant up to rounding if less than this fraction of its variation is in the
+#: direction of its tangents.
 ONWARD = 0.5
 
-#: Cubics nearer to each other than this part of the extent of both curves meet.
+#: Distance of two cubics at an intersection, as a fraction of the extent of both curves.
 SAME = 1e-8
 
 
-class Curve(Protocol):
-    """What is asked of a curve: its rows, and its unit tangents."""
+class PlanarCurve(Protocol):
+    """A curve with points and unit tangents."""
 
     @property
     def points(self) -> Array:
@@ -52,11 +53,11 @@ class Curve(Protocol):
         """Shape (N, k)."""
 
 
-def intersections(one: Curve, other: Curve, names: tuple[str, str]) -> Array:
-    """Points common to two curves in a plane; see `Branch.intersections`."""
+def intersections(one: PlanarCurve, other: PlanarCurve, names: tuple[str, str]) -> Array:
+    """Compute the intersections of two curves in a plane; see `Branch.intersections`."""
     instance(type(one))("other", other)
     if one is other:
-        raise ArgumentError("expected another curve; every point of a curve is common with itself")
+        raise ArgumentError("expected two different curves, received the same one twice")
     if names[0] == names[1]:
         raise ArgumentError(f"expected two different columns, received {names[0]!r} twice")
     lines, slopes = [], []
@@ -73,17 +74,17 @@ def intersections(one: Curve, other: Curve, names: tuple[str, str]) -> Array:
     i, j = _overlapping(lines[0], lines[1])
     along = _along(lines, [tuple(s / scale for s in pair) for pair in slopes], i, j)
     if along.size and along.mean() > MOST:
-        plane = f"the curves run along each other in the plane of {names[0]} and {names[1]}: they "
+        plane = f"the curves coincide in the plane of {names[0]} and {names[1]}: they "
         apart_in = _differing(one, other)
         if apart_in:
             raise ArgumentError(
-                f"{plane}differ in {', '.join(apart_in)} alone; expected columns that differ"
+                f"{plane}differ only in {', '.join(apart_in)}; expected columns that differ"
             )
         raise ArgumentError(f"{plane}are one curve, traced twice; expected another curve")
     apart = ~along[i]
     i, j = i[apart], j[apart]
-    part, meet = _met(lines[0], lines[1], i, j)
-    i, j, part = i[meet], j[meet], part[meet]
+    part, crossing = _chord_intersections(lines[0], lines[1], i, j)
+    i, j, part = i[crossing], j[crossing], part[crossing]
     cubics = [
         _cubic(line[:-1][k], line[1:][k], before[k] / scale, after[k] / scale)
         for line, (before, after), k in zip(lines, slopes, (i, j), strict=True)
@@ -98,11 +99,11 @@ def intersections(one: Curve, other: Curve, names: tuple[str, str]) -> Array:
     return np.array(distinct).reshape(-1, 2) * scale
 
 
-def _differing(one: Curve, other: Curve) -> list[str]:
-    """Columns in which curves that are over each other in a plane differ, none for one curve.
+def _differing(one: PlanarCurve, other: PlanarCurve) -> list[str]:
+    """Return the columns in which two curves that coincide in a plane differ.
 
-    Rows of one curve are on the other one if they are nearer to a step of it than the step is
-    long, in units of the extents.
+    A row of one curve is on the other if its distance from a step is less than the length of
+    the step, in units of the extents.
     """
     names = [name for name in one.point_names if name in other.point_names]
     first, second = (
@@ -125,15 +126,16 @@ def _differing(one: Curve, other: Curve) -> list[str]:
     return [name for name, differs in zip(names, apart, strict=True) if differs]
 
 
-def step_slopes(curve: Curve) -> tuple[Array, Array]:
-    """Derivatives of every step's cubic at its two ends by the part of the step, (N − 1, k).
+def step_slopes(curve: PlanarCurve) -> tuple[Array, Array]:
+    """Return the derivatives of every step's cubic at its two ends, each of shape (N − 1, k).
 
-    The tangents, scaled to the length of the chord in units of the columns' extents.
+    They are the tangents scaled to the length of the chord in units of the columns' extents;
+    the cubic is a function of the fraction of the step.
     """
     points = curve.points
     chords = np.diff(points, axis=0)
     unit = np.ptp(points, axis=0) if len(points) else np.ones(points.shape[1])
-    # a column that is constant but for rounding does not move in the direction of its tangents
+    # a column that is constant up to rounding does not follow its tangents
     onward = (chords * np.sign(curve.tangent[:-1] + curve.tangent[1:])).sum(axis=0)
     unit[onward <= ONWARD * np.abs(chords).sum(axis=0)] = np.inf
     tangents = curve.tangent / unit
@@ -152,7 +154,7 @@ def _along(
     i: NDArray[np.intp],
     j: NDArray[np.intp],
 ) -> NDArray[np.bool_]:
-    """Which steps of the first curve run along the second, from pairs of steps that overlap."""
+    """Mark the steps of the first curve that overlap the second, from candidate pairs of steps."""
     first, second = lines
     on = np.zeros(len(first), dtype=bool)
     cubics = _cubic(second[:-1][j], second[1:][j], slopes[1][0][j], slopes[1][1][j])
@@ -178,7 +180,7 @@ def _along(
 
 
 def _boxes(line: Array) -> list[tuple[Array, Array]]:
-    """Bounding boxes of the steps of a line, of pairs of them, and so on up to one."""
+    """Return a tree of bounding boxes: of the steps of a line, of pairs of steps, and so on."""
     low, high = np.minimum(line[:-1], line[1:]), np.maximum(line[:-1], line[1:])
     levels = [(low, high)]
     while len(low) > 1:
@@ -191,7 +193,7 @@ def _boxes(line: Array) -> list[tuple[Array, Array]]:
 
 
 def _overlapping(first: Array, second: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Pairs of steps whose boxes overlap, from the top of both trees down."""
+    """Return the pairs of steps whose bounding boxes overlap, by descending both trees."""
     if len(first) < 2 or len(second) < 2:
         nothing = np.empty(0, dtype=np.intp)
         return nothing, nothing
@@ -215,10 +217,10 @@ def _cross(one: Array, other: Array) -> Array:
     return np.asarray(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
 
 
-def _met(
+def _chord_intersections(
     first: Array, second: Array, i: NDArray[np.intp], j: NDArray[np.intp]
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Where on both steps straight lines meet (K, 2), and whether they do."""
+    """Return the fractions of both steps at which their chords intersect, (K, 2), and a mask."""
     one, other = first[i + 1] - first[i], second[j + 1] - second[j]
     away = second[j] - first[i]
     area = _cross(one, other)
@@ -229,7 +231,7 @@ def _met(
 
 
 def _cubic(start: Array, end: Array, leaving: Array, arriving: Array) -> Array:
-    """Coefficients of the cubics with these ends and slopes, shape (K, 4, 2)."""
+    """Return the coefficients of the cubics with given ends and slopes, shape (K, 4, 2)."""
     chord = end - start
     return np.stack(
         [start, leaving, 3 * chord - 2 * leaving - arriving, leaving + arriving - 2 * chord], axis=1
@@ -237,17 +239,17 @@ def _cubic(start: Array, end: Array, leaving: Array, arriving: Array) -> Array:
 
 
 def _value(cubic: Array, part: Array) -> tuple[Array, Array]:
-    """Points and slopes of cubics, one each."""
+    """Return the points and slopes of cubics at one fraction each."""
     s = part[:, None]
     a, b, c, d = cubic.swapaxes(0, 1)
     return a + s * (b + s * (c + s * d)), b + s * (2 * c + s * 3 * d)
 
 
 def _refined(one: Array, other: Array, part: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Meetings of cubics by Newton's method from those of the straight lines between their ends.
+    """Compute intersections of cubics by Newton's method from those of their chords.
 
-    Returns the part of the first step, the points, and which of them are meetings:
-    where Newton's method leaves the steps, those of straight lines at a wide angle.
+    Returns the fraction of the first step, the points, and a mask of valid intersections;
+    if Newton's method leaves the steps, those of chords at a large angle are valid.
     """
     begin, end = one[:, 0], one.sum(axis=1)
     straight = begin + part[:, :1] * (end - begin)
@@ -262,7 +264,7 @@ def _refined(one: Array, other: Array, part: Array) -> tuple[Array, Array, NDArr
     good = (np.abs(now - 0.5) <= 0.6).all(axis=1) & (apart <= SAME)
     chords = end - begin, other.sum(axis=1) - other[:, 0]
     size = np.linalg.norm(chords[0], axis=1) * np.linalg.norm(chords[1], axis=1)
-    # lines at a narrow angle may meet where the curves do not
+    # chords at a small angle may intersect where the curves do not
     wide = np.abs(_cross(*chords)) > WIDE * size
     places = np.where(good, now[:, 0], part[:, 0])
     return places, np.where(good[:, None], points, straight), good | wide

@@ -1,4 +1,4 @@
-"""All branches of one frozen model over one parameter."""
+"""Bifurcation diagrams: the branches of equilibria of a frozen model over one parameter."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ from fastslow.results.io.html import diagram_html
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.stored.model import StoredModel
 
-#: The usual end of the search for branches.
+#: The outcome of a completed search for branches.
 SEARCHED = Outcome("searched", "every start was followed.", True)
 
-#: Code of a search that ended at the largest number of branches.
+#: Code of a search that was stopped at the maximal number of branches.
 TOO_MANY = "too many branches"
 
 
 @dataclass(frozen=True, eq=False)
 class Diagram(Table, Result):
-    """The branches of equilibria of a frozen model over one parameter.
+    """A bifurcation diagram: branches of equilibria of a frozen model over one parameter.
 
-    ``diagram[0]`` and iteration give branches, ``diagram["x"]`` a column of all
-    of them, row by row.
+    ``diagram[0]`` and iteration return branches, ``diagram["x"]`` the concatenated
+    column of all of them.
 
     Parameters
     ----------
@@ -50,38 +50,39 @@ class Diagram(Table, Result):
     parameter : str
         The continuation parameter.
     over : tuple of float
-        The range asked for, (low, high).
+        The range of the parameter, (low, high).
     parameters : mapping
         The values of all other parameters.
     branches : tuple of Branch
-        Every branch found.
+        The branches found.
     completeness : str
-        ``"complete"`` when every branch in the range is proved found, else ``"found"``.
+        ``"complete"`` if it is proved that all branches in the range were found, else
+        ``"found"``.
     interfaces, regions : tuple of str
         Names, in the model's order.
     interface_values : mapping
-        For every interface that is a plain value of one state, (state, value).
+        For each interface at a constant value of one state, (state, value).
     equations : str
-        The equations as they were written, as text.
+        The model equations as text.
     corrector : callable, optional
-        Solves for an equilibrium read between rows; not kept in a file.
+        Solves for equilibria between rows; not saved to files.
     outcome : Outcome
-        How the search for branches ended.
+        The outcome of the search for branches.
     path : mapping
-        Of a model frozen along a path, each slow quantity as text in the parameter.
+        For a model frozen along a path, each slow quantity as text in the parameter.
     settings : mapping
-        How the branches were traced.
+        The settings of the continuation.
     bands : tuple of EquilibriumBand
-        Sets of equilibria within discontinuities over the parameter, such as the
-        sticking band of dry friction.
+        Sets of equilibria on discontinuities over the parameter, such as the sticking
+        band of dry friction.
     window : StateWindow, optional
-        The ranges of the states within which they were: what lies beyond was
-        neither looked for nor traced, and "complete" says nothing of it.
+        The ranges of the states within which branches were traced; ``"complete"``
+        refers to this window only.
     periods : mapping
-        The period of every state that has one.
+        The period of each periodic state.
     model : Model or StoredModel, optional
-        The frozen model, in which the parameter has no value; of a diagram from a file a stored
-        model, which can be simulated and needs no SymPy.
+        The frozen model, in which the parameter has no value; for a diagram loaded from
+        a file a stored model, which can be simulated and does not require SymPy.
 
     Examples
     --------
@@ -115,7 +116,7 @@ class Diagram(Table, Result):
 
     @property
     def stored_model(self) -> StoredModel | None:
-        """The model as a file keeps it, with what its branches are traced by."""
+        """The model as stored in files."""
         source = self.model if self.corrector is None else self.corrector
         return getattr(source, "stored", None)
 
@@ -130,23 +131,23 @@ class Diagram(Table, Result):
     @overload
     def __getitem__(self, key: str) -> NDArray[np.float64]: ...
     def __getitem__(self, key: object) -> Branch | NDArray[np.float64]:
-        """A branch by number; a column or expression of all branches, row by row.
+        """Return a branch by index, or a column or expression of all branches, concatenated.
 
         Raises
         ------
         UnknownNameError
-            For a name that is no state and no parameter.
+            For a name that is neither a state nor a parameter.
         ArgumentError
-            For text that is no expression.
+            For text that is not an expression.
         OutOfRangeError
-            For a branch that there is not.
+            For an index out of range.
         """
         if isinstance(key, int | np.integer) and not isinstance(key, bool):
             return self.branches[position(key, len(self), "branch")]
         if isinstance(key, slice):
             raise ArgumentError(
-                "a diagram has no slices; expected the number of a branch, a name or an "
-                "expression (some of its branches are diagram.branches[0:2])"
+                "a diagram cannot be sliced; expected the index of a branch, a name or an "
+                "expression (or slice its branches: diagram.branches[0:2])"
             )
         names = (*self.states, self.parameter)
         columns = {name: partial(self._joined, name) for name in names}
@@ -158,9 +159,9 @@ class Diagram(Table, Result):
 
     @property
     def special(self) -> SpecialPoints:
-        """Every special point, branch by branch; ``diagram.special("BE")`` those of one code.
+        """The special points, branch by branch; ``diagram.special("BE")`` selects one code.
 
-        A point that several branches share, as a branch point, is listed once.
+        A point common to several branches, such as a branch point, is listed once.
         """
         kept: dict[str, SpecialPoint] = {}
         for branch in self.branches:
@@ -172,10 +173,10 @@ class Diagram(Table, Result):
     def unexplained(self) -> tuple[UnexplainedChange, ...]:
         """Changes of the number of unstable eigenvalues that no special point explains.
 
-        Branch by branch, from row to row: at a fold or branch point the number of
-        eigenvalues with positive real part changes by one, at a Hopf point by two,
-        and it may change by any number from one region to another. An entry says
-        that a special point is missing, or that rounding decides a stability.
+        The number of eigenvalues with positive real part changes by one at a fold or
+        branch point, by two at a Hopf point, and by any number between regions. Any
+        other change indicates a missed special point, or a stability that is decided
+        by rounding.
         """
         return tuple(
             change
@@ -184,7 +185,7 @@ class Diagram(Table, Result):
         )
 
     def _warn(self, query: str) -> None:
-        """Warn that a query may lack what a branch that was cut short would have added."""
+        """Warn that a query may be incomplete, because branches were cut short."""
         cut = sum(any(o.code in CUT_SHORT for o in b.outcomes) for b in self.branches)
         reasons = []
         if cut:
@@ -195,7 +196,7 @@ class Diagram(Table, Result):
             reasons.append("a change of stability is unexplained")
         if reasons:
             warnings.warn(
-                f"{query} may lack something: {' and '.join(reasons)}; see diagram.outcome",
+                f"{query} may be incomplete: {' and '.join(reasons)}; see diagram.outcome",
                 IncompleteWarning,
                 stacklevel=4,
             )
@@ -212,20 +213,19 @@ class Diagram(Table, Result):
     def at(
         self, *, stable: bool | None = None, region: str | None = None, **value: float
     ) -> list[Equilibrium]:
-        """Equilibria at one value of the parameter, one per passage of a branch.
+        """Return the equilibria at one value of the parameter.
 
-        Where the branch is vertical at that value its two ends are given, with
-        ``continuum=True``. With the model attached each is solved for to
-        rounding; a diagram read from a file interpolates and says so
-        (``interpolated=True``). A set of equilibria (see ``bands``) is given by its ends
-        or corners, with ``continuum=True``.
+        A vertical segment of a branch is represented by its two ends, with
+        ``continuum=True``, and a set of equilibria (see ``bands``) by its ends or
+        corners. If the model is attached, each equilibrium is solved for to rounding;
+        otherwise it is interpolated (``interpolated=True``).
 
         Parameters
         ----------
         stable : bool, optional
-            Keep only the stable (or only the others).
+            Select the stable equilibria, or those that are not stable.
         region : str, optional
-            Keep only those of one region.
+            Select those of one region.
         **value : float
             The parameter by name, e.g. ``w=1.0``.
 
@@ -236,7 +236,7 @@ class Diagram(Table, Result):
         Raises
         ------
         UnknownNameError
-            If the name is not the diagram's parameter.
+            If the name is not the parameter of the diagram.
         ArgumentError
             If the value is outside the range of the diagram.
         """
@@ -253,7 +253,7 @@ class Diagram(Table, Result):
 
     @property
     def _known_regions(self) -> tuple[str, ...]:
-        # pseudo-equilibria lie in no region of the model
+        # pseudo-equilibria belong to no region of the model
         sliding = (*(r for b in self.branches for r in b.regions), *(b.region for b in self.bands))
         return tuple(dict.fromkeys([*self.regions, *sliding]))
 
@@ -266,7 +266,7 @@ class Diagram(Table, Result):
         code: str | None = None,
         between: tuple[float, float] | None = None,
     ) -> Diagram:
-        """The diagram of those parts of branches whose rows all fulfil the conditions.
+        """Return the diagram of the slices of branches whose rows satisfy all conditions.
 
         Parameters
         ----------
@@ -276,14 +276,14 @@ class Diagram(Table, Result):
         Returns
         -------
         Diagram
-            Its special points are those on the parts.
+            With the special points on these slices.
 
         Raises
         ------
         UnknownNameError
-            For a region or code that there is not.
+            For an unknown region or code.
         ArgumentError
-            For a range that is none, or outside that of the diagram.
+            For an invalid interval, or one outside the range of the diagram.
         """
         if region is not None and region not in self._known_regions:
             raise unknown_name("region", region, self._known_regions)
@@ -309,15 +309,15 @@ class Diagram(Table, Result):
 
     @validated(at_least=whole(1))
     def bistable(self, at_least: int = 2) -> NDArray[np.float64]:
-        """Intervals of the parameter with two (or more) stable equilibria, shape (k, 2).
+        """Return the intervals of the parameter with several stable equilibria, shape (k, 2).
 
-        Where a special point ends an interval, it ends exactly there. Virtual
-        branches do not count.
+        An interval bounded by a special point ends exactly there. Virtual branches
+        are not counted.
 
         Parameters
         ----------
         at_least : int
-            How many stable equilibria.
+            Smallest number of coexisting stable equilibria.
 
         Raises
         ------
@@ -334,12 +334,12 @@ class Diagram(Table, Result):
         return {}
 
     def nearest(self, **values: float) -> Equilibrium:
-        """The point of any branch nearest to some values; see `Branch.nearest`."""
+        """Return the point of any branch nearest to given values; see `Branch.nearest`."""
         self._warn("nearest()")
         return nearest_of(self.branches, self.parameters, values, self.corrector)
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """The columns of `Branch.to_dict`, with the number of the branch, row by row."""
+        """Return the columns of `Branch.to_dict`, with the index of the branch of each row."""
         tables = [branch.to_dict() for branch in self.branches]
         numbers = np.repeat(np.arange(len(tables)), [len(branch) for branch in self.branches])
         columns = {"branch": numbers}
@@ -352,7 +352,7 @@ class Diagram(Table, Result):
 
     @property
     def _within(self) -> str:
-        """The window, where it was asked for or has cut a branch off."""
+        """The window as text, if it was given or a branch ends at one of its bounds."""
         cut = any(o.code == LEFT for branch in self.branches for o in branch.outcomes)
         return f", {self.window}" if self.window and (self.window.chosen or cut) else ""
 

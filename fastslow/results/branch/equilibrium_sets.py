@@ -1,4 +1,4 @@
-"""Sets of equilibria within discontinuities, such as the sticking band of dry friction."""
+"""Sets of equilibria on discontinuities, such as the sticking band of dry friction."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EquilibriumSet(Result):
-    """All equilibria of a Filippov field along some discontinuities, at one parameter value.
+    """A set of equilibria of a Filippov system on discontinuities, at one parameter value.
 
-    Zero is in the convex hull of the fields around each of its points (Filippov
-    1988): a block that sticks by dry friction stays anywhere in it.
+    At each of its points zero is in the convex hull of the adjacent vector fields
+    (Filippov 1988), as for a block held by dry friction.
 
     Parameters
     ----------
@@ -29,24 +29,24 @@ class EquilibriumSet(Result):
     region : str
         The sliding motion, such as ``"S1|S2"``.
     interfaces : tuple of str
-        Those that are slid along: the contacts that stick.
+        The interfaces of the sliding motion: the sticking contacts.
     dimension : int
-        Of the set.
+        Dimension of the set.
     parameters : mapping
     lower, upper : ndarray, shape (n,)
-        Range of each state; infinite where the set has no end.
+        Range of each state; infinite where the set is unbounded.
     corners : ndarray, shape (k, n)
-        The two ends of a set of dimension 1; of one as large as the number of
+        The two ends of a set of dimension 1; if the dimension equals the number of
         interfaces, the points at which every contact is about to slip.
     eigenvalues : ndarray of complex, shape (n,)
-        In its middle, of the sliding motion: zeros along the set, and −∞ for each
-        interface (+∞ where the fields point away).
+        Of the sliding motion at the middle of the set: zeros along the set, and −∞ for
+        each interface (+∞ if the vector fields point away).
     attracting : bool
-        Whether the field on all sides points at the interfaces: the contact sticks.
+        True if the vector fields on all sides point towards the interfaces (sticking).
     stable : bool
-        Whether it attracts and what is not neutral along it decays.
+        True if the set is attracting and all eigenvalues that are not neutral decay.
     exact : bool
-        Whether the ranges are sure; else they were found by search.
+        True for exact ranges, False for ranges found by search.
 
     Examples
     --------
@@ -73,7 +73,7 @@ class EquilibriumSet(Result):
 
     @property
     def equilibria(self) -> list[Equilibrium]:
-        """Its corners, each one of a continuum unless the set is a single point."""
+        """The corners as equilibria, of a continuum unless the set is a single point."""
         return [
             Equilibrium(
                 self.states,
@@ -113,7 +113,7 @@ class EquilibriumSet(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EquilibriumBand(Result):
-    """An `EquilibriumSet` over a range of the parameter, with its edges as curves.
+    """An `EquilibriumSet` over an interval of the parameter, with its edges as curves.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class EquilibriumBand(Result):
     stable : ndarray of bool, shape (N,)
     exact : bool
     solver : callable, optional
-        Solves for the set at a value; not kept in a file.
+        Solves for the set at a value; not saved to files.
     """
 
     states: tuple[str, ...]
@@ -163,25 +163,25 @@ class EquilibriumBand(Result):
 
     @property
     def edge(self) -> str:
-        """What a motion that slips along its edge follows: ``"edge of S1|S2"``."""
+        """Name of the edge, which a slipping motion follows: ``"edge of S1|S2"``."""
         return f"edge of {self.region}"
 
     @property
     def range(self) -> tuple[float, float]:
-        """The smallest and the largest value of the parameter."""
+        """Smallest and largest value of the parameter."""
         return float(self.values[0]), float(self.values[-1])
 
     def at(self, **value: float) -> EquilibriumSet | None:
-        """The set at one value of the parameter, None where there is none.
+        """Return the set at one value of the parameter, None if there is none.
 
-        With the model attached it is solved for; a band read from a file interpolates.
+        If the model is attached, the set is solved for; otherwise it is interpolated.
 
         Raises
         ------
         UnknownNameError
-            If the name is not the band's parameter.
+            If the name is not the parameter of the band.
         ArgumentError
-            For what is no number.
+            For a value that is not a finite number.
         """
         if list(value) != [self.parameter]:
             raise unknown_name("parameter", next(iter(value), None), [self.parameter])
@@ -193,7 +193,7 @@ class EquilibriumBand(Result):
         return self.set_at(number)
 
     def set_at(self, number: float) -> EquilibriumSet | None:
-        """As `at`, for a number."""
+        """Return the set at a number; see `at`."""
         if not self.values[0] <= number <= self.values[-1]:
             return None
         middle = self._between(0.5 * (self.lower + self.upper), number)
@@ -219,11 +219,11 @@ class EquilibriumBand(Result):
 
     @property
     def is_stable(self) -> bool:
-        """Whether it is stable all along."""
+        """True if the set is stable at all values."""
         return bool(self.stable.all())
 
     def between(self, low: float, high: float) -> EquilibriumBand | None:
-        """The part between two values of the parameter, None where there is none."""
+        """Return the band between two values of the parameter, None if it is empty."""
         first, last = max(low, self.range[0]), min(high, self.range[1])
         if not first < last:
             return None
@@ -243,7 +243,7 @@ class EquilibriumBand(Result):
         )
 
     def bounds(self, numbers: Array) -> tuple[Array, Array]:
-        """Ranges of the states at values of the parameter, interpolated; NaN beyond its range."""
+        """Interpolate the ranges of the states at parameter values; NaN outside the band."""
         numbers = np.asarray(numbers, dtype=float)
         inside = (numbers >= self.values[0]) & (numbers <= self.values[-1])
         found = []
@@ -266,7 +266,7 @@ class EquilibriumBand(Result):
 
 
 def set_name(region: str, attracting: bool) -> str:
-    """A sliding motion at rest, in words.
+    """Return the name of a set of equilibria from its sliding motion.
 
     Examples
     --------

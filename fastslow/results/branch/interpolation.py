@@ -1,4 +1,4 @@
-"""States between the rows of a branch, from its tangents."""
+"""Interpolation of a branch between its rows."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Cubics:
-    """States on the steps of a branch as cubics in the part of the step, by their coefficients.
+    """Cubic interpolants of the states on the steps of a branch.
 
     Parameters
     ----------
     begin, width : ndarray, shape (m,)
-        The parameter at the lower row, and by how much it changes to the next.
+        The parameter at the first row of each step, and its change to the next row.
     powers : ndarray, shape (4, n, m)
-        Coefficients of 1, s, s² and s³, those of each state side by side.
+        Coefficients of 1, s, s² and s³, where s is the fraction of the step.
     """
 
     begin: Floats
@@ -32,17 +32,17 @@ class Cubics:
     powers: Floats
 
     def at(self, steps: NDArray[np.intp], values: Floats) -> Floats:
-        """States on some of the steps at parameter values, shape (N, n)."""
-        part = (values - self.begin[steps]) / self.width[steps]
+        """Return the states on given steps at parameter values, shape (N, n)."""
+        s = (values - self.begin[steps]) / self.width[steps]
         zero, one, two, three = self.powers.take(steps, axis=2)
-        return np.asarray(zero + part * one + part**2 * two + part**3 * three).T
+        return np.asarray(zero + s * one + s**2 * two + s**3 * three).T
 
 
 def cubics(branch: Branch, rows: NDArray[np.intp]) -> Cubics:
-    """The steps between rows ``rows`` and ``rows + 1``.
+    """Return interpolants of the steps between rows ``rows`` and ``rows + 1``.
 
-    Cubic Hermite in the parameter where both end slopes are finite and mild,
-    linear otherwise (beside a fold the slope dx/dp grows without bound).
+    They are cubic Hermite polynomials in the parameter if both end slopes are finite
+    and bounded by the chord, and linear otherwise (near a fold dx/dp is unbounded).
     """
     p0, p1 = branch.parameter[rows], branch.parameter[rows + 1]
     x0, x1 = branch.state[rows], branch.state[rows + 1]
@@ -60,5 +60,5 @@ def cubics(branch: Branch, rows: NDArray[np.intp]) -> Cubics:
 
 
 def hermite(branch: Branch, rows: NDArray[np.intp], values: Floats) -> Floats:
-    """States between rows ``rows`` and ``rows + 1`` at parameter values, shape (m, n); `cubics`."""
+    """Interpolate states between ``rows`` and ``rows + 1`` at parameter values, shape (m, n)."""
     return cubics(branch, rows).at(np.arange(len(rows)), values)

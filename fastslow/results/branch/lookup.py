@@ -1,7 +1,7 @@
-"""Where a branch takes one value of its parameter: a binary search on the pieces that do not turn.
+"""Lookup of equilibria by parameter value: a binary search on ranges of monotone parameter.
 
-The pieces are found once for a branch; each question then costs a comparison
-per piece and a binary search in those that hold the value.
+The ranges are computed once for a branch; each lookup then costs a comparison per
+range and a binary search in those that contain the value.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-#: A row is at a value of the parameter if it is off it by this part of the parameter's size.
+#: Relative distance below which a row is at a value of the parameter.
 AT = 1e-12
 
-#: Rows at one value between which a state moves by this part of its size are a continuum.
+#: Relative change of a state between rows at one value from which they are a continuum.
 MOVED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class MonotoneRuns(Immutable):
-    """Runs of rows over which the parameter does not turn; each begins where the last ends.
+    """Ranges of rows with monotone parameter; each begins at the last row of the previous one.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class MonotoneRuns(Immutable):
     low, high : ndarray, shape (K,)
         Smallest and largest parameter value.
     signed : ndarray, shape (2, N)
-        The parameter and its negative, one of which rises along a piece.
+        The parameter and its negative, one of which increases along each range.
     """
 
     first: NDArray[np.intp]
@@ -54,7 +54,7 @@ class MonotoneRuns(Immutable):
     signed: Array
 
     def around(self, value: float, near: float) -> tuple[list[tuple[int, int]], list[int]]:
-        """Runs of rows at a value, and rows between which and the next one it is passed."""
+        """Return ranges of rows at a value, and rows before a crossing of the value."""
         level: list[tuple[int, int]] = []
         passed: list[int] = []
         for k in np.flatnonzero((self.low <= value + near) & (self.high >= value - near)):
@@ -80,16 +80,16 @@ def monotone_runs(parameter: Array) -> MonotoneRuns:
 
     Examples
     --------
-    >>> pieces = monotone_runs(np.array([0.0, 1.0, 1.0, 2.0, 1.0, 0.0]))
-    >>> pieces.first.tolist(), pieces.last.tolist()
+    >>> runs = monotone_runs(np.array([0.0, 1.0, 1.0, 2.0, 1.0, 0.0]))
+    >>> runs.first.tolist(), runs.last.tolist()
     ([0, 3], [3, 5])
-    >>> pieces.around(0.5, 0.0)
+    >>> runs.around(0.5, 0.0)
     ([], [0, 4])
     """
     way = np.sign(np.diff(parameter))
     moving = np.flatnonzero(way)
     if len(moving):
-        # a row without change goes on in the direction before it
+        # a constant step continues in the direction of the step before it
         source = np.zeros(len(way), dtype=np.intp)
         source[moving] = moving
         source = np.maximum.accumulate(source)
@@ -107,12 +107,12 @@ def monotone_runs(parameter: Array) -> MonotoneRuns:
 def passages(
     branch: Branch, where: float, constants: Mapping[str, float], corrector: Corrector | None
 ) -> list[Equilibrium]:
-    """The equilibria of a branch at a parameter value, in order along it."""
+    """Return the equilibria of a branch at a parameter value, in order along it."""
     near = AT * float(np.abs(branch.parameter).max(initial=0.0))
     level, passed = branch.monotone_runs.around(where, near)
     runs = [(begin, begin, end) for begin, end in level]
     if branch.closed and len(runs) > 1 and runs[0][1] == 0 and runs[-1][2] == len(branch) - 1:
-        # the first row is the last one again: both runs are one
+        # the last row repeats the first: merge both ranges
         last = runs.pop()
         runs[0] = (0, last[1], runs[0][2])
     found: list[tuple[int, Equilibrium]] = []
@@ -126,7 +126,7 @@ def passages(
 
 
 def _unit(branch: Branch) -> Array:
-    """Size of each state on a branch; where it is zero but for rounding, its natural unit."""
+    """Return the scale of each state on a branch, at least the unit of the model."""
     unit = np.abs(branch.state).max(axis=0, initial=0.0)
     for point in branch.special[:1]:
         if point.source is not None:
@@ -135,14 +135,14 @@ def _unit(branch: Branch) -> Array:
 
 
 def wrapped(branch: Branch, state: Array) -> Array:
-    """A state of a branch with angles in their principal range."""
+    """Return a state of a branch with periodic states in their principal range."""
     return principal(state, periods_of(branch.states, branch.periods))
 
 
 def stored(
     branch: Branch, row: int, constants: Mapping[str, float], continuum: bool = False
 ) -> Equilibrium:
-    """The equilibrium of one row."""
+    """Return the equilibrium of one row."""
     return Equilibrium(
         branch.states,
         wrapped(branch, branch.state[row]),
@@ -166,7 +166,7 @@ def between(
     constants: Mapping[str, float],
     corrector: Corrector | None,
 ) -> Equilibrium:
-    """The equilibrium between a row and the next one, where the parameter has a value."""
+    """Return the equilibrium at a parameter value between a row and the next one."""
     state = hermite(branch, np.array([row]), np.array([where]))[0]
     region = str(branch.region[row])
     if corrector is not None:
@@ -181,9 +181,9 @@ def between(
 def read_off(
     branch: Branch, row: int, part: float, state: Array, parameters: Mapping[str, float]
 ) -> Equilibrium:
-    """An equilibrium that is interpolated, with its eigenvalues, and says so."""
+    """Return an interpolated equilibrium, with interpolated eigenvalues."""
     pair = branch.eigenvalues[row : row + 2]
-    # apart, because a complex number times an infinite one (of sliding) is not a number
+    # separately, because a complex number times an infinite one (of sliding) is NaN
     real, imaginary = (np.array([1 - part, part]) @ p for p in (pair.real, pair.imag))
     return Equilibrium(
         branch.states,
@@ -201,12 +201,12 @@ def read_off(
 def validate_value(
     parameter: str, over: tuple[float, float], what: str, value: Mapping[str, float]
 ) -> float:
-    """The value asked for, of the right parameter and inside the range.
+    """Validate a parameter value given by keyword.
 
     Raises
     ------
     UnknownNameError
-        For another name.
+        For the name of another quantity.
     ArgumentError
         For a value outside the range.
     """
@@ -225,7 +225,7 @@ def validate_value(
 def filter_equilibria(
     found: list[Equilibrium], stable: bool | None, region: str | None, regions: tuple[str, ...]
 ) -> list[Equilibrium]:
-    """Those that are stable (or not), and those of a region."""
+    """Select equilibria by stability and region."""
     if region is not None and region not in regions:
         raise unknown_name("region", region, regions)
     return [

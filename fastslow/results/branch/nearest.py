@@ -1,4 +1,4 @@
-"""The point of some branches nearest to given values."""
+"""Nearest-point queries on branches."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def nearest_of(
     values: Mapping[str, float],
     corrector: Corrector | None,
 ) -> Equilibrium:
-    """The nearest point of branches; see `Branch.nearest`."""
+    """Return the nearest point of several branches; see `Branch.nearest`."""
     if not branches:
-        raise ArgumentError("there is no branch to be near to")
+        raise ArgumentError("this diagram has no branches")
     valid = (*branches[0].states, branches[0].parameter_name)
     if not values:
         raise ArgumentError(f"expected values of some of {', '.join(valid)}, received none")
@@ -56,7 +56,7 @@ def nearest_of(
 
 
 def _closest(line: Array, target: Array) -> tuple[float, int, float]:
-    """Distance, row and part of the step after it, of the nearest point of a line."""
+    """Return distance, row and fraction of the following step, of the nearest point of a line."""
     if len(line) == 1:
         return float(np.linalg.norm(line[0] - target)), 0, 0.0
     distance, part = along_line(line, target)
@@ -65,7 +65,7 @@ def _closest(line: Array, target: Array) -> tuple[float, int, float]:
 
 
 def along_line(line: Array, target: Array) -> tuple[Array, Array]:
-    """Distance² of every step of a line from a target, and the part of the step gone there."""
+    """Return the squared distance of every step of a line, and the fraction of the step."""
     step = np.diff(line, axis=0)
     length = (step**2).sum(axis=1)
     part = ((target - line[:-1]) * step).sum(axis=1) / np.where(length > 0, length, 1.0)

@@ -1,4 +1,4 @@
-"""A curve of special points in the plane of two parameters, as a table."""
+"""Curves of special points in the plane of two parameters, stored as tables."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from fastslow.results.io.html import points_html
 from fastslow.results.point_types import POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
-#: Solves for the point of a curve after a part of the step behind a row at which a
-#: parameter has a value: (row, part, name, value) -> SpecialPoint.
+#: Solves for the point of a curve at a parameter value near a fraction of the step after a
+#: row: (row, fraction, name, value) -> SpecialPoint.
 PointCorrector = Callable[[int, float, str, float], SpecialPoint | None]
 
 
@@ -38,11 +38,11 @@ class PointBranch(Table, Result):
     states : tuple of str
         State names.
     parameter_names : tuple of str
-        The two parameters, as they were asked for.
+        The two parameters, in the given order.
     code : str
-        What the curve was asked to be made of: LP, HB, BP or BE.
+        The code of the curve: LP, HB, BP or BE.
     codes : ndarray of str, shape (N,)
-        What each row is: a curve of Hopf points goes on as one of neutral
+        The code of each row: a curve of Hopf points continues as one of neutral
         saddles (NSD) beyond a Bogdanov-Takens point.
     state : ndarray, shape (N, n)
     parameter : ndarray, shape (N, 2)
@@ -53,24 +53,24 @@ class PointBranch(Table, Result):
     region : str
         The region whose rates vanish.
     admissible : ndarray of bool, shape (N,)
-        Whether each row lies in its region; the others are virtual.
+        False for virtual points, outside the region.
     coefficient : ndarray, shape (N,)
         Normal-form coefficient: a of folds, l₁ of Hopf points, else NaN.
     special : SpecialPoints
-        In order along the curve; ``curve.special("CP")`` gives those of one code.
+        In order along the curve; ``curve.special("CP")`` selects one code.
     special_rows : tuple of int
         The row of each special point.
     outcomes : tuple of Outcome
-        Why the curve stopped at its first and its last row.
+        The outcomes at the first and the last row.
     closed : bool
     parameters : mapping
         The values of all other parameters.
     equations : str
         The model as text.
     settings : mapping
-        How the curve was traced.
+        The settings of the continuation.
     corrector : callable, optional
-        Solves for a point read between rows; not kept in a file.
+        Solves for points between rows; not saved to files.
     """
 
     states: tuple[str, ...]
@@ -95,17 +95,17 @@ class PointBranch(Table, Result):
 
     @property
     def outcome(self) -> Outcome:
-        """How the tracing ended: the first unsuccessful end, else the last one."""
+        """The outcome of the tracing: the first unsuccessful one, else that at the last row."""
         return next((o for o in self.outcomes if not o.success), self.outcomes[-1])
 
-    #: Numbers are no columns, and rows no points: there is nothing to go through one by one.
+    #: Not iterable: rows are not points, and columns are accessed by name.
     __iter__: ClassVar[None] = None
 
     def __len__(self) -> int:
         return len(self.state)
 
     def __getitem__(self, name: object) -> NDArray[np.float64]:
-        """A state, a parameter, or an expression in them, shape (N,)."""
+        """Return a state, a parameter, or an expression in them, shape (N,)."""
         columns = {key: partial(self._column, k) for k, key in enumerate(self.point_names)}
         return column(name, columns, self.parameters, len(self))
 
@@ -115,7 +115,7 @@ class PointBranch(Table, Result):
 
     @property
     def criticality(self) -> NDArray[np.str_]:
-        """Of Hopf points supercritical, subcritical or degenerate, else empty, shape (N,)."""
+        """Supercritical, subcritical or degenerate for Hopf points, else empty, shape (N,)."""
         kinds = np.array(["supercritical", "degenerate", "subcritical"])
         hopf = (self.codes == "HB") & np.isfinite(self.coefficient)
         signs = np.sign(np.where(hopf, self.coefficient, 0.0)).astype(int)
@@ -128,31 +128,31 @@ class PointBranch(Table, Result):
 
     @property
     def point_names(self) -> tuple[str, ...]:
-        """The columns of `points`."""
+        """The names of the columns of `points`."""
         return (*self.states, *self.parameter_names)
 
     def at(self, **value: float) -> SpecialPoints:
-        """The points of the curve at one value of one of its parameters.
+        """Return the points of the curve at one value of one of its parameters.
 
-        Each is solved for to rounding while the model is attached. Of a curve read
-        from a file it is interpolated by cubics, and its note says so.
+        If the model is attached, each point is solved for to rounding; on a curve loaded
+        from a file it is interpolated by cubics, as its ``note`` states.
 
         Parameters
         ----------
         **value : float
-            One of both parameters by name, e.g. ``q=0.5``.
+            One of the two parameters by name, e.g. ``q=0.5``.
 
         Returns
         -------
         SpecialPoints
-            In order along the curve; none where it does not reach the value.
+            In order along the curve; empty if it does not reach the value.
 
         Raises
         ------
         UnknownNameError
-            For a name that is neither of both parameters.
+            For a name that is neither of the two parameters.
         ArgumentError
-            For a number that is not finite, or not one value.
+            For a number that is not finite, or for more or fewer than one value.
 
         Examples
         --------
@@ -177,7 +177,7 @@ class PointBranch(Table, Result):
     def intersections(
         self, other: PointBranch, x: object = None, y: object = None
     ) -> NDArray[np.float64]:
-        """Where two curves meet in the plane of two columns; see `Branch.intersections`.
+        """Compute intersections in the plane of two columns; see `Branch.intersections`.
 
         Parameters
         ----------
@@ -188,14 +188,14 @@ class PointBranch(Table, Result):
         Raises
         ------
         ArgumentError
-            For the same curve, also where it was traced twice.
+            If both curves are the same, also if it was traced twice.
         """
         first, second = self.parameter_names
         names = str(first if x is None else x), str(second if y is None else y)
         return intersections(self, other, names)
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Parameters, states, code, admissibility, coefficient, eigenvalues, labels of points."""
+        """Return parameters, states, code, admissibility, coefficient, eigenvalues and labels."""
         return {
             **{name: self[name] for name in (*self.parameter_names, *self.states)},
             "code": self.codes,
@@ -223,7 +223,7 @@ class PointBranch(Table, Result):
 
 
 class PointCurves(ImmutableSequence, tuple[PointBranch, ...]):
-    """The curves of all special points of a diagram, each once.
+    """The curves of all special points of a diagram, without duplicates.
 
     Attributes
     ----------
@@ -231,7 +231,7 @@ class PointCurves(ImmutableSequence, tuple[PointBranch, ...]):
         The two parameters.
     isolated : SpecialPoints
         Points of the diagram from which no curve could be traced, such as branch
-        points that no symmetry keeps.
+        points that do not persist without a symmetry.
     """
 
     parameter_names: tuple[str, str]
@@ -253,7 +253,7 @@ class PointCurves(ImmutableSequence, tuple[PointBranch, ...]):
 
     @property
     def special(self) -> SpecialPoints:
-        """The special points of all curves; one that lies on two of them is there twice."""
+        """The special points of all curves; a point on two curves is listed twice."""
         return SpecialPoints(point for curve in self for point in curve.special)
 
     def __repr__(self) -> str:

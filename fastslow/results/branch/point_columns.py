@@ -1,4 +1,4 @@
-"""Special points as columns."""
+"""Tables of special points."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def columns_of_points(points: Sequence[SpecialPoint]) -> dict[str, NDArray[Any]]:
-    """One row a point; empty text and NaN where a point has no such thing."""
+    """Return columns with one row for each point; missing entries are empty text or NaN."""
     states = tuple(dict.fromkeys(n for p in points for n in p.states))
     parameters = tuple(dict.fromkeys(n for p in points for n in p.parameters))
     columns: dict[str, NDArray[Any]] = {
@@ -36,7 +36,7 @@ def columns_of_points(points: Sequence[SpecialPoint]) -> dict[str, NDArray[Any]]
 
 
 def labels_at(points: Sequence[SpecialPoint], rows: Sequence[int], count: int) -> NDArray[np.str_]:
-    """The labels of the special points on each row of a curve, empty where there is none."""
+    """Return the labels of the special points on each row of a curve, empty without any."""
     texts: dict[int, str] = {}
     for point, row in zip(points, rows, strict=True):
         texts[row] = f"{texts.get(row, '')} {point.label}".strip()

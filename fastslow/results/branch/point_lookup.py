@@ -1,4 +1,4 @@
-"""Where a curve of special points takes one value of a parameter."""
+"""Lookup of points of a curve of special points by the value of a parameter."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Rows nearer to a value than this part of the parameter's extent are at it.
+#: Relative distance below which a row is at a value of the parameter.
 AT = 1e-12
 
-#: Roots this little outside of a step belong to it: beyond rounding at its ends.
+#: Roots outside a step by less than this fraction, due to rounding, belong to it.
 BEYOND = 1e-9
 
 
 def points_at(curve: PointBranch, name: str, value: float) -> SpecialPoints:
-    """The points of a curve at one value of a parameter; see `PointBranch.at`."""
+    """Return the points of a curve at one value of a parameter; see `PointBranch.at`."""
     column = curve.parameter[:, curve.parameter_names.index(name)] - value
     extent = float(np.abs(curve.parameter[:, curve.parameter_names.index(name)]).max())
     near = np.abs(column) <= AT * max(extent, abs(value))
@@ -39,7 +39,7 @@ def points_at(curve: PointBranch, name: str, value: float) -> SpecialPoints:
 
 
 def _rows(near: NDArray[np.bool_], closed: bool) -> list[int]:
-    """The first of every run of rows at the value; the last row of a closed curve is its first."""
+    """Return the first row of every run at the value; a closed curve repeats its first row."""
     begins = np.flatnonzero(near & ~np.append(False, near[:-1]))
     rows = [int(row) for row in begins]
     if closed and len(rows) > 1 and rows[0] == 0 and near[-1]:
@@ -48,12 +48,12 @@ def _rows(near: NDArray[np.bool_], closed: bool) -> list[int]:
 
 
 def _between(curve: PointBranch, column: Array, name: str, near: NDArray[np.bool_]) -> list[float]:
-    """Places between rows at which the cubic of a step takes the value."""
+    """Return fractional rows at which the cubic of a step takes the value."""
     k = len(curve.states) + curve.parameter_names.index(name)
     leaving, arriving = step_slopes(curve)
     start, end = column[:-1], column[1:]
     first, last = leaving[:, k], arriving[:, k]
-    # a cubic lies within the hull of its Bézier points
+    # a cubic is contained in the convex hull of its Bézier points
     hull = np.stack([start, start + first / 3.0, end - last / 3.0, end])
     found: list[float] = []
     inside = (hull.min(axis=0) <= 0) & (hull.max(axis=0) >= 0) & ~near[:-1] & ~near[1:]
@@ -72,7 +72,7 @@ def _between(curve: PointBranch, column: Array, name: str, near: NDArray[np.bool
 
 
 def _read_off(curve: PointBranch, row: int, part: float) -> SpecialPoint:
-    """A point interpolated by the cubic of a step, which says so."""
+    """Return a point interpolated by the cubic of a step, marked as such in its note."""
     points, n = curve.points, len(curve.states)
     other = min(row + 1, len(curve) - 1)
     nearest = row if part < 0.5 else other

@@ -1,4 +1,4 @@
-"""Parts of a branch, with the special points on them."""
+"""Slices of a branch, with their special points."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 
 def rows_of(branch: Branch, wanted: slice) -> Branch:
-    """The branch of some consecutive rows; see `Branch.__getitem__`."""
+    """Return the branch of some consecutive rows; see `Branch.__getitem__`."""
     start, stop, step = wanted.indices(len(branch))
     if step != 1:
         raise ArgumentError(
-            f"a branch is cut with a step of 1, received {step}; thin its columns instead"
+            f"a branch is sliced with a step of 1, received {step}; slice its columns instead"
         )
     if stop <= start:
         raise ArgumentError(
-            f"rows {start} to {stop} hold none of the branch's {len(branch)} points"
+            f"rows {start} to {stop} contain none of the {len(branch)} points of the branch"
         )
     if stop - start == len(branch):
         return branch
@@ -67,7 +67,7 @@ def parts_of(
     code: str | None,
     between: tuple[float, float] | None,
 ) -> tuple[Branch, ...]:
-    """Runs of rows that fulfil conditions; see `Branch.select`."""
+    """Return the slices of a branch that satisfy all conditions; see `Branch.select`."""
     if code is not None and code not in POINT_TYPES:
         raise unknown_name("special point code", code, POINT_TYPES)
     wanted = np.ones(len(branch), dtype=bool)
@@ -83,7 +83,7 @@ def parts_of(
 
 
 def runs_of(wanted: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Start and stop of every run of True.
+    """Return start and stop of every run of True.
 
     Examples
     --------
@@ -95,12 +95,12 @@ def runs_of(wanted: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def limits_of(between: tuple[float, float]) -> tuple[float, float]:
-    """Two numbers in rising order.
+    """Validate an interval: two numbers in increasing order.
 
     Raises
     ------
     ArgumentError
-        For anything else.
+        For any other value.
     """
     sequence = isinstance(between, tuple | list) or getattr(between, "ndim", 0) == 1
     ends = [real_number(end) for end in between] if sequence else []

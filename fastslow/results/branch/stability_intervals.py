@@ -1,4 +1,4 @@
-"""Intervals of the parameter over which equilibria are stable, and how many at once."""
+"""Intervals of the parameter with stable equilibria, and with several of them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 def stable_rows(branch: Branch) -> list[tuple[int, int]]:
-    """First and last row of every stable stretch, the special points at its ends included."""
+    """Return first and last row of every stable slice, including special points at its ends."""
     ends = set()
     for point, row in zip(branch.special, branch.special_rows, strict=True):
         known = POINT_TYPES[point.code]
@@ -31,26 +31,26 @@ def stable_rows(branch: Branch) -> list[tuple[int, int]]:
 
 
 def stable_intervals(branch: Branch) -> Array:
-    """See `Branch.stable_intervals`."""
+    """Compute the stable intervals of a branch; see `Branch.stable_intervals`."""
     spans = [branch.parameter[first : last + 1] for first, last in stable_rows(branch)]
     return np.array([(s.min(), s.max()) for s in spans], dtype=float).reshape(-1, 2)
 
 
 def multistable(branches: Sequence[Branch], at_least: int) -> Array:
-    """Intervals with so many stable equilibria; see `Diagram.bistable`."""
-    sheets = [
+    """Return intervals with several stable equilibria; see `Diagram.bistable`."""
+    ends = [
         sorted((branch.parameter[first], branch.parameter[last]))
         for branch in branches
         if branch.admissible
         for run in stable_rows(branch)
-        for first, last in _unturned(branch, *run)
+        for first, last in _monotone(branch, *run)
     ]
-    if not sheets:
+    if not ends:
         return np.empty((0, 2))
-    low, high = np.array(sheets, dtype=float).T
+    low, high = np.array(ends, dtype=float).T
     values = np.concatenate([high, low])
     change = np.repeat([-1, 1], len(low))
-    # at one value the sheets that end do so before others begin: a touch is no overlap
+    # at one value ends are counted before beginnings: intervals that touch do not overlap
     order = np.lexsort((change, values))
     values, count = values[order], np.cumsum(change[order])
     tiny = 1e-12 * float(np.ptp(values))
@@ -64,9 +64,9 @@ def multistable(branches: Sequence[Branch], at_least: int) -> Array:
     return np.array(intervals).reshape(-1, 2)
 
 
-def _unturned(branch: Branch, first: int, last: int) -> list[tuple[int, int]]:
-    """The parts of a run of rows along which the parameter does not turn."""
-    pieces = branch.monotone_runs
-    begin, end = np.maximum(pieces.first, first), np.minimum(pieces.last, last)
+def _monotone(branch: Branch, first: int, last: int) -> list[tuple[int, int]]:
+    """Split a range of rows into ranges with monotone parameter."""
+    runs = branch.monotone_runs
+    begin, end = np.maximum(runs.first, first), np.minimum(runs.last, last)
     real = end > begin
     return list(zip(begin[real].tolist(), end[real].tolist(), strict=True))

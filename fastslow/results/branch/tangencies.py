@@ -1,4 +1,4 @@
-"""Points at which a field is tangent to an interface."""
+"""Tangency points: points at which a vector field is tangent to an interface."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from fastslow.results.points import _Point
 
 @dataclass(frozen=True, eq=False)
 class Tangency(_Point):
-    """A point of an interface h = 0 at which the field of one of its sides is tangent to it.
+    """A point of an interface h = 0 at which the vector field of one side is tangent to it.
 
-    There the Lie derivative L h = ∇h·f of the region's rates vanishes; the second
-    one says to which side the orbit through the point bends (Filippov 1988).
+    There the Lie derivative L h = ∇h·f along the region's vector field vanishes; the
+    sign of the second one determines the side of the orbit through the point (Filippov
+    1988).
 
     Parameters
     ----------
     interface : str
         The interface.
     region : str
-        The region whose field is tangent; the point lies in its closure.
+        The region with the tangent vector field; the point is in its closure.
     states : tuple of str
         State names.
     state : ndarray, shape (n,)
         The point.
     parameters : mapping
-        Every parameter value at which it was found.
+        All parameter values.
     second_derivative : float
-        L²h, the second derivative of h in time along the region's field.
+        L²h, the second time derivative of h along the region's vector field.
     visible : bool or None
-        Whether the orbit bends into the region, so that it is one of the model's:
-        L²h has the sign of h there. None where L²h vanishes (a cusp, or a boundary
-        equilibrium).
+        True if the orbit through the point remains in the region: L²h has the sign of
+        h there. None if L²h vanishes (a cusp, or a boundary equilibrium).
     two_fold : bool
-        Whether the field across the interface, a different one, is tangent there too.
+        True if the vector field on the other side, a different one, is tangent too.
     residual : float
-        Larger of |h| and |L h| at the point.
+        The larger of |h| and |L h| at the point.
     """
 
     interface: str
@@ -61,12 +61,12 @@ class Tangency(_Point):
 
 
 class Tangencies(ImmutableSequence, tuple[Tangency, ...]):
-    """The tangency points at given values, as a tuple that says how sure it is.
+    """The tangency points at given parameter values, as a tuple.
 
     Attributes
     ----------
     completeness : str
-        ``"complete"`` when the tuple is proved to hold all of them, else ``"found"``.
+        ``"complete"`` if it is proved that these are all of them, else ``"found"``.
     """
 
     completeness: str

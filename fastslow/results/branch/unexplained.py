@@ -23,7 +23,7 @@ class UnexplainedChange:
     Parameters
     ----------
     branch : int
-        Number of the branch in its diagram; 0 for a branch by itself.
+        Index of the branch in its diagram; 0 for a single branch.
     rows : (int, int)
         The rows of the branch between which the number changes.
     parameter : str
@@ -53,10 +53,10 @@ class UnexplainedChange:
 def unstable_range(
     eigenvalues: NDArray[np.complex128],
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Least and largest number of eigenvalues with positive real part, shape (...).
+    """Return bounds of the number of eigenvalues with positive real part, shape (...).
 
-    They differ by those whose real part is zero to rounding. Eigenvalues that are
-    not finite numbers are undecided, infinite ones count by their sign.
+    The bounds differ by the eigenvalues whose real part is zero to rounding or NaN;
+    infinite ones count by their sign.
 
     Parameters
     ----------
@@ -78,11 +78,10 @@ def unstable_range(
 
 
 def unexplained_changes(branch: Branch, number: int = 0) -> tuple[UnexplainedChange, ...]:
-    """The changes along a branch that the special points between its rows do not explain.
+    """Return the changes along a branch that its special points do not explain.
 
-    At a fold or branch point the number of unstable eigenvalues changes by one, at a
-    Hopf point by two, at a neutral saddle it stays, and from one region to another it
-    may change by any number.
+    The number of unstable eigenvalues changes by one at a fold or branch point, by two
+    at a Hopf point, by zero at a neutral saddle and by any number between regions.
     """
     steps: dict[int, list[int | None]] = {}
     for point, row in zip(branch.special, branch.special_rows, strict=True):
@@ -110,22 +109,22 @@ def unexplained_rows(
     steps: Mapping[int, Sequence[int | None]],
     jumps: Collection[int] = (),
 ) -> list[tuple[int, int]]:
-    """Rows between which the number of unstable eigenvalues changes without an explanation.
+    """Return rows between which the number of unstable eigenvalues changes unexplained.
 
     Parameters
     ----------
     low, high : ndarray of int, shape (N,)
         The least and largest number at every row.
     steps : dict of int to list
-        By how much it changes at the special points at some rows, None for any number. The
-        number at these rows themselves is undecided.
+        The changes at the special points of some rows, None for any number. The number
+        at these rows themselves is undecided.
     jumps : collection of int
-        Rows before which it may change by any number, as another region begins there.
+        First rows of another region, at which it may change by any number.
 
     Returns
     -------
     list of (int, int)
-        The last row at which the number was certain, and the one at which it is another.
+        The last row with a known number, and the row at which it differs.
 
     Examples
     --------
@@ -135,7 +134,7 @@ def unexplained_rows(
     """
     most = int(high.max(initial=0))
     found = []
-    # the numbers that are possible at the row, and the last row at which there was only one
+    # the possible numbers at the row, and the last row at which the number was unique
     possible = set(range(most + 1))
     since, done = 0, -1
     for row in _eventful(low, high, [*steps, *jumps]):
@@ -160,7 +159,7 @@ def unexplained_rows(
 
 
 def _eventful(low: NDArray[np.intp], high: NDArray[np.intp], places: Collection[int]) -> list[int]:
-    """Rows that differ from the one before, some others, and the one after each of these."""
+    """Return rows that differ from the previous one, given rows, and the row after each."""
     eventful = np.ones(len(low), dtype=bool)
     eventful[1:] = (np.diff(low) != 0) | (np.diff(high) != 0)
     near = np.array([*places, *(place + 1 for place in places)], dtype=np.intp)

@@ -1,4 +1,4 @@
-"""A window in the states: the ranges within which branches are traced."""
+"""State windows: the ranges of the states within which branches are traced."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from fastslow.results.base.outcome import Outcome
 
 Array = NDArray[np.float64]
 
-#: Code of the outcome of a branch that ends on an edge of the window of the states.
+#: Outcome code of a branch that ends at a bound of the window.
 LEFT = "left the window"
 
-#: A default bound is this many times the size of the known equilibria away from them.
+#: Distance of a default bound from the known equilibria, in units of their size.
 MARGIN = 1e4
 
-#: A range of equilibria is at most this many times their typical distance from the median; of
-#: numbers spread evenly it is four times.
+#: Largest range of equilibria in units of their median distance from the median; for
+#: uniformly distributed numbers the range is four times that distance.
 TYPICAL = 8.0
 
-#: Distances below this part of the size of a state are rounding.
+#: Distances below this fraction of the size of a state are rounding errors.
 ROUNDING = 1e-9
 
-#: What is beyond a bound by less than this fraction of the state's unit is on it.
+#: Distance from a bound, in units of the state, below which a state is on it.
 ON_EDGE = 1e-9
 
 
@@ -38,7 +38,7 @@ ON_EDGE = 1e-9
 class StateWindow:
     """The ranges of the states within which branches are traced.
 
-    ``window["x"]`` is the range of one state, (low, high); an infinite end is no bound.
+    ``window["x"]`` is the range of one state, (low, high); an infinite end means no bound.
 
     Parameters
     ----------
@@ -47,13 +47,13 @@ class StateWindow:
     lower, upper : tuple of float
         Bounds, state by state, in the states' units.
     given : tuple of (bool, bool)
-        Whether the lower and the upper bound of each state were asked for; the
-        others are defaults.
+        Whether the lower and the upper bound of each state were given; the others
+        are defaults.
     core : tuple of (float, float) or None
-        For each state the range of the equilibria from which the tracing
-        started without the few that are far from the others, near a pole.
+        For each state the range of the equilibria from which branches were traced,
+        without outliers near a pole.
     periods : tuple of float
-        The period of each state, 0 where it has none; empty where none has one.
+        The period of each state, 0 without one; empty without any.
 
     Examples
     --------
@@ -80,43 +80,41 @@ class StateWindow:
 
     @property
     def chosen(self) -> bool:
-        """Whether any bound was asked for."""
+        """True if any bound was given."""
         return any(low or high for low, high in self.given)
 
     def contains(self, state: Array, unit: Array | float = 0.0) -> NDArray[np.bool_]:
-        """Whether states, shape (…, n), lie in the window; its edges belong to it.
+        """Return True for states, shape (…, n), in the closed window.
 
-        ``unit`` is the size of every state, by which rounding at an edge is judged.
+        ``unit`` is the scale of each state for rounding errors at a bound.
         """
         slack = ON_EDGE * np.maximum(np.abs(state), unit)
         inside = (state >= np.array(self.lower) - slack) & (state <= np.array(self.upper) + slack)
         return np.asarray(inside.all(axis=-1))
 
-    def meets(self, lower: Array, upper: Array) -> bool:
-        """Whether a box of states, or a copy of it by whole periods, has a part in the window."""
+    def intersects(self, lower: Array, upper: Array) -> bool:
+        """Return True if a box of states, or a copy by whole periods, intersects the window."""
         low, high = np.array(self.lower), np.array(self.upper)
-        turning = (self._periods > 0) & np.isfinite(low) & np.isfinite(upper)
-        period = np.where(turning, self._periods, 1.0)
+        periodic = (self._periods > 0) & np.isfinite(low) & np.isfinite(upper)
+        period = np.where(periodic, self._periods, 1.0)
         # the first copy that is not below the window
-        first = np.where(turning, low, 0.0) / period - np.where(turning, upper, 0.0) / period
-        move = np.where(turning, period * np.ceil(first - ON_EDGE), 0.0)
+        first = np.where(periodic, low, 0.0) / period - np.where(periodic, upper, 0.0) / period
+        move = np.where(periodic, period * np.ceil(first - ON_EDGE), 0.0)
         return bool(np.all((upper + move >= low) & (lower + move <= high)))
 
     def around(self, points: Array, known: NDArray[np.bool_] | None = None) -> StateWindow:
-        """The window with defaults in place of the bounds that were not asked for.
+        """Return the window with default bounds in place of those that were not given.
 
-        A periodic state has none.
-
-        They are `MARGIN` times the size of the equilibria away from these, where
-        the size of a state is the larger of its spread and its largest modulus:
-        measured in other units, it is the same window.
+        The distance of a default bound from the equilibria is `MARGIN` times their size,
+        the larger of their range and their largest modulus, so that the window does not
+        depend on units. Periodic states have no default bounds.
 
         Parameters
         ----------
         points : ndarray, shape (m, n)
             Known equilibria.
         known : ndarray of bool, shape (m, n), optional
-            False for what is zero but for rounding.
+            False for values that are zero up to rounding.
         """
         kept = np.isfinite(points) & (True if known is None else known)
         lower, upper = list(self.lower), list(self.upper)
@@ -138,9 +136,9 @@ class StateWindow:
         return replace(self, lower=tuple(lower), upper=tuple(upper), core=tuple(core))
 
     def near(self, states: Array) -> NDArray[np.bool_]:
-        """Whether states, shape (N, n), are not farther from the core than it is wide, shape (N,).
+        """Return True for states whose distance from the core is at most its width, shape (N,).
 
-        Figures are scaled to these where a branch goes to infinity.
+        The axes of figures are scaled to these if a branch goes to infinity.
         """
         found = np.ones(len(states), dtype=bool)
         for k, core in enumerate(self.core):
@@ -150,7 +148,7 @@ class StateWindow:
         return found
 
     def middle(self) -> Array:
-        """The middle of the core, 0 where there is none, NaN of periodic states, shape (n,)."""
+        """Return the middle of the core, 0 without one, NaN for periodic states, shape (n,)."""
         middle = [0.0 if c is None else 0.5 * (c[0] + c[1]) for c in self.core]
         return np.where(self._periods > 0, np.nan, middle)
 
@@ -159,7 +157,7 @@ class StateWindow:
         return np.array(self.periods or (0.0,) * len(self.states))
 
     def shifted(self, states: Array) -> Array:
-        """States, shape (…, n), shifted by whole periods into the window's ranges."""
+        """Return states, shape (…, n), shifted by whole periods into the window."""
         if not self.periods:
             return np.array(states, dtype=float)
         low, high = np.array(self.lower), np.array(self.upper)
@@ -179,10 +177,10 @@ class StateWindow:
 
 
 def typical(points: Array, least: Array | float) -> Array:
-    """How widely each state of some points is spread, but for the few far from the others.
+    """Return the typical range of each state, without outliers.
 
-    `TYPICAL` times the median distance from the median, of distances above
-    ``least``; infinite where there is none. Shapes (m, n) and (n,).
+    It is `TYPICAL` times the median distance from the median, of distances above
+    ``least``; infinite without any. Shapes (m, n) and (n,).
 
     Examples
     --------
@@ -203,23 +201,23 @@ def state_window(
     given: Mapping[Any, Any] | None = None,
     periodic: Mapping[str, float] | None = None,
 ) -> StateWindow:
-    """The window that a user asks for, without defaults.
+    """Return the window given by the user, without default bounds.
 
     Parameters
     ----------
     states : tuple of str
     given : mapping, optional
-        State (symbol or name) to its range (low, high); None in place of an end
-        leaves the default there, an infinite end is no bound at all.
+        The range (low, high) of states (symbols or names); None in place of an end
+        selects the default bound, an infinite end means no bound.
     periodic : mapping, optional
-        State to its period.
+        The period of periodic states.
 
     Raises
     ------
     UnknownNameError
-        For a name that is no state.
+        For a name that is not a state.
     ArgumentError
-        For a range that is none.
+        For an invalid range.
 
     Examples
     --------
@@ -232,14 +230,14 @@ def state_window(
 first, or None for an end without bound; did you mean (-5, 5)?
     """
     lower, upper = [-math.inf] * len(states), [math.inf] * len(states)
-    asked = [(False, False)] * len(states)
+    bounded = [(False, False)] * len(states)
     for key, ends in (given or {}).items():
         name = str(key)
         if name not in states:
             raise unknown_name("state of the window", name, states)
         k = states.index(name)
         lower[k], upper[k] = _range(name, ends)
-        asked[k] = (ends[0] is not None, ends[1] is not None)
+        bounded[k] = (ends[0] is not None, ends[1] is not None)
         period = (periodic or {}).get(name)
         if period is not None and not upper[k] - lower[k] <= period * (1 + ON_EDGE):
             raise ArgumentError(
@@ -249,7 +247,7 @@ first, or None for an end without bound; did you mean (-5, 5)?
     none = (None,) * len(states)
     periods = tuple(float((periodic or {}).get(name, 0.0)) for name in states)
     return StateWindow(
-        states, tuple(lower), tuple(upper), tuple(asked), none, periods if any(periods) else ()
+        states, tuple(lower), tuple(upper), tuple(bounded), none, periods if any(periods) else ()
     )
 
 
@@ -268,15 +266,15 @@ def _range(name: str, ends: Any) -> tuple[float, float]:
 
 
 def left_window(window: StateWindow, state: Array, unit: Array, where: str) -> Outcome:
-    """What is said of a curve that ends at a state on an edge of a window.
+    """Return the outcome of a curve that ends at a bound of a window.
 
     Parameters
     ----------
     window : StateWindow
     state, unit : ndarray, shape (n,)
-        The last state, and the unit of each.
+        The last state, and the unit of each component.
     where : str
-        The values of the parameters there.
+        The parameter values there, as text.
     """
     bounds = np.array([window.lower, window.upper]).T
     off = np.abs(state[:, None] - bounds) / unit[:, None]
@@ -285,7 +283,7 @@ def left_window(window: StateWindow, state: Array, unit: Array, where: str) -> O
     if window.given[k][side]:
         return Outcome(
             "left the window",
-            f"reached {name} = {bound:g}, an edge of the window, at {where}.",
+            f"reached {name} = {bound:g}, a bound of the window, at {where}.",
             True,
         )
     return Outcome(

@@ -27,13 +27,13 @@ from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
 
-#: Types of points of an equilibrium curve; those written every so many steps are none.
+#: Point types of an equilibrium curve, without regular output points.
 CODES = {number: one.code for one in POINT_TYPES.values() for number in one.auto}
 
-#: IPS of equilibria of ODEs, and of travelling waves seen as such.
+#: IPS of equilibria of ODEs, and of the ODEs of travelling waves.
 EQUILIBRIA = (1, 11)
 
-#: The one region of a smooth model.
+#: The single region of a smooth model.
 REGION = "S1"
 
 
@@ -46,44 +46,42 @@ def read_auto(
     names: Mapping[str, str] | None = None,
     parameter: str | None = None,
 ) -> Diagram:
-    """Read the equilibria of a diagram file of AUTO-07p, to lay them under a trajectory.
+    """Read a diagram of equilibria from files of AUTO-07p.
 
     The special points LP, HB, BP, UZ and EP keep their codes; a curve that ended
-    without convergence (MX) has an outcome that says so. Stability is as AUTO
-    found it; eigenvalues, to five digits, are in the file of diagnostics (NaN
-    without it), and an overlay needs them. Values between the points are
-    interpolated, and say so. Curves of periodic solutions, and curves
-    in two parameters, are left out, which the diagram's outcome tells.
+    without convergence (MX) has an unsuccessful outcome. The stability is that computed
+    by AUTO; the eigenvalues, to five digits, are read from the diagnostics file (NaN
+    without it) and are required by an overlay. Points between those of the file are
+    interpolated and marked as such. Curves of periodic solutions and curves in two
+    parameters are omitted, as reported by the outcome of the diagram.
 
     Parameters
     ----------
     path : str or path
-        Such as ``b.fhn`` or ``fort.7``.
+        The diagram file, such as ``b.fhn`` or ``fort.7``.
     solutions : str or path, optional
-        Such as ``s.fhn`` or ``fort.8``, for the values of the other parameters;
-        by default the one beside it, when there is one.
+        The solutions file, such as ``s.fhn`` or ``fort.8``, with the values of the other
+        parameters; by default the one in the same folder, if it exists.
     diagnostics : str or path, optional
-        Such as ``d.fhn`` or ``fort.9``, for the eigenvalues; by default the one
-        beside it, when there is one.
+        The diagnostics file, such as ``d.fhn`` or ``fort.9``, with the eigenvalues; by
+        default the one in the same folder, if it exists.
     names : mapping, optional
-        Own names for AUTO's, e.g. ``{"PAR(1)": "w", "U(1)": "x"}``.
+        New names for those of AUTO, e.g. ``{"PAR(1)": "w", "U(1)": "x"}``.
     parameter : str, optional
-        The parameter of the diagram, where curves over several are in the file;
-        by default that of the first curve.
+        The parameter of the diagram, if the file has curves over several; by default
+        that of the first curve.
 
     Returns
     -------
     Diagram
-        With ``completeness`` "found", and the one region S1 of a smooth model.
+        With ``completeness`` "found" and the single region S1 of a smooth model.
 
     Raises
     ------
     FileError
-        When there is no such file, or it is cut short, of another program, or
-        without equilibria.
+        If the file is missing, truncated, of another program, or without equilibria.
     UnknownNameError
-        For a name in ``names`` that is not in the file, or a parameter over
-        which it has no curve.
+        For a name in ``names`` that is not in the file, or a parameter without a curve.
 
     Examples
     --------
@@ -95,12 +93,12 @@ def read_auto(
     source = Path(path)
     sections = sections_of(source)
     if not sections:
-        raise FileError(f"{source} holds no curve; expected a diagram file of AUTO-07p")
+        raise FileError(f"{source} contains no curve; expected a diagram file of AUTO-07p")
     beside = _beside(source, solutions, "s", "fort.8")
     known = {} if beside is None else parameters_of(beside)
     equilibria = [s for s in sections if _left_out(s) is None]
     if not equilibria:
-        raise FileError(f"{source} holds no curve of equilibria: {_left_out(sections[0])}")
+        raise FileError(f"{source} contains no curve of equilibria: {_left_out(sections[0])}")
     called = _Names(equilibria[0], names or {})
     valid = tuple(dict.fromkeys(called.own(s.columns[0]) for s in equilibria))
     if parameter is not None and parameter not in valid:
@@ -125,7 +123,7 @@ def read_auto(
     count = f"{len(kept)} curve{'s' * (len(kept) > 1)}"
     text = f"read {count} of equilibria from {source.name}, a file of AUTO-07p"
     if reasons:
-        text += f"; left out: {', '.join(dict.fromkeys(reasons))}"
+        text += f"; omitted: {', '.join(dict.fromkeys(reasons))}"
     values = np.concatenate([b.parameter for b in branches])
     return Diagram(
         branches[0].states,
@@ -145,7 +143,7 @@ def read_auto(
 def _beside(
     path: Path, given: str | os.PathLike[str] | None, letter: str, plain: str
 ) -> Path | None:
-    """The file given, or the one that goes with a diagram file, if there is one."""
+    """Return the given file, or else the one that belongs to a diagram file, if it exists."""
     if given is not None:
         return Path(given)
     name = f"{letter}{path.name[1:]}" if path.name.startswith("b.") else plain
@@ -155,7 +153,7 @@ def _beside(
 
 
 def _left_out(section: AutoCurve) -> str | None:
-    """Why a curve is none of equilibria over one parameter."""
+    """Return the reason why a curve is not one of equilibria over one parameter, else None."""
     problem, switch = section.constants.get("IPS", 1), section.constants.get("ISW", 1)
     if problem not in EQUILIBRIA:
         what = "periodic solutions" if problem == 2 else "another problem"
@@ -165,7 +163,7 @@ def _left_out(section: AutoCurve) -> str | None:
 
 @dataclass(frozen=True)
 class _Names:
-    """AUTO's names, and the user's own for them."""
+    """The names of AUTO, with the new names given by the user."""
 
     section: AutoCurve
     changes: Mapping[str, str]
@@ -187,7 +185,7 @@ class _Names:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """AUTO's names of the states that its table shows, after parameter and norm."""
+        """AUTO's names of the states in the table, after parameter and norm."""
         shown = len(self.section.columns) - 2
         return self.section.columns[2 : 2 + min(shown, self.section.constants.get("NDIM", shown))]
 
@@ -195,7 +193,7 @@ class _Names:
         return self.changes.get(name, name)
 
     def values(self, numbers: Array, parameter: str) -> dict[str, float]:
-        """Every parameter but the one that varies."""
+        """Return all parameters except the continuation parameter."""
         pairs = zip(self._parameters, numbers.tolist(), strict=False)
         return {self.own(n): v for n, v in pairs if self.own(n) != parameter}
 
@@ -264,8 +262,8 @@ def _outcome(kind: int, parameter: str, value: float) -> Outcome:
 
 
 def _tangents(points: Array) -> Array:
-    """Unit tangents of a curve by differences of second order along it, shape (N, k)."""
-    # in a unit in which no square overflows, by a power of two that changes no digit
+    """Return unit tangents of a curve by second-order differences, shape (N, k)."""
+    # scale by a power of two, which is exact, so that no square overflows
     points = np.ldexp(points, -np.frexp(np.abs(points).max(initial=0.0))[1])
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
     distinct = np.append(True, length > 1e-150)

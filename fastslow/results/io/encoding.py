@@ -1,8 +1,8 @@
-"""Results as text and arrays, and back, bit for bit.
+"""Bit-exact encoding of results as JSON text and arrays, and decoding.
 
-Text and numbers become JSON; arrays are kept beside it under names such as
-``branches/0/state``, small ones in the text itself. Only the classes of
-`fastslow.results` are ever built.
+Text and numbers are encoded as JSON; large arrays are stored separately under names such
+as ``branches/0/state``, small ones in the text itself. Only classes of `fastslow.results`
+are instantiated.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from fastslow.results.stored.model import StoredModel
 
 Array = NDArray[Any]
 
-#: Gives an array by name and type.
+#: Returns an array by name and type.
 Arrays = Callable[[str, str], Array]
 
-#: Arrays up to this size stand in the text.
+#: Largest size of arrays that are stored in the text.
 SMALL = 16
 
-#: What they are made of.
+#: Types of arrays that are stored in the text.
 INLINE = ("<f8", "<c16", "<i8", "|b1")
 
 _SEQUENCES: dict[str, Callable[..., Any]] = {
@@ -49,12 +49,12 @@ _NUMBERS = {"nan": math.nan, "-nan": -math.nan, "inf": math.inf, "-inf": -math.i
 
 
 class BrokenError(Exception):
-    """What a file holds is no result of this version; the message says why."""
+    """The content of a file is not a valid result of this version."""
 
 
 @cache
 def classes() -> dict[str, type[Any]]:
-    """Every dataclass of the results by name."""
+    """Return every dataclass of the results by name."""
     found: dict[str, type[Any]] = {}
     package = "fastslow.results"
     for entry in walk_packages(import_module(package).__path__, f"{package}."):
@@ -68,7 +68,7 @@ def classes() -> dict[str, type[Any]]:
 
 
 def encoded(value: Any, path: str, arrays: dict[str, Array]) -> Any:
-    """A JSON tree of a result; its arrays are put into ``arrays``.
+    """Encode a result as a JSON tree; its large arrays are added to ``arrays``.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def _array(value: Array, path: str, arrays: dict[str, Array]) -> Any:
 
 
 def _name(value: float) -> str:
-    """The key in `_NUMBERS` of a float that is not finite, or the bytes of any other NaN."""
+    """Return the key in `_NUMBERS` of a non-finite float, or the bytes of another NaN."""
     known = (name for name, one in _NUMBERS.items() if _bits(one) == _bits(value))
     return next(known, _bits(value).hex())
 
@@ -164,7 +164,7 @@ def _mapping(value: Mapping[Any, Any], path: str, arrays: dict[str, Array]) -> A
 
 
 def _safe(name: str) -> str:
-    """A name as a part of the name of an array."""
+    """Escape a name for use in the name of an array."""
     return "".join(c if c.isalnum() or c in "_-" else f"%{ord(c):x}" for c in name) or "%"
 
 
@@ -184,7 +184,7 @@ def _record(value: Any, path: str, arrays: dict[str, Array]) -> Any:
 
 
 def _stored(value: Any) -> StoredModel | None:
-    """The stored model of a result, None where there is none.
+    """Return the stored model of a result, None without one.
 
     Where it cannot be made the result is kept without it, with a warning: numbers are not lost
     because of equations.
@@ -208,7 +208,7 @@ def _is_stored(entry: Field[Any]) -> bool:
 
 
 def decoded(node: Any, arrays: Arrays) -> Any:
-    """The result of a JSON tree.
+    """Decode a result from a JSON tree.
 
     Parameters
     ----------

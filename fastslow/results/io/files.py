@@ -21,22 +21,21 @@ from fastslow.errors import (
 from fastslow.results.io.encoding import Arrays, BrokenError, decoded, encoded
 from fastslow.results.io.npz_netcdf import read_archive, read_netcdf, write_archive, write_netcdf
 
-#: Version of the layout described here; a file of another one is not read.
+#: Version of the file format; files of other versions are rejected.
 FORMAT = 3
 
 WRITERS = {".npz": write_archive, ".nc": write_netcdf}
 
-#: How files begin.
+#: Readers by the first bytes of a file.
 READERS = {b"PK\x03\x04": read_archive, b"\x89HDF\r\n\x1a\n": read_netcdf}
 
 
 def write(result: object, path: str | os.PathLike[str]) -> None:
     """Write a result; see `Result.save`.
 
-    The text of a file is JSON: ``format``, ``library`` (the version that wrote
-    it) and ``result``, the fields of the result by name with its equations,
-    parameters and settings. Arrays too large for it stand beside it, and a
-    checksum of everything at the end of the file.
+    A file contains JSON text with the keys ``format``, ``library`` (the version of the
+    package) and ``result`` (the fields of the result by name, including equations,
+    parameters and settings), large arrays in binary form, and a checksum at its end.
     """
     target = Path(path)
     writer = WRITERS.get(target.suffix.lower())
@@ -52,38 +51,38 @@ def write(result: object, path: str | os.PathLike[str]) -> None:
     except (OSError, ValueError, RuntimeError, struct.error) as error:
         if raised_by_handler(error):
             raise
-        # of the HDF5 library, and of `zipfile` for a name that is too long
+        # raised by the HDF5 library, and by `zipfile` for a name that is too long
         raise FileError(f"{target} cannot be written: {reason(error)}") from error
     write_file(target, content)
 
 
 @validated(path=path)
 def load(path: str | os.PathLike[str]) -> Any:
-    """Read a result that was saved.
+    """Load a saved result from a file.
 
-    The checksum of the file is compared first: a file that changed since it was
-    written is refused. Nothing in the file is run, and neither SymPy, Numba nor
-    matplotlib is needed. The result answers and plots as before, and its ``model`` can be
-    simulated (`StoredModel`); what a diagram solved for (`Diagram.at` between rows) is
-    interpolated now, and says so.
+    The checksum of the file is verified first, and a changed file is rejected. No code
+    in the file is executed; SymPy, Numba and Matplotlib are not required. The result
+    supports the same queries and plots, and its ``model`` can be simulated
+    (`StoredModel`); equilibria between the rows of a diagram (`Diagram.at`) are
+    interpolated and marked as such.
 
     Parameters
     ----------
     path : str or path
-        Written by ``save``.
+        A file written by ``save``.
 
     Returns
     -------
     Diagram, Branch, Trajectory, Overlay, …
-        What was saved.
+        The saved result.
 
     Raises
     ------
     FileError
-        When there is no such file, or it is no regular one, cut short, damaged, of
-        another program, or of another format than that of this version.
+        If the file is missing, not a regular file, truncated, damaged, of another
+        program, or of another format version.
     MissingPackageError
-        For NetCDF without the extra ``data``.
+        For NetCDF if the extra ``data`` is not installed.
 
     Examples
     --------
@@ -109,7 +108,7 @@ def load(path: str | os.PathLike[str]) -> Any:
     except Exception as error:
         if raised_by_handler(error):
             raise
-        # what a file written by hand with a right checksum can raise has no end
+        # a crafted file with a correct checksum can raise any exception
         raise FileError(
             f"{source} is damaged, or not written by fastslow: {reason(error)}"
         ) from error

@@ -1,4 +1,4 @@
-"""Results as tables of plain HTML, for notebooks."""
+"""HTML tables of results for notebooks."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from fastslow.results.points import SpecialPoint
     from fastslow.results.trajectory.trajectory import Trajectory
 
-#: Tables are not longer than this; the rest is counted.
+#: Maximal number of rows of a table; further ones are counted.
 LONGEST = 40
 
 
 def table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], notes: str = "") -> str:
-    """A table with a caption; every text is escaped.
+    """Return a table with a caption; all text is escaped.
 
     Examples
     --------
@@ -75,12 +75,12 @@ def points_html(
 
 
 def branch_html(branch: Branch) -> str:
-    """One branch with its special points."""
+    """Return the table of a branch with its special points."""
     return _with_points([("", branch)], repr(branch).split(";")[0], branch.parameter_name)
 
 
 def diagram_html(diagram: Diagram) -> str:
-    """All branches with their special points."""
+    """Return the table of all branches with their special points."""
     title = repr(diagram).split("\n")[0]
     if not diagram.outcome:
         title += f"\n{diagram.outcome}"
@@ -104,7 +104,7 @@ def _with_points(branches: Sequence[tuple[str, Branch]], title: str, name: str) 
 
 
 def trajectory_html(run: Trajectory) -> str:
-    """A run with its crossings."""
+    """Return the table of a run with its crossings."""
     title = repr(run)
     head = ["t", *run.states, "interface", "direction", "from", "to"]
     arrows = {1: "upwards", -1: "downwards", 0: "touching"}

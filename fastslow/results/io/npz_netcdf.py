@@ -31,21 +31,21 @@ from fastslow.results.io.encoding import Arrays, BrokenError
 
 Array = NDArray[Any]
 
-#: What is done with the text and the arrays of a file.
+#: Decodes the text and the arrays of a file.
 Use = Callable[[str, Arrays], Any]
 
-#: The name of the text among the arrays.
+#: Name of the entry with the text.
 TEXT = "fastslow"
 
-#: What stands before the checksum.
+#: Marker before the checksum.
 SEAL = b"fastslow sha256 "
 
-#: Bytes of both at the end of a file.
+#: Length in bytes of marker and checksum.
 SEAL_SIZE = len(SEAL) + 2 * hashlib.sha256().digest_size
 
 
 def sealed(content: bytes) -> bytes:
-    """Content with its checksum at the end.
+    """Append the checksum to the content of a file.
 
     Examples
     --------
@@ -55,7 +55,7 @@ def sealed(content: bytes) -> bytes:
 
 
 def check_seal(content: bytes) -> None:
-    """Compare content to the checksum at its end.
+    """Verify the checksum at the end of the content of a file.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def check_seal(content: bytes) -> None:
 
 
 def _sealed(stream: BytesIO, size: int) -> bytes:
-    """Put the checksum behind so many bytes; nothing is copied, as results can be large."""
+    """Write the checksum after given bytes in place; results can be large."""
     with stream.getbuffer() as content:
         seal = _seal(content[:size])
     stream.seek(size)
@@ -86,7 +86,7 @@ def _seal(content: bytes | memoryview) -> bytes:
 
 
 def write_archive(text: str, arrays: Mapping[str, Array]) -> bytes:
-    """Give the content of an .npz archive, which `numpy.load` reads too."""
+    """Return the content of an .npz archive, which `numpy.load` can read too."""
     stream = BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
         archive.comment = bytes(SEAL_SIZE)
@@ -103,7 +103,7 @@ def write_archive(text: str, arrays: Mapping[str, Array]) -> bytes:
 
 
 def read_archive(content: bytes, use: Use) -> Any:
-    """Give the text and the arrays of an archive to a function; KeyError without the text."""
+    """Call a function with the text and the arrays of an archive; KeyError without the text."""
     check_seal(content)
     budget = _Budget(len(content))
     with zipfile.ZipFile(BytesIO(content)) as archive:
@@ -124,7 +124,7 @@ def read_archive(content: bytes, use: Use) -> Any:
 
 
 def _parsed(name: str, member: bytes) -> Array:
-    """The array of a member of an archive, whose header is compared to its size first."""
+    """Return the array of an archive member, after its header is checked against its size."""
     stream = BytesIO(member)
     if np.lib.format.read_magic(stream) != (1, 0):
         raise BrokenError(f"the header of {name} is not of version 1.0")
@@ -140,7 +140,7 @@ def _parsed(name: str, member: bytes) -> Array:
 
 
 def write_netcdf(text: str, arrays: Mapping[str, Array]) -> bytes:
-    """Give the content of NetCDF 4, made in memory, where no disk can fail.
+    """Return the content of a NetCDF 4 file, built in memory.
 
     There is one group for each part; complex numbers are two variables, and text is characters
     in UTF-8.
@@ -177,7 +177,7 @@ def _write_variable(file: Any, name: str, array: Array) -> None:
 
 
 def _characters(array: Array) -> Array:
-    """Words as single bytes of UTF-8, along one more axis at least as long as their type."""
+    """Encode strings in UTF-8 as single bytes along one more axis."""
     words = [word.encode("utf-8", "surrogatepass") for word in array.reshape(-1).tolist()]
     width = max([array.dtype.itemsize // 4, *map(len, words)])
     joined = b"".join(word.ljust(width, b"\0") for word in words)
@@ -185,14 +185,14 @@ def _characters(array: Array) -> Array:
 
 
 def read_netcdf(content: bytes, use: Use) -> Any:
-    """Give the text and the arrays of a NetCDF file to a function; KeyError without the text."""
+    """Call a function with the text and the arrays of a NetCDF file; KeyError without the text."""
     h5py = extra("h5py")
     check_seal(content)
     budget = _Budget(len(content))
     with h5py.File(BytesIO(content), "r") as file:
 
         def stored(name: str) -> Array:
-            """A variable that is stored plainly in this very file."""
+            """Return a variable stored in this file itself, not a link."""
             found = file
             for part in filter(None, name.split("/")):
                 if not isinstance(found.get(part, getlink=True), h5py.HardLink):
@@ -226,7 +226,7 @@ def read_netcdf(content: bytes, use: Use) -> Any:
 
 
 def _words(name: str, characters: Array, dtype: np.dtype[Any]) -> Array:
-    """The words whose bytes stand along the last axis."""
+    """Decode strings from their bytes along the last axis."""
     if characters.dtype.str != "|S1" or not 4 <= dtype.itemsize <= 4 * characters.shape[-1]:
         raise BrokenError(f"{name} is not stored as fastslow stores words")
     joined = np.ascontiguousarray(characters).view(f"S{characters.shape[-1]}")
@@ -235,7 +235,7 @@ def _words(name: str, characters: Array, dtype: np.dtype[Any]) -> Array:
 
 
 class _Budget:
-    """What may still be read of a file; a crafted one can show the same bytes many times."""
+    """Limit on the bytes read from a file, because a crafted one can repeat the same bytes."""
 
     def __init__(self, size: int) -> None:
         self._left = size
@@ -247,7 +247,7 @@ class _Budget:
 
 
 def _check_dtype(name: str, dtype: np.dtype[Any], kinds: str = "biufcUS") -> None:
-    """Numbers and characters only, no objects and no records."""
+    """Accept numbers and characters, but no objects and records."""
     if dtype.kind not in kinds or dtype.itemsize == 0 or dtype.subdtype is not None:
         raise BrokenError(f"{name} is of type {str(dtype)[:40]}, which no result holds")
 

@@ -1,4 +1,4 @@
-"""A plane of two parameters divided by what happens at each point, finely at boundaries only."""
+"""Adaptive maps of an outcome over two parameters, refined at its boundaries."""
 
 from __future__ import annotations
 
@@ -28,32 +28,32 @@ FAILED = "failed"
 class RefinedMap(Result):
     """Labels over a plane of two parameters.
 
-    Positions are counted in the finest cells, of which a cell of size s holds
-    s × s. A cell larger than the finest has one label at all points evaluated
-    on its rim. Between points evaluated the label of the nearest corner holds.
+    Positions are in units of the finest cells; a cell of size s contains s × s of
+    them. All points evaluated on the sides of a larger cell have the same label.
+    Between evaluated points the label is that of the nearest corner.
 
     Parameters
     ----------
     names : (str, str)
-        What is along the first and the second axis.
+        The parameters along the first and the second axis.
     over : ((float, float), (float, float))
-        Range of each.
+        The range of each.
     shape : (int, int)
         Number of finest cells along each axis.
     labels : tuple of str, bool or int
         In order; ``"failed"`` for points that could not be evaluated.
     corners : ndarray of int, shape (N, 2)
-        Positions of the points evaluated, in lexicographic order.
+        Positions of the evaluated points, in lexicographic order.
     codes : ndarray of int, shape (N,)
-        Which of the labels each point has.
+        Index of each point's label.
     cells : ndarray of int, shape (M, 3)
-        First corner and size of each cell; together they fill the plane.
+        First corner and size of each cell; the cells tile the plane.
     edges : MapEdges
         Sides of the finest cells along which the label changes.
     failures : tuple of ((float, float), str)
         Points labelled ``"failed"``, each with the reason.
     n_evaluations : int
-        Points evaluated in all, those for narrowing the edges included.
+        Total number of evaluated points, including those of the bisection.
 
     Examples
     --------
@@ -78,29 +78,29 @@ class RefinedMap(Result):
 
     @property
     def steps(self) -> Floats:
-        """Sides of a finest cell in the units of the axes, shape (2,)."""
+        """Side lengths of a finest cell in the units of the axes, shape (2,)."""
         return np.array([high - low for low, high in self.over]) / self.shape
 
     @property
     def points(self) -> Floats:
-        """The points evaluated, shape (N, 2)."""
-        return self._located(self.corners)
+        """The evaluated points, shape (N, 2)."""
+        return self._coordinates(self.corners)
 
     @property
     def point_labels(self) -> NDArray[Any]:
-        """The label of each point evaluated, shape (N,)."""
-        return self._worded(self.codes)
+        """The label of each evaluated point, shape (N,)."""
+        return self._labels_of(self.codes)
 
     @property
     def bounds(self) -> Floats:
-        """Of each cell: low and high along the first axis, then along the second, shape (M, 4)."""
-        low = self._located(self.cells[:, :2])
-        high = self._located(self.cells[:, :2] + self.cells[:, 2:])
+        """Bounds of each cell, low and high along the first axis, then the second, (M, 4)."""
+        low = self._coordinates(self.cells[:, :2])
+        high = self._coordinates(self.cells[:, :2] + self.cells[:, 2:])
         return np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
 
     @cached_property
     def corner_rows(self) -> Integers:
-        """Which of the points evaluated are the corners of each cell, shape (M, 2, 2)."""
+        """Indices of the corners of each cell among the evaluated points, shape (M, 2, 2)."""
         height = self.shape[1] + 1
         keys = self.corners @ np.array([height, 1])
         far = self.cells[:, 2, None, None] * np.array([[0, 1]])
@@ -109,30 +109,30 @@ class RefinedMap(Result):
 
     @property
     def corner_codes(self) -> Integers:
-        """Which of the labels each corner of each cell has, shape (M, 2, 2)."""
+        """Index of the label of each corner of each cell, shape (M, 2, 2)."""
         return self.codes[self.corner_rows]
 
     @property
     def mixed(self) -> NDArray[np.bool_]:
-        """Whether the corners of a cell differ, shape (M,): a boundary passes through it."""
+        """True for cells whose corners differ, crossed by a boundary, shape (M,)."""
         codes = self.corner_codes.reshape(-1, 4)
         return np.any(codes != codes[:, :1], axis=1)
 
     @property
     def n_pixels(self) -> int:
-        """Points that a grid as fine as the finest cells would need."""
+        """Number of points of a uniform grid as fine as the finest cells."""
         return (self.shape[0] + 1) * (self.shape[1] + 1)
 
     @cached_property
     def areas(self) -> Floats:
-        """How many of the finest cells each point evaluated stands for, shape (N,)."""
+        """Area represented by each evaluated point, in finest cells, shape (N,)."""
         quarter = np.repeat(0.25 * self.cells[:, 2].astype(float) ** 2, 4)
         sums = np.bincount(self.corner_rows.reshape(-1), quarter, len(self.corners))
         return sums.astype(float)
 
     @property
     def shares(self) -> dict[Label, float]:
-        """The part of the plane's area that each label has."""
+        """The fraction of the area with each label."""
         sums = np.bincount(self.codes, self.areas, len(self.labels)) / np.prod(self.shape)
         return dict(zip(self.labels, sums.tolist(), strict=True))
 
@@ -141,10 +141,10 @@ class RefinedMap(Result):
         """All boundaries between two labels, as polylines."""
         finest = self.cells[:, 2] == 1
         cells, codes = self.cells[finest, :2], self.corner_codes[finest]
-        return boundaries_of(cells, codes, self.labels, self.edges, self._located)
+        return boundaries_of(cells, codes, self.labels, self.edges, self._coordinates)
 
     def boundary(self, one: Label, other: Label) -> tuple[MapBoundary, ...]:
-        """The polylines between two labels, longest first.
+        """Return the polylines between two labels, longest first.
 
         Raises
         ------
@@ -157,19 +157,19 @@ class RefinedMap(Result):
         return tuple(sorted(found, key=lambda b: -len(b.points)))
 
     def at(self, *values: ArrayLike, **named: ArrayLike) -> Any:
-        """The label at points of the plane, given in order or by the names of the axes.
+        """Return the label at points given by position or by the names of the axes.
 
         Returns
         -------
         str, bool or int, or ndarray of them
-            For numbers one label, for arrays an array.
+            One label for numbers, an array for arrays.
 
         Raises
         ------
         UnknownNameError
-            For a name that is no axis.
+            For a name that is not an axis.
         ArgumentError
-            For values that are missing, or that lie outside the map.
+            For missing values, or values outside the map.
         """
         for name in named:
             if name not in self.names:
@@ -190,17 +190,17 @@ class RefinedMap(Result):
             if outside.any():
                 wrong = place[..., k][outside].flat[0]
                 raise ArgumentError(f"{name} = {wrong:g}; the map covers [{low:g}, {high:g}]")
-        found = self._worded(self._codes_at(place.reshape(-1, 2))).reshape(place.shape[:-1])
+        found = self._labels_of(self._codes_at(place.reshape(-1, 2))).reshape(place.shape[:-1])
         return found if found.ndim else found.item()
 
     @validated(predict=function)
     def compare(self, predict: Callable[[Floats, Floats], Sequence[Any]]) -> MapComparison:
-        """Set what a function predicts beside what was found, at every point evaluated.
+        """Compare a prediction with the label found at every evaluated point.
 
         Parameters
         ----------
         predict : callable
-            Two arrays of shape (N,), the parameters, to N labels.
+            Maps two arrays of shape (N,), the parameters, to N labels.
 
         Returns
         -------
@@ -209,7 +209,7 @@ class RefinedMap(Result):
         Raises
         ------
         ArgumentError
-            If it returns another number of labels.
+            If it returns a different number of labels.
         """
         points = self.points
         predicted = items()("what predict returns", predict(points[:, 0], points[:, 1]))
@@ -221,19 +221,19 @@ class RefinedMap(Result):
         agree = np.array([one == other for one, other in zip(found, predicted, strict=True)])
         return MapComparison(points, tuple(found), tuple(predicted), agree, self.areas)
 
-    def _located(self, positions: ArrayLike) -> Floats:
-        part = np.asarray(positions, dtype=float) / self.shape
+    def _coordinates(self, positions: ArrayLike) -> Floats:
+        fraction = np.asarray(positions, dtype=float) / self.shape
         low, high = np.transpose(self.over)
-        return np.asarray(low * (1.0 - part) + high * part)
+        return np.asarray(low * (1.0 - fraction) + high * fraction)
 
-    def _worded(self, codes: Integers) -> NDArray[Any]:
+    def _labels_of(self, codes: Integers) -> NDArray[Any]:
         kinds = {type(label) for label in self.labels}
         words = np.empty(len(self.labels), dtype=object)
         words[:] = self.labels
         return words[codes] if len(kinds) > 1 else np.array(self.labels)[codes]
 
     def _codes_at(self, place: Floats) -> Integers:
-        """The label of the nearest corner of the cell that holds each point."""
+        """Return the label index at the nearest corner of the cell containing each point."""
         low, high = np.transpose(self.over)
         position = (place - low) / (high - low) * self.shape
         unit = np.clip(np.floor(position), 0, np.array(self.shape) - 1).astype(np.int64)
@@ -271,16 +271,16 @@ class RefinedMap(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MapComparison(Result):
-    """What was found at the points of a map beside what was predicted.
+    """Comparison of the labels of a map with predicted ones.
 
     Parameters
     ----------
     points : ndarray, shape (N, 2)
     found, predicted : tuple
-        Labels at each.
+        Labels at each point.
     agree : ndarray of bool, shape (N,)
     areas : ndarray, shape (N,)
-        How many of the finest cells each point stands for.
+        Area represented by each point, in finest cells.
     """
 
     points: Floats
@@ -291,12 +291,12 @@ class MapComparison(Result):
 
     @property
     def share(self) -> float:
-        """The part of the area on which the two agree."""
+        """The fraction of the area on which both agree."""
         return float(self.areas[self.agree].sum() / self.areas.sum())
 
     @property
     def disagreements(self) -> Mapping[tuple[Any, Any], Floats]:
-        """Points by what was found and what was predicted instead, each of shape (any, 2)."""
+        """Points of disagreement by (found, predicted) labels, each of shape (k, 2)."""
         pairs = list(zip(self.found, self.predicted, strict=True))
         differing = dict.fromkeys(p for p, same in zip(pairs, self.agree, strict=True) if not same)
         return {
@@ -315,7 +315,7 @@ class MapComparison(Result):
 
 
 def label_of(value: Any) -> tuple[Label, str]:
-    """A label as a plain value, and the reason where it says that a point failed.
+    """Return a label as a plain value, and the reason for a failed point.
 
     Parameters
     ----------
@@ -325,7 +325,7 @@ def label_of(value: Any) -> tuple[Label, str]:
     Raises
     ------
     ArgumentError
-        For anything else, e.g. a number that is not whole.
+        For any other value, e.g. a number that is not an integer.
 
     Examples
     --------
@@ -335,7 +335,7 @@ def label_of(value: Any) -> tuple[Label, str]:
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, np.ndarray | Sequence) and not isinstance(value, str):
-        raise ArgumentError(f"{shown(value)} is no label of a map; expected one for each point")
+        raise ArgumentError(f"{shown(value)} is not a label of a map; expected one for each point")
     if value is None or value != value:
         return FAILED, "no outcome"
     if isinstance(value, Exception) or (isinstance(value, Outcome) and not value):
@@ -346,7 +346,7 @@ def label_of(value: Any) -> tuple[Label, str]:
         return int(value), ""
     if isinstance(value, str | bool | int):
         return value, ""
-    raise ArgumentError(f"{value!r} is no label of a map; expected a string, a bool or a count")
+    raise ArgumentError(f"{value!r} is not a label of a map; expected a string, a bool or a count")
 
 
 def _require_label(label: Any, labels: tuple[Label, ...]) -> None:

@@ -1,4 +1,4 @@
-"""The boundaries between the labels of a map, as polylines."""
+"""Boundaries between the labels of a map, as polylines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fastslow.results.base.immutable import Immutable
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-#: A point of a boundary: on a side of a cell (i, j, axis), or within a cell (i, j, 2).
+#: A point of a boundary: on a side of a cell (i, j, axis), or at the centre of a cell (i, j, 2).
 Node = tuple[int, int, int]
 
 
@@ -25,9 +25,9 @@ class MapEdges(Immutable):
     Parameters
     ----------
     places : ndarray of int, shape (E, 3)
-        Position of the first end, and along which axis the side goes, 0 or 1.
+        Position of the first end, and the axis of the side, 0 or 1.
     brackets : ndarray, shape (E, 2)
-        Parts of the side between which the label of its first end is lost.
+        Bracket of the change of label, as fractions of the side.
     """
 
     places: Integers
@@ -36,17 +36,17 @@ class MapEdges(Immutable):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MapBoundary(Immutable):
-    """One polyline between two labels.
+    """A polyline between two labels.
 
     Parameters
     ----------
     labels : tuple of two labels
-        One on each side.
+        The labels on the two sides.
     points : ndarray, shape (N, 2)
-        In the units of the axes; first and last agree on a closed line.
+        In the units of the axes; the last point of a closed line repeats the first.
     accuracy : ndarray, shape (N, 2)
-        How far the boundary may be from each point, along either axis: zero
-        along the axis across the side of a cell on which the point lies.
+        Error bound of each point along both axes; zero along the axis transverse to
+        the side of the cell that contains the point.
     """
 
     labels: tuple[Any, Any]
@@ -55,7 +55,7 @@ class MapBoundary(Immutable):
 
     @property
     def closed(self) -> bool:
-        """Whether the line returns to its first point."""
+        """True for a closed line."""
         return len(self.points) > 2 and bool(np.all(self.points[0] == self.points[-1]))
 
     def __repr__(self) -> str:
@@ -69,13 +69,13 @@ def boundaries_of(
     codes: Integers,
     labels: tuple[Any, ...],
     edges: MapEdges,
-    located: Callable[[Floats], Floats],
+    coordinates: Callable[[Floats], Floats],
 ) -> tuple[MapBoundary, ...]:
     """Join the sides on which the label changes, cell by cell, into polylines.
 
-    In a cell with two labels the line goes from one side to another; where
-    three or more labels meet, the lines end in the middle of the cell. Of two
-    labels at opposite corners the one that is later in order is cut off.
+    In a cell with two labels the line connects two sides; with three or more labels
+    the lines end at the centre of the cell. If two labels are at opposite corners,
+    the corners of the later label are separated.
 
     Parameters
     ----------
@@ -85,34 +85,34 @@ def boundaries_of(
         Labels at the corners of each.
     labels : tuple
     edges : MapEdges
-    located : callable
-        Positions, shape (N, 2), to points in the units of the axes.
+    coordinates : callable
+        Maps positions, shape (N, 2), to points in the units of the axes.
 
     Returns
     -------
     tuple of MapBoundary
-        By pair of labels in order.
+        Ordered by pairs of labels.
     """
     segments: dict[tuple[int, int], list[tuple[Node, Node]]] = {}
     for (i, j), corner in zip(cells.tolist(), codes.tolist(), strict=True):
         for pair, one, other in _segments(i, j, corner):
             segments.setdefault(pair, []).append((one, other))
     brackets = dict(zip(map(tuple, edges.places.tolist()), edges.brackets.tolist(), strict=True))
-    unit = located(np.ones((1, 2)))[0] - located(np.zeros((1, 2)))[0]
+    unit = coordinates(np.ones((1, 2)))[0] - coordinates(np.zeros((1, 2)))[0]
     found = []
     for pair in sorted(segments):
         for line in _chained(segments[pair]):
             placed = np.array([_place(node, brackets) for node in line])
             accuracy = np.array([_spread(node, brackets) for node in line]) * np.abs(unit)
             between = (labels[pair[0]], labels[pair[1]])
-            found.append(MapBoundary(between, located(placed), accuracy))
+            found.append(MapBoundary(between, coordinates(placed), accuracy))
     return tuple(found)
 
 
 def _segments(
     i: int, j: int, corner: list[list[int]]
 ) -> Iterable[tuple[tuple[int, int], Node, Node]]:
-    """Pieces of boundaries within one cell: labels on the two sides, and both ends."""
+    """Yield the boundary segments of a cell: the labels on both sides, and both ends."""
     (a, b), (d, c) = corner
     around = (a, d, c, b)
     sides: list[Node] = [(i, j, 0), (i + 1, j, 1), (i, j + 1, 0), (i, j, 1)]
@@ -133,7 +133,7 @@ def _segments(
 
 
 def _chained(segments: list[tuple[Node, Node]]) -> Iterable[list[Node]]:
-    """Segments joined end to end, open lines first."""
+    """Join segments end to end into lines, open ones first."""
     beside: dict[Node, list[Node]] = {}
     for one, other in segments:
         beside.setdefault(one, []).append(other)

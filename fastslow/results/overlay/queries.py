@@ -18,16 +18,16 @@ from fastslow.results.trajectory.lookup import (
     between_samples,
     in_region,
     known_region,
-    moments_on,
     one_value,
+    states_at_level,
 )
 from fastslow.results.trajectory.nearest import (
     checked_values,
-    nearest_moment,
+    nearest_state,
     nearest_time,
     units_of,
 )
-from fastslow.results.trajectory.slicing import rows_asked, samples_of
+from fastslow.results.trajectory.slicing import samples_of, slice_bounds
 from fastslow.results.trajectory.state_at import StatePoint, state_points_at
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def moments_of(
     """See `Overlay.at`."""
     name, level = one_value(value, columns_of(lay))
     if name in (*lay.run.columns, "t"):
-        found = moments_on(lay.run, name, level, direction)
+        found = states_at_level(lay.run, name, level, direction)
     else:
         found = between_samples(lay.run, name, lay.slow, level, direction)
     known_sheet(lay, sheet)
@@ -108,7 +108,7 @@ def nearest_on(lay: Overlay, values: Mapping[str, float]) -> StatePoint:
     """See `Overlay.nearest`."""
     checked_values(values, columns_of(lay))
     if set(values) <= {*lay.run.columns, "t"}:
-        return measured(lay, [nearest_moment(lay.run, values)])[0]
+        return measured(lay, [nearest_state(lay.run, values)])[0]
     table = np.column_stack([lay[name] for name in values])
     scale = units_of(table)
     target = np.array([float(value) for value in values.values()])
@@ -121,7 +121,7 @@ def nearest_on(lay: Overlay, values: Mapping[str, float]) -> StatePoint:
 
 def rows_of(lay: Overlay, wanted: slice) -> Overlay:
     """The overlay of some consecutive samples; see `Overlay.__getitem__`."""
-    start, stop = rows_asked(wanted, len(lay), "an overlay")
+    start, stop = slice_bounds(wanted, len(lay), "an overlay")
     if stop - start == len(lay):
         return lay
     rows = slice(start, stop)

@@ -1,4 +1,4 @@
-"""A model as it is kept in a file: operations and numbers, without its equations in SymPy."""
+"""Models as stored in files: operations and numbers, without SymPy equations."""
 
 from __future__ import annotations
 
@@ -24,29 +24,30 @@ from fastslow.results.stored.operations import Operations
 from fastslow.results.stored.sign_patterns import Pattern, possible_patterns, scaled_row
 from fastslow.results.stored.typed import has_types
 
-#: What a stored model cannot do, and what to do then.
+#: Reason and remedy for operations that a stored model does not support.
 INSTEAD = "it was stored as numbers, without its equations; build the Model from its equations"
 
 
 @dataclass(frozen=True)
 class Traits:
-    """What the steps of a run do not say of a model, and its outcome needs.
+    """Properties of a model that the outcome of a run requires in addition to its steps.
 
     Parameters
     ----------
     vanishing : tuple of str
-        States that stay zero once they are.
+        States whose zero set is invariant.
     together : tuple of tuple of str
-        Sets of states that stay zero together.
+        Sets of states whose common zero set is invariant.
     names : tuple of str
         The parameters ``p0``, ``p1``, … of ``growth``.
     growth : tuple of tuple of str
         Growth rate at zero of each vanishing state in each region, of time, states and
-        parameters; empty where it is not known.
+        parameters; empty if unknown.
     parallel : bool
-        Whether there are two interfaces that differ by a constant.
+        True if two interface functions differ by a constant.
     rising : tuple of int
-        For each interface whether its function rises (1) or falls (−1) with the first state in it.
+        For each interface function, 1 if it increases and −1 if it decreases with its
+        first state.
     """
 
     vanishing: tuple[str, ...]
@@ -59,33 +60,33 @@ class Traits:
 
 @dataclass(frozen=True, eq=False)
 class Validity(Immutable):
-    """At which parameter values the operations of a stored model hold, and what changes there.
+    """Parameter values for which the operations of a stored model are valid.
 
     Parameters
     ----------
     names : tuple of str
         The parameters ``p0``, ``p1``, … of all texts.
     values : mapping
-        Values of those that decide on regions, slopes and the period, at which all this was
-        derived.
+        Values of the parameters that determine regions, slopes and the period, at which
+        these were derived.
     steady : tuple of str
         Parameters that must keep these values.
     loose : tuple of str
-        By which the interface functions are written in ``rows``: a name where it is a
-        parameter without value, else empty.
+        For each variable of ``rows`` its name if it is a parameter without value, else
+        empty.
     rows : tuple of tuple of str
-        Slopes and constant of each interface function, none where it is not affine.
+        Slopes and constant of each interface function, empty if it is not affine.
     patterns : tuple of tuple of int
         The sign patterns of the regions.
     scales : tuple of str
-        Factors of switching functions that hold parameters alone.
+        Factors of switching functions that contain parameters only.
     signs : tuple of int or None
         Their signs.
     slopes : tuple of str
-        By the first state in it, the slope of each interface; empty where it is no number.
+        The slope of each interface function in its first state; empty if not constant.
     period : float or None
     frequencies : tuple of str or None
-        Of all harmonics; None where time stands outside of periodic functions.
+        Angular frequencies of all harmonics; None if time occurs outside periodic functions.
     """
 
     names: tuple[str, ...]
@@ -101,16 +102,16 @@ class Validity(Immutable):
     frequencies: tuple[str, ...] | None
 
     def changed(self, values: Mapping[str, float]) -> list[str]:
-        """The deciding parameters with other values."""
+        """Return the determining parameters whose values differ."""
         deciding = dict.fromkeys([*self.values, *self.steady, *filter(None, self.loose)])
         return [n for n in deciding if values.get(n) != self.values.get(n)]
 
     def numbers(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Parameter values under the names of the texts."""
+        """Return parameter values under their names in the expressions."""
         return {f"p{k}": values[n] for k, n in enumerate(self.names) if n in values}
 
     def patterns_at(self, values: Mapping[str, float]) -> tuple[Pattern, ...]:
-        """The sign patterns that are not empty at parameter values."""
+        """Return the sign patterns of nonempty regions at parameter values."""
         numbers, known = self.numbers(values), np.array([n in values for n in self.loose])
         given = np.array([values.get(n, 0.0) for n in self.loose])
         rows: list[NDArray[np.float64] | None] = []
@@ -124,17 +125,17 @@ class Validity(Immutable):
         return tuple(possible_patterns(rows))
 
     def signs_at(self, values: Mapping[str, float]) -> tuple[int | None, ...]:
-        """Signs of the factors of parameters alone, None where one has no value."""
+        """Return the signs of the parameter factors, None for one without a value."""
         numbers = self.numbers(values)
         return tuple(_sign(text, numbers) for text in self.scales)
 
     def rising_at(self, values: Mapping[str, float]) -> tuple[int, ...]:
-        """Whether each interface function rises or falls."""
+        """Return 1 or −1 for interface functions that increase or decrease."""
         numbers = self.numbers(values)
         return tuple(-1 if text and _sign(text, numbers) == -1 else 1 for text in self.slopes)
 
     def period_at(self, values: Mapping[str, float]) -> float | None:
-        """The common period of all harmonics."""
+        """Return the common period of all harmonics."""
         if self.frequencies is None:
             return None
         numbers = self.numbers(values)
@@ -151,12 +152,12 @@ def _sign(text: str, numbers: Mapping[str, float]) -> int | None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StoredModel(Result):
-    """A model from a file, which runs without SymPy.
+    """A model loaded from a file, which does not require SymPy.
 
-    `fastslow.simulate` takes it in place of the `Model` that it was, and so does
-    `fastslow.continue_equilibria` from points of a diagram's branches, with the same
-    results bit for bit. It has that model's equations as text alone: what needs them in
-    SymPy says so. ``Model.stored`` makes one; runs are saved with the one of their model.
+    `fastslow.simulate` accepts it in place of the original `Model`, and so does
+    `fastslow.continue_equilibria` with points of a diagram's branches, with bit-identical
+    results. Its equations are available as text only; functions that need them in SymPy
+    raise an error. ``Model.stored`` creates it, and results are saved with it.
 
     Parameters
     ----------
@@ -167,14 +168,14 @@ class StoredModel(Result):
     parameters : mapping
         Parameter values.
     periodic : mapping
-        State to its period.
+        The period of each periodic state.
     equations : str
-        As they were written.
+        The equations as text.
     operations : Operations
     traits : Traits
     validity : Validity
     field : StoredField, optional
-        Of a frozen model that is kept with a diagram: its rates over the parameter.
+        For a frozen model stored with a diagram, its rates over the parameter.
 
     Examples
     --------
@@ -203,7 +204,7 @@ class StoredModel(Result):
     validity: Validity
     field: StoredField | None = None
 
-    #: Why it is not what is asked for where a `Model` is.
+    #: Reason why it is not accepted in place of a `Model`.
     not_enough = INSTEAD
 
     @cached_property
@@ -220,11 +221,11 @@ class StoredModel(Result):
 
     @property
     def regions(self) -> Mapping[str, Pattern]:
-        """The side of every interface, +1 or −1, in each region by its name."""
+        """The sign of each interface function, +1 or −1, by region."""
         return self.operations.regions
 
     def period(self) -> float | None:
-        """Smallest common period of everything that depends on time, None if there is none."""
+        """Return the smallest common period of the forcing, None without one."""
         return self._period
 
     @cached_property
@@ -236,22 +237,22 @@ class StoredModel(Result):
     def with_parameters(
         self, changes: Mapping[Any, Any] | None = None, /, **named: float
     ) -> StoredModel:
-        """The same model at other parameter values.
+        """Return the model with other parameter values.
 
         Parameters
         ----------
         changes : mapping, optional
-            Parameter to value.
+            Values of parameters.
         **named : float
-            The same by name.
+            Values of parameters by name.
 
         Raises
         ------
         UnknownNameError
-            For a name that is no parameter of the model.
+            For a name that is not a parameter of the model.
         ModelError
-            For a value that is not a finite number, or one at which the model has other
-            regions than those that were stored.
+            For a value that is not a finite number, or at which the regions differ from
+            the stored ones.
         """
         values = dict(self.parameters)
         valid = [*values, *(n for n in self.free if n not in values)]
@@ -267,7 +268,7 @@ class StoredModel(Result):
         return replace(self, parameters=values, traits=traits)
 
     def with_free(self, name: object) -> StoredModel:
-        """The model without the value of a slow quantity that was frozen.
+        """Return the model without the value of a frozen slow quantity.
 
         Raises
         ------
@@ -276,22 +277,20 @@ class StoredModel(Result):
         """
         key = normalised(str(name))
         if key not in self.free:
-            raise ModelError(
-                f"whether the regions stay the same over {key} is not known: {INSTEAD}"
-            )
+            raise ModelError(f"it is unknown whether the regions depend on {key}: {INSTEAD}")
         return replace(self, parameters={n: v for n, v in self.parameters.items() if n != key})
 
     def _check_regions(self, changed: Sequence[str], values: Mapping[str, float]) -> None:
-        """Raise where the model has other regions, or that cannot be told."""
+        """Raise ModelError if the regions differ, or if this is unknown."""
         now, blocked = self.validity, [n for n in changed if n in self.validity.steady]
         what = ", ".join(f"{n} = {values[n]:g}" for n in blocked or changed if n in values)
         if blocked:
-            raise ModelError(f"whether the regions are the same at {what} is not known: {INSTEAD}")
+            raise ModelError(f"it is unknown whether the regions differ at {what}: {INSTEAD}")
         if now.patterns_at(values) != now.patterns or now.signs_at(values) != now.signs:
-            raise ModelError(f"at {what} the model has other regions than stored: {INSTEAD}")
+            raise ModelError(f"at {what} the regions differ from the stored ones: {INSTEAD}")
 
     def check(self) -> None:
-        """Refuse what no model is stored as; called for every one that is read from a file.
+        """Validate a stored model; called for each one read from a file.
 
         Raises
         ------
@@ -364,14 +363,14 @@ class StoredModel(Result):
         return "\n".join(lines)
 
 
-#: What a `Model` can do by its equations alone.
+#: Attributes of a `Model` that require its equations.
 _OF_MODELS = frozenset(
     ("continuous", "frozen", "path", "with_ramp", "rates", "to_latex", "empty_regions")
 )
 
 
 def finite_number(what: str, value: object) -> float:
-    """A finite float, or an error that shows what was received.
+    """Return a finite float, or raise ModelError with the value received.
 
     Examples
     --------

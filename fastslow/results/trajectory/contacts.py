@@ -1,4 +1,4 @@
-"""How often interfaces are crossed and how long a trajectory stays in each region."""
+"""Contact statistics: numbers of crossings and time fractions in each region."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Contacts(Result):
-    """Contact statistics of a part of a run.
+    """Contact statistics over a time interval of a run.
 
     Parameters
     ----------
     interfaces : tuple of str
     since, until : float
-        The part of the run: ``until`` is its end unless given.
+        The time interval.
     hits : ndarray of int, shape (n_interfaces, 2)
         Crossings upwards and downwards.
     time_fractions : mapping
-        Region (or sliding motion) to the part of the time spent in it.
+        The fraction of time in each region and sliding motion.
     period : float or None
-        Length of a period; None for a run without one.
+        The period; None for a run without one.
     per_period : ndarray of int, shape (n_periods, n_interfaces, 2)
-        The same in every whole period, counted back from ``until``.
+        Crossings in each whole period, counted back from ``until``.
 
     Examples
     --------
@@ -60,7 +60,7 @@ class Contacts(Result):
 def count_hits(
     run: Trajectory, interface: object, direction: int | None, window: tuple[float, float]
 ) -> int:
-    """Crossings of an interface; see `Trajectory.hits`."""
+    """Count the crossings of an interface; see `Trajectory.hits`."""
     if str(interface) not in run.interfaces:
         raise unknown_name("interface", interface, run.interfaces)
     up, down = _counts(run, window)[run.interfaces.index(str(interface))]
@@ -68,7 +68,7 @@ def count_hits(
 
 
 def time_fractions_in(run: Trajectory, window: tuple[float, float]) -> dict[str, float]:
-    """The part of a window spent in every region (and in every sliding motion)."""
+    """Return the fraction of a time interval in each region and sliding motion."""
     begin, end = window
     total = end - begin
     spent = dict.fromkeys(run.regions, 0.0)
@@ -80,7 +80,7 @@ def time_fractions_in(run: Trajectory, window: tuple[float, float]) -> dict[str,
 
 
 def contacts_of(run: Trajectory, period: float | None, window: tuple[float, float]) -> Contacts:
-    """Hits and residence, in all and by period; see `Trajectory.contacts`."""
+    """Return hits and time fractions, in total and by period; see `Trajectory.contacts`."""
     length = period_of(run, period) if (period or run.period) is not None else None
     begin, end = window
     per_period = np.zeros((0, len(run.interfaces), 2), dtype=np.int64)
@@ -101,7 +101,7 @@ def contacts_of(run: Trajectory, period: float | None, window: tuple[float, floa
 
 
 def _counts(run: Trajectory, window: tuple[float, float]) -> NDArray[np.int64]:
-    """Crossings in [since, until), or up to the end of the run, shape (n_interfaces, 2)."""
+    """Count crossings in [since, until), closed at the end of the run, (n_interfaces, 2)."""
     begin, end = window
     time, interface, direction = run.crossing_table[:, :3].T
     inside = (time >= begin) & ((time < end) | (end == run.span[1]))

@@ -1,4 +1,4 @@
-"""Crossings of interfaces, and the stretches of time between them."""
+"""Crossings of interfaces, and the time intervals between them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Crossing(Immutable):
-    """One passage through an interface, or one touch.
+    """A crossing of an interface, or a grazing contact.
 
     Parameters
     ----------
@@ -28,12 +28,12 @@ class Crossing(Immutable):
         States and slow states, on the interface.
     interface : str
     direction : int
-        +1 where h grows, −1 where it falls, 0 where it only touches zero.
+        +1 if h increases, −1 if it decreases, 0 for grazing.
     from_region, to_region : str
-        The same region for a touch; ``"A|B"`` is sliding between A and B.
+        The same region for grazing; ``"A|B"`` is sliding between A and B.
     tangential : bool
-        Whether a change of h by a millionth of its size would undo the crossing,
-        so that its time is known less well than others.
+        True for a nearly tangential crossing, which a change of h by a millionth of its
+        size would remove, and whose time is less accurate.
     """
 
     time: float
@@ -54,15 +54,15 @@ class Crossing(Immutable):
 
 
 class Crossings(ImmutableSequence, tuple[Crossing, ...]):
-    """Crossings in order of time; called with an interface, those of that interface.
+    """Crossings in order of time.
 
-    ``crossings("x - D", direction=+1)`` are the upward ones of an interface.
+    ``crossings("x - D", direction=+1)`` selects the upward crossings of an interface.
 
     Parameters
     ----------
     items : iterable of Crossing
     interfaces : tuple of str
-        Those that can be asked for.
+        The interfaces of the model.
     """
 
     interfaces: tuple[str, ...]
@@ -77,12 +77,12 @@ class Crossings(ImmutableSequence, tuple[Crossing, ...]):
 
     @validated(direction=among(-1, 0, 1, None))
     def __call__(self, interface: object = None, *, direction: int | None = None) -> Crossings:
-        """Those of an interface, upwards (+1), downwards (−1) or only touching (0).
+        """Select the crossings of an interface, upwards (+1), downwards (−1) or grazing (0).
 
         Raises
         ------
         UnknownNameError
-            For an interface that is not in the model.
+            For an unknown interface.
         """
         if interface is not None and str(interface) not in self.interfaces:
             raise unknown_name("interface", interface, self.interfaces)
@@ -96,7 +96,7 @@ class Crossings(ImmutableSequence, tuple[Crossing, ...]):
 
 
 def crossings_of(run: Trajectory) -> Crossings:
-    """Every crossing in order of time."""
+    """Return the crossings in order of time."""
     found = (
         Crossing(
             float(entry[0]),
@@ -114,7 +114,7 @@ def crossings_of(run: Trajectory) -> Crossings:
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of time within one region (or of sliding between two)."""
+    """A time interval in one region (or of sliding between two)."""
 
     start: float
     end: float
@@ -126,7 +126,7 @@ class Segment:
 
 
 def segments_of(run: Trajectory) -> tuple[Segment, ...]:
-    """Stretches of one region, in order."""
+    """Return the time intervals in one region, in order."""
     if not len(run.steps):
         return ()
     mode = run.steps[:, 2].astype(int)
@@ -139,7 +139,7 @@ def segments_of(run: Trajectory) -> tuple[Segment, ...]:
 
 
 def regions_at(run: Trajectory, times: NDArray[np.float64]) -> NDArray[np.str_]:
-    """The region at each of some times; at a crossing the one that is entered."""
+    """Return the region at each time; at a crossing the one entered."""
     if not len(run.steps):
         return np.full(len(times), "")
     row = np.searchsorted(run.step_starts, times, side="right") - 1

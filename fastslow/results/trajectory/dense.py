@@ -1,4 +1,4 @@
-"""Values of a run between its steps, from the series of every step."""
+"""Evaluation of the dense output of a run, from the series of every step."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from fastslow.errors import ArgumentError
 if TYPE_CHECKING:
     from fastslow.results.trajectory.trajectory import Trajectory
 
-#: A plotted curve may leave the solution by this part of the range of each column.
+#: Tolerated error of a plotted polyline, as a fraction of the range of each column.
 FLATNESS = 2e-4
 
-#: Most points that one step is divided into for plotting, and least ones for an implicit
-#: step, which may go a good part of a slow period.
+#: Maximal number of line segments for a step, and minimal number for an implicit step,
+#: which may extend over much of a slow period.
 MOST_POINTS, LEAST_POINTS = 48, 16
 
 
 def columns_at(
     run: Trajectory, times: ArrayLike, wanted: Sequence[int] | slice = slice(None)
 ) -> NDArray[np.float64]:
-    """Columns at any times, by default all of them; see `Trajectory.dense_columns`."""
+    """Return columns at any times, by default all columns; see `Trajectory.dense_columns`."""
     where = np.asarray(times, dtype=float)
     if run.series is None:
         raise ArgumentError(
-            "this run kept no dense output; simulate with dense=True, or ask for samples="
+            "this run has no dense output; simulate with dense=True, or with samples="
         )
     low, high = run.span
     if where.size and not (where.min() >= low and where.max() <= high):
@@ -39,7 +39,7 @@ def columns_at(
     flat, starts = where.reshape(-1), run.step_starts
     series = run.series[:, wanted]
     if len(flat) > len(starts) and bool((flat[1:] >= flat[:-1]).all()):
-        # steps are looked for among the times, of which there are more
+        # fewer steps than times: search for the steps among the times
         first = np.searchsorted(flat, starts)
         first[0] = 0
         counts = np.diff(first, append=len(flat))
@@ -53,7 +53,7 @@ def columns_at(
 def evaluate(
     run: Trajectory, row: NDArray[np.intp], offset: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """All columns at offsets into given steps, shape (n + n_forcing, N)."""
+    """Return all columns at offsets into given steps, shape (n + n_forcing, N)."""
     assert run.series is not None
     return _at(run.series, row, offset)
 
@@ -61,11 +61,11 @@ def evaluate(
 def _at(
     series: NDArray[np.float64], row: NDArray[np.intp], offset: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Columns at offsets into given steps, shape (columns, N)."""
+    """Return columns at offsets into given steps, shape (columns, N)."""
     if len(row) and row.min() == row.max():
         taken = series[row[0]].T[:, :, None]
         return _horner(np.repeat(taken[-1], len(row), axis=1), taken[-2::-1], offset)
-    # the coefficients of one power side by side
+    # coefficients of each power contiguous in memory
     if len(row) < len(series):
         taken = np.ascontiguousarray(series[row].transpose(2, 1, 0))
         return _horner(taken[-1], taken[-2::-1], offset)
@@ -79,7 +79,7 @@ def _at(
 def _spread(
     powers: NDArray[np.float64], counts: NDArray[np.intp], offset: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Columns at so many offsets into each step, in order, shape (columns, N).
+    """Return columns at given numbers of offsets into each step, shape (columns, N).
 
     The coefficients have the shape (order + 1, columns, n_steps).
     """
@@ -92,7 +92,7 @@ def _horner(
     lower: Iterable[NDArray[np.float64]],
     offset: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Sums of powers of the offset, from the coefficients of the highest, which are replaced."""
+    """Evaluate polynomials in the offset by Horner's scheme; overwrites ``value``."""
     for power in lower:
         value *= offset
         value += power
@@ -100,25 +100,25 @@ def _horner(
 
 
 def refined_table(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Every step divided finely enough that straight lines look smooth."""
+    """Return times and columns, dense enough that a polyline looks smooth."""
     if run.series is None or not len(run.steps):
         return run.end[:1], run.end[1:, None]
     powers = np.ascontiguousarray(run.series.transpose(2, 1, 0))
     length = run.steps[:, 1]
     least = np.where(run.steps[:, 3] >= 2, LEAST_POINTS, 1)
-    pieces = np.clip(_pieces(powers, length), least, MOST_POINTS).astype(int)
-    counts = pieces.copy()
+    lines = np.clip(_line_segments(powers, length), least, MOST_POINTS).astype(int)
+    counts = lines.copy()
     counts[-1] += 1
-    number = np.arange(int(counts.sum())) - np.repeat(np.cumsum(pieces) - pieces, counts)
-    offset = number * np.repeat(length / pieces, counts)
+    number = np.arange(int(counts.sum())) - np.repeat(np.cumsum(lines) - lines, counts)
+    offset = number * np.repeat(length / lines, counts)
     offset[-1] = length[-1]
     times = np.repeat(run.step_starts, counts) + offset
     times[-1] = run.span[1]
     return times, _spread(powers, counts, offset)
 
 
-def _pieces(powers: NDArray[np.float64], length: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Into how many straight lines each step is divided by its second derivatives."""
+def _line_segments(powers: NDArray[np.float64], length: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the number of line segments for each step, from bounds of its second derivatives."""
     bend = np.zeros(powers.shape[1:])
     for k in range(len(powers) - 1, 1, -1):
         bend *= length
@@ -126,5 +126,5 @@ def _pieces(powers: NDArray[np.float64], length: NDArray[np.float64]) -> NDArray
     bend *= length**2
     reach = np.ptp(powers[0], axis=1)
     reach = np.where(reach > 0, reach, bend.max(axis=1) + np.finfo(float).tiny)
-    pieces = np.sqrt((bend / (8 * FLATNESS * reach[:, None])).max(axis=0))
-    return np.nan_to_num(np.ceil(pieces), nan=1.0)
+    count = np.sqrt((bend / (8 * FLATNESS * reach[:, None])).max(axis=0))
+    return np.nan_to_num(np.ceil(count), nan=1.0)

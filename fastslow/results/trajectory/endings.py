@@ -1,4 +1,4 @@
-"""What the stepping loop's end means, in words."""
+"""Outcomes of a simulation, from the codes of the stepping loop."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fastslow.results.base.outcome import Outcome
 
-#: A state this much larger than where it began counts as a blow-up, where a run cannot go on.
+#: Growth relative to the initial state from which a run that fails is a blow-up.
 _BLOW_UP = 1e6
 
 
@@ -21,14 +21,14 @@ def outcome_of(
     limits: tuple[int, int],
     undecided: tuple[tuple[str, str], ...] = (),
 ) -> Outcome:
-    """The outcome of a run, from the code of the loop (see `fastslow.simulation.stepper.driver`).
+    """Return the outcome of a run from the code of `fastslow.simulation.stepper.driver`.
 
-    ``begin`` is the initial state, ``end`` the time and state reached; ``undecided`` names
-    intersections of interfaces without a sliding motion, and why.
+    ``begin`` is the initial state, ``end`` the final time and state; ``undecided`` lists
+    intersections of interfaces without a sliding motion, with the reason.
     """
     time = f"t = {end[0]:.10g}"
     if code == 0:
-        return Outcome("end of time", f"reached {time}, the end of the time asked for.", True)
+        return Outcome("end of time", f"reached {time}, the end of the time span.", True)
     if code == 2:
         return Outcome(
             "too many crossings",
@@ -52,9 +52,8 @@ def outcome_of(
     if code in (3, 4) and n_steps:
         return Outcome(
             "singular",
-            f"the step was driven to nothing at {time}, where the rates or their derivatives "
-            "are not finite; end the time span before it, or write the rates without a "
-            "singularity there.",
+            f"the step size vanished at {time}, where the rates or their derivatives are not "
+            "finite; end the time span before it, or write the rates without a singularity there.",
             False,
         )
     if code in (3, 4):
@@ -67,9 +66,9 @@ def outcome_of(
     if code == 5:
         return Outcome(
             "not unique",
-            f"at {time} the forward motion is not unique: several solutions go on, because the "
-            "fields on the sides of an interface point away from it; start a little off the "
-            "interface to choose one.",
+            f"at {time} the forward motion is not unique: the vector fields on both sides of an "
+            "interface point away from it, so that several solutions exist; start slightly off "
+            "the interface to choose one.",
             False,
         )
     if code == 6 and mode >= 0 and undecided:
@@ -84,10 +83,10 @@ def outcome_of(
     if code == 6:
         since = f", after {modes[mode]}," if mode >= 0 else ""
         return Outcome(
-            "no way on",
-            f"at {time}{since} no motion goes on: the state lies outside every region, or on "
-            "several interfaces where neither a region nor sliding continues; start a little "
-            "off them, or perturb a parameter.",
+            "no continuation",
+            f"at {time}{since} there is no admissible continuation: the state is outside every "
+            "region, or on several interfaces from which neither a region nor a sliding motion "
+            "continues; start slightly off them, or perturb a parameter.",
             False,
         )
     return Outcome(

@@ -1,4 +1,4 @@
-"""Many solutions in time, each by what sums it up."""
+"""Ensembles: summaries of many trajectories."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from fastslow.results.trajectory.regimes import REGIMES
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ensemble(Table, Result):
-    """What sums up each of m trajectories.
+    """Summaries of m trajectories: extremes, crossings and final states.
 
-    A trajectory that could not go on keeps what it had reached; where it did
-    not reach the time from which extremes count, they are NaN.
+    A trajectory that ended early is summarised up to its end; its extremes are NaN if it
+    ended before they were recorded.
 
     Parameters
     ----------
@@ -34,53 +34,52 @@ class Ensemble(Table, Result):
     modes : tuple of str
         Regions, then sliding motions, of all parameter sets.
     parameters : mapping
-        The parameters that were varied, each an array of shape (m,).
+        The varied parameters, each an array of shape (m,).
     start : ndarray, shape (m, n)
     span : ndarray, shape (m, 2)
-        First time and last time asked for.
+        Requested first and last time.
     since : ndarray, shape (m,)
-        Time from which extremes and hits count.
+        Time from which extremes and hits are recorded.
     minimum, maximum : ndarray, shape (m, n)
         Extremes of every state, exact within the steps.
     final : ndarray, shape (m, n)
-        State at the time reached.
+        Final state.
     reached : ndarray, shape (m,)
-        Time reached.
+        Final time.
     hits : ndarray of int, shape (m, n_interfaces, 2)
-        How often each interface was crossed, upwards (index 0) and downwards (index 1).
+        Number of crossings of each interface, upwards (index 0) and downwards (index 1).
     regime : ndarray of str, shape (m,)
-        How the sides of a gap were touched, period by period, as in
-        `Trajectory.regime`; empty for models without a gap or a period.
+        The contact regime of a gap, as in `Trajectory.regime`; empty for models without
+        a gap or a period.
     n_steps : ndarray of int, shape (m,)
     codes, last_mode : ndarray of int, shape (m,)
-        How each ended, and in which of the modes.
+        Code of the outcome and index of the final mode.
     sampled : tuple of ndarray, optional
         Times (N,) or (m, N) and columns (m, n + n_forcing, N), NaN after the end of a trajectory.
     method : str
-        How the steps were made; where a series is singular, collocation takes its place.
+        The integration method, with collocation for steps with a singular series.
     limits : tuple of int
-        Most steps and most crossings of one trajectory.
+        Maximal number of steps and of crossings of one trajectory.
     constants : mapping
         The values of all other parameters.
     equations : str
         The model as text.
     settings : mapping
-        How they were simulated.
+        The settings of the integration.
     undecided : tuple of (str, str)
-        Intersections of discontinuities along which no sliding is derived, and why.
+        Intersections of discontinuities without a sliding motion, with the reason.
     notes : tuple of str
-        In how many trajectories a tolerance, or the smallest number, decides when a state
-        leaves zero, and which.
+        Warnings on trajectories in which a tolerance, or the smallest representable number,
+        decides when a state departs from zero.
     touched : ndarray of int, shape (m, k)
-        Which sides of a gap were touched in each whole period of the second half of a
-        run, the last one last: lower 1, inside 2, upper 4, added up; 0 where the run has
-        fewer periods.
+        The sides of a gap in contact during each whole period of the second half of a
+        run, as the sum of lower 1, inside 2 and upper 4; 0 for missing periods.
     multiples : ndarray of int, shape (m,)
-        After how many periods the states repeat at the end of a run with a gap, 0 where
-        they do not.
+        Number of periods after which the states repeat at the end of a run with a gap,
+        0 if they do not.
     changes : ndarray, shape (m,)
-        By how much they change over so many periods, else over one, in units of their
-        ranges.
+        Largest change of a state over that number of periods, else over one, in units
+        of its range.
 
     Examples
     --------
@@ -127,7 +126,7 @@ class Ensemble(Table, Result):
 
     _row = "trajectory"
 
-    #: Numbers are no columns, and rows no points: there is nothing to go through one by one.
+    #: Not iterable: columns are accessed by name.
     __iter__: ClassVar[None] = None
 
     def __len__(self) -> int:
@@ -135,12 +134,12 @@ class Ensemble(Table, Result):
 
     @property
     def success(self) -> NDArray[np.bool_]:
-        """Whether each trajectory reached the end of time, shape (m,)."""
+        """True for trajectories that reached the end of the time span, shape (m,)."""
         return self.codes == 0
 
     @property
     def fractions(self) -> dict[str, NDArray[np.float64]]:
-        """The fraction of the periods of each regime, over the second half of each run, (m,)."""
+        """The fraction of periods in each regime, over the second half of each run, shape (m,)."""
         counted = np.maximum(np.count_nonzero(self.touched, axis=1), 1)
         found: dict[str, NDArray[np.float64]] = {}
         for bits in np.unique(self.touched[self.touched > 0]):
@@ -150,7 +149,7 @@ class Ensemble(Table, Result):
 
     @cached_property
     def outcomes(self) -> tuple[Outcome, ...]:
-        """How each trajectory ended, in words."""
+        """The outcome of each trajectory."""
         ends = np.column_stack([self.reached, self.final])
         return tuple(
             outcome_of(
@@ -168,23 +167,23 @@ class Ensemble(Table, Result):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names that can be asked for: states, slow states, slow quantities."""
+        """Names of the columns: states, slow states, slow quantities."""
         return (*self.states, *self.forcing)
 
     @property
     def t(self) -> NDArray[np.float64]:
-        """Times of the samples, shape (N,), or (m, N) where the trajectories differ in them."""
+        """Times of the samples, shape (N,), or (m, N) if they differ between trajectories."""
         return self._samples[0]
 
     def __getitem__(self, name: object) -> NDArray[np.float64]:
-        """A state, slow state or slow quantity at the times ``t``, shape (m, N).
+        """Return a state, slow state or slow quantity at the times ``t``, shape (m, N).
 
         Raises
         ------
         UnknownNameError
-            For a name that is no column.
+            For a name that is not a column.
         ArgumentError
-            When no samples were asked for.
+            Without samples.
         """
         if str(name) == "t":
             return self.t
@@ -195,11 +194,11 @@ class Ensemble(Table, Result):
     @property
     def _samples(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         if self.sampled is None:
-            raise ArgumentError("this ensemble kept no samples; simulate_many with samples=")
+            raise ArgumentError("this ensemble has no samples; call simulate_many with samples=")
         return self.sampled
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """What sums up each trajectory, one row each; samples are not among it."""
+        """Return the summaries with one row for each trajectory, without samples."""
         columns: dict[str, NDArray[Any]] = dict(self.parameters)
         for name in ("start", "final", "minimum", "maximum"):
             values = getattr(self, name)
@@ -224,7 +223,7 @@ class Ensemble(Table, Result):
             lines.append("  " + ", ".join(f"{k}: {n}" for k, n in zip(kinds, counts, strict=True)))
         done = int(np.count_nonzero(self.success))
         lines.append(f"  {self.method}")
-        lines.append(f"  {done} of {count} reached the end of time")
+        lines.append(f"  {done} of {count} reached the end of the time span")
         if done < count:
             worst = int(np.flatnonzero(~self.success)[0])
             lines.append(f"  trajectory {worst}: {self.outcomes[worst]}")

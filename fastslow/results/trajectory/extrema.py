@@ -1,4 +1,4 @@
-"""Where columns of a run turn: their extremes, to rounding."""
+"""Extremes of the columns of a trajectory."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def extremes_of(
     run: Trajectory, name: object, since: float | None, until: float | None = None
 ) -> tuple[float, float]:
-    """Minimum and maximum of a column; see `Trajectory.extremes`."""
+    """Return minimum and maximum of a column; see `Trajectory.extremes`."""
     if str(name) not in run.columns:
         raise unknown_name("column", name, run.columns)
     row = run.columns.index(str(name))
@@ -33,8 +33,8 @@ def extremes_of(
     reach = np.abs(scaled[:, 1:]).sum(axis=1)
     for i in np.flatnonzero((scaled[:, 0] + reach > high) | (scaled[:, 0] - reach < low)):
         roots = np.polynomial.polynomial.polyroots(np.polynomial.polynomial.polyder(scaled[i]))
-        turning = roots.real[np.abs(roots.imag) < 1e-6]
-        turning = turning[(turning >= after[i]) & (turning <= before[i])]
-        values = np.polynomial.polynomial.polyval(turning, scaled[i])
+        critical = roots.real[np.abs(roots.imag) < 1e-6]
+        critical = critical[(critical >= after[i]) & (critical <= before[i])]
+        values = np.polynomial.polynomial.polyval(critical, scaled[i])
         low, high = float(np.append(values, low).min()), float(np.append(values, high).max())
     return low, high

@@ -1,4 +1,4 @@
-"""What can be asked of a run once it repeats: sections, lines of a spectrum, periods, extremes."""
+"""Long-time queries of a trajectory: sections, spectrum, periodicity and extremes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class LongTime:
-    """The questions to a `Trajectory` about how it repeats."""
+    """Mixin of a `Trajectory` with the queries of its long-time behaviour."""
 
     @property
     def _run(self) -> Trajectory:
@@ -33,7 +33,7 @@ class LongTime:
         phase: float = 0.0,
         since: float | None = None,
     ) -> Section:
-        """States once every period, at start + phase + k·period.
+        """Return the stroboscopic section: states at the times start + phase + k·period.
 
         Parameters
         ----------
@@ -42,7 +42,7 @@ class LongTime:
         phase : float
             Time after the start of the run, in units of time.
         since : float, optional
-            Earlier points are left out.
+            Earlier points are omitted.
 
         Raises
         ------
@@ -77,11 +77,11 @@ class LongTime:
         since: float | None = None,
         until: float | None = None,
     ) -> Section:
-        """Poincaré section: where an expression passes a level, or an interface is crossed.
+        """Return a Poincaré section, at a level of an expression or on an interface.
 
-        Every root of every step's polynomial is found, to rounding; where the
-        run begins on the section there is no point. A periodic state passes a level
-        wherever it does so modulo its period.
+        All roots of the polynomial of every step are computed to rounding; an initial
+        state on the section is not included. For a periodic state the level is taken
+        modulo its period.
 
         Parameters
         ----------
@@ -89,18 +89,18 @@ class LongTime:
             A column, or a polynomial in columns, parameters and t.
         level : float
         direction : int, optional
-            +1 upwards, −1 downwards, 0 for touches; all by default.
+            +1 upwards, −1 downwards, 0 for tangencies; all by default.
         interface : str or Expr, optional
             Instead of an expression: the crossings of this interface.
         since, until : float, optional
-            The part of the run, by default all of it.
+            The time interval, by default that of the run.
 
         Raises
         ------
         UnknownNameError
             For an unknown column, parameter or interface.
         ArgumentError
-            For an expression that is no polynomial, or without dense output.
+            For an expression that is not a polynomial, or without dense output.
 
         Examples
         --------
@@ -122,23 +122,24 @@ class LongTime:
         window: str = "hann",
         samples: int | None = None,
     ) -> Spectrum:
-        """Frequencies and amplitudes of a column.
+        """Return the amplitude spectrum of a column.
 
         Parameters
         ----------
         name : str or Symbol
         since : float, optional
-            The transient before is left out; with forcing, so is what is left
-            over of a period, so that its multiples fall on bins.
+            Start of the time interval, after the transient; with forcing it is shortened
+            to whole periods, so that the harmonics coincide with bins.
         window : str
             ``"hann"``, ``"flattop"``, ``"blackman"``, ``"hamming"`` or ``"rectangular"``.
         samples : int, optional
-            Even samples of the dense output; by default 16 a step, 4096 at least.
+            Number of equidistant samples of the dense output; by default 16 for each
+            step, at least 4096.
 
         Raises
         ------
         UnknownNameError
-            For a name that is no column, or no window.
+            For an unknown column or window.
         ArgumentError
             For a time outside the run, or without dense output.
         """
@@ -148,10 +149,10 @@ class LongTime:
     def periodicity(
         self, period: float | None = None, tol: float = 1e-6, most: int = 16
     ) -> Periodicity:
-        """After how many periods the states repeat, and from which time on.
+        """Detect the period of the motion at the end of the run.
 
-        Without forcing, the returns to a Poincaré section take the place of
-        the periods: the state with the largest range passes its mean upwards.
+        Without forcing, periods are replaced by the returns to a Poincaré section,
+        on which the state with the largest range crosses its mean upwards.
 
         Parameters
         ----------
@@ -160,12 +161,12 @@ class LongTime:
         tol : float
             Largest difference that counts as a repeat, in units of each state's range.
         most : int
-            Largest multiple that is tried.
+            Largest multiple of the period that is tried.
 
         Returns
         -------
         Periodicity
-            Also where nothing repeats: ``multiple`` is then None, and ``outcome`` says why.
+            If nothing repeats, ``multiple`` is None and ``outcome`` gives the reason.
         """
         return periodicity_of(self._run, period, tol, most)
 
@@ -173,21 +174,21 @@ class LongTime:
     def extremes(
         self, name: object, since: float | None = None, until: float | None = None
     ) -> tuple[float, float]:
-        """Minimum and maximum of a column in a part of the run, to rounding.
+        """Return minimum and maximum of a column in a time interval, to rounding.
 
-        Every step's polynomial is maximised where its coefficients allow more
-        than the extremes at the ends of the steps.
+        The polynomial of a step is maximised if its coefficients allow values beyond
+        the extremes at the ends of the steps.
 
         Parameters
         ----------
         name : str or Symbol
         since, until : float, optional
-            The part, by default all of it.
+            The time interval, by default that of the run.
 
         Raises
         ------
         UnknownNameError
-            For a name that is no column.
+            For a name that is not a column.
         ArgumentError
             For a time outside the run, or without dense output.
         """

@@ -1,4 +1,4 @@
-"""Where a trajectory takes one value of a column: every root of its series, or between samples."""
+"""Lookup of states by the value of a column: roots of the series, or of linear interpolants."""
 
 from __future__ import annotations
 
@@ -26,19 +26,20 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: An end of a run that misses the value by this part of the terms of its step is on it.
+#: Distance of an end of the run from the value, relative to the terms of the step, below
+#: which it is a root.
 NEAR = 1e-12
 
 
 def one_value(values: Mapping[str, float], valid: Sequence[str]) -> tuple[str, float]:
-    """The column asked for and its value.
+    """Validate a single column given with its value.
 
     Raises
     ------
     UnknownNameError
-        For a name that is no column.
+        For a name that is not a column.
     ArgumentError
-        For none, several, or a number that is not finite.
+        For no value, several values, or a number that is not finite.
     """
     for name in values:
         if name not in valid:
@@ -50,8 +51,10 @@ def one_value(values: Mapping[str, float], valid: Sequence[str]) -> tuple[str, f
     return name, finite(name, value)
 
 
-def moments_on(run: Trajectory, name: str, level: float, direction: int | None) -> list[StatePoint]:
-    """The moments at which a column has a value, in order of time; see `Trajectory.at`."""
+def states_at_level(
+    run: Trajectory, name: str, level: float, direction: int | None
+) -> list[StatePoint]:
+    """Return the states at which a column has a value, in order of time; see `Trajectory.at`."""
     check_readable(run)
     if name == "t":
         low, high = run.span if is_dense(run) else (float(run.t[0]), float(run.t[-1]))
@@ -68,15 +71,15 @@ def moments_on(run: Trajectory, name: str, level: float, direction: int | None) 
         low, high = extremes_of(run, name, None)
         if not low <= level <= high:
             raise outside(name, level, (low, high))
-    return _moments(run, zeros, run.steps[:, 0], run.steps[:, 1], direction)
+    return _states_at_roots(run, zeros, run.steps[:, 0], run.steps[:, 1], direction)
 
 
 def _with_ends(zeros: list[Zero], quantity: StepPolynomials) -> list[Zero]:
-    """The zeros, and an end of the run that misses zero by rounding only."""
+    """Return the roots, with an end of the run that misses zero by rounding."""
     b = quantity.coefficients
     first, last = float(b[0, 0]), float(b[-1].sum())
     near = NEAR * quantity.size
-    # the passage of a neighbouring zero is not counted again
+    # a neighbouring root is not counted twice
     if abs(first) <= near[0] and not (zeros and zeros[0].low <= CLOSE):
         zeros = [Zero(0.0, 0.0, 0, int(np.sign(b[0, 1:].sum()))), *zeros]
     if abs(last) <= near[-1] and not (zeros and zeros[-1].high >= len(b) - CLOSE):
@@ -87,7 +90,7 @@ def _with_ends(zeros: list[Zero], quantity: StepPolynomials) -> list[Zero]:
 def between_samples(
     run: Trajectory, name: str, values: Array, level: float, direction: int | None
 ) -> list[StatePoint]:
-    """The same on straight lines between values at the samples, and so interpolated."""
+    """Return states as `states_at_level`, by linear interpolation between samples."""
     low, high = float(values.min()), float(values.max())
     if not low <= level <= high:
         raise outside(name, level, (low, high))
@@ -97,18 +100,18 @@ def between_samples(
     lines = StepPolynomials(
         np.column_stack([values[:-1] - level, rise]), np.abs(values[:-1]) + np.abs(rise)
     )
-    found = _moments(run, find_zeros(lines), run.t[:-1], np.diff(run.t), direction)
-    at_samples = np.isin([moment.time for moment in found], run.t).tolist()
+    found = _states_at_roots(run, find_zeros(lines), run.t[:-1], np.diff(run.t), direction)
+    at_samples = np.isin([point.time for point in found], run.t).tolist()
     return [
-        replace(moment, interpolated=not exact)
-        for moment, exact in zip(found, at_samples, strict=True)
+        replace(point, interpolated=not exact)
+        for point, exact in zip(found, at_samples, strict=True)
     ]
 
 
-def _moments(
+def _states_at_roots(
     run: Trajectory, zeros: list[Zero], starts: Array, lengths: Array, direction: int | None
 ) -> list[StatePoint]:
-    """The moments of zeros along steps; of a stretch its two ends."""
+    """Return the states at roots along steps; an interval of roots gives its two ends."""
     places: list[float] = []
     resting: list[bool] = []
     for zero in zeros:
@@ -122,34 +125,34 @@ def _moments(
     low, high = run.span
     found = state_points_at(run, np.clip(times, low, high))
     return [
-        replace(moment, resting=True) if rests else moment
-        for moment, rests in zip(found, resting, strict=True)
+        replace(point, resting=True) if rests else point
+        for point, rests in zip(found, resting, strict=True)
     ]
 
 
 def in_region(run: Trajectory, found: list[StatePoint], region: str | None) -> list[StatePoint]:
-    """Those of a region, or of sliding between two.
+    """Select the states in a region, or sliding between two.
 
     Raises
     ------
     UnknownNameError
-        For a region that there is not.
+        For an unknown region.
     """
     if region is None:
         return found
     known_region(run, region)
-    return [moment for moment in found if moment.region == region]
+    return [point for point in found if point.region == region]
 
 
 def known_region(run: Trajectory, region: str) -> None:
-    """Refuse a name that is no region, and no sliding between two."""
+    """Raise UnknownNameError for a name that is neither a region nor a sliding motion."""
     valid = tuple(dict.fromkeys([*run.regions, *run.modes]))
     if region not in valid:
         raise unknown_name("region", region, valid)
 
 
 def outside(name: str, level: float, over: tuple[float, float]) -> ArgumentError:
-    """The error for a value that is not reached, to be raised."""
+    """Return the error for a value that is not reached."""
     return ArgumentError(
         f"{name} = {level:g} is outside this run's range [{over[0]:g}, {over[1]:g}]"
     )

@@ -14,12 +14,12 @@ from fastslow.results.base.result import Result
 
 Floats = NDArray[np.float64]
 
-#: Standard errors from zero at which a sign counts as decided: of ten blocks, Student's t
-#: exceeds this with a probability of 0.2 %.
+#: Distance from zero, in standard errors, at which a sign is significant: with ten blocks,
+#: Student's t exceeds it with a probability of 0.2 %.
 DECIDED = 4.0
 
-#: Growth and decay over the whole measurement, as exponents of e, below which a sign says
-#: nothing: without chaos separations grow by a bounded factor, or as a power of time.
+#: Smallest growth and decay over the measurement, as exponents of e, for a significant sign:
+#: without chaos separations grow by a bounded factor, or as a power of time.
 GROWN, SHRUNK = 10.0, 1.0
 
 
@@ -30,8 +30,8 @@ class LyapunovExponent(Result):
     Parameters
     ----------
     value : float
-        Per unit of time; minus infinity where nearby trajectories meet, NaN where
-        nothing was measured.
+        Per unit of time; minus infinity if nearby trajectories merge, NaN if nothing
+        was measured.
     uncertainty : float
         Standard error of the value, from the spread over the blocks.
     blocks : ndarray, shape (k,)
@@ -41,7 +41,7 @@ class LyapunovExponent(Result):
     period : float or None
         Of the forcing.
     interval : float
-        Time over which each separation was followed.
+        Time between renormalisations of the separation.
     outcome : Outcome
         ``"chaotic"``, ``"not chaotic"``, ``"not decided"``, or ``"stopped early"``.
     state : ndarray, shape (n,)
@@ -50,7 +50,7 @@ class LyapunovExponent(Result):
     equations : str
         The model as text.
     settings : mapping
-        How the trajectories were integrated.
+        The settings of the integration.
 
     Examples
     --------
@@ -80,7 +80,7 @@ class LyapunovExponent(Result):
 
     @property
     def chaotic(self) -> bool:
-        """Whether the exponent is evidence of chaos: positive, of bounded motion that recurs."""
+        """True if the exponent is evidence of chaos: positive, on a bounded recurrent motion."""
         return self.outcome.code == "chaotic"
 
     def __repr__(self) -> str:
@@ -97,14 +97,14 @@ class LyapunovExponent(Result):
 
 
 def sign_of(value: float, uncertainty: float, length: float) -> int:
-    """The sign of an exponent, 0 where it is not decided.
+    """Return the sign of an exponent, 0 if it is not significant.
 
     Parameters
     ----------
     value, uncertainty : float
         Per unit of time.
     length : float
-        Of the measurement.
+        Length of the measurement.
 
     Examples
     --------

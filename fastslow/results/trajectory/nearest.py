@@ -1,4 +1,4 @@
-"""The moment of a trajectory nearest to given values."""
+"""The state of a trajectory nearest to given values."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Steps that are looked at along their series: a motion that repeats is near everywhere.
+#: Number of nearest steps, by linear interpolation, that are refined on their series.
 STEPS = 24
 
 
 def checked_values(values: Mapping[str, float], valid: tuple[str, ...]) -> None:
-    """Refuse names that are no columns, and numbers that are none."""
+    """Raise errors for unknown columns and values that are not finite numbers."""
     if not values:
         raise ArgumentError(f"expected values of some of {', '.join(valid)}, received none")
     for name, value in values.items():
@@ -44,13 +44,13 @@ def checked_values(values: Mapping[str, float], valid: tuple[str, ...]) -> None:
 
 
 def nearest_time(times: Array, table: Array, target: Array) -> tuple[float, Array]:
-    """The nearest time on straight lines between rows, and the distances² of all steps.
+    """Return the nearest time by linear interpolation, and the squared distances of all steps.
 
     Parameters
     ----------
     times : ndarray, shape (N,)
     table : ndarray, shape (N, k)
-        Columns in units of their ranges, as the target is.
+        Columns in units of their ranges, like the target.
     target : ndarray, shape (k,)
     """
     if len(times) == 1:
@@ -61,13 +61,13 @@ def nearest_time(times: Array, table: Array, target: Array) -> tuple[float, Arra
 
 
 def units_of(table: Array) -> Array:
-    """The range of every column, 1 for one that stands still."""
+    """Return the range of every column, 1 for a constant one."""
     reach = np.ptp(table, axis=0)
     return np.where(reach > 0, reach, 1.0)
 
 
 def nearest_target(table: Array, target: Array, scale: Array, periods: Array) -> Array:
-    """Of the copies of a target by whole periods the one that a table comes nearest to."""
+    """Return the copy of a target, by whole periods, that is nearest to a table."""
     if not periods.any() or not len(table):
         return target
     low, high = table.min(axis=0), table.max(axis=0)
@@ -79,8 +79,8 @@ def nearest_target(table: Array, target: Array, scale: Array, periods: Array) ->
     return found[int(np.argmin([d.min(initial=np.inf) for d in distances]))]
 
 
-def nearest_moment(run: Trajectory, values: Mapping[str, float]) -> StatePoint:
-    """The nearest moment of a trajectory; see `Trajectory.nearest`."""
+def nearest_state(run: Trajectory, values: Mapping[str, float]) -> StatePoint:
+    """Return the nearest state of a trajectory; see `Trajectory.nearest`."""
     checked_values(values, (*run.columns, "t"))
     check_readable(run)
     if is_dense(run) and run.sampled is not None:
@@ -99,7 +99,7 @@ def nearest_moment(run: Trajectory, values: Mapping[str, float]) -> StatePoint:
         close = close[np.argsort(distance[close], kind="stable")]
         starts = times[close]
         steps = np.searchsorted(run.step_starts, starts, side="right") - 1
-        # of those nearest by straight lines, in that order, each step once
+        # the nearest steps by linear interpolation, in that order, each once
         _, order = np.unique(steps, return_index=True)
         time = _along_series(run, steps[np.sort(order)[:STEPS]], list(values), target, scale)
     return state_points_at(run, np.array([time]))[0]
@@ -108,7 +108,7 @@ def nearest_moment(run: Trajectory, values: Mapping[str, float]) -> StatePoint:
 def _along_series(
     run: Trajectory, steps: NDArray[np.intp], names: list[str], target: Array, scale: Array
 ) -> float:
-    """The time of least distance on some steps."""
+    """Return the time of least distance on given steps."""
     assert run.series is not None
     some = replace(run, steps=run.steps[steps], series=run.series[steps])
     total = StepPolynomials(np.zeros((len(steps), 1)), np.zeros(len(steps)))

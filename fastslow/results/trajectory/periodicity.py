@@ -1,4 +1,4 @@
-"""Whether a run has settled, and after how many periods it repeats."""
+"""Detection of equilibria and periodic orbits at the end of a run."""
 
 from __future__ import annotations
 
@@ -19,46 +19,46 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Only the last half of a run says what it settles on.
+#: Fraction of a run, at its end, that is examined.
 LATE = 0.5
 
-#: A state whose range is below this part of its size does not move.
+#: A state whose range is below this fraction of its size is constant.
 STILL = 1e-9
 
-#: Changes below this many relative tolerances of the integration are its errors: on an
-#: attracting orbit those of one period add up to some tens of them.
+#: Changes below this multiple of the relative tolerance are integration errors; on an
+#: attracting orbit those of one period add up to some tens of tolerances.
 ERRORS = 1e3
 
-#: A run has settled when no more than this many tolerances are left to its limit.
+#: A run has settled if its distance from the limit is at most this many tolerances.
 NEARLY = 100.0
 
 
 @dataclass(frozen=True, eq=False)
 class Periodicity(Result):
-    """What a run settles on.
+    """The period of the motion at the end of a run.
 
     Parameters
     ----------
     multiple : int or None
-        After how many periods of the forcing (without forcing: after how many
-        returns to the section) the states repeat: 1, 2 for a doubled period, …;
-        None when they do not.
+        Number of periods of the forcing (without forcing: of returns to the section)
+        after which the states repeat: 1, 2 after a period doubling, …; None if they do
+        not repeat.
     period : float or None
-        Length of time after which they repeat.
+        The period of the motion.
     since : float or None
-        Time from which they do.
+        Time from which the motion is periodic.
     distance : float
-        Largest change over that time, in units of each state's range; without
-        a period, the smallest among those tried.
+        Largest change of a state over one period, in units of its range; without a
+        period, the smallest among those tried.
     section : Section
-        The states compared.
+        The states that were compared.
     outcome : Outcome
         ``"periodic"``, ``"equilibrium"``, ``"too short"``, ``"not periodic"``, or
-        ``"drifting"`` where changes below the tolerance do not shrink, as near a
+        ``"drifting"`` if changes below the tolerance do not decrease, as near a
         fold of periodic solutions.
     left : float
-        How far the states still are from those they settle on, in the same units, by
-        the rate at which the changes shrink; infinite where they do not.
+        Estimated distance from the limit, in the same units, by the rate at which the
+        changes decrease; infinite if they do not.
 
     Examples
     --------
@@ -82,16 +82,16 @@ class Periodicity(Result):
 
 
 def periodicity_of(run: Trajectory, period: float | None, tol: float, most: int) -> Periodicity:
-    """Look for a period; see `Trajectory.periodicity`."""
+    """Detect a period; see `Trajectory.periodicity`."""
     if not tol > 0:
         raise ArgumentError(f"tol = {tol!r}; expected a positive number")
     if most < 1:
         raise ArgumentError(f"most = {most!r}; expected at least 1")
-    # says what is wrong with a run that kept nothing, or made no step
+    # raises the appropriate error for a run without dense output or steps
     run.dense_columns(run.span[1])
     assert run.series is not None
     late = run.span[1] - LATE * (run.span[1] - run.span[0])
-    # the ends of steps are close enough to each other to tell how far a state ranges
+    # the ends of the steps suffice to estimate the range of a state
     everywhere = np.vstack([run.series[:, : len(run.states), 0], run.end[1:]])
     settled = everywhere[np.append(run.steps[:, 0] >= late, True)]
     periods = periods_of(run.states, run.periods)
@@ -99,7 +99,7 @@ def periodicity_of(run: Trajectory, period: float | None, tol: float, most: int)
     ranges, whole = (
         np.minimum(np.ptp(table, axis=0), most_apart) for table in (settled, everywhere)
     )
-    # a state that does not move is compared with its own size, or that of where it came from
+    # a constant state is compared with its largest modulus
     size = np.abs(everywhere).max(axis=0)
     least = STILL * np.where(size > 0, size, 1.0)
     scale = np.maximum(ranges, least)
@@ -129,7 +129,7 @@ def periodicity_of(run: Trajectory, period: float | None, tol: float, most: int)
         first = int(wrong[-1]) + 1 if len(wrong) else 0
         agreeing = change[first:]
         smallest = min(smallest, float(change[-max(multiple, 2) :].max()))
-        # as many repeats as there are points, or the next point might still differ
+        # at least as many repeats as points of the orbit
         if len(agreeing) >= max(multiple, 2):
             length = float(section.times[-1] - section.times[-1 - multiple])
             left, moved = _left(states[:, first:], periods / scale, multiple, noise)
@@ -173,9 +173,9 @@ _NONE = np.empty(0, dtype=np.int64)
 
 
 def _left(states: Array, periods: Array, multiple: int, noise: float) -> tuple[float, float]:
-    """How far states are from their limit, and how far they moved, from both halves of a run.
+    """Return the distance of states from their limit, and the distance they moved.
 
-    Geometric convergence moves them by a ratio less in the second half.
+    The limit is extrapolated from both halves of a run, assuming geometric convergence.
     """
     same = states[:, (states.shape[1] - 1) % multiple :: multiple]
     middle, extra = divmod(same.shape[1] - 1, 2)
@@ -198,7 +198,7 @@ def _single(unit: str) -> str:
 
 
 def _mean(run: Trajectory, row: int, since: float) -> float:
-    """Time average of a state over the steps that begin after a time."""
+    """Return the time average of a state over the steps that begin after a given time."""
     assert run.series is not None
     late = run.steps[:, 0] >= since
     if not late.any():

@@ -1,12 +1,12 @@
-"""What a run is asked: its moments at a value, its parts, the moment nearest to a point."""
+"""Queries of a trajectory: states at a value, slices, and the nearest state."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
 from fastslow.arguments import among, text, validated
-from fastslow.results.trajectory.lookup import in_region, moments_on, one_value
-from fastslow.results.trajectory.nearest import nearest_moment
+from fastslow.results.trajectory.lookup import in_region, one_value, states_at_level
+from fastslow.results.trajectory.nearest import nearest_state
 from fastslow.results.trajectory.slicing import parts_of
 from fastslow.results.trajectory.state_at import StatePoint
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Queries:
-    """The questions to a `Trajectory` about its moments and parts."""
+    """Mixin of a `Trajectory` with the queries of its states and slices."""
 
     @property
     def _run(self) -> Trajectory:
@@ -25,20 +25,20 @@ class Queries:
     def at(
         self, *, region: str | None = None, direction: int | None = None, **value: float
     ) -> list[StatePoint]:
-        """The moments at one value of a column, one per passage; of a time, the one then.
+        """Return the states at which a column has a given value, or the state at a time.
 
-        Every root of every step's series is found, to rounding; a touch counts
-        once, and so does an end of the run that misses the value by rounding. Of a stretch
-        of time that stays on the value its two ends are given, with
-        ``resting=True``. Without dense output the samples are joined by straight
-        lines, and what is read between them says so (``interpolated=True``).
+        All roots of the series of every step are computed to rounding. A tangency counts
+        once, and so does an end of the run that misses the value by rounding. A time
+        interval in which the column is constant at the value is represented by its two
+        ends, with ``resting=True``. Without dense output the states are interpolated
+        linearly between samples (``interpolated=True``).
 
         Parameters
         ----------
         region : str, optional
-            Keep only those in one region (or sliding, as ``"S1|S2"``).
+            Select states in one region (or sliding, as ``"S1|S2"``).
         direction : int, optional
-            Keep only passages upwards (+1), downwards (−1), or touches (0).
+            Select crossings of the value upwards (+1) or downwards (−1), or tangencies (0).
         **value : float
             A state, slow state, slow quantity or ``t`` by name, e.g. ``x=0.5``.
 
@@ -50,7 +50,7 @@ class Queries:
         Raises
         ------
         UnknownNameError
-            For a name that is no column, or no region.
+            For an unknown column or region.
         ArgumentError
             If the run does not reach the value.
 
@@ -60,8 +60,8 @@ class Queries:
         >>> x, v = sp.symbols("x v")
         >>> fine = fs.Integration(rtol=1e-13)
         >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 6), integration=fine)
-        >>> for moment in run.at(x=0.5):  # at π/3 and 5π/3
-        ...     print(moment)
+        >>> for point in run.at(x=0.5):  # at π/3 and 5π/3
+        ...     print(point)
         StatePoint(t = 1.04719755: x = 0.5, v = -0.866025; in S1)
         StatePoint(t = 5.23598776: x = 0.5, v = 0.866025; in S1)
         >>> run.at(t=3.2)
@@ -70,23 +70,23 @@ class Queries:
         [(1.0, 2.0)]
         """
         name, level = one_value(value, (*self._run.columns, "t"))
-        return in_region(self._run, moments_on(self._run, name, level, direction), region)
+        return in_region(self._run, states_at_level(self._run, name, level, direction), region)
 
     @validated(region=text)
     def select(
         self, *, region: str | None = None, between: tuple[float, float] | None = None
     ) -> tuple[Trajectory, ...]:
-        """The parts of the run that fulfil the conditions, each a trajectory, in order.
+        """Return the slices of the run that satisfy all conditions, in order.
 
-        A part is cut exactly, keeps its series, and has the crossings at its ends.
-        Without dense output it goes from the first sample within to the last.
+        Each slice is a trajectory with exact ends, its series, and the crossings at its
+        ends. Without dense output it extends from the first to the last sample inside.
 
         Parameters
         ----------
         region : str, optional
-            Stays in one region (or sliding, as ``"S1|S2"``).
+            Select the time in one region (or sliding, as ``"S1|S2"``).
         between : (float, float), optional
-            Times, ends included.
+            Select a closed time interval.
 
         Returns
         -------
@@ -95,17 +95,17 @@ class Queries:
         Raises
         ------
         UnknownNameError
-            For a region that there is not.
+            For an unknown region.
         ArgumentError
-            For a range that is none.
+            For an invalid interval.
         """
         return parts_of(self._run, region, between)
 
     def nearest(self, **values: float) -> StatePoint:
-        """The moment nearest to some values of columns.
+        """Return the state nearest to given values of columns.
 
-        Distances are measured in units of each column's range. The moment is
-        found along the series, to rounding; without dense output on straight lines.
+        Distances are measured in units of each column's range. The minimum is computed
+        on the series, to rounding; without dense output by linear interpolation.
 
         Parameters
         ----------
@@ -119,8 +119,8 @@ class Queries:
         Raises
         ------
         UnknownNameError
-            For a name that is no column.
+            For a name that is not a column.
         ArgumentError
-            For a number that is not finite, or none at all.
+            For a number that is not finite, or without any value.
         """
-        return nearest_moment(self._run, values)
+        return nearest_state(self._run, values)

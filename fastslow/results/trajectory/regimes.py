@@ -1,4 +1,4 @@
-"""How the sides of a gap are touched, period by period, and what the periods amount to."""
+"""Contact regimes of a gap: classification of periods and of whole motions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Bits = NDArray[np.int64]
 
-#: The regimes by which sides of a gap were touched: lower, inside, upper as bits 1, 2, 4.
+#: Regimes by the visited sides of a gap: lower, inside, upper as bits 1, 2, 4.
 REGIMES = (
     "",
     "meshed lower",
@@ -34,48 +34,49 @@ REGIMES = (
     "bilateral",
 )
 
-#: Labels of motions that are no regime.
+#: Labels of motions without a regime.
 NOT_SETTLED, CHAOTIC = "not settled", "chaotic"
 
-#: What comes before the names of several regimes at one set of parameters.
+#: Prefix of the names of several coexisting regimes.
 COEXISTING = "coexisting: "
 
-#: States that differ by less, in units of their range, are the same.
+#: Difference, in units of their range, below which states repeat.
 SAME = 1e-6
 
-#: Errors of an integration over some periods, in units of its relative tolerance.
+#: Integration error over several periods, in units of the relative tolerance.
 ERRORS = 1e3
 
-#: Largest number of periods after which states are expected to repeat.
+#: Largest number of periods after which a repeat is detected.
 MOST = 16
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Regimes(Result):
-    """The regime of a run in each of many periods, and of its motion.
+    """The contact regime of a motion, and of each of its periods.
 
     Parameters
     ----------
     label : str
-        The regime: which sides are touched in all periods or, where the motion repeats
-        after several, in those together; ``"chaotic"`` with a positive Lyapunov exponent
-        as evidence; else ``"not settled"``.
+        The regime of the motion: the sides in contact in all periods or, if the motion
+        repeats after several periods, in these together; ``"chaotic"`` for a positive
+        Lyapunov exponent; else ``"not settled"``.
     kinds : tuple of str
-        Of each period, in order of time: ``"bilateral"``, ``"unilateral upper"``,
-        ``"unilateral lower"``, ``"meshed upper"``, ``"meshed lower"`` or ``"free"``.
+        The regime of each period, in order of time: ``"bilateral"``, ``"unilateral
+        upper"``, ``"unilateral lower"``, ``"meshed upper"``, ``"meshed lower"`` or
+        ``"free"``.
     period : float
-        Length of each.
+        Length of each period.
     span : tuple of float
-        Begin of the first and end of the last of them.
+        Start of the first and end of the last period.
     multiple : int or None
-        After how many periods the states repeat, None where they do not.
+        Number of periods after which the states repeat, None if they do not.
     change : float
-        Largest change of a state over so many periods (without a multiple: over one), in
-        units of its range; NaN without states.
+        Largest change of a state over that number of periods (else over one), in units
+        of its range; NaN without states.
     outcome : Outcome
         ``"settled"``, ``"not settled"`` or ``"chaotic"``.
     exponent : LyapunovExponent or None
-        Measured where the states do not repeat, by `fastslow.classify_regime`.
+        Computed by `fastslow.classify_regime` if the states do not repeat.
 
     Examples
     --------
@@ -97,12 +98,12 @@ class Regimes(Result):
 
     @property
     def fractions(self) -> dict[str, float]:
-        """The fraction of the periods of each kind, the most frequent first."""
+        """The fraction of periods of each kind, most frequent first."""
         return fractions_of(self.kinds)
 
     @property
     def settled(self) -> bool:
-        """Whether the states repeat."""
+        """True if the states repeat."""
         return self.multiple is not None
 
     def __repr__(self) -> str:
@@ -110,19 +111,19 @@ class Regimes(Result):
 
     @property
     def words(self) -> str:
-        """The label and the fractions of the periods."""
+        """The label and the fractions of the periods as text."""
         return in_words(self.label, self.kinds)
 
 
 def fractions_of(kinds: Sequence[str]) -> dict[str, float]:
-    """The fraction of each kind, the most frequent first."""
+    """Return the fraction of each kind, most frequent first."""
     names, counts = np.unique(np.array(kinds), return_counts=True)
     order = np.argsort(-counts, kind="stable")
     return {str(names[k]): float(counts[k] / len(kinds)) for k in order}
 
 
 def in_words(label: str, kinds: Sequence[str]) -> str:
-    """A label, with the fractions of the periods where they differ.
+    """Return a label as text, with the fractions of the periods if they differ.
 
     Examples
     --------
@@ -136,12 +137,14 @@ def in_words(label: str, kinds: Sequence[str]) -> str:
     shares = fractions_of(kinds)
     if list(shares) == [label]:
         return f"{label} in {'each of ' if count > 1 else ''}{last}"
-    told = ", ".join(f"{kind} in {share:.1%}".replace("%", " %") for kind, share in shares.items())
-    return f"{label}: {told} of {last}"
+    listed = ", ".join(
+        f"{kind} in {share:.1%}".replace("%", " %") for kind, share in shares.items()
+    )
+    return f"{label}: {listed} of {last}"
 
 
 def bits_of(modes: Sequence[str], gap: tuple[str, str, str]) -> Bits:
-    """Which sides each mode touches; sliding along an edge is rest against its side."""
+    """Return the sides of each mode as bits; sliding along an edge is contact with its side."""
     lower, inside, upper = gap
     bits = np.zeros(len(modes), dtype=np.int64)
     for column, mode in enumerate(modes):
@@ -151,7 +154,7 @@ def bits_of(modes: Sequence[str], gap: tuple[str, str, str]) -> Bits:
 
 
 def periods_at_the_end(length: Floats, period: Floats) -> NDArray[np.int64]:
-    """How many periods are looked at: those in the second half of a run, one at least.
+    """Return the number of periods in the second half of a run, at least one.
 
     Examples
     --------
@@ -166,24 +169,25 @@ def periods_at_the_end(length: Floats, period: Floats) -> NDArray[np.int64]:
 def repeats(
     states: Floats, scale: Floats, turns: Floats, allowed: float
 ) -> tuple[NDArray[np.int64], Floats]:
-    """After how many periods states repeat, 0 where they do not, and by how much they change.
+    """Detect after how many periods states repeat, and by how much they change.
 
     Parameters
     ----------
     states : ndarray, shape (m, k + 1, n)
-        Of m runs at the ends of successive periods.
+        States of m runs at the ends of successive periods.
     scale : ndarray, shape (m, n)
         Ranges of the states.
     turns : ndarray, shape (n,)
-        Their own periods, 0 for those without.
+        The periods of the states, 0 for states without one.
     allowed : float
         Largest change, in units of the scale.
 
     Returns
     -------
     multiples : ndarray of int, shape (m,)
+        Number of periods, 0 if the states do not repeat.
     changes : ndarray, shape (m,)
-        Over so many periods; over one where the states do not repeat.
+        Largest change over that number of periods, else over one.
     """
     m, count, n = states.shape
     multiples, changes = np.zeros(m, dtype=np.int64), np.full(m, np.nan)
@@ -207,7 +211,7 @@ def repeats(
 
 
 def labels_of(touched: Bits, multiples: NDArray[np.int64]) -> list[str]:
-    """The regime of successive periods of each run, from the sides touched in each.
+    """Return the regime of each run from the sides in contact in successive periods.
 
     Parameters
     ----------
@@ -219,7 +223,7 @@ def labels_of(touched: Bits, multiples: NDArray[np.int64]) -> list[str]:
     >>> labels_of(np.array([[7, 5], [6, 3], [6, 7]]), np.array([0, 0, 2]))
     ['bilateral', 'not settled', 'bilateral']
     """
-    # both kinds of bilateral are one
+    # bilateral with and without time inside the gap
     names = np.where(touched == 7, 5, touched)
     same = (names == names[:, :1]).all(axis=1)
     found = [REGIMES[bits] for bits in names[:, 0].tolist()]
@@ -232,7 +236,7 @@ def labels_of(touched: Bits, multiples: NDArray[np.int64]) -> list[str]:
 def regimes_of(
     run: Trajectory, period: float | None, since: float | None, until: float | None, tol: float
 ) -> Regimes:
-    """The regimes of a run, period by period; see `Trajectory.regimes`."""
+    """Classify a run period by period; see `Trajectory.regimes`."""
     if run.gap is None:
         raise ArgumentError(
             "this run has no gap: no three regions between two parallel interfaces; name the "
@@ -278,24 +282,24 @@ def regimes_of(
 
 
 def ending_of(multiple: int, change: float, count: int, early: str = "") -> Outcome:
-    """Whether the states repeat over the last periods, in words."""
+    """Return the outcome that states whether the last periods repeat."""
     if multiple:
         each = "1 period" if multiple == 1 else f"{multiple} periods"
         text = f"The states repeat after {each}, to {change:.2g} of their ranges." + early
         return Outcome("settled", text, True)
     periods = "the last period" if count == 1 else f"the last {count} periods"
     if np.isnan(change):
-        text = f"Whether the states repeat over {periods} is not known." + early
+        text = f"It is unknown whether the states repeat over {periods}." + early
         return Outcome("not settled", text, False)
     text = (
         f"Over {periods} the states do not repeat: in one they change by {change:.2g} of their "
-        "ranges. classify_regime() tells chaos from a transient." + early
+        "ranges. classify_regime() distinguishes chaos from a transient." + early
     )
     return Outcome("not settled", text, False)
 
 
 def coexisting(labels: Sequence[str]) -> str:
-    """The label of motions at one set of parameters: one, or several that coexist.
+    """Return the label of the motions at one set of parameters, which may coexist.
 
     Examples
     --------
@@ -308,16 +312,16 @@ def coexisting(labels: Sequence[str]) -> str:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RegimeSet(Result):
-    """The motions that runs from several states settle on, at one set of parameters.
+    """The limit motions of runs from several initial states, at one set of parameters.
 
     Parameters
     ----------
     motions : tuple of Regimes
-        Different motions, in the order in which they were found.
+        The distinct motions, in the order of detection.
     starts : ndarray, shape (m, n)
         The initial states.
     index : ndarray of int, shape (m,)
-        The motion that each of them comes to.
+        Index of the motion reached from each initial state.
     parameters : mapping
     equations : str
         The model as text.
@@ -331,12 +335,12 @@ class RegimeSet(Result):
 
     @property
     def label(self) -> str:
-        """The regime, or ``"coexisting: "`` and those of all motions."""
+        """The regime, or ``"coexisting: "`` with the regimes of all motions."""
         return coexisting([motion.label for motion in self.motions])
 
     @property
     def fractions(self) -> dict[str, float]:
-        """The fraction of the periods of each kind, over all starts."""
+        """The fraction of periods of each kind, over all initial states."""
         return fractions_of([kind for k in self.index for kind in self.motions[k].kinds])
 
     def __repr__(self) -> str:

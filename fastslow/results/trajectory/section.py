@@ -1,4 +1,4 @@
-"""Points of a trajectory where it meets a section, or once every period."""
+"""Poincaré sections and stroboscopic sections of a trajectory."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ class Section(Table, Result):
     Parameters
     ----------
     rule : str
-        What the points have in common, e.g. ``"v = 0 downwards"``.
+        The condition of the section, e.g. ``"v = 0 downwards"``.
     names : tuple of str
-        Columns: states, slow states and, where known, slow quantities.
+        Columns: states, slow states and, if known, slow quantities.
     times : ndarray, shape (K,)
     table : ndarray, shape (len(names), K)
         Every column at those times.
     directions : ndarray of int, shape (K,)
-        +1 upwards, −1 downwards, 0 for a touch; 0 throughout for a stroboscopic section.
+        +1 upwards, −1 downwards, 0 for a tangency; 0 throughout for a stroboscopic section.
     ended : str
-        Why the run ended early, as the code of its outcome; empty where it did not.
+        The outcome code of a run that ended early, else empty.
     """
 
     rule: str
@@ -52,16 +52,16 @@ class Section(Table, Result):
     _row = "t"
     _places = ("t",)
 
-    #: Numbers are no columns, and rows no points: there is nothing to go through one by one.
+    #: Not iterable: columns are accessed by name.
     __iter__: ClassVar[None] = None
 
     def __getitem__(self, name: object) -> NDArray[np.float64]:
-        """A column, or an expression in columns, at the times of the section, shape (K,)."""
+        """Return a column, or an expression in columns, at the points, shape (K,)."""
         columns = {key: partial(self.table.__getitem__, k) for k, key in enumerate(self.names)}
         return column(name, {**columns, "t": lambda: self.times}, {}, len(self))
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Time t, every column, and the direction."""
+        """Return time t, every column, and the direction."""
         columns = dict(zip(self.names, self.table, strict=True))
         return {"t": self.times, **columns, "direction": self.directions}
 
@@ -77,7 +77,7 @@ class Section(Table, Result):
 def window_of(
     run: Trajectory, since: float | None = None, until: float | None = None
 ) -> tuple[float, float]:
-    """The part of a run that is looked at, by default all of it.
+    """Validate a time interval, by default that of the run.
 
     Raises
     ------
@@ -95,12 +95,12 @@ def window_of(
 
 
 def period_of(run: Trajectory, period: float | None) -> float:
-    """The period given, else that of the forcing.
+    """Return the given period, else that of the forcing.
 
     Raises
     ------
     ArgumentError
-        For a period that is not positive, or without any.
+        Without either.
     """
     if period is None:
         period = run.period
@@ -112,11 +112,11 @@ def period_of(run: Trajectory, period: float | None) -> float:
 def stroboscopic_section(
     run: Trajectory, period: float | None, phase: float, since: float | None
 ) -> Section:
-    """States once every period; see `Trajectory.stroboscopic`."""
+    """Return the states once every period; see `Trajectory.stroboscopic`."""
     length = period_of(run, period)
     first, last = window_of(run, since)
     begin = run.span[0] + phase
-    # the ends of a run of whole periods belong to it whatever the rounding
+    # include the ends of a run of whole periods despite rounding
     slack = 1e-9
     lowest = math.ceil((first - begin) / length - slack)
     highest = math.floor((last - begin) / length + slack)
@@ -135,7 +135,7 @@ def poincare_section(
     interface: object,
     window: tuple[float, float],
 ) -> Section:
-    """Points on a level or an interface; see `Trajectory.section`."""
+    """Return the points at a level or on an interface; see `Trajectory.section`."""
     if (expression is None) == (interface is None):
         received = "both" if interface is not None else "neither"
         raise ArgumentError(
@@ -172,17 +172,17 @@ def _on_level(run: Trajectory, expression: object, level: float) -> Section:
 
 
 def _modulo(line: StepPolynomials, level: float, period: float) -> StepRoots:
-    """Zeros of a quantity less every copy of a level, shifted by whole periods.
+    """Return the roots of a periodic quantity at a level, modulo its period.
 
-    The steps near each copy are put after those near the copy before it, with a
-    straight step between them, whose zeros are none.
+    The steps near each copy of the level, shifted by whole periods, follow those near
+    the previous copy, joined by a linear step whose roots are discarded.
     """
     c = line.coefficients
     count = len(c)
     moved = np.abs(c[:, 1:]).sum(axis=1) + 1e-9 * period
     low = np.ceil((c[:, 0] - moved - level) / period)
     high = np.floor((c[:, 0] + moved - level) / period)
-    # with their neighbours, so that a zero between two steps is seen from both
+    # including their neighbours, so that a root between two steps is detected from both
     first, last = low.copy(), high.copy()
     for shifted, source in ((slice(1, None), slice(-1)), (slice(-1), slice(1, None))):
         first[shifted] = np.minimum(first[shifted], low[source])
@@ -217,7 +217,7 @@ def _on_interface(run: Trajectory, interface: object) -> Section:
     times, states = mine[:, 0], mine[:, 6:].T
     names, table = run.states, states
     if run.series is not None:
-        # the state as it was put on the interface, slow quantities from the series
+        # states projected onto the interface, slow quantities from the series
         slow = run.dense_columns(times)[len(run.states) :]
         names, table = run.columns, np.vstack([states, slow])
     return Section("", names, times, table, mine[:, 2].astype(np.int64))

@@ -1,4 +1,4 @@
-"""Parts of a trajectory, each a trajectory of its own: between two times, or of some samples."""
+"""Slices of a trajectory, between two times or of consecutive samples."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ Array = NDArray[np.float64]
 Samples = tuple[Array, Array]
 
 
-def rows_asked(wanted: slice, count: int, what: str) -> tuple[int, int]:
-    """First and last but one of some consecutive samples.
+def slice_bounds(wanted: slice, count: int, what: str) -> tuple[int, int]:
+    """Return start and stop of a slice of consecutive samples.
 
     Raises
     ------
     ArgumentError
-        For a slice that holds none or leaves some out.
+        For a slice that is empty or has a step.
     """
     start, stop, step = wanted.indices(count)
     if step != 1:
         raise ArgumentError(
-            f"{what} is cut with a step of 1, received {step}; thin its columns instead"
+            f"{what} is sliced with a step of 1, received {step}; slice its columns instead"
         )
     if stop <= start:
-        raise ArgumentError(f"samples {start} to {stop} hold none of the {count} there are")
+        raise ArgumentError(f"samples {start} to {stop} contain none of the {count} samples")
     return start, stop
 
 
 def samples_of(run: Trajectory, wanted: slice) -> Trajectory:
-    """The trajectory of some consecutive samples; see `Trajectory.__getitem__`."""
-    start, stop = rows_asked(wanted, len(run), "a trajectory")
+    """Return the trajectory of consecutive samples; see `Trajectory.__getitem__`."""
+    start, stop = slice_bounds(wanted, len(run), "a trajectory")
     if stop - start == len(run):
         return run
     kept = run.t[start:stop], run.sampled_columns[:, start:stop]
@@ -66,7 +66,7 @@ def parts_of(
 
 
 def _window(run: Trajectory, begin: float, end: float) -> Trajectory | None:
-    """The part between two times; without dense output between the samples within, if any."""
+    """Return the slice between two times, or without dense output that of the samples inside."""
     if (begin, end) == run.span:
         return run
     if not is_dense(run):
@@ -83,7 +83,7 @@ def _window(run: Trajectory, begin: float, end: float) -> Trajectory | None:
 
 
 def _cut(run: Trajectory, begin: float, end: float, sampled: Samples | None) -> Trajectory:
-    """The part between two times, with its crossings, its ends included."""
+    """Return the slice between two times, with its crossings and exact ends."""
     first = max(int(np.searchsorted(run.step_starts, begin, side="right")) - 1, 0)
     stop = max(int(np.searchsorted(run.step_starts, end, side="left")), first + 1)
     steps = run.steps[first:stop].copy()
@@ -94,7 +94,7 @@ def _cut(run: Trajectory, begin: float, end: float, sampled: Samples | None) -> 
             steps[0, :2] += ahead, -ahead
             if series is not None:
                 series = np.concatenate([_moved(series[0], ahead)[None], series[1:]])
-        # the last step may reach past the end, the first one be all there is
+        # the last step may extend beyond the end, and may also be the first
         steps[-1, 1] = max(min(steps[-1, 1], end - steps[-1, 0]), 0.0)
     times = run.crossing_table[:, 0]
     part = replace(
@@ -110,7 +110,7 @@ def _cut(run: Trajectory, begin: float, end: float, sampled: Samples | None) -> 
 
 
 def _reached(part: Trajectory, end: float) -> Array:
-    """Time and state at the end of a part."""
+    """Return time and state at the end of a slice."""
     n = len(part.states)
     if is_dense(part):
         last = np.array([len(part.steps) - 1])
@@ -128,7 +128,7 @@ def _outcome(run: Trajectory, begin: float, end: float) -> Outcome:
 
 
 def _moved(coefficients: Array, ahead: float) -> Array:
-    """A series about a later time, shape (columns, order + 1).
+    """Re-expand a series about a later time, shape (columns, order + 1).
 
     Examples
     --------

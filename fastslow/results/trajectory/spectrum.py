@@ -1,4 +1,4 @@
-"""Frequencies and amplitudes in a trajectory."""
+"""Amplitude spectra of trajectories."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ WINDOWS: dict[str, tuple[float, ...]] = {
     "flattop": (0.21557895, 0.41663158, 0.277263158, 0.083578947, 0.006947368),
 }
 
-#: Samples per Taylor step, and bounds of their number.
+#: Samples per Taylor step, and bounds of their total number.
 PER_STEP, FEWEST, MOST = 16, 2**12, 2**20
 
 
 @dataclass(frozen=True)
 class Peak:
-    """A line of a spectrum, interpolated between its bins.
+    """A line of a spectrum, interpolated between bins.
 
     Parameters
     ----------
@@ -62,14 +62,14 @@ class Spectrum(Table, Result):
         The column.
     window : str
     span : tuple of float
-        First and last time looked at.
+        The time interval.
     frequency : ndarray, shape (N,)
         In cycles per unit of time, from zero.
     amplitude : ndarray, shape (N,)
-        A sine of amplitude a at the centre of a bin has amplitude a there; at
-        zero, the modulus of the mean.
+        Amplitude of a sine wave at the centre of each bin; at zero frequency, the
+        modulus of the mean.
     ended : str
-        Why the run ended early, as the code of its outcome; empty where it did not.
+        The outcome code of a run that ended early, else empty.
 
     Examples
     --------
@@ -92,7 +92,7 @@ class Spectrum(Table, Result):
     _places = ("frequency",)
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Frequency, angular frequency and amplitude."""
+        """Return frequency, angular frequency and amplitude."""
         return {
             "frequency": self.frequency,
             "angular": self.angular,
@@ -106,19 +106,19 @@ class Spectrum(Table, Result):
 
     @validated(n=whole(0), least=within(0.0, 1.0))
     def peaks(self, n: int = 5, least: float = 1e-6) -> tuple[Peak, ...]:
-        """The largest lines beside the mean, largest first.
+        """Return the largest lines except the mean, largest first.
 
-        A line between two bins is placed where the window's own transform has
-        the ratio of the two bins, so that a single sine is found exactly. A
-        line counts when it is the largest within the window's resolution;
-        side lobes of the window farther away may be among the smaller ones.
+        The frequency of a line is interpolated from the ratio of two bins by the
+        transform of the window, exactly for a single sine wave. A line is a maximum
+        within the resolution of the window; the smaller lines may include side lobes
+        farther away.
 
         Parameters
         ----------
         n : int
-            How many at most.
+            Maximal number of lines.
         least : float
-            Lines smaller than this part of the largest are left out.
+            Lines below this fraction of the largest amplitude are omitted.
 
         Returns
         -------
@@ -165,7 +165,7 @@ class Spectrum(Table, Result):
 
 
 def transform(terms: tuple[float, ...], shift: float) -> float:
-    """Modulus of a window's transform at a shift in bins, relative to that at none.
+    """Return the modulus of a window's transform at a shift in bins, relative to zero shift.
 
     Examples
     --------
@@ -182,18 +182,18 @@ def transform(terms: tuple[float, ...], shift: float) -> float:
 def spectrum_of(
     run: Trajectory, name: object, since: float | None, window: str, samples: int | None
 ) -> Spectrum:
-    """Spectrum of a column; see `Trajectory.spectrum`."""
+    """Compute the spectrum of a column; see `Trajectory.spectrum`."""
     if str(name) not in run.columns:
         raise unknown_name("column", name, run.columns)
     if window not in WINDOWS:
         raise unknown_name("window", window, WINDOWS)
     first, last = window_of(run, since)
     if run.period is not None and last - first >= run.period:
-        # whole periods put the forcing and its multiples at the centres of bins
+        # with whole periods the harmonics of the forcing are at the centres of bins
         count = int((last - first) / run.period + 1e-9)
         first = max(last - count * run.period, run.span[0])
     if not last > first:
-        raise ArgumentError(f"since = {first:g} leaves nothing of the run, which ends there")
+        raise ArgumentError(f"since = {first:g} is the end of the run; expected an earlier time")
     if samples is None:
         steps = int(np.count_nonzero(run.steps[:, 0] + run.steps[:, 1] > first))
         samples = 2 ** int(np.ceil(np.log2(np.clip(PER_STEP * steps, FEWEST, MOST))))
@@ -203,7 +203,7 @@ def spectrum_of(
     weights = np.zeros(samples)
     for m, a in enumerate(WINDOWS[window]):
         weights += (-1.0) ** m * a * np.cos(2.0 * np.pi * m * part)
-    # without its mean first, or the window would spread it over the lowest bins
+    # subtract the mean, which the window would spread over the lowest bins
     amplitude = 2.0 * np.abs(np.fft.rfft((values - mean) * weights)) / weights.sum()
     amplitude[0] = abs(mean)
     if samples % 2 == 0:

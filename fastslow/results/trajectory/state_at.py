@@ -1,4 +1,4 @@
-"""A state at a time: of a trajectory, and of an overlay with what is followed then."""
+"""States at instants of a trajectory or an overlay."""
 
 from __future__ import annotations
 
@@ -19,41 +19,41 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Samples that are read at once by an iteration.
+#: Number of samples evaluated at once by an iteration.
 BLOCK = 1024
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StatePoint(_Point):
-    """A trajectory at one time; of an overlay also what it follows then.
+    """The state of a trajectory at one instant; for an overlay also the branch it follows.
 
-    ``moment["x"]`` is a state, slow quantity or parameter by name, ``moment["t"]`` the time.
+    ``point["x"]`` is a state, slow quantity or parameter by name, ``point["t"]`` the time.
 
     Parameters
     ----------
     time : float
     states : tuple of str
-        States and slow states; of an overlay the fast states.
+        States and slow states; for an overlay the fast states.
     state : ndarray, shape (n,)
-        Their values: of a trajectory with ``time`` a start for `fastslow.simulate`.
+        Their values; with ``time`` an initial state for `fastslow.simulate`.
     slow : mapping
-        Slow quantities then.
+        Values of the slow quantities.
     region : str
-        The region then; at a crossing the one that is entered.
+        The region; at a crossing the one entered.
     parameters : mapping
         Parameter values.
     interpolated : bool
-        Whether it was read between samples on a straight line, for want of dense output.
+        True if interpolated linearly between samples, without dense output.
     resting : bool
-        Whether it is an end of a stretch of time that stays on the level asked for.
+        True for an end of a time interval in which the quantity is constant at the level.
     parameter : str
-        Of an overlay the slow quantity that its diagram is over.
+        For an overlay, the slow quantity that is the parameter of its diagram.
     sheet : str
-        Of an overlay the label of the sheet followed, empty where none is.
+        For an overlay, the label of the stable branch followed, empty if there is none.
     branch : int or None
-        The number of that sheet's branch in the diagram.
+        The index of that branch in the diagram.
     distance : float
-        Of an overlay the distance from the sheet; see `fastslow.Overlay`.
+        For an overlay, the distance from that branch; see `fastslow.Overlay`.
     """
 
     time: float
@@ -71,7 +71,7 @@ class StatePoint(_Point):
 
     @property
     def value(self) -> float:
-        """Of an overlay, the slow quantity that its diagram is over; else nan."""
+        """The value of the parameter of an overlay's diagram, else NaN."""
         return self.slow.get(self.parameter, float("nan"))
 
     def __getitem__(self, name: object) -> float:
@@ -91,43 +91,43 @@ class StatePoint(_Point):
 
 
 def is_dense(run: Trajectory) -> bool:
-    """Whether there is a series to read between samples."""
+    """Return True for a run with dense output."""
     return run.series is not None and len(run.steps) > 0 and run.span[0] < run.span[1]
 
 
 def check_readable(run: Trajectory) -> None:
-    """Refuse a run that kept neither series nor samples."""
+    """Raise ArgumentError for a run without dense output and samples."""
     if not is_dense(run) and not len(run):
         raise ArgumentError(
-            "this run kept no samples and no dense output; simulate with dense=True or samples="
+            "this run has no samples and no dense output; simulate with dense=True or samples="
         )
 
 
 def state_points_at(run: Trajectory, times: Array) -> list[StatePoint]:
-    """The moments at times inside the run, in the order given."""
+    """Return the states at times inside the run, in the given order."""
     if is_dense(run):
         columns, between = columns_at(run, times), np.zeros(len(times), dtype=bool)
     else:
         # without series a run may have samples of its states alone
         rows = run.sampled_columns
-        # a few times of many samples: only the neighbours are looked at
+        # only the samples next to each time are evaluated
         after = np.clip(np.searchsorted(run.t, times), 1, max(len(run.t) - 1, 1))
         near = np.minimum(np.stack([after - 1, after]), len(run.t) - 1)
         low, high = run.t[near]
-        part = np.where(high > low, (times - low) / np.where(high > low, high - low, 1.0), 0.0)
-        columns = (1 - part) * rows[:, near[0]] + part * rows[:, near[1]]
-        between = (part > 0.0) & (part < 1.0)
+        weight = np.where(high > low, (times - low) / np.where(high > low, high - low, 1.0), 0.0)
+        columns = (1 - weight) * rows[:, near[0]] + weight * rows[:, near[1]]
+        between = (weight > 0.0) & (weight < 1.0)
     return _built(run, times, columns, between)
 
 
 def sample(run: Trajectory, row: int) -> StatePoint:
-    """The moment of a sample."""
+    """Return the state at a sample."""
     (found,) = _samples(run, row, row + 1)
     return found
 
 
 def in_blocks(run: Trajectory) -> Iterator[list[StatePoint]]:
-    """The moments of all samples, many at once."""
+    """Yield the states at all samples, in blocks."""
     return (_samples(run, row, row + BLOCK) for row in range(0, len(run), BLOCK))
 
 
@@ -140,7 +140,7 @@ def _samples(run: Trajectory, start: int, stop: int) -> list[StatePoint]:
 def _built(
     run: Trajectory, times: Array, columns: Array, interpolated: NDArray[np.bool_]
 ) -> list[StatePoint]:
-    """Moments from columns, shape (n or n + n_forcing, N)."""
+    """Return states at instants from columns, shape (n or n + n_forcing, N)."""
     n, regions = len(run.states), regions_at(run, times).tolist()
     states = np.ascontiguousarray(columns[:n].T)
     slow = columns[n:].T.tolist()

@@ -35,9 +35,9 @@ class StepPolynomials:
     Parameters
     ----------
     coefficients : ndarray, shape (n_steps, degree + 1)
-        Of s**k, where s is the part of the step gone through.
+        Coefficients of s**k, where s is the fraction of the step.
     size : ndarray, shape (n_steps,)
-        Sum of the moduli of all terms that were added: what rounding is relative to.
+        Sum of the moduli of all terms, the scale of rounding errors.
     """
 
     coefficients: Array
@@ -62,34 +62,34 @@ class StepPolynomials:
         return StepPolynomials(product, self.size * other.size)
 
     def minus(self, level: float) -> StepPolynomials:
-        """The quantity less a constant."""
+        """Subtract a constant."""
         shifted = self.coefficients.copy()
         shifted[:, 0] -= level
         return StepPolynomials(shifted, self.size + abs(level))
 
 
 def along_steps(run: Trajectory, expression: object) -> StepPolynomials:
-    """A column, or a polynomial in columns, parameters and time, along every step.
+    """Expand a column, or a polynomial in columns, parameters and time, along every step.
 
     Parameters
     ----------
     run : Trajectory
         With dense output.
     expression : str or Expr
-        Columns and t in ``+ - *`` and whole powers, of a total degree up to `DEGREE`;
-        numbers, parameters and functions of these for coefficients.
+        A polynomial in columns and t of total degree up to `DEGREE`, whose coefficients
+        are numbers, parameters and functions of these.
 
     Raises
     ------
     UnknownNameError
-        For a name that is no column and no parameter.
+        For a name that is neither a column nor a parameter.
     ArgumentError
-        For an expression that is no polynomial, or a run without dense output.
+        For an expression that is not a polynomial, or a run without dense output.
     """
     text = written_formula(expression)
     if run.series is None:
         raise ArgumentError(
-            "this run kept no dense output, which this question needs; simulate with dense=True"
+            "this run has no dense output, which this query requires; simulate with dense=True"
         )
     if text in run.columns:
         return _column(run, text)
@@ -109,7 +109,7 @@ def _constant(run: Trajectory, value: float) -> StepPolynomials:
 
 
 class _Expansion:
-    """One expression along one run."""
+    """The expansion of an expression along a run."""
 
     def __init__(self, run: Trajectory, text: str) -> None:
         self.run, self.text = run, text
@@ -121,7 +121,7 @@ class _Expansion:
         }
 
     def polynomial(self) -> StepPolynomials:
-        # all is checked before the first product is formed
+        # check everything before the first product is computed
         self.degree(self.tree)
         with np.errstate(over="ignore", invalid="ignore"):
             found = self.read(self.tree)
@@ -131,24 +131,24 @@ class _Expansion:
 
     def refused(self, node: Node) -> ArgumentError:
         return ArgumentError(
-            f"{quoted(self.text)} is no polynomial in columns and parameters, at "
+            f"{quoted(self.text)} is not a polynomial in columns and parameters, at "
             f"{quoted(text_of(node))}; add it to the model as an interface, and write "
             "section(interface=...)"
         )
 
     def fixed(self, node: Node) -> bool:
-        """Whether nothing in a part of the expression moves along the run."""
+        """Return True if a subexpression is constant along the run."""
         return self.moving.isdisjoint(names_of(node))
 
     def number(self, node: Node) -> float:
-        """The value of a part that does not move."""
+        """Return the value of a constant subexpression."""
         value = float(computed(node, self.constants))
         if not np.isfinite(value):
             raise self.refused(node)
         return value
 
     def degree(self, node: Node) -> int:
-        """The total degree of a part in what moves, after a check that it is a polynomial."""
+        """Return the total degree of a subexpression, after a check that it is a polynomial."""
         if isinstance(node, Name) and node.name in self.moving:
             return 1
         if self.fixed(node):
@@ -175,12 +175,12 @@ class _Expansion:
         if degree > DEGREE:
             raise ArgumentError(
                 f"{quoted(self.text)} has the degree {degree} at {quoted(text_of(node))}; "
-                f"expected a polynomial of a total degree up to {DEGREE}"
+                f"expected a polynomial of total degree up to {DEGREE}"
             )
         return degree
 
     def read(self, node: Node) -> StepPolynomials:
-        """The polynomial of a checked part."""
+        """Expand a checked subexpression."""
         if isinstance(node, Name) and node.name in self.moving:
             return self.column(self.known[node.name])
         if self.fixed(node):

@@ -1,8 +1,8 @@
-"""Where a quantity known as a polynomial on every step passes zero: no root missed, none twice.
+"""Roots of piecewise polynomials: all of them, each once.
 
-The sign changes of the Bernstein coefficients bound the number of roots in an
-open interval, with equality for none and one (Descartes' rule); intervals with
-more are halved. Steps share their ends, so that a root there is found once.
+The number of sign changes of the Bernstein coefficients bounds the number of roots
+in an open interval, exactly for none and one (Descartes' rule of signs); intervals
+with more are bisected. Adjacent steps share an end, so that a root there is found once.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from fastslow.results.trajectory.step_polynomials import StepPolynomials
 
 Array = NDArray[np.float64]
 
-#: Intervals are not halved more often.
+#: Maximal number of bisections of an interval.
 DEEPEST = 44
 
-#: Roots closer than this part of a step are looked at again: are they one touch?
+#: Distance of roots, as a fraction of a step, below which they may be a single tangency.
 CLOSE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class StepRoots:
-    """Zeros in order of time.
+    """Roots in order of time.
 
     Parameters
     ----------
     step : ndarray of int, shape (K,)
     part : ndarray, shape (K,)
-        How far into the step, 0 to 1.
+        The fraction of the step, 0 to 1.
     direction : ndarray of int, shape (K,)
-        +1 where the quantity grows through zero, −1 where it falls, 0 where it only touches.
+        +1 if the quantity increases through zero, −1 if it decreases, 0 for a tangency.
     """
 
     step: NDArray[np.intp]
@@ -45,9 +45,10 @@ class StepRoots:
 
 @dataclass(frozen=True)
 class Zero:
-    """Zero from ``low`` to ``high`` (step + part), with the signs on both sides.
+    """A root, or an interval of roots, with the signs on both sides.
 
-    The sign is 0 on the side of an end of the run that lies on zero.
+    Its ends ``low`` and ``high`` are step + fraction. The sign is 0 beyond an end of the
+    run at which the quantity is zero.
     """
 
     low: float
@@ -57,7 +58,7 @@ class Zero:
 
     @property
     def long(self) -> bool:
-        """Whether the quantity rests on zero for a step or longer."""
+        """True if the quantity is zero for a step or longer."""
         return self.high - self.low >= 1
 
     @property
@@ -66,13 +67,13 @@ class Zero:
 
     @property
     def direction(self) -> int:
-        """+1 where the quantity grows through zero, −1 where it falls, 0 where it touches."""
+        """+1 if the quantity increases through zero, −1 if it decreases, 0 for a tangency."""
         after = self.after or -self.before
         return 0 if after == self.before else after
 
 
 def find_roots(quantity: StepPolynomials) -> StepRoots:
-    """All zeros along consecutive steps; a run that begins on zero has none there.
+    """Compute all roots along consecutive steps, except one at the beginning of the run.
 
     Parameters
     ----------
@@ -81,8 +82,8 @@ def find_roots(quantity: StepPolynomials) -> StepRoots:
     Returns
     -------
     StepRoots
-        A stretch on which the quantity is zero to rounding counts once, at its beginning
-        (at its middle when it is shorter than a step).
+        An interval on which the quantity is zero to rounding counts once, at its beginning
+        (at its middle if it is shorter than a step).
     """
     found = [zero for zero in find_zeros(quantity) if zero.before != 0]
     where = np.array([zero.low if zero.long else zero.middle for zero in found])
@@ -92,14 +93,14 @@ def find_roots(quantity: StepPolynomials) -> StepRoots:
 
 
 def find_zeros(quantity: StepPolynomials) -> list[Zero]:
-    """All zeros along consecutive steps in order, those at the ends of the run too."""
+    """Compute all roots along consecutive steps in order, including the ends of the run."""
     b = quantity.coefficients
     if not len(b):
         return []
     if b.shape[1] == 1:
         b = np.column_stack([b, np.zeros(len(b))])
     noise = 8.0 * np.finfo(float).eps * quantity.size
-    # where the constant term outweighs the others there is no root
+    # there is no root if the constant term dominates
     near = np.flatnonzero(np.abs(b[:, 0]) <= np.abs(b[:, 1:]).sum(axis=1) + noise)
     transform = _to_bernstein(b.shape[1] - 1)
     bernstein = b[near] @ transform.T
@@ -124,13 +125,13 @@ def _to_bernstein(n: int) -> Array:
 
 @cache
 def _halves(n: int) -> tuple[Array, Array]:
-    """Matrices that give the Bernstein coefficients of the left and the right half."""
+    """Return the matrices of de Casteljau's subdivision into the left and the right half."""
     left = np.array([[comb(j, k) / 2.0**j for k in range(n + 1)] for j in range(n + 1)])
     return left, np.ascontiguousarray(left[::-1, ::-1])
 
 
 def _changes(bernstein: Array) -> tuple[NDArray[np.int64], Array, Array]:
-    """Sign changes of every row, and the signs of its first and last coefficient but zeros."""
+    """Count the sign changes of each row, and return its first and last nonzero sign."""
     signs = np.sign(bernstein)
     count = np.zeros(len(signs), dtype=np.int64)
     first, last = np.zeros(len(signs)), np.zeros(len(signs))
@@ -144,9 +145,9 @@ def _changes(bernstein: Array) -> tuple[NDArray[np.int64], Array, Array]:
 def _inside(
     bernstein: Array, step: NDArray[np.intp], noise: Array, b: Array
 ) -> tuple[list[Zero], list[tuple[float, float]]]:
-    """Single roots in open steps, and intervals that are zero to rounding.
+    """Return simple roots inside steps, and intervals that are zero to rounding.
 
-    The Bernstein coefficients are those of some steps only.
+    The Bernstein coefficients are those of the candidate steps.
     """
     low, width = np.zeros(len(step)), np.ones(len(step))
     left, right = _halves(b.shape[1] - 1)
@@ -164,7 +165,7 @@ def _inside(
             break
         step, low, width = step[more], low[more], 0.5 * width[more]
         bernstein = np.vstack([bernstein[more] @ left.T, bernstein[more] @ right.T])
-        # a middle that is zero to rounding is a root of its own, of neither half
+        # a midpoint that is zero to rounding is a separate root, of neither half
         zero = np.abs(bernstein[: len(step), -1]) <= noise[step]
         bernstein[: len(step), -1][zero] = bernstein[len(step) :, 0][zero] = 0.0
         vague += [(float(u), float(u)) for u in (step + low + width)[zero]]
@@ -176,7 +177,7 @@ def _inside(
 
 
 def _joined(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Sorted intervals, those that touch each other made one."""
+    """Merge sorted intervals that touch or overlap."""
     kept: list[tuple[float, float]] = []
     for low, high in intervals:
         if kept and low <= kept[-1][1]:
@@ -187,7 +188,7 @@ def _joined(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def _refined(b: Array, low: Array, high: Array, sign: Array) -> Array:
-    """Roots to rounding: Newton, kept inside brackets at whose lower ends the sign is given."""
+    """Refine roots by Newton's method, safeguarded by brackets with given sign at the lower end."""
     s = 0.5 * (low + high)
     for _ in range(100):
         value, slope = np.zeros(len(s)), np.zeros(len(s))
@@ -198,7 +199,7 @@ def _refined(b: Array, low: Array, high: Array, sign: Array) -> Array:
         low, high = np.where(same, s, low), np.where(same, high, s)
         with np.errstate(divide="ignore", invalid="ignore"):
             new = s - value / slope
-        # where the correction is below rounding the root is found, if at an end of the bracket
+        # a root at an end of the bracket has converged if the correction is below rounding
         kept = ((low < new) & (new < high)) | (new == s)
         new = np.where(kept, new, 0.5 * (low + high))
         new = np.where(value == 0.0, s, new)
@@ -215,7 +216,7 @@ def _value(b: Array, u: float) -> tuple[int, float]:
 
 
 def _sign_beyond(b: Array, noise: Array, u: float, side: int) -> int:
-    """The first sign above rounding on one side, 0 where the run ends before there is one."""
+    """Return the first sign above rounding on one side, 0 if the run ends before."""
     reach = 2.0**-DEEPEST
     while True:
         at = u + side * reach
@@ -226,12 +227,12 @@ def _sign_beyond(b: Array, noise: Array, u: float, side: int) -> int:
         step, value = _value(b, at)
         if abs(value) > noise[step]:
             return int(np.sign(value))
-        # not farther than half a step at once: whole runs may rest on zero
+        # at most half a step at once: the quantity may be zero over many steps
         reach += min(reach, 0.5)
 
 
 def _merged(zeros: list[Zero], b: Array, noise: Array) -> list[Zero]:
-    """Neighbours between which the quantity stays within rounding are one zero."""
+    """Merge adjacent roots between which the quantity is zero to rounding."""
     kept: list[Zero] = []
     for zero in zeros:
         if kept:
@@ -239,7 +240,7 @@ def _merged(zeros: list[Zero], b: Array, noise: Array) -> list[Zero]:
             gap = zero.low - last.high
             if gap <= CLOSE:
                 step, value = _value(b, last.high + 0.5 * gap)
-                # signs that contradict each other were read from rounding
+                # contradictory signs are due to rounding
                 doubt = last.after != zero.before or abs(value) <= 2.0 * noise[step]
                 if gap <= 0.0 or doubt:
                     low, high = last.low, max(last.high, zero.high)

@@ -1,4 +1,4 @@
-"""A bifurcation diagram by simulation: what runs settle on as a parameter is swept."""
+"""Brute-force bifurcation diagrams: long-time behaviour of runs over a swept parameter."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SweepPass(Result):
-    """One pass over the values of a parameter, each run begun where the last one ended.
+    """One pass over the values of a parameter; each run starts at the end of the previous one.
 
     Parameters
     ----------
     direction : int
-        +1 for rising values, −1 for falling ones.
+        +1 for increasing values, −1 for decreasing ones.
     values : ndarray, shape (m,)
         In the order of the pass.
     counts : ndarray of int, shape (m,)
-        How many points were recorded at each value.
+        Number of points recorded at each value.
     parameter, x : ndarray, shape (N,)
         The points, value by value.
     ends : ndarray, shape (m, n)
-        States in which the runs ended; nan where one failed.
+        Final states of the runs; NaN for those that failed.
     outcomes : tuple of Outcome
-        How each value's run ended.
+        The outcome of the run at each value.
     """
 
     direction: int
@@ -47,7 +47,7 @@ class SweepPass(Result):
     outcomes: tuple[Outcome, ...]
 
     def at(self, value: float) -> Array:
-        """The points recorded at the nearest of the values, shape (its count,)."""
+        """Return the points recorded at the nearest of the values."""
         row = int(np.argmin(np.abs(self.values - value)))
         first = int(self.counts[:row].sum())
         return self.x[first : first + int(self.counts[row])]
@@ -65,24 +65,24 @@ class SweepPass(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BifurcationSweep(Table, Result):
-    """A bifurcation diagram by simulation.
+    """A brute-force bifurcation diagram, computed by simulation.
 
     Parameters
     ----------
     parameter_name, name : str
-        The parameter swept, and the column recorded.
+        The swept parameter and the recorded column.
     what : str
         ``"stroboscopic"``, ``"extremes"`` or ``"section"``.
     rule : str
-        The same in full, e.g. ``"x where v = 0 downwards"``.
+        A description of the recorded points, e.g. ``"x where v = 0 downwards"``.
     passes : tuple of SweepPass
-        One, or one each way.
+        One pass, or one in each direction.
     parameters : mapping
         The values of all other parameters.
     equations : str
         The model as text.
     settings : mapping
-        How the runs were made.
+        The settings of the integration.
     """
 
     parameter_name: str
@@ -97,7 +97,7 @@ class BifurcationSweep(Table, Result):
     _row = "point"
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """The parameter, the column recorded, and the direction of the pass, point by point."""
+        """Return parameter, recorded column and direction of the pass, for each point."""
         return {
             self.parameter_name: self.parameter,
             self.name: self.x,
@@ -106,37 +106,37 @@ class BifurcationSweep(Table, Result):
 
     @property
     def up(self) -> SweepPass | None:
-        """The pass with rising values."""
+        """The pass with increasing values."""
         return next((p for p in self.passes if p.direction > 0), None)
 
     @property
     def down(self) -> SweepPass | None:
-        """The pass with falling values."""
+        """The pass with decreasing values."""
         return next((p for p in self.passes if p.direction < 0), None)
 
     @property
     def values(self) -> Array:
-        """The parameter values in rising order, shape (m,)."""
+        """The parameter values in increasing order, shape (m,)."""
         return np.sort(self.passes[0].values)
 
     @property
     def parameter(self) -> Array:
-        """Parameter value of every point, shape (N,)."""
+        """The parameter value of every point, shape (N,)."""
         return np.concatenate([p.parameter for p in self.passes])
 
     @property
     def x(self) -> Array:
-        """The column at every point, shape (N,)."""
+        """The recorded column at every point, shape (N,)."""
         return np.concatenate([p.x for p in self.passes])
 
     @property
     def direction(self) -> NDArray[np.int64]:
-        """Pass of every point, +1 up and −1 down, shape (N,)."""
+        """The direction of the pass of every point, +1 up and −1 down, shape (N,)."""
         return np.concatenate([np.full(len(p.x), p.direction, dtype=np.int64) for p in self.passes])
 
     @property
     def failures(self) -> tuple[tuple[float, Outcome], ...]:
-        """Values whose run failed, each with what happened."""
+        """Parameter values at which the run failed, each with its outcome."""
         return tuple(
             (float(value), outcome)
             for p in self.passes
@@ -146,23 +146,23 @@ class BifurcationSweep(Table, Result):
 
     @validated(resolution=within(0.0, 1.0))
     def hysteresis(self, resolution: float = 1e-3) -> Array:
-        """Intervals of the parameter over which the two passes differ.
+        """Return the intervals of the parameter over which the two passes differ.
 
-        At each value the points of one pass are compared with the nearest of
-        the other, both ways. Passes through chaos differ throughout.
+        At each value every point of one pass is compared with the nearest point of
+        the other, and conversely. Passes through chaotic motion differ throughout.
 
         Parameters
         ----------
         resolution : float
-            Largest difference that does not count, as a part of the range of all points.
+            Smallest difference that counts, as a fraction of the range of all points.
 
         Returns
         -------
         ndarray, shape (k, 2)
-            First and last differing value of each interval; each jump lies within
-            one step of the sweep outside it, when the runs settle. Just past a
-            fold a lost motion lingers, and may still be there when a run ends. A
-            value that failed is passed over.
+            First and last differing value of each interval. If the runs settle, each
+            jump is within one step of the sweep outside it; just past a fold the
+            passage is slow, and a run may end before it jumps. Values at which a run
+            failed are skipped.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""A solution in time: its series, its crossings, and the regions it went through."""
+"""Trajectories: the solution in time, its crossings of interfaces and its itinerary."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ class Trajectory(Queries, LongTime, Table, Result):
     """A solution in time.
 
     ``run["x"]`` is a column and ``run["x**2 + v"]`` an expression at the samples ``run.t``;
-    ``run[3]`` and iteration give the moments of samples, ``run[10:50]`` is the trajectory of
-    those samples, with its crossings, and ``run(t)`` the states at any time.
+    ``run[3]`` and iteration return the states at samples, ``run[10:50]`` is the trajectory
+    of those samples, with its crossings, and ``run(t)`` returns the states at any time.
 
     Parameters
     ----------
@@ -63,34 +63,34 @@ class Trajectory(Queries, LongTime, Table, Result):
     gap : tuple of str or None
         For a model with a gap, the regions below, inside and above it.
     outcome : Outcome
-        Why the run ended.
+        The outcome at the end of the run.
     end : ndarray, shape (1 + n,)
         Time and state reached.
     method : str
-        How the steps were made.
+        The integration method.
     steps : ndarray, shape (n_steps, 4)
-        Time, length and mode of every step, and what took the place of a
-        series: 0 nothing, 1 collocation, 2 an implicit method.
+        Time, length, mode and method of every step: 0 Taylor series, 1 collocation,
+        2 an implicit method.
     modes : tuple of str
-        What the modes in ``steps`` and ``crossing_table`` are: regions, then sliding motions.
+        Names of the modes in ``steps`` and ``crossing_table``: regions, then sliding motions.
     crossing_table : ndarray, shape (n_crossings, 6 + n)
         Time, interface, direction, mode before, mode after, near-tangential, state.
     series : ndarray, shape (n_steps, n + n_forcing, order + 1), optional
         Taylor coefficients of every step.
     sampled : tuple of ndarray, optional
-        Times (N,) asked for and their columns (n or n + n_forcing, N).
+        Times of the samples (N,) and their columns (n or n + n_forcing, N).
     span : tuple of float
-        First and last time reached.
+        First and last time.
     equations : str
         The model as text.
     settings : mapping
-        How it was simulated.
+        The settings of the integration.
     periods : mapping
-        The period of every state that has one. Columns go on beyond it without a
-        jump; distances are taken modulo the period.
+        The period of each periodic state. Its column is unwrapped, that is, continuous
+        beyond one period; distances are taken modulo the period.
     model : Model or StoredModel, optional
-        What was simulated; of a run from a file a stored model, which can be simulated again
-        and needs no SymPy.
+        The simulated model; for a run loaded from a file a stored model, which can be
+        simulated again and does not require SymPy.
 
     Examples
     --------
@@ -131,22 +131,22 @@ class Trajectory(Queries, LongTime, Table, Result):
 
     @property
     def stored_model(self) -> StoredModel | None:
-        """The model as a file keeps it."""
+        """The model as stored in files."""
         return None if self.model is None else self.model.stored
 
     @property
     def symbolic_model(self) -> Any:
-        """The model with its equations in SymPy, None of a run from a file."""
+        """The model with its SymPy equations, None for a run loaded from a file."""
         return None if isinstance(self.model, StoredModel) else self.model
 
     @cached_property
     def t(self) -> NDArray[np.float64]:
-        """Times of the samples; without samples, enough of them to plot."""
+        """Times of the samples; without samples, times dense enough for a plot."""
         return self._table[0]
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names that can be asked for: states, slow states, slow quantities."""
+        """Names of the columns: states, slow states, slow quantities."""
         return (*self.states, *self.forcing)
 
     def __len__(self) -> int:
@@ -162,16 +162,16 @@ class Trajectory(Queries, LongTime, Table, Result):
     @overload
     def __getitem__(self, key: str) -> NDArray[np.float64]: ...
     def __getitem__(self, key: object) -> Trajectory | StatePoint | NDArray[np.float64]:
-        """A column or expression at the times ``t``, shape (N,); a moment; the run of some samples.
+        """Return a column or expression, the state at a sample, or the run of some samples.
 
         Raises
         ------
         UnknownNameError
-            For a name that is no column and no parameter.
+            For a name that is neither a column nor a parameter.
         ArgumentError
-            For text that is no expression, or a slice that holds no sample or leaves some out.
+            For text that is not an expression, or a slice that is empty or has a step.
         OutOfRangeError
-            For a sample that there is not.
+            For an index out of range.
         """
         if isinstance(key, slice):
             return samples_of(self, key)
@@ -188,7 +188,7 @@ class Trajectory(Queries, LongTime, Table, Result):
 
     @validated(times=numbers)
     def __call__(self, times: ArrayLike) -> NDArray[np.float64]:
-        """States at any times of the run, shape (n, N); (n,) for a scalar time.
+        """Return the states at any times of the run, shape (n, N); (n,) for a scalar time.
 
         Raises
         ------
@@ -199,7 +199,7 @@ class Trajectory(Queries, LongTime, Table, Result):
 
     @validated(times=numbers)
     def dense_columns(self, times: ArrayLike) -> NDArray[np.float64]:
-        """All columns at any times of the run, shape (n + n_forcing, N).
+        """Return all columns at any times of the run, shape (n + n_forcing, N).
 
         Raises
         ------
@@ -218,41 +218,42 @@ class Trajectory(Queries, LongTime, Table, Result):
 
     @property
     def sampled_columns(self) -> NDArray[np.float64]:
-        """Columns at the times ``t``: all of them, or without dense output those that were kept."""
+        """Columns at the times ``t``: all of them, or the stored ones without dense output."""
         values = self._table[1]
         known = len(values) == len(self.columns) or not is_dense(self)
         return values if known else self._all_sampled
 
     @cached_property
     def step_starts(self) -> NDArray[np.float64]:
-        """When each step begins, side by side in memory for a binary search."""
+        """Start times of the steps, contiguous in memory for a binary search."""
         return np.ascontiguousarray(self.steps[:, 0])
 
     @cached_property
     def crossings(self) -> Crossings:
-        """In order of time; ``run.crossings("x - D", direction=+1)`` those of an interface."""
+        """Crossings in order of time; ``run.crossings("x - D", direction=+1)`` selects some."""
         return crossings_of(self)
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
-        """Stretches of one region, in order."""
+        """The time intervals in one region, in order."""
         return segments_of(self)
 
     @property
     def itinerary(self) -> tuple[str, ...]:
-        """The regions in the order they were gone through."""
+        """The sequence of regions along the trajectory."""
         return tuple(segment.region for segment in self.segments)
 
     @cached_property
     def regime(self) -> str | None:
-        """How the sides of a gap are touched in the second half of the run, period by period.
+        """The contact regime of a gap in the second half of the run.
 
         ``"bilateral"``, ``"unilateral upper"``, ``"unilateral lower"``, ``"meshed upper"``,
-        ``"meshed lower"`` or ``"free"`` where all whole periods are so, or where the motion
-        repeats after several that are so together; else ``"not settled"``. None for models
-        without gap or period. A run of fewer than four periods is named by its last one
-        alone. Sliding along an edge touches it; rounding decides grazes. `regimes` gives the
-        fractions of the periods, `fastslow.classify_regime` tells chaos from a transient.
+        ``"meshed lower"`` or ``"free"`` if it is that of all whole periods, or of several
+        together after which the motion repeats; else ``"not settled"``. None for models
+        without gap or period. A run of fewer than four periods is classified by its last
+        period. Sliding along an edge counts as contact; grazing contacts are decided by
+        rounding. `regimes` returns the fractions of the periods,
+        `fastslow.classify_regime` distinguishes chaos from a transient.
         """
         return None if self._regimes is None else self._regimes.label
 
@@ -270,18 +271,18 @@ class Trajectory(Queries, LongTime, Table, Result):
         until: float | None = None,
         tol: float = SAME,
     ) -> Regimes:
-        """The regime in each of many periods, their fractions, and whether the states repeat.
+        """Classify each period of a time interval, and detect whether the states repeat.
 
         Parameters
         ----------
         period : float, optional
             By default that of the forcing.
         since, until : float, optional
-            The part of the run; by default its second half. Whole periods are counted
-            back from its end.
+            The time interval; by default the second half of the run. Whole periods are
+            counted back from its end.
         tol : float
             Largest difference that counts as a repeat, in units of each state's range; at
-            least a thousand tolerances of the integration.
+            least a thousand times the rtol of the integration.
 
         Returns
         -------
@@ -290,13 +291,13 @@ class Trajectory(Queries, LongTime, Table, Result):
         Raises
         ------
         ArgumentError
-            Without a gap or a period, or for times outside the run.
+            Without a gap or period, or for times outside the run.
         """
         return regimes_of(self, period, since, until, tol)
 
     @property
     def time_fractions(self) -> dict[str, float]:
-        """The part of the run spent in every region (and in every sliding motion)."""
+        """The fraction of time in each region and each sliding motion."""
         return time_fractions_in(self, self.span)
 
     @validated(direction=among(-1, 1, None), since=finite, until=finite)
@@ -308,19 +309,19 @@ class Trajectory(Queries, LongTime, Table, Result):
         since: float | None = None,
         until: float | None = None,
     ) -> int:
-        """How often an interface was crossed, upwards (+1), downwards (−1) or either way.
+        """Count crossings of an interface, upwards (+1), downwards (−1) or both.
 
         Parameters
         ----------
         interface : str or Expr
         direction : int, optional
         since, until : float, optional
-            The part of the run, by default all of it.
+            The time interval, by default that of the run.
 
         Raises
         ------
         UnknownNameError
-            For an interface that is not in the model.
+            For an unknown interface.
         ArgumentError
             For another direction, or times outside the run.
         """
@@ -334,12 +335,12 @@ class Trajectory(Queries, LongTime, Table, Result):
         *,
         period: float | None = None,
     ) -> Contacts:
-        """Crossings and residence in a part of the run, in all and period by period.
+        """Return crossings and time fractions in a time interval, in total and by period.
 
         Parameters
         ----------
         since, until : float, optional
-            The part of the run, by default all of it.
+            The time interval, by default that of the run.
         period : float, optional
             By default that of the forcing.
 
@@ -350,7 +351,7 @@ class Trajectory(Queries, LongTime, Table, Result):
         return contacts_of(self, period, window_of(self, since, until))
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Time t, every column, and the region at that time."""
+        """Return time t, every column, and the region."""
         columns = {name: self[name] for name in self.columns}
         return {"t": self.t, **columns, "region": regions_at(self, self.t)}
 
