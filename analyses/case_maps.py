@@ -144,7 +144,8 @@ def criterion(plane: CaseMap, scaling: str) -> MapComparison:
 
     def predicted(first: Floats, second: Floats) -> list[str]:
         given = values(plane, scaling, first, second)
-        return [str(w) for w in fs.slow_load_criterion(model, given, exact=True).regime.tolist()]
+        load = fs.systems.slow_load_criterion(model, given, exact=True)
+        return [str(w) for w in load.regime.tolist()]
 
     return simulated(plane, scaling).compare(predicted)
 
@@ -156,7 +157,7 @@ def _curve(plane: CaseMap, scaling: str) -> tuple[Floats, Floats]:
     p = {**dict(gear(scaling).parameters)}
     if plane.name == "map_frequency_width":
         omega = 10**first
-        widest = fs.slow_load_gap(p["B"], p["C"], omega, stiffness=p["A"], exact=True)
+        widest = fs.systems.slow_load_gap(p["B"], p["C"], omega, stiffness=p["A"], exact=True)
         return first, np.log10(np.where(widest > 0, widest, np.nan))
     given = values(plane, scaling, first, np.zeros_like(first))
     ratio = critical_ratio({**p, "A": given["A"], "D": given["D"]}, exact=True)

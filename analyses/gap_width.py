@@ -50,7 +50,7 @@ def widest(scaling: str, omega: float) -> float:
     """The widest gap that the load of figure 3 crosses, by the criterion."""
     p = gear(scaling, D=GAP).parameters
     stiffness = p["A"] + p["D"] ** 2
-    return float(fs.slow_load_gap(p["B"], p["C"], omega, stiffness=stiffness, exact=True))
+    return float(fs.systems.slow_load_gap(p["B"], p["C"], omega, stiffness=stiffness, exact=True))
 
 
 def _largest(scaling: str) -> float:

@@ -133,7 +133,7 @@ def predicted(plane: Plane, exact: bool) -> Callable[[Floats, Floats], list[str]
 
     def regimes(first: Floats, ratio: Floats) -> list[str]:
         values = {plane.parameter: first, "C": model.parameters["B"] * ratio}
-        told = fs.slow_load_criterion(model, values, exact=exact).regime.tolist()
+        told = fs.systems.slow_load_criterion(model, values, exact=exact).regime.tolist()
         return [str(word) for word in told]
 
     return regimes
@@ -147,7 +147,7 @@ def critical_ratio(parameters: Mapping[str, Any], exact: bool) -> Floats:
     parameters : mapping
         A, B, D and omega of the gear, numbers or arrays broadcast together.
     exact : bool
-        As in `fastslow.slow_load_gap`.
+        As in `fastslow.systems.slow_load_gap`.
     """
     A, B, D, omega = np.broadcast_arrays(*(parameters[name] for name in ("A", "B", "D", "omega")))
     # the excess C/B - 1 is halved on a logarithmic scale
@@ -155,7 +155,7 @@ def critical_ratio(parameters: Mapping[str, Any], exact: bool) -> Floats:
     for _ in range(60):
         middle = 0.5 * (low + high)
         swing = B * (1.0 + 10.0**middle)
-        wide = fs.slow_load_gap(B, swing, omega, stiffness=A + D**2, exact=exact) < D
+        wide = fs.systems.slow_load_gap(B, swing, omega, stiffness=A + D**2, exact=exact) < D
         low, high = np.where(wide, middle, low), np.where(wide, high, middle)
     return np.asarray(1.0 + 10.0**high)
 

@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from fastslow.passage.delays.scaling_runs import delay_scaling
     from fastslow.passage.overlay.overlays import overlay
     from fastslow.passage.regimes import classify_regime, regime_map
-    from fastslow.passage.slow_loads import slow_load_criterion, slow_load_gap
     from fastslow.precompilation import precompile
     from fastslow.results.branch.branch import Branch
     from fastslow.results.branch.diagram import Diagram
@@ -46,7 +45,6 @@ if TYPE_CHECKING:
     from fastslow.results.overlay.delay_scaling import DelayScaling
     from fastslow.results.overlay.drifts import Drift
     from fastslow.results.overlay.overlay import Overlay
-    from fastslow.results.overlay.slow_loads import SlowLoad
     from fastslow.results.points import Equilibrium, SpecialPoint
     from fastslow.results.trajectory.ensemble import Ensemble
     from fastslow.results.trajectory.lyapunov import LyapunovExponent
@@ -94,7 +92,6 @@ _HOME = {
     "RegimeSet": "results.trajectory.regimes",
     "Regimes": "results.trajectory.regimes",
     "Section": "results.trajectory.section",
-    "SlowLoad": "results.overlay.slow_loads",
     "SpecialPoint": "results.points",
     "Spectrum": "results.trajectory.spectrum",
     "Periodicity": "results.trajectory.periodicity",
@@ -126,8 +123,6 @@ _HOME = {
     "regime_map": "passage.regimes",
     "simulate": "simulation.one",
     "simulate_many": "simulation.many",
-    "slow_load_criterion": "passage.slow_loads",
-    "slow_load_gap": "passage.slow_loads",
     "systems": "",
     "tangencies": "diagrams.curves.tangency_points",
 }
@@ -160,7 +155,6 @@ __all__ = [
     "RegimeSet",
     "Regimes",
     "Section",
-    "SlowLoad",
     "SpecialPoint",
     "Spectrum",
     "Trajectory",
@@ -191,8 +185,6 @@ __all__ = [
     "regime_map",
     "simulate",
     "simulate_many",
-    "slow_load_criterion",
-    "slow_load_gap",
     "systems",
     "tangencies",
 ]

@@ -24,11 +24,11 @@ from fastslow.formulas.columns import evaluated, names_in
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.maps.adaptive_map import RefinedMap
-from fastslow.results.overlay.slow_loads import NO_GAP
 from fastslow.results.trajectory.ensemble import Ensemble
 from fastslow.results.trajectory.lyapunov import LyapunovExponent
 from fastslow.results.trajectory.regimes import (
     CHAOTIC,
+    NO_GAP,
     NOT_SETTLED,
     REGIMES,
     Regimes,

@@ -50,7 +50,7 @@ class Scaling:
 @validated(model=instance(Model), region=text, replace=mapping)
 def nondimensionalise(
     model: Model,
-    ones: Iterable[tuple[Any, Any]],
+    unit_coefficients: Iterable[tuple[Any, Any]],
     *,
     region: str | None = None,
     replace: Mapping[Any, Any] | None = None,
@@ -64,7 +64,7 @@ def nondimensionalise(
     Parameters
     ----------
     model : Model
-    ones : iterable of (state, term)
+    unit_coefficients : iterable of (state, term)
         The coefficient of the term (a product of states and slow quantities)
         in the scaled rate of the state is to be one in size.
     region : str, optional
@@ -108,7 +108,7 @@ def nondimensionalise(
     smooth = model.regions[whose].rates
     names = {n: real(n) for n in quantities}
     rows, sides = [], []
-    for state, term in items(_pair)("ones", ones):
+    for state, term in items(_pair)("unit_coefficients", unit_coefficients):
         if str(state) not in smooth:
             raise unknown_name("state", state, smooth)
         monomial = _formula(term, known)

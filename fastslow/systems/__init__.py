@@ -1,5 +1,6 @@
 """Ready-made models: the harmonic gear and classics of the field, each with its source."""
 
+from fastslow.results.trajectory.slow_loads import SlowLoad
 from fastslow.systems.classics import (
     cusp,
     fitzhugh_nagumo,
@@ -16,9 +17,11 @@ from fastslow.systems.gears import (
 )
 from fastslow.systems.geartrain import harmonic_gear_twist, harmonic_gear_two_inertias
 from fastslow.systems.oscillators import bilinear_oscillator, stick_slip
+from fastslow.systems.slow_loads import slow_load_criterion, slow_load_gap
 
 __all__ = [
     "GearScales",
+    "SlowLoad",
     "bilinear_oscillator",
     "cusp",
     "fitzhugh_nagumo",
@@ -29,6 +32,8 @@ __all__ = [
     "harmonic_gear_twist",
     "harmonic_gear_two_inertias",
     "hindmarsh_rose",
+    "slow_load_criterion",
+    "slow_load_gap",
     "stick_slip",
     "van_der_pol",
     "van_der_pol_relaxation",

@@ -322,6 +322,6 @@ def _identified(slip: bool) -> Identification:
     """Equation (5) in the scales of (6), without or with the slip in f_h(θ) = θ_s f(x)."""
     marked = _twist({**harmonic_gear_twist().parameters, "kappa": 1.0}, real("kappa"))
     factor = 1 / scale_symbol("theta") if slip else sp.S.One
-    ones = [("theta", "v"), ("v", "v"), ("v", "theta**3"), ("v", "w")]
-    scaling = nondimensionalise(marked, ones, replace={"kappa": factor})
+    unit = [("theta", "v"), ("v", "v"), ("v", "theta**3"), ("v", "w")]
+    scaling = nondimensionalise(marked, unit, replace={"kappa": factor})
     return identify(scaling, harmonic_gear(), {"theta": "x"})

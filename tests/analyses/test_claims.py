@@ -354,7 +354,9 @@ def test_thresholds_of_the_mean_torque_are_those_of_the_criterion():
             def excess(mean, amplitude=amplitude, p=p):
                 stiff = p["A"] + p["D"] ** 2
                 low = p["B"] * mean / 10.0
-                widest = fs.slow_load_gap(low, amplitude, p["omega"], stiffness=stiff, exact=True)
+                widest = fs.systems.slow_load_gap(
+                    low, amplitude, p["omega"], stiffness=stiff, exact=True
+                )
                 return widest - p["D"]
 
             mean = brentq(excess, 0.9 * T_am, 0.996 * T_am, xtol=1e-12)

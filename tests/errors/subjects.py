@@ -25,7 +25,7 @@ RESULTS = (
     fs.RegimeSet,
     fs.Regimes,
     fs.Section,
-    fs.SlowLoad,
+    fs.systems.SlowLoad,
     fs.SpecialPoint,
     fs.Spectrum,
     fs.Periodicity,
@@ -120,7 +120,7 @@ def results():
         "motions": fs.classify_regime(gear, [0.0, 0.0], periods=2, longest=2),
         "exponent": fs.lyapunov_exponent(gear, [0.0, 0.0], t=(0.0, 1.0)),
         "scaling": fs.delay_scaling(fast, fold, [1e-5, 1e-6], level={"x": 0.5}),
-        "load": fs.slow_load_criterion(gear),
+        "load": fs.systems.slow_load_criterion(gear),
         "law": fs.derive(fs.Model({x: p - q * x}, parameters={p: 0, q: 1})),
     }
 
@@ -189,7 +189,7 @@ def simulations(r):
 
 
 def analyses(r):
-    gear, fold, fast = r["gear"], r["fold"], r["fast"]
+    fold, fast = r["fold"], r["fast"]
     x, k, u, a, b = sp.symbols("x k u a b")
     return {
         "equilibria": {"model": fast, "named": {"p": 0.0}},
@@ -202,14 +202,15 @@ def analyses(r):
         },
         "derive": {"model": logistic()},
         "compare_scalings": {"one": {"A": k}, "other": {"A": k}},
-        "nondimensionalise": {"model": logistic(), "ones": [("x", "x"), ("x", "x**2")]},
+        "nondimensionalise": {
+            "model": logistic(),
+            "unit_coefficients": [("x", "x"), ("x", "x**2")],
+        },
         "reduce_states": {"rates": {a: -k * (a - b), b: k * (a - b)}, "combinations": {u: a - b}},
         "export": {"model": logistic(), "format": "numpy"},
         "predict_delay": {"point": fold, "rate": 1e-3},
         "hopf_exit": {"diagram": r["turning"], "point": r["hopf"], "entry": -1, "rate": 0.05},
         "overlay": {"diagram": r["diagram"], "run": r["run"]},
-        "slow_load_criterion": {"model": gear},
-        "slow_load_gap": {"B": 2.0, "C": 4.0, "omega": 0.1},
         "load": {"path": "nothing.npz"},
         "read_auto": {"path": "b.nothing"},
         "pick": {"drawing": fs.plot.diagram(r["diagram"]), "result": r["diagram"]},
@@ -290,7 +291,7 @@ def methods(r):
             },
         ),
         "Section": (r["section"], {"__getitem__": {"name": "x"}, "save": save}),
-        "SlowLoad": (r["load"], {"save": save}),
+        "systems.SlowLoad": (r["load"], {"save": save}),
         "Spectrum": (r["spectrum"], {"peaks": {}, "save": save}),
         "LyapunovExponent": (r["exponent"], {"save": save}),
         "RegimeSet": (r["motions"], {"save": save}),
@@ -338,6 +339,14 @@ def figures(r):
     }
 
 
+def of_systems(r):
+    """What must be given to those of `fastslow.systems` that have no defaults."""
+    return {
+        "slow_load_criterion": {"model": r["gear"]},
+        "slow_load_gap": {"B": 2.0, "C": 4.0, "omega": 0.1},
+    }
+
+
 def fuller(r):
     """What more a good call may hold, so that what is inside can be spoiled too."""
     x, v, k, w, p, t = sp.symbols("x v k w p t")
@@ -360,8 +369,8 @@ def fuller(r):
         "nondimensionalise": {"replace": {"r": "r"}},
         "export": {"values": {"r": 1.0}, "start": {"x": 0.5}},
         "predict_delay": {"level": {"x": 0.5}},
-        "slow_load_criterion": {"parameters": {"D": [0.1, 0.2]}},
-        "slow_load_gap": {"B": [1.0, 2.0]},
+        "systems.slow_load_criterion": {"parameters": {"D": [0.1, 0.2]}},
+        "systems.slow_load_gap": {"B": [1.0, 2.0]},
         "Model": {
             "rates": {x: v, v: w - k * x - sp.Abs(x)},
             "forcing": {w: sp.sin(t)},
@@ -405,8 +414,9 @@ def subjects():
     found.append(Subject("plot.Drawing.save", drawing.save, {"path": "unused.png", "dpi": 20}))
     panel = fs.plot.panel(r["lay"])
     found.append(Subject("plot.PanelDrawing.save", panel.save, {"path": "unused.png", "dpi": 20}))
+    given = of_systems(r)
     found += [
-        Subject(f"systems.{name}", getattr(fs.systems, name), {})
+        Subject(f"systems.{name}", getattr(fs.systems, name), given.get(name, {}))
         for name in fs.systems.__all__
         if not inspect.isclass(getattr(fs.systems, name))
     ]

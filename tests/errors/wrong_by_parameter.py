@@ -113,8 +113,8 @@ BY_PARAMETER = {
     "named": [({"omga": 1.0}, Unknown, "unknown")],
     "names": MAPPING,
     "observed": [*SYMBOL, ("y", Unknown, "unknown state 'y'")],
-    "ones": [
-        (3, Wrong, "ones = 3; expected a sequence"),
+    "unit_coefficients": [
+        (3, Wrong, "unit_coefficients = 3; expected a sequence"),
         ([("x",)], Wrong, "expected a state and a term of its rate"),
         ([("y", "x")], Unknown, "unknown state 'y'"),
         ([("x", "x**7")], Wrong, "the rate of x has no term x**7"),

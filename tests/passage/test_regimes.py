@@ -5,6 +5,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.systems import slow_load_criterion, slow_load_gap
 
 OVER = {"D": (0.02, 0.3), "ratio": (0.95, 1.1)}
 
@@ -33,7 +34,7 @@ def test_the_criterion_beside_it(slow, found):
     def says(exact):
         return found.compare(
             lambda width, ratio: (
-                fs.slow_load_criterion(slow, {"D": width, "C": 2.372 * ratio}, exact=exact).regime
+                slow_load_criterion(slow, {"D": width, "C": 2.372 * ratio}, exact=exact).regime
             )
         )
 
@@ -49,7 +50,7 @@ def test_the_criterion_is_for_slow_loads(gear):
         gear, {"omega": (0.1, 3), "C": (1.5, 8)}, [0, 0], cells=(6, 5), levels=1, periods=30
     )
     beside = fast.compare(
-        lambda omega, C: fs.slow_load_criterion(gear, {"omega": omega, "C": C}, exact=True).regime
+        lambda omega, C: slow_load_criterion(gear, {"omega": omega, "C": C}, exact=True).regime
     )
     assert beside.share == pytest.approx(0.8, abs=0.04)
     # the criterion knows nothing of chaos, which is the most of what it misses
@@ -79,12 +80,12 @@ def test_the_boundary_in_the_width(slow):
     assert uncertain <= 1.5e-10
     k = 41.67 + edge**2
     B, C = 2.372, 1.03 * 2.372
-    exact = fs.slow_load_gap(B, C, omega, stiffness=k, exact=True)
+    exact = slow_load_gap(B, C, omega, stiffness=k, exact=True)
     assert exact == pytest.approx(edge, abs=uncertain + 3e-10)
     # the expansion at rigid contact, and its first term alone: off by 0.05 % and 0.46 %
-    assert fs.slow_load_gap(B, C, omega) / edge - 1 == pytest.approx(-5.29e-4, rel=0.01)
+    assert slow_load_gap(B, C, omega) / edge - 1 == pytest.approx(-5.29e-4, rel=0.01)
     # all points of the line lie on the criterion's curve
-    curve = fs.slow_load_gap(
+    curve = slow_load_gap(
         B, B * line.points[:, 1], omega, stiffness=41.67 + line.points[:, 0] ** 2, exact=True
     )
     slope = np.gradient(curve) / np.gradient(line.points[:, 1])

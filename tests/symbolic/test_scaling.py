@@ -73,8 +73,8 @@ def test_printed_parameters_do_not_follow_and_the_slip_reproduces_them(scaling):
 
 def test_scaled_rates_agree_with_numbers():
     # x'' at one state, once from the physical equation and once from the dimensionless one
-    ones = [("theta", "v"), ("v", "v"), ("v", "theta**3"), ("v", "w")]
-    scaled = nondimensionalise(harmonic_gear_twist(), ones)
+    unit = [("theta", "v"), ("v", "v"), ("v", "theta**3"), ("v", "w")]
+    scaled = nondimensionalise(harmonic_gear_twist(), unit)
     place = {real(n): v for n, v in PAPER.items()}
     theta_s, v_s, w_s = (float(scaled.scales[n].subs(place)) for n in ("theta", "v", "w"))
     time = float(scaled.time.subs(place))

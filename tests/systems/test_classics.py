@@ -9,7 +9,8 @@ from scipy.integrate import solve_ivp
 
 from fastslow import systems
 
-ALL = [name for name in systems.__all__ if name.islower() and name != "gear_scales"]
+OTHERS = {"gear_scales", "slow_load_criterion", "slow_load_gap"}
+ALL = [name for name in systems.__all__ if name.islower() and name not in OTHERS]
 
 
 def field_of(model, region, extra=None):

@@ -92,4 +92,9 @@ def test_the_rates_are_those_written_down(name):
 
 def test_every_ready_made_model_is_here():
     known = {n for n in systems.__all__ if n.islower()}
-    assert known - set(RATES) == {"gear_scales", "harmonic_gear_from_physical"}
+    assert known - set(RATES) == {
+        "gear_scales",
+        "harmonic_gear_from_physical",
+        "slow_load_criterion",
+        "slow_load_gap",
+    }

@@ -37,6 +37,9 @@ REGIMES = (
 #: Labels of motions without a regime.
 NOT_SETTLED, CHAOTIC = "not settled", "chaotic"
 
+#: Label of parameters at which the gap is empty.
+NO_GAP = "no gap"
+
 #: Prefix of the names of several coexisting regimes.
 COEXISTING = "coexisting: "
 

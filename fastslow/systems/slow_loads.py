@@ -24,7 +24,7 @@ from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.periods import frequencies
 from fastslow.model.structure import TIME, real
-from fastslow.results.overlay.slow_loads import SlowLoad
+from fastslow.results.trajectory.slow_loads import SlowLoad
 from fastslow.simulation.arguments import gap_regions
 
 Floats = NDArray[np.float64]
@@ -197,9 +197,9 @@ def slow_load_criterion(
     --------
     >>> import fastslow as fs
     >>> gear = fs.systems.harmonic_gear(C=1.03 * 2.372, omega=0.02)
-    >>> fs.slow_load_criterion(gear)
+    >>> fs.systems.slow_load_criterion(gear)
     SlowLoad 2.372 ± 2.44316 at ω = 0.02: half-width 0.25, crossed up to 0.570544: bilateral
-    >>> fs.slow_load_criterion(gear, {"D": [0.5, 0.6], "C": 2.5}).regime
+    >>> fs.systems.slow_load_criterion(gear, {"D": [0.5, 0.6], "C": 2.5}).regime
     array(['bilateral', 'bilateral'], dtype='<U16')
     """
     swept = {str(n): finite_numbers(f"parameter {n}", v) for n, v in (parameters or {}).items()}

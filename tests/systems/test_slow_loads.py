@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.passage.slow_loads import slow_load_criterion, slow_load_gap
+from fastslow.systems import slow_load_criterion, slow_load_gap
 
 
 def deepest_rigid(B, C, omega, c):

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.results.base.result import Result
+from fastslow.results.trajectory.regimes import NO_GAP
 
 Floats = NDArray[np.float64]
 
-#: The regime of a set of parameters at which there is no gap, and where nothing can be said.
-NO_GAP, UNDECIDED = "no gap", "undecided"
+#: Regime where the criterion does not apply.
+UNDECIDED = "undecided"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
