@@ -14,7 +14,7 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from fastslow.errors import ModelError
 from fastslow.kernels.field_code import FILLED, CompiledField, load_field
-from fastslow.model.known_functions import refusal, teach_functions
+from fastslow.model.known_functions import refusal, register_functions
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.stored.fields import FieldOperations
@@ -168,7 +168,7 @@ class _Printer(PythonCodePrinter):
         return self._print_Rational(expr) if abs(expr) >= 2**53 else str(expr.p)
 
 
-teach_functions(_Printer)
+register_functions(_Printer)
 
 
 def _float(code: str) -> str:

@@ -1,4 +1,4 @@
-"""States modulo a period: reading them, and checking that the model repeats with it."""
+"""States modulo a period, and the check that a model is periodic in them."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from fastslow.formulas.grammar import normalised
 from fastslow.model.functions import numpy_function
 from fastslow.model.structure import Structure, real, sympified
 
-#: Random states and parameter values at which an expression is compared with its copy.
+#: Random states and parameter values at which an expression is compared with its translate.
 POINTS = 40
 
-#: Largest difference, in units of what the expression is made of, that is rounding.
+#: Largest difference, relative to the size of the expression, that is rounding.
 ROUNDING = 1e-9
 
 
 def read_periods(
     structure: Structure, values: Mapping[str, float], periodic: Mapping[Any, Any]
 ) -> dict[str, sp.Expr]:
-    """The periods of states, each checked against every rate, law and interface.
+    """Return the periods of states, each checked against every rate, law and interface.
 
     Raises
     ------
     UnknownNameError
         For a name that is no state.
     ModelError
-        For a period that is no positive number, or with which something does not repeat.
+        For a period that is not a positive number, or in which an expression is not periodic.
 
     Examples
     --------
@@ -40,8 +40,8 @@ def read_periods(
     >>> Model({theta: 1 - theta}, periodic={theta: 2 * sp.pi})
     Traceback (most recent call last):
     ...
-    fastslow.errors.ModelError: theta modulo 2*pi: the rate of theta, 1 - theta, does not repeat \
-when theta grows by 2*pi
+    fastslow.errors.ModelError: theta modulo 2*pi: the rate of theta, 1 - theta, is not \
+periodic in theta with period 2*pi
     """
     periods: dict[str, sp.Expr] = {}
     for key, given in periodic.items():
@@ -52,8 +52,8 @@ when theta grows by 2*pi
         for what, expression in _expressions(structure).items():
             if not _repeats(expression, name, periods[name], values):
                 raise ModelError(
-                    f"{name} modulo {periods[name]}: the {what}, {expression}, does not repeat "
-                    f"when {name} grows by {periods[name]}"
+                    f"{name} modulo {periods[name]}: the {what}, {expression}, is not "
+                    f"periodic in {name} with period {periods[name]}"
                 )
     return periods
 
@@ -69,7 +69,7 @@ def _period(name: str, given: Any) -> sp.Expr:
 
 
 def _expressions(structure: Structure) -> dict[str, sp.Expr]:
-    """Everything that must repeat, by what it is."""
+    """Expressions that must be periodic, by description."""
     rates = {f"rate of {n}": e for n, e in structure.rates.items()}
     laws = {f"law of {n}": e for n, e in structure.forcing.items()}
     edges = {f"interface {i.name}": i.function for i in structure.interfaces}
@@ -77,7 +77,7 @@ def _expressions(structure: Structure) -> dict[str, sp.Expr]:
 
 
 def _repeats(expression: sp.Expr, name: str, period: sp.Expr, values: Mapping[str, float]) -> bool:
-    """Whether an expression is the same when a state grows by its period."""
+    """Check that an expression is unchanged when a state is shifted by its period."""
     symbol = real(name)
     if symbol not in expression.free_symbols:
         return True

@@ -1,4 +1,4 @@
-"""What is derived from a model, kept for all models with the same content."""
+"""Caching of functions of a model by the content on which their result depends."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from fastslow.model.model import Model
 P = ParamSpec("P")
 R = TypeVar("R")
 
-#: Contents for which a function's result is kept.
+#: Number of cached results of a function.
 KEPT = 256
 
 
 def partition_of(model: Model) -> Hashable:
-    """All of a model but the values of its parameters."""
+    """Return everything of a model except its parameter values."""
     return model.partition
 
 
-def sloped(model: Model) -> Hashable:
-    """The same, with the values of those parameters that turn an interface."""
+def with_slopes(model: Model) -> Hashable:
+    """Return the partition, with the values of parameters in the slopes of interfaces."""
     return model.partition, _values(model, model.structure.sloping)
 
 
-def timed(model: Model) -> Hashable:
-    """The equations, with the values of those parameters that stand beside time."""
+def with_time_parameters(model: Model) -> Hashable:
+    """Return the equations, with the values of parameters in time-dependent expressions."""
     return model.structure, _values(model, model.structure.timed)
 
 
@@ -35,22 +35,23 @@ def _values(model: Model, names: tuple[str, ...]) -> tuple[float | None, ...]:
     return tuple(model.parameters.get(name) for name in names)
 
 
-def once(
+def cached_by(
     content: Callable[[Model], Hashable],
 ) -> Callable[[Callable[Concatenate[Model, P], R]], Callable[Concatenate[Model, P], R]]:
-    """Keep a function's results by what they depend on of a model, and by other arguments.
+    """Cache a function of a model by the content that its result depends on.
 
     Parameters
     ----------
     content : callable
-        `partition_of`, `sloped` or `timed`: what the result depends on, and nothing else.
+        Everything of a model that the result depends on: `partition_of`, `with_slopes` or
+        `with_time_parameters`.
 
     Examples
     --------
     >>> import sympy as sp
     >>> x, k = sp.symbols("x k")
     >>> model = Model({x: -k * x}, parameters={k: 1})
-    >>> rate = once(partition_of)(lambda model: model.rates["x"])
+    >>> rate = cached_by(partition_of)(lambda model: model.rates["x"])
     >>> rate(model) is rate(model.with_parameters(k=2))
     True
     """

@@ -10,23 +10,23 @@ import numpy as np
 import sympy as sp
 from sympy.printing.numpy import NumPyPrinter
 
-#: Expressions whose function is kept.
+#: Number of cached functions.
 KEPT = 1024
 
-#: What printed expressions call. SymPy would import all of NumPy for them, and its compiler of
-#: Fortran with it, which takes longer than many a diagram.
+#: Names that printed expressions use. SymPy would import all of NumPy for them, including f2py,
+#: which takes longer than many a diagram.
 _NAMES = {name: vars(np)[name] for name in np.__all__ if name in vars(np)} | {"I": 1j}
 
 _PRINTING = {"fully_qualified_modules": False, "inline": True, "allow_unknown_functions": True}
 
 
 def numpy_function(symbols: Any, expression: Any, *, cse: bool = False) -> Callable[..., Any]:
-    """A function of numbers or arrays.
+    """Return a NumPy function that evaluates an expression.
 
     Parameters
     ----------
     symbols : sympy.Symbol or sequence of sympy.Symbol
-        Its arguments.
+        Arguments of the function.
     expression : sympy.Expr, or a nested sequence of them
     cse : bool
         Compute common subexpressions once.
@@ -45,13 +45,13 @@ def numpy_function(symbols: Any, expression: Any, *, cse: bool = False) -> Calla
 def function_of(
     expression: sp.Expr, values: tuple[tuple[sp.Symbol, float], ...] = ()
 ) -> tuple[tuple[sp.Symbol, ...], Callable[..., Any]]:
-    """The symbols of an expression in the order of their names, and its function of them.
+    """Return the symbols of an expression, sorted by name, and its NumPy function of them.
 
     Parameters
     ----------
     expression : sympy.Expr
     values : tuple of (Symbol, float), optional
-        What is put in for symbols first.
+        Values that are substituted first.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Interfaces and regions: what a model's right-hand side switches on."""
+"""Interfaces (switching manifolds) and the regions that they bound."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Interface:
     Parameters
     ----------
     name : str
-        Given by the user, else what the function prints.
+        Given by the user, else the printed function.
     function : sympy.Expr
         h, a function of states, parameters, slow quantities and time.
 
@@ -38,7 +38,7 @@ class Interface:
 
 @dataclass(frozen=True)
 class Region:
-    """One sign pattern of the interfaces, where every rate is smooth.
+    """The open set of one sign pattern of the interfaces, where every rate is smooth.
 
     Parameters
     ----------
@@ -65,19 +65,19 @@ class Region:
         return f"{self.name}: {where}"
 
 
-#: Points of a zero set at which an expression is evaluated, and how many digits it is with.
+#: Points of a zero set at which an expression is evaluated, and the number of digits.
 POINTS, DIGITS = 4, 40
 
-#: Part of its size next to the zero set up to which a value on it is zero.
+#: Values below this, relative to those next to the zero set, are zero.
 ZERO = 1e-25
 
 
 def vanishes_on(difference: sp.Expr, function: sp.Expr) -> bool:
-    """Whether an expression is zero wherever a smooth function is.
+    """Check that an expression vanishes on the zero set of a smooth function.
 
-    Evaluated at points of the zero set in general position, with 40 digits. Where
-    no point is found it is decided by solving the function for a symbol it is affine in,
-    else by polynomial division; where neither applies, only an identical zero counts.
+    The expression is evaluated at generic points of the zero set, with 40 digits. If no
+    point is found, the function is solved for a symbol in which it is affine, or
+    polynomial division is used; where neither applies, only an identical zero counts.
 
     Examples
     --------
@@ -106,9 +106,9 @@ def vanishes_on(difference: sp.Expr, function: sp.Expr) -> bool:
 
 
 def _on_points(difference: sp.Expr, function: sp.Expr) -> bool | None:
-    """Whether an expression vanishes at random points of a zero set, None where none is found.
+    """Check that an expression vanishes at random points of a zero set; None if none is found.
 
-    All symbols but one have random values, and the function is a polynomial in that one.
+    All symbols but one get random values, and the function is a polynomial in the other.
     """
     symbol = next(
         (
@@ -120,7 +120,7 @@ def _on_points(difference: sp.Expr, function: sp.Expr) -> bool | None:
     )
     if symbol is None:
         return None
-    # floats stand for the decimal numbers that they were written as
+    # floats are read as the decimal numbers that were written
     difference, function = (sp.nsimplify(e, rational=True) for e in (difference, function))
     used = sorted(difference.free_symbols | function.free_symbols, key=lambda s: s.name)
     others = [s for s in used if s != symbol]

@@ -1,4 +1,4 @@
-"""States that stay zero once they are, alone or together: the rates that have them as factors."""
+"""Invariant coordinate planes: states that remain zero, alone or together."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from fastslow.model.model import Model
 from fastslow.model.structure import real
 
 
-def factor_states(model: Model) -> tuple[str, ...]:
-    """States whose rate is x g, with g finite at x = 0, in every region of a model.
+def invariant_states(model: Model) -> tuple[str, ...]:
+    """Return the states x with rate x g in every region, g finite at x = 0.
 
-    Decided from the equations: the rate vanishes at x = 0, and so does not the
-    denominator of its derivative there.
+    The plane x = 0 is then invariant. Decided from the equations: the rate vanishes at
+    x = 0, and its derivative by x is finite there.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def factor_states(model: Model) -> tuple[str, ...]:
     Examples
     --------
     >>> x, y, k = sp.symbols("x y k")
-    >>> factor_states(Model({x: x * (1 - y), y: k * x - y}, parameters={k: 1}))
+    >>> invariant_states(Model({x: x * (1 - y), y: k * x - y}, parameters={k: 1}))
     ('x',)
     """
     names = (*model.states, *model.slow_states)
@@ -46,21 +46,21 @@ def _is_factor(symbol: sp.Symbol, rate: sp.Expr) -> bool:
     return not slope.has(sp.nan, sp.zoo, sp.oo, -sp.oo)
 
 
-#: Most states of a set that vanish together.
+#: Largest number of states that vanish together.
 MOST_TOGETHER = 4
 
-#: Expressions of more operations are not multiplied out.
+#: Expressions with more operations are not expanded.
 LONGEST = 2000
 
 
-def states_together(model: Model) -> tuple[tuple[str, ...], ...]:
-    """Smallest sets of two to four states that stay zero together, and feed one another.
+def jointly_invariant_states(model: Model) -> tuple[tuple[str, ...], ...]:
+    """Return minimal sets of two to four states that remain zero together.
 
     E' = b S I − s E and I' = s E − g I vanish where E = I = 0, though neither is a
-    multiple of its state. Every term of the rates of a set has one of its states as a
-    factor, in every region, and with positive symbols no state of the set diminishes
-    another one: from positive values none of them passes zero, other than in an
-    oscillation about it. All states of a model together are no set, but an equilibrium.
+    multiple of its state. In every region, each term of the rates of a set has one of
+    its states as a factor, and no state of the set decreases another one when all symbols
+    are positive (the subsystem is cooperative), so that positive values change sign only
+    in oscillations about zero. The set of all states is excluded: its zero is an equilibrium.
 
     Parameters
     ----------
@@ -74,11 +74,12 @@ def states_together(model: Model) -> tuple[tuple[str, ...], ...]:
     Examples
     --------
     >>> S, E, I, b = sp.symbols("S E I b")
-    >>> states_together(Model({S: -b * S * I, E: b * S * I - E, I: E - I}, parameters={b: 2}))
+    >>> rates = {S: -b * S * I, E: b * S * I - E, I: E - I}
+    >>> jointly_invariant_states(Model(rates, parameters={b: 2}))
     (('E', 'I'),)
     """
     names = (*model.states, *model.slow_states)
-    alone = factor_states(model)
+    alone = invariant_states(model)
     terms = {name: _terms(model, name) for name in names}
     found: list[frozenset[str]] = []
     for name in names:
@@ -95,7 +96,7 @@ def states_together(model: Model) -> tuple[tuple[str, ...], ...]:
 
 
 def _terms(model: Model, name: str) -> list[frozenset[str]] | None:
-    """The states that are factors of each term of a rate, None where that is not known."""
+    """Return the states that are factors of each term of a rate, None if that is unknown."""
     known = {real(n): n for n in (*model.states, *model.slow_states)}
     found = []
     for region in model.regions.values():
@@ -117,7 +118,7 @@ def _terms(model: Model, name: str) -> list[frozenset[str]] | None:
 def _closures(
     chosen: frozenset[str], terms: dict[str, list[frozenset[str]] | None]
 ) -> Iterator[frozenset[str]]:
-    """All ways to make a set complete by states of the terms that have none of it."""
+    """Yield all closures of a set under the terms that have none of its states."""
     for name in sorted(chosen):
         own = terms[name]
         if own is None:

@@ -1,4 +1,4 @@
-"""Keys of what is kept: a value under the content that a result depends on."""
+"""Keys of caches: a value compared by the content that a result depends on."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ V = TypeVar("V")
 
 
 class Keyed(Generic[V]):
-    """A value that is equal to others with the same key, for `functools.lru_cache`.
+    """A value compared and hashed by a key, for `functools.lru_cache`.
 
     Examples
     --------
@@ -20,7 +20,7 @@ class Keyed(Generic[V]):
     __slots__ = ("_hash", "key", "value")
 
     def __init__(self, key: Hashable, value: V) -> None:
-        # once: a dictionary asks for it again when the process ends, where SymPy has none
+        # stored: a dictionary hashes again at interpreter exit, when SymPy is gone
         self.key, self.value, self._hash = key, value, hash(key)
 
     def __hash__(self) -> int:

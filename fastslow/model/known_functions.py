@@ -1,4 +1,4 @@
-"""The functions that a model may use: how each is computed, and which have a Taylor recurrence."""
+"""Functions supported in models: their numerical evaluation and their Taylor recurrences."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sympy.printing.codeprinter import CodePrinter
 
 from fastslow.errors import ModelError
 
-#: How the value of a function is computed. Its higher coefficients follow from its derivative.
+#: Source of the value of a function. Higher Taylor coefficients follow from its derivative.
 ELEMENTARY = {
     sp.exp: "math.exp({})",
     sp.log: "math.log({})",
@@ -46,7 +46,7 @@ ELEMENTARY = {
     sp.erfc: "math.erfc({})",
 }
 
-#: Special functions whose derivatives lead back to functions of these two tables.
+#: Special functions whose derivatives are expressed by functions of these two tables.
 CLOSED = {
     sp.erfi: "special.erfi({})",
     sp.erfinv: "special.erfinv({})",
@@ -67,7 +67,7 @@ CLOSED = {
     sp.lowergamma: "special.gammainc({0}, {1}) * special.gamma({0})",
 }
 
-#: Special functions whose derivatives lead ever farther, or are quotients at a zero of both.
+#: Special functions whose derivatives are not, or are indeterminate quotients 0/0 somewhere.
 OPEN = {
     sp.gamma: "special.gamma({})",
     sp.loggamma: "special.loggamma({})",
@@ -89,31 +89,31 @@ OPEN = {
 
 VALUES = ELEMENTARY | CLOSED | OPEN
 
-#: Functions that mpmath knows under other names than SymPy.
+#: Functions that have other names in mpmath than in SymPy.
 IN_MPMATH: dict[str, Callable[[Any], Any]] = {
     "airyaiprime": lambda x: mpmath.airyai(x, derivative=1),
     "airybiprime": lambda x: mpmath.airybi(x, derivative=1),
     "erfcinv": lambda x: mpmath.erfinv(1 - x),
 }
 
-#: Functions that have a recurrence only in some of their arguments: their numbers.
+#: Indices of the arguments in which functions have a recurrence, where not in all.
 _IN_ARGUMENTS = {sp.LambertW: (0,), sp.expint: (1,), sp.uppergamma: (1,), sp.lowergamma: (1,)}
 
-#: What SymPy itself prints as Python.
+#: Functions that SymPy prints as Python.
 _PRINTED = (sp.Abs, sp.sign, sp.Max, sp.Min, sp.Heaviside, sp.Piecewise)
 
-#: Two forms of one name in SymPy: arguments that are left out there, another function here.
+#: Functions with two forms in SymPy: default arguments, and another function here.
 _DEFAULTS = {sp.LambertW: (sp.Integer(0),)}
 _OTHERWISE = {(sp.elliptic_e, 2): "special.ellipeinc({}, {})"}
 
 
 def value_code(expression: sp.Function, code_of: Callable[[sp.Expr], str]) -> str:
-    """Source of a function's value, from the source of its arguments.
+    """Return the source of a function's value, from the source of its arguments.
 
     Raises
     ------
     ModelError
-        For a function that is not in the tables, or in a form that is not.
+        For a function, or a form of one, that is not in the tables.
     """
     function, arguments = expression.func, expression.args
     if function not in VALUES:
@@ -127,7 +127,7 @@ def value_code(expression: sp.Function, code_of: Callable[[sp.Expr], str]) -> st
 
 
 def refusal(expressions: Iterable[sp.Expr]) -> ModelError:
-    """The error that names what in some expressions has no value."""
+    """Return the error that names the unsupported functions in some expressions."""
     held = set().union(*(e.atoms(sp.Function, sp.Derivative, sp.Integral) for e in expressions))
     names = {
         f"the derivative of {f.expr.func}" if isinstance(f, sp.Derivative) else str(f.func)
@@ -141,8 +141,8 @@ def refusal(expressions: Iterable[sp.Expr]) -> ModelError:
     )
 
 
-def teach_functions(printer: type[CodePrinter]) -> None:
-    """Let a printer of source know all functions that have a value."""
+def register_functions(printer: type[CodePrinter]) -> None:
+    """Add all supported functions to a printer of source code."""
 
     def show(self: CodePrinter, expr: sp.Function) -> str:
         return value_code(expr, self._print)
@@ -154,7 +154,7 @@ def teach_functions(printer: type[CodePrinter]) -> None:
 
 
 def _count(code: str) -> int:
-    """How many arguments a template takes."""
+    """Number of arguments of a template."""
     return len(set(re.findall(r"{\d?}", code))) if "{0}" in code else code.count("{}")
 
 
@@ -178,7 +178,7 @@ def _form(function: type[sp.Function]) -> str:
 
 
 def without_recurrence(expression: sp.Expr, changing: set[sp.Symbol]) -> set[str]:
-    """Names of functions of changing symbols that have no Taylor recurrence.
+    """Return the names of functions of changing symbols that have no Taylor recurrence.
 
     Examples
     --------
@@ -198,15 +198,15 @@ def without_recurrence(expression: sp.Expr, changing: set[sp.Symbol]) -> set[str
 
 
 def slope_of(expression: sp.Function, index: int) -> sp.Expr:
-    """Derivative of a function by one of its arguments, numbered from 1.
+    """Return the derivative of a function by one of its arguments, numbered from 1.
 
     Raises
     ------
     ModelError
-        If there is none.
+        If it has no closed form.
     """
     if isinstance(expression, sp.LambertW):
-        # SymPy's is a quotient of zeros at 0
+        # SymPy's form is 0/0 at 0
         return sp.exp(-expression) / (1 + expression)
     try:
         return sp.sympify(expression.fdiff(index))

@@ -1,4 +1,4 @@
-"""The model: what the user writes, read once and never changed."""
+"""The immutable model: equations, parameter values, interfaces and regions."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from fastslow.model.structure import (
     TIME,
     Partition,
     Structure,
+    interned,
     name_of,
     read_expression,
     read_structure,
     real,
-    shared,
 )
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.model import StoredModel, Traits, finite_number
@@ -36,14 +36,14 @@ Written = Mapping[Any, Any]
 class Model:
     """A piecewise-smooth ODE with slow quantities, written in SymPy.
 
-    Symbols are matched by name and are real inside, so ``Symbol("x")`` and
-    ``Symbol("x", real=True)`` are the same state. Time is the symbol named t.
+    Symbols are matched by name and treated as real, so ``Symbol("x")`` and
+    ``Symbol("x", real=True)`` denote the same state. Time is the symbol named t.
     Expressions and conditions may also be text, such as ``"w - x**3"`` and ``"x > D"``,
     with functions named as in SymPy.
 
-    Models cannot be changed, and are equal, with one hash, when their content is:
-    equations, parameter values, interfaces, regions and periods, with their names and in
-    the same order. Names of regions that are empty at these values (``empty_regions``) count.
+    Models are immutable and hashable. Two models are equal when their equations, parameter
+    values, interfaces, regions and periods are equal, including names and order. Names of
+    regions that are empty at these values (``empty_regions``) are compared as well.
 
     Parameters
     ----------
@@ -56,16 +56,16 @@ class Model:
     slow : mapping, optional
         Slow state to its rate.
     interfaces : mapping, optional
-        Name to switching function h. Interfaces that the equations show
-        (Piecewise, Abs, Max, Min, sign, Heaviside) are added when not named here.
+        Name to switching function h. Interfaces that the equations imply
+        (Piecewise, Abs, Max, Min, sign, Heaviside) are added unless they are named here.
     regions : mapping, optional
         Name to a condition; other regions are named S1, S2, … in lexicographic
         order of their sign patterns, + before −.
     periodic : mapping, optional
         State to its period, a number or an expression of numbers such as ``2*sp.pi``:
-        an angle. States that differ by a period are one; equilibria are given in
-        the principal range (−period/2, period/2]. Rates and interfaces must
-        repeat with the period, which is checked.
+        an angle. States that differ by a period are identified; equilibria are given in
+        the principal range (−period/2, period/2]. Rates and interfaces must be
+        periodic in the state, which is checked.
 
     Attributes
     ----------
@@ -81,8 +81,8 @@ class Model:
     Raises
     ------
     ModelError
-        For an unknown symbol, a missing or non-finite value, regions that contradict,
-        or a rate or interface that does not repeat with a period.
+        For an unknown symbol, a missing or non-finite value, contradictory regions,
+        or a rate or interface that is not periodic in a periodic state.
 
     Examples
     --------
@@ -134,13 +134,13 @@ class Model:
             for k, v in (parameters or {}).items()
         }
         if len(values) < len(parameters or {}):
-            raise ModelError("two parameters have one name; expected different names")
+            raise ModelError("two parameters have the same name; expected distinct names")
         structure = read_structure(
             rates, forcing or {}, slow or {}, tuple(values), interfaces or {}, (), regions or {}
         )
         periods = read_periods(structure, values, periodic or {})
         periodic_states = NamedMapping("periodic state", periods)
-        self._fill(shared(replace(structure, periodic=periodic_states)), values)
+        self._fill(interned(replace(structure, periodic=periodic_states)), values)
 
     def _fill(self, structure: Structure, values: Mapping[str, float]) -> None:
         partition = structure.partition(values)
@@ -194,14 +194,14 @@ class Model:
 
     @validated(changes=mapping)
     def with_parameters(self, changes: Written | None = None, /, **named: float) -> Model:
-        """The same model at other parameter values; region names are kept.
+        """Return the model at other parameter values; region names are kept.
 
         Parameters
         ----------
         changes : mapping, optional
             Parameter (symbol or name) to value.
         **named : float
-            The same by name. A slow quantity of a frozen model may be given a value.
+            The same as keywords. A slow quantity of a frozen model may be given a value.
 
         Raises
         ------
@@ -227,10 +227,10 @@ class Model:
 
     @validated(name=formula)
     def with_free(self, name: object) -> Model:
-        """The model with one parameter's value taken away, to vary it.
+        """Return the model with one parameter freed, so that it can be varied.
 
-        Regions that are empty at the old value but not at every value are among
-        its regions; names are kept.
+        Regions that are empty at the old value but not at all values are included;
+        region names are kept.
 
         Parameters
         ----------
@@ -259,9 +259,9 @@ class Model:
 
     @validated(slow=mapping)
     def frozen(self, slow: Written | None = None) -> Model:
-        """The fast subsystem: every slow quantity becomes a parameter without a value.
+        """Return the fast subsystem, in which every slow quantity is a free parameter.
 
-        Parameters that only the laws of the slow quantities used leave the model.
+        Parameters that occur only in the laws of the slow quantities are removed.
 
         Parameters
         ----------
@@ -272,7 +272,7 @@ class Model:
         Raises
         ------
         ModelError
-            If time stands in a rate itself, outside the slow quantities.
+            If a rate depends on time explicitly, outside the slow quantities.
 
         Examples
         --------
@@ -284,8 +284,8 @@ class Model:
         timed = [n for n in self.states if TIME in self.structure.rates[n].free_symbols]
         if timed:
             raise ModelError(
-                f"the rate of {timed[0]} contains time itself ({self.rates[timed[0]]}); only slow "
-                "quantities can be frozen: give the time-dependent part a name in forcing="
+                f"the rate of {timed[0]} depends on time explicitly ({self.rates[timed[0]]}); only "
+                "slow quantities can be frozen: define the time-dependent term in forcing="
             )
         quantities = (*self.forcing, *self.slow_states)
         path: dict[str, sp.Expr] = {}
@@ -298,27 +298,27 @@ class Model:
 
     @validated(name=formula)
     def with_ramp(self, name: object, rate: float, start: float = 0.0) -> Model:
-        """The model with one parameter drifting at a constant rate: start + rate·t.
+        """Return the model with one parameter ramped at a constant rate, start + rate·t.
 
-        Both numbers become parameters, named after it, so that a range of rates
-        needs no new equations: ``ramp.with_parameters(w_rate=1e-4)``.
+        Both numbers become parameters named after it, so that the rate can be changed
+        without new equations: ``ramp.with_parameters(w_rate=1e-4)``.
 
         Parameters
         ----------
         name : str or Symbol
             A parameter, or a slow quantity of a frozen model.
         rate : float
-            In units of the parameter by time.
+            In units of the parameter per time.
         start : float
-            The value at t = 0.
+            Value at t = 0.
 
         Raises
         ------
         UnknownNameError
             For a name that is no parameter of the model.
         ModelError
-            For a slow quantity that has a law, a number that is not finite, or a
-            model that already has parameters of the new names.
+            For a slow quantity that has a law, a number that is not finite, or if the
+            model already has parameters of the new names.
 
         Examples
         --------
@@ -354,7 +354,7 @@ class Model:
         return self._from(structure, {**freed.parameters, **numbers})
 
     def period(self) -> float | None:
-        """Smallest common period of everything that depends on time, None if there is none.
+        """Return the smallest common period of all time-dependent terms, None if there is none.
 
         Examples
         --------
@@ -367,7 +367,7 @@ class Model:
 
     @property
     def empty_regions(self) -> tuple[str, ...]:
-        """Names of regions seen at other parameter values that are empty at these.
+        """Names of regions that exist at other parameter values and are empty at these.
 
         Examples
         --------
@@ -381,7 +381,7 @@ class Model:
 
     @property
     def path(self) -> NamedMapping[sp.Expr]:
-        """Of a model frozen along a path: slow quantities as functions of the path's parameters.
+        """Slow quantities as functions of the path's parameters, for a model frozen along a path.
 
         Examples
         --------
@@ -393,12 +393,12 @@ class Model:
 
     @property
     def values(self) -> dict[sp.Symbol, float]:
-        """Parameter values by (real) symbol, for substitution."""
+        """Parameter values by real symbol, for substitution."""
         return {real(name): value for name, value in self.parameters.items()}
 
     @cached_property
     def continuous(self) -> NamedMapping[bool]:
-        """Whether the rates are continuous across each interface, decided symbolically.
+        """Continuity of the rates across each interface, decided symbolically.
 
         Examples
         --------
@@ -413,21 +413,21 @@ class Model:
 
     @property
     def operations(self) -> Operations:
-        """The equations as lists of operations, from which code is made."""
+        """The equations as lists of operations, from which machine code is generated."""
         from fastslow.model.operations import operations_of
 
         return operations_of(self)
 
     @property
     def traits(self) -> Traits:
-        """What the outcome of a run needs of the equations."""
+        """Properties of the equations that classify the outcome of a run."""
         from fastslow.model.traits import traits_of
 
         return traits_of(self)
 
     @property
     def stored(self) -> StoredModel:
-        """The model as it is kept in a file: it runs without SymPy, and has no equations.
+        """The model as stored in files, which is simulated without SymPy or symbolic equations.
 
         Examples
         --------
@@ -458,7 +458,7 @@ class Model:
 
     @property
     def equations(self) -> str:
-        """The equations as they were written, as text; parameters stand by name.
+        """The equations as text, with parameters by name.
 
         Examples
         --------
@@ -476,7 +476,7 @@ class Model:
         )
 
     def to_latex(self) -> str:
-        """The equations of every region as LaTeX, for a document with amsmath."""
+        """Return the equations of every region as LaTeX, for a document with amsmath."""
         from fastslow.model.typesetting import model_latex
 
         return model_latex(self)
@@ -501,7 +501,7 @@ class Model:
         return "\n".join(lines)
 
 
-#: Structures and values of which the period is kept.
+#: Number of cached periods.
 PERIODS = 256
 
 

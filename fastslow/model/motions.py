@@ -1,4 +1,4 @@
-"""The smooth motions of a model: its regions, and sliding along its discontinuities."""
+"""Smooth motions of a piecewise-smooth model: flows in regions, and Filippov sliding."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from math import prod
 
 import sympy as sp
 
-from fastslow.model.derived import once, partition_of
+from fastslow.model.derived import cached_by, partition_of
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.model import Model
 from fastslow.model.rational import exact
 from fastslow.model.structure import TIME, real
 
-#: Operations up to which a quotient is cancelled, so that exact zeros stay exact.
+#: Operations up to which a quotient is cancelled, so that exact zeros remain exact.
 SHORT = 150
 
 #: Operations up to which a drift is expanded, for the same reason.
 EXPANDED = 2000
 
-#: Motions up to which sliding on one more interface at a time is derived: every motion is
-#: compiled, and m contacts with dry friction have 3**m.
+#: Number of motions up to which sliding on one more interface at a time is derived: every
+#: motion is compiled, and m contacts with dry friction have 3**m.
 MOST = 128
 
 Pattern = tuple[int, ...]
@@ -30,29 +30,29 @@ Pattern = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Motion:
-    """One smooth motion: that of a region, or sliding along one or several interfaces.
+    """A smooth motion: the flow in a region, or sliding along one or several interfaces.
 
     Sliding along the interfaces I with the rates f₀ + Σ bᵢ sᵢ, sᵢ = sign hᵢ, solves
-    0 = ḣ_I = a + B s for s, with B_ij = ∇hᵢ·b_j, and holds where every |sᵢ| < 1
-    (Filippov 1988). Its name joins the two regions that it lies between: those
-    in which all functions hᵢ are positive, and negative.
+    0 = ḣ_I = a + B s for s, with B_ij = ∇hᵢ·b_j, and is valid where every |sᵢ| < 1
+    (Filippov 1988). Its name joins the names of two regions: that in which all hᵢ are
+    positive, and that in which all are negative.
 
     Parameters
     ----------
     name : str
     signs : tuple of int
-        Sign of every interface function; 0 along the interfaces that are slid along.
+        Sign of every interface function; 0 for the sliding interfaces.
     rates : tuple of sympy.Expr
         Of states and slow states.
     laws : tuple of sympy.Expr
         Of the slow quantities.
     corners : tuple of int
-        Numbers of the regions around: 2**m of them for sliding along m interfaces, the
-        one where all are positive first.
+        Indices of the adjacent regions: 2**m of them for sliding along m interfaces,
+        beginning with the one where all hᵢ are positive.
     bounds : tuple of sympy.Expr
-        Two for each interface that is slid along: the drift of hᵢ along the motion with
-        sᵢ = 1 and along that with sᵢ = −1, both sliding along the other interfaces. One
-        is negative and one positive just where |sᵢ| < 1.
+        Two for each sliding interface: the Lie derivative of hᵢ for sᵢ = 1 and for
+        sᵢ = −1, both while sliding along the other interfaces. They have opposite
+        signs if and only if |sᵢ| < 1.
     weights : tuple of sympy.Expr
         sᵢ for each of them.
     """
@@ -67,7 +67,7 @@ class Motion:
 
     @property
     def slides(self) -> tuple[int, ...]:
-        """Numbers of the interfaces that are slid along."""
+        """Indices of the sliding interfaces."""
         return tuple(j for j, sign in enumerate(self.signs) if sign == 0)
 
 
@@ -79,7 +79,7 @@ class Motions:
     ----------
     regions, sliding : tuple of Motion
     undecided : tuple of (str, str)
-        Intersections of discontinuities for which no sliding motion is derived, and why.
+        Intersections of discontinuities for which no sliding motion is derived, with the reason.
     """
 
     regions: tuple[Motion, ...]
@@ -88,7 +88,7 @@ class Motions:
 
 
 def regions_of(model: Model) -> tuple[Motion, ...]:
-    """The motion of every region of a model."""
+    """Return the motion in every region of a model."""
     return tuple(
         Motion(
             region.name,
@@ -101,17 +101,17 @@ def regions_of(model: Model) -> tuple[Motion, ...]:
     )
 
 
-@once(partition_of)
-def motions_of(model: Model, *, at_once: int | None = None, most: int = MOST) -> Motions:
+@cached_by(partition_of)
+def motions_of(model: Model, *, max_sliding: int | None = None, max_motions: int = MOST) -> Motions:
     """Derive the smooth motions of a model.
 
     Parameters
     ----------
     model : Model
-    at_once : int, optional
-        Number of interfaces slid along at once, at most.
-    most : int
-        Number of motions past which sliding on more interfaces at once is not derived.
+    max_sliding : int, optional
+        Largest number of interfaces of one sliding motion.
+    max_motions : int
+        Number of motions beyond which sliding on more interfaces at once is not derived.
 
     Examples
     --------
@@ -122,12 +122,12 @@ def motions_of(model: Model, *, at_once: int | None = None, most: int = MOST) ->
     >>> both.sliding[-1].weights
     (y, 0)
 
-    Across a continuous interface, or one that is crossed at the same speed, nothing slides:
+    A continuous interface, or one crossed at equal normal speeds, has no sliding motion:
 
     >>> motions_of(Model({x: -sp.Abs(x)})).sliding
     ()
     """
-    return _Derivation(model, most).motions(at_once)
+    return _Derivation(model, max_motions).motions(max_sliding)
 
 
 def drift(
@@ -136,7 +136,7 @@ def drift(
     rates: Sequence[sp.Expr],
     laws: Mapping[str, sp.Expr] | None = None,
 ) -> sp.Expr:
-    """Rate of change of a function along rates, ∂h/∂t + ∇h·f.
+    """Return the rate of change of a function along a vector field, ∂h/∂t + ∇h·f.
 
     Examples
     --------
@@ -156,7 +156,7 @@ def drift(
 
 
 class _Derivation:
-    """The regions of one model by their sign patterns, and what slides between them."""
+    """Derivation of the sliding motions of one model from the sign patterns of its regions."""
 
     def __init__(self, model: Model, most: int) -> None:
         self.model, self.most = model, most
@@ -166,14 +166,14 @@ class _Derivation:
         self.numbers = {region.signs: k for k, region in enumerate(self.regions)}
         self.undecided: list[tuple[str, str]] = []
 
-    def motions(self, at_once: int | None) -> Motions:
+    def motions(self, max_sliding: int | None) -> Motions:
         jumping = [j for j, name in enumerate(self.model.interfaces) if self._jumps(j, name)]
         sliding: list[Motion] = []
-        for m in range(1, min(len(jumping), at_once or len(jumping)) + 1):
+        for m in range(1, min(len(jumping), max_sliding or len(jumping)) + 1):
             faces = [
                 (along, corners)
                 for along in combinations(jumping, m)
-                for corners in self._faces(along)
+                for corners in self._adjacent_regions(along)
             ]
             if m > 1 and len(self.regions) + len(sliding) + len(faces) > self.most:
                 why = f"more than {self.most} smooth motions; {m} interfaces at once are too many"
@@ -183,8 +183,8 @@ class _Derivation:
         return Motions(self.regions, tuple(sliding), tuple(self.undecided))
 
     def _jumps(self, j: int, name: str) -> bool:
-        """Whether any rate may jump across an interface."""
-        pairs = list(self._faces((j,)))
+        """Check whether any rate may jump across an interface."""
+        pairs = list(self._adjacent_regions((j,)))
         alike = all(
             self.regions[a].rates == self.regions[b].rates
             and self.regions[a].laws == self.regions[b].laws
@@ -192,8 +192,8 @@ class _Derivation:
         )
         return bool(pairs) and not alike and not self.model.continuous[name]
 
-    def _faces(self, along: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-        """The regions around every common zero of some interfaces, + before −."""
+    def _adjacent_regions(self, along: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+        """Yield the regions adjacent to each intersection of some interfaces, + before −."""
         for signs in self.numbers:
             if all(signs[j] > 0 for j in along):
                 corners = []
@@ -219,7 +219,7 @@ class _Derivation:
         above, below = (self.regions[k] for k in corners)
         a, b = (self._drift(j, side.rates, side.laws) for side in (above, below))
         if _vanishes(a - b, [self.functions[j]]):
-            # the flow crosses wherever it meets the interface transversally
+            # the flow crosses wherever it is transversal to the interface
             return None
         share = _short(a / (a - b))
         rates = [
@@ -232,7 +232,7 @@ class _Derivation:
         """The rates f₀ + Σ bᵢ sᵢ with the weights that keep every hᵢ, by Cramer's rule."""
         count = len(along)
         sides = list(product((1, -1), repeat=count))
-        # sums of decimal numbers vanish to rounding only, those of what they are written as exactly
+        # sums of floats vanish to rounding only, those of the decimal numbers written exactly
         heights = [exact(self.functions[j]) for j in along]
         values = [
             [exact(e) for e in (*self.regions[k].rates, *self.regions[k].laws)] for k in corners
@@ -244,7 +244,7 @@ class _Derivation:
             parts[used] = [_mean(factors, column) for column in columns]
         mixed = [part for used, part in parts.items() if sum(used) > 1]
         if not all(_vanishes(e, heights) for part in mixed for e in part):
-            self._undecided(along, "the rates there are no sum of one jump for each interface")
+            self._undecided(along, "the rates are not a sum of one jump for each interface")
             return None
         units = [tuple(int(i == k) for i in range(count)) for k in range(count)]
         n = len(self.names)
@@ -256,7 +256,7 @@ class _Derivation:
         )
         whole = _determinant(matrix)
         if _vanishes(whole, heights):
-            self._undecided(along, "the jumps of their drifts are a singular matrix")
+            self._undecided(along, "the matrix of the jumps of their Lie derivatives is singular")
             return None
         weights, bounds = [], []
         for i in range(count):
@@ -293,16 +293,16 @@ class _Derivation:
     ) -> Motion:
         first, last = self.regions[corners[0]], self.regions[corners[-1]]
         for j in along:
-            held = self._held(self.functions[j])
-            if held is not None:
-                # what is slid along is one state: it does not move at all
-                rates[held] = sp.Integer(0)
+            fixed = self._fixed_state(self.functions[j])
+            if fixed is not None:
+                # the interface fixes one state, whose rate is zero
+                rates[fixed] = sp.Integer(0)
         signs = tuple(0 if j in along else sign for j, sign in enumerate(first.signs))
         name = f"{first.name}|{last.name}"
         return Motion(name, signs, tuple(rates), first.laws, corners, bounds, weights)
 
-    def _held(self, function: sp.Expr) -> int | None:
-        """The state that keeps a constant value where a function vanishes, if it is one."""
+    def _fixed_state(self, function: sp.Expr) -> int | None:
+        """Index of the state that is constant on the zero set of a function, if there is one."""
         moving = {real(n) for n in (*self.names, *self.model.forcing)} | {TIME}
         used = function.free_symbols & moving
         if len(used) != 1:
@@ -321,7 +321,7 @@ def _mean(factors: Sequence[int], values: Sequence[sp.Expr]) -> sp.Expr:
 
 
 def _vanishes(expression: sp.Expr, heights: Sequence[sp.Expr]) -> bool:
-    """Whether an expression is zero where some functions are, each solved for one symbol."""
+    """Check that an expression vanishes where some functions do, each solved for one symbol."""
     expression = sp.expand(expression) if sp.count_ops(expression) <= EXPANDED else expression
     if expression == 0:
         return True
@@ -335,7 +335,7 @@ def _vanishes(expression: sp.Expr, heights: Sequence[sp.Expr]) -> bool:
 
 
 def _solved(heights: Sequence[sp.Expr]) -> tuple[int, sp.Symbol, sp.Expr] | None:
-    """The first function that is affine in a symbol: its number, the symbol, and its root."""
+    """The first function that is affine in a symbol: its index, the symbol, and its root."""
     for number, height in enumerate(heights):
         for symbol in sorted(height.free_symbols, key=lambda s: s.name):
             slope = height.diff(symbol)

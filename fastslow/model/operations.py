@@ -1,4 +1,4 @@
-"""A model's equations as lists of operations, from which its code is made without SymPy."""
+"""A model's equations as lists of operations, from which code is generated without SymPy."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from fastslow.model.derived import once, partition_of
+from fastslow.model.derived import cached_by, partition_of
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.model import Model
 from fastslow.model.motions import Motion, drift, motions_of, regions_of
@@ -17,7 +17,7 @@ from fastslow.results.stored.operations import Operations, SeriesOperations, Val
 
 @dataclass(frozen=True)
 class Equations:
-    """Everything that the operations depend on."""
+    """The expressions that the operations depend on."""
 
     states: tuple[sp.Symbol, ...]
     quantities: tuple[sp.Symbol, ...]
@@ -26,14 +26,14 @@ class Equations:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of all parameters in use, sorted."""
+        """Sorted names of all parameters that occur."""
         used = set().union(*(h.free_symbols for h in self.interfaces))
         for mode in self.modes:
             used |= set().union(*(e.free_symbols for e in (*mode.rates, *mode.laws)))
         return tuple(sorted(s.name for s in used - self.moving))
 
     def renamed(self) -> Equations:
-        """The same with symbols that are valid in any source: y0, w0, p0, …."""
+        """Return the same equations with symbols that are valid in any source: y0, w0, p0, …."""
         groups = {"y": self.states, "w": self.quantities, "p": map(real, self.parameters)}
         new = {s: real(f"{g}{i}") for g, symbols in groups.items() for i, s in enumerate(symbols)}
 
@@ -55,12 +55,12 @@ class Equations:
 
     @property
     def n_bounds(self) -> int:
-        """Number of rows for the bounds of sliding, the same in every mode."""
+        """Number of rows for the sliding bounds, equal in all modes."""
         return max(2, *(len(mode.bounds) for mode in self.modes), 0)
 
     @property
     def moving(self) -> set[sp.Symbol]:
-        """All symbols that change with time."""
+        """Symbols that change with time."""
         return {*self.states, *self.quantities, TIME}
 
     @property
@@ -75,9 +75,9 @@ class Equations:
 _derived: dict[tuple[Equations, tuple[bool, ...]], Operations] = {}
 
 
-@once(partition_of)
+@cached_by(partition_of)
 def operations_of(model: Model) -> Operations:
-    """The operations of a model, of its regions and of sliding, derived once.
+    """Return the operations of a model, in its regions and in sliding.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def operations_of(model: Model) -> Operations:
         tuple(i.function for i in model.interfaces.values()),
         regions_of(model),
     )
-    # models that differ in what is not in their equations have the same
+    # models with equal equations share their operations
     key = equations, tuple(model.continuous.values())
     if key not in _derived:
         motions = motions_of(model)
@@ -140,7 +140,7 @@ def _series_operations(equations: Equations, mode: Motion) -> SeriesOperations:
 
 
 def _value_operations(equations: Equations, mode: Motion) -> ValueOperations:
-    """What a mode fills without recurrences: values, and rates of states and interfaces."""
+    """Operations of a mode without recurrences: values, and rates of states and interfaces."""
     names = [s.name for s in equations.states]
     laws = dict(zip((s.name for s in equations.quantities), mode.laws, strict=True))
     outputs = [*mode.rates]
@@ -163,7 +163,7 @@ def _value_operations(equations: Equations, mode: Motion) -> ValueOperations:
 
 
 def _gradient(equations: Equations, function: sp.Expr) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The terms of a function, and its derivatives by states."""
+    """The terms of a function, and its gradient with respect to the states."""
     return (
         tuple(scalar_code(term) for term in sp.Add.make_args(function)),
         tuple(scalar_code(function.diff(s)) for s in equations.states),

@@ -1,4 +1,4 @@
-"""The common period of a forcing, from its harmonics."""
+"""Common period of a forcing, from its harmonics."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from fastslow.results.stored.harmonics import period_of
 def common_period(
     expressions: Iterable[sp.Expr], time: sp.Symbol, values: Mapping[sp.Symbol, float]
 ) -> float | None:
-    """Smallest common period in time of all harmonics of several expressions.
+    """Return the smallest common period in time of all harmonics of several expressions.
 
     Products and powers of sines are expanded into harmonics first, so that
-    sin(ωt)² has the period π/ω. Frequencies whose ratio is no fraction with a
+    sin(ωt)² has the period π/ω. Frequencies whose ratio is not a fraction with a
     denominator up to 10 000 have no common period.
 
     Parameters
@@ -32,8 +32,8 @@ def common_period(
     Returns
     -------
     float or None
-        None when time stands outside periodic functions, when there is no
-        common period, or when nothing depends on time.
+        None if time occurs outside periodic functions, if there is no common
+        period, or if nothing depends on time.
 
     Examples
     --------
@@ -55,7 +55,7 @@ def common_period(
 def common_periods(
     expressions: Iterable[sp.Expr], time: sp.Symbol, values: Mapping[sp.Symbol, NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """The common period at each of many parameter sets, NaN where there is none.
+    """Return the common period at each of many parameter sets, NaN where there is none.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def common_periods(
 
 
 def frequencies(expressions: Iterable[sp.Expr], time: sp.Symbol) -> list[sp.Expr] | None:
-    """Angular frequencies of all harmonics, in the parameters; None where not periodic."""
+    """Return the angular frequencies of all harmonics, as expressions; None if not periodic."""
     collected: list[sp.Expr] = []
     for expression in expressions:
         if time in expression.free_symbols:

@@ -1,10 +1,10 @@
 """Greatest common divisors and factors of sparse polynomials in many symbols.
 
 A polynomial that is linear in one of its symbols, as most are in some parameter, is
-irreducible once the common divisor of its two coefficients is taken out. That settles
-in a few divisions what general algorithms need long for; only what is linear in no
-symbol goes to SymPy. What is past the budget raises, so that the answer depends on the
-polynomial alone.
+irreducible once the common divisor of its two coefficients is divided out. This takes a
+few divisions where general algorithms are slow; only polynomials that are linear in no
+symbol are factored by SymPy. Beyond a budget of terms an exception is raised, so that the
+result depends on the polynomial alone.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ from sympy.polys.heuristicgcd import heugcd
 from sympy.polys.polyerrors import HeuristicGCDFailed
 from sympy.polys.rings import PolyElement
 
-#: Most terms of a polynomial that is formed.
+#: Largest number of terms of a polynomial.
 TERMS = 600
 
-#: Most products of terms in one multiplication.
+#: Largest number of products of terms in one multiplication.
 PRODUCTS = 12_000
 
 #: Bits of the integers that a heuristic common divisor may reach.
 BITS = 200_000
 
-#: Most terms of a polynomial that SymPy factors, and most terms times symbols.
+#: Limits of polynomials that SymPy factors: terms, and terms times symbols.
 FACTORED, FACTORED_MANY = 200, 1000
 
-#: Integer points at which a polynomial is tried for irreducibility (Hilbert).
+#: Integer points at which irreducibility is tested (Hilbert).
 TRIALS = 3
 
 
 class PastBudgetError(Exception):
-    """A polynomial is longer than what is computed with."""
+    """A polynomial exceeds the budget of terms."""
 
 
 def product(one: PolyElement, two: PolyElement) -> PolyElement:
-    """Multiply within the budget.
+    """Return the product of two polynomials.
 
     Raises
     ------
@@ -53,17 +53,17 @@ def product(one: PolyElement, two: PolyElement) -> PolyElement:
 
 
 def used(poly: PolyElement) -> list[int]:
-    """Numbers of the generators that occur."""
+    """Return the indices of the generators that occur."""
     return [k for k in range(poly.ring.ngens) if any(m[k] for m in poly)]
 
 
 def degree(poly: PolyElement, k: int) -> int:
-    """Degree in generator k."""
+    """Return the degree in generator k."""
     return max((m[k] for m in poly), default=0)
 
 
 def coefficients(poly: PolyElement, k: int) -> dict[int, PolyElement]:
-    """Power of generator k to its coefficient."""
+    """Map each power of generator k to its coefficient."""
     found: dict[int, PolyElement] = {}
     for monomial, value in poly.items():
         rest = (*monomial[:k], 0, *monomial[k + 1 :])
@@ -72,7 +72,7 @@ def coefficients(poly: PolyElement, k: int) -> dict[int, PolyElement]:
 
 
 def content(poly: PolyElement, k: int) -> PolyElement:
-    """Greatest common divisor of the coefficients with respect to generator k."""
+    """Return the greatest common divisor of the coefficients with respect to generator k."""
     total = poly.ring.zero
     for part in sorted(coefficients(poly, k).values(), key=len):
         total = gcd(total, part)
@@ -82,7 +82,7 @@ def content(poly: PolyElement, k: int) -> PolyElement:
 
 
 def divided(poly: PolyElement, by: PolyElement) -> PolyElement | None:
-    """Exact quotient, None where there is a remainder."""
+    """Return the exact quotient, None if there is a remainder."""
     if by == 1:
         return poly
     if len(by) == 1:
@@ -103,7 +103,7 @@ def divided(poly: PolyElement, by: PolyElement) -> PolyElement | None:
 
 
 def _may_divide(poly: PolyElement, by: PolyElement) -> bool:
-    """Whether the values at an integer point divide; a quick test before a long division."""
+    """Check that the values at an integer point divide, before a long division."""
     point = [sp.prime(k + 4) for k in range(poly.ring.ngens)]
     below = _value(by, point)
     return below == 0 or _value(poly, point) % below == 0
@@ -117,12 +117,12 @@ def _value(poly: PolyElement, point: list[int]) -> int:
 
 
 def gcd(one: PolyElement, two: PolyElement) -> PolyElement:
-    """Greatest common divisor over the integers, with a positive leading coefficient.
+    """Return the greatest common divisor over the integers, with positive leading coefficient.
 
     Raises
     ------
     PastBudgetError
-        Where only a computation with huge integers would decide it.
+        If the computation would need huge integers.
 
     Examples
     --------
@@ -141,7 +141,7 @@ def gcd(one: PolyElement, two: PolyElement) -> PolyElement:
 
 
 def _gcd(one: PolyElement, two: PolyElement) -> PolyElement:
-    """As `gcd`, for two without a common monomial factor of their own."""
+    """As `gcd`, for two polynomials without monomial factors."""
     ring = one.ring
     if len(one) > len(two):
         one, two = two, one
@@ -159,7 +159,7 @@ def _gcd(one: PolyElement, two: PolyElement) -> PolyElement:
     for poly, other in ((one, two), (two, one)):
         k = next((k for k in mine if degree(poly, k) == 1), None)
         if k is not None:
-            # without its content it is irreducible: it divides the other one or shares nothing
+            # its primitive part is irreducible: it divides the other one or is coprime to it
             inside = content(poly, k)
             bare = divided(poly, inside)
             rest = gcd(inside, content(other, k))
@@ -186,7 +186,7 @@ def _positive(poly: PolyElement) -> PolyElement:
 
 
 def _monomial_content(poly: PolyElement) -> PolyElement:
-    """Greatest monomial, with its integer, that divides every term."""
+    """Greatest monomial, with integer coefficient, that divides every term."""
     low = tuple(map(min, zip(*poly, strict=True)))
     return poly.ring.from_dict({low: ZZ(math.gcd(*map(int, poly.values())))})
 
@@ -199,7 +199,9 @@ def _monomial_gcd(one: PolyElement, two: PolyElement) -> PolyElement:
 
 
 def factor(poly: PolyElement) -> tuple[int, list[tuple[PolyElement, int]]]:
-    """Integer factor, and irreducible factors with their powers; a long one may stay whole.
+    """Return the integer factor and the irreducible factors with their powers.
+
+    A long factor may remain unfactored.
 
     Raises
     ------
@@ -256,7 +258,7 @@ def _factors(poly: PolyElement) -> list[tuple[PolyElement, int]]:
 
 
 def _irreducible(poly: PolyElement, k: int) -> bool:
-    """Whether a primitive polynomial is seen to be irreducible at an integer point."""
+    """Test a primitive polynomial for irreducibility at integer points."""
     size = degree(poly, k)
     for trial in range(TRIALS):
         point = [sp.prime(3 * trial + 2 * j + 3) for j in range(poly.ring.ngens)]
@@ -270,7 +272,7 @@ def _irreducible(poly: PolyElement, k: int) -> bool:
 
 
 def square_root(poly: PolyElement) -> PolyElement | None:
-    """Square root of a polynomial that is a square, else None.
+    """Return the square root of a polynomial that is a square, else None.
 
     Examples
     --------

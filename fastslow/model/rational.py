@@ -24,21 +24,21 @@ from fastslow.model.polynomials import (
     used,
 )
 
-#: Quotients that are kept for the next question about them.
+#: Number of cached quotients.
 MEMORY = 4096
 
-#: Largest power of a sum that is multiplied out.
+#: Largest power of a sum that is expanded.
 POWER = 24
 
-#: Roots of a higher index are not reduced.
+#: Largest index of roots that are reduced.
 INDEX = 4
 
-#: Parts of an expression that is read.
+#: Largest number of nodes of an expression that is read.
 PARTS = 1500
 
 
 def exact(expression: sp.Expr) -> sp.Expr:
-    """With rational numbers in place of floats, so that polynomials divide without remainder.
+    """Replace floats by rational numbers, so that polynomials divide without remainder.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def exact(expression: sp.Expr) -> sp.Expr:
 
 @functools.lru_cache(maxsize=MEMORY)
 def _rational(number: sp.Float) -> sp.Expr:
-    """A float as the rational number it is written as; searched for once."""
+    """Return the rational number that a float is printed as."""
     return sp.nsimplify(number, rational=True)
 
 
@@ -63,8 +63,8 @@ class Quotient:
     numerator, denominator : PolyElement
         Over the integers; the leading coefficient of the denominator is positive.
     roots : dict
-        Number of a generator that is a root to (radicand, index): its power of that
-        index is the radicand, a polynomial of the same ring.
+        Index of a generator that is a root to (radicand, n): its n-th power is the
+        radicand, a polynomial of the same ring.
     """
 
     numerator: PolyElement
@@ -73,11 +73,11 @@ class Quotient:
 
     @property
     def polynomial(self) -> bool:
-        """Whether the denominator is one term."""
+        """True if the denominator is one term."""
         return len(self.denominator) == 1
 
     def expanded(self) -> sp.Expr:
-        """A sum of terms where the denominator is one term, else one quotient.
+        """Return a sum of terms where the denominator is one term, else one quotient.
 
         Examples
         --------
@@ -97,7 +97,7 @@ class Quotient:
         return inside / below
 
     def factored(self) -> sp.Expr:
-        """Numerator and denominator as products of irreducible factors.
+        """Return numerator and denominator as products of irreducible factors.
 
         Examples
         --------
@@ -112,7 +112,7 @@ class Quotient:
         return number * sp.Mul(*(p**e for p, e in parts))
 
     def factors(self) -> tuple[sp.Rational, tuple[tuple[sp.Expr, int], ...]]:
-        """Constant and irreducible factors; those of the denominator have negative powers.
+        """Return the constant and the irreducible factors, with negative powers in the denominator.
 
         Raises
         ------
@@ -127,12 +127,12 @@ class Quotient:
 
 @functools.lru_cache(maxsize=MEMORY)
 def quotient(expression: sp.Expr) -> Quotient | None:
-    """Give the cancelled quotient of an expression.
+    """Return the cancelled quotient of an expression.
 
     Returns
     -------
     Quotient or None
-        None for what is not rational in symbols and roots, and past the budget.
+        None if the expression is not rational in symbols and roots, or beyond the budget.
 
     Examples
     --------
@@ -174,14 +174,14 @@ def _kernels(expression: sp.Expr) -> list[sp.Expr] | None:
         else:
             return None
     symbols = [s for s in found if s.is_Symbol]
-    # in the order of SymPy, on which the signs of factors depend
+    # in SymPy's order, on which the signs of factors depend
     ordered = sp.Poly(sp.Add(*symbols)).gens if symbols else ()
     roots = sorted(found - set(symbols), key=lambda s: (sp.count_ops(s), str(s)))
     return [*ordered, *roots]
 
 
 def _root(power: sp.Pow) -> sp.Expr:
-    """The root that a power is a power of; one of a high index is a symbol of its own."""
+    """The root of which a power is formed; one of high index is a generator of its own."""
     if power.exp.q > INDEX:
         return sp.Pow(power.base, abs(power.exp))
     return sp.Pow(power.base, sp.Rational(1, power.exp.q))
@@ -229,7 +229,7 @@ class _Reader:
                 a, under = self.cancelled(a, under)
                 over, b = self.cancelled(over, b)
                 over, under = self.reduced(product(over, a)), self.reduced(product(under, b))
-            # roots that were multiplied may have left a common factor
+            # products of roots may leave a common factor
             return self.cancelled(over, under) if self.roots else (over, under)
         if node.exp.is_Integer:
             power = int(node.exp)
@@ -270,7 +270,7 @@ class _Reader:
         return result
 
     def reduced(self, poly: PolyElement) -> PolyElement:
-        """Powers of roots replaced by their radicands, innermost last."""
+        """Replace powers of roots by their radicands, innermost last."""
         for k in sorted(self.roots, reverse=True):
             inside, index = self.roots[k]
             while degree(poly, k) >= index:

@@ -1,4 +1,4 @@
-"""Reading interfaces off the equations, and the smooth rates off a sign pattern."""
+"""Extraction of interfaces from equations, and of smooth rates from a sign pattern."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from fastslow.model.interfaces import vanishes_on
 from fastslow.model.polynomials import PastBudgetError
 from fastslow.model.rational import quotient
 
-#: Factorised expressions that are kept for the next question about them.
+#: Number of cached factorisations.
 MEMORY = 4096
 
-#: A function that prints no longer than this, in characters, is given by its one factor.
+#: Length in characters up to which a switching function is replaced by its only factor.
 LONG = 40
 
 SWITCHING = (sp.Abs, sp.Max, sp.Min, sp.sign, sp.Heaviside)
@@ -27,8 +27,8 @@ SWITCHING = (sp.Abs, sp.Max, sp.Min, sp.sign, sp.Heaviside)
 def with_piecewise(expression: sp.Expr) -> sp.Expr:
     """Rewrite Abs, Max, Min, sign and Heaviside as Piecewise, inside out.
 
-    On an interface itself, sign and Heaviside have values of their own; a
-    region is open, so those single points are left out.
+    The values of sign and Heaviside on an interface itself are ignored, as regions
+    are open sets.
 
     Examples
     --------
@@ -65,11 +65,11 @@ class Factorised:
 
 
 def factorise(expression: sp.Expr, moving: Sequence[sp.Symbol]) -> Factorised:
-    """Split a smooth switching expression into irreducible interface functions.
+    """Factor a smooth switching expression into irreducible interface functions.
 
-    Factors without zeros are dropped by their sign, parameter-only factors
-    are kept apart as scales, and each remaining factor is oriented so that
-    the first moving symbol in it grows with it.
+    Factors of one sign are dropped, factors in parameters alone are returned as
+    scales, and each remaining factor is oriented so that it increases with its
+    first moving symbol.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def _pieces(expression: sp.Expr) -> tuple[sp.Expr, list[tuple[sp.Expr, int]]]:
 
 
 def as_written(expression: sp.Expr, moving: Sequence[sp.Symbol]) -> sp.Expr | None:
-    """A switching expression itself, oriented, where its one factor is longer than it.
+    """Return a switching expression itself, oriented, if its only factor is longer.
 
     Examples
     --------
@@ -144,7 +144,7 @@ def as_written(expression: sp.Expr, moving: Sequence[sp.Symbol]) -> sp.Expr | No
 
 
 def _decreases(factor: sp.Expr, order: Sequence[sp.Symbol]) -> bool:
-    """Whether the first of the symbols in a factor lowers it (by its leading coefficient)."""
+    """Check whether a factor decreases in its first symbol (by its leading coefficient)."""
     for symbol in order:
         if symbol not in factor.free_symbols:
             continue
@@ -158,7 +158,7 @@ def _decreases(factor: sp.Expr, order: Sequence[sp.Symbol]) -> bool:
 
 
 def switching_expressions(expression: sp.Expr) -> Iterable[sp.Expr]:
-    """Every smooth expression whose sign decides a branch, in order of appearance."""
+    """Yield every smooth expression whose sign selects a branch, in order of appearance."""
     for piecewise in _piecewise_in_order(expression):
         for _, condition in piecewise.args:
             for relation in _relations(condition):
@@ -172,7 +172,7 @@ def switching_expressions(expression: sp.Expr) -> Iterable[sp.Expr]:
 
 
 def _folded(expression: sp.Expr) -> list[tuple[sp.Expr, sp.Basic]]:
-    """All smooth values an expression with Piecewise can take (conditions unpruned)."""
+    """All smooth branches of an expression with Piecewise, whether or not they are reachable."""
     inner = next((p for p in _piecewise_in_order(expression) if not _nested(p)), None)
     if inner is None:
         return [(expression, sp.true)]
@@ -205,18 +205,18 @@ def smooth(
     moving: Sequence[sp.Symbol],
     values: Mapping[sp.Symbol, float],
 ) -> sp.Expr:
-    """The smooth expression that holds where the interface functions have given signs.
+    """Return the smooth expression on the set where interface functions have given signs.
 
     Parameters
     ----------
     expression : sympy.Expr
-        May hold nested Piecewise.
+        May contain nested Piecewise.
     signs : mapping
         Interface function to +1 or −1.
     moving : sequence of Symbol
         As for `factorise`.
     values : mapping
-        Parameter values, used for the sign of parameter-only factors alone.
+        Parameter values, used only for the signs of factors in parameters alone.
 
     Raises
     ------
@@ -270,7 +270,7 @@ def sign_of(
     moving: Sequence[sp.Symbol],
     values: Mapping[sp.Symbol, float],
 ) -> int:
-    """Sign of a smooth switching expression where the interface functions have given signs."""
+    """Return the sign of a switching expression where interface functions have given signs."""
     if expression in signs:
         return signs[expression]
     if -expression in signs:
@@ -285,7 +285,7 @@ def sign_of(
         number = scale.subs(values)
         if not number.is_number or number == 0:
             raise ModelError(
-                f"{expression} decides a branch, but the sign of {scale} is not known; "
+                f"{expression} decides a branch, but the sign of {scale} is unknown; "
                 "expected parameter values at which it is not zero"
             )
         value = float(number)
@@ -293,17 +293,17 @@ def sign_of(
     return side
 
 
-def both_ways(
+def signs_of_factors(
     signs: Iterable[tuple[sp.Expr, int]],
     moving: Sequence[sp.Symbol],
     values: Mapping[sp.Symbol, float],
 ) -> dict[sp.Expr, int]:
-    """Signs of interface functions, of their negatives, and of the factors that they hold.
+    """Return the signs of interface functions, of their negatives and of their factors.
 
     Examples
     --------
     >>> x, y = sp.symbols("x y", real=True)
-    >>> both_ways([(x - (y + 1) ** 2, 1)], [x, y], {})[x - y**2 - 2 * y - 1]
+    >>> signs_of_factors([(x - (y + 1) ** 2, 1)], [x, y], {})[x - y**2 - 2 * y - 1]
     1
     """
     known: dict[sp.Expr, int] = {}
@@ -325,11 +325,11 @@ def both_ways(
 
 
 def continuous(expression: sp.Expr) -> bool:
-    """Whether an expression as it is written is seen to be continuous.
+    """Check that an expression is continuous, from the way it is written.
 
-    Max, Min and Abs are; a Piecewise of two branches is where their difference vanishes
-    with what its condition compares. sign, Heaviside and any other Piecewise leave the
-    question open.
+    Max, Min and Abs are continuous; a Piecewise of two branches is where their difference
+    vanishes on the boundary of its condition. For sign, Heaviside and any other Piecewise
+    the result is False, which is inconclusive.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Expressions as operations on Taylor series, shared subexpressions once.
+"""Expressions as operations on Taylor series, with common subexpressions evaluated once.
 
-Along a solution every subexpression is a power series in time, which has a row of
-coefficients. What an operation does to rows is written in
+Along a solution every subexpression is a power series in time, stored as a row of
+coefficients. The operations on rows are implemented in
 `fastslow.kernels.taylor.recurrences`.
 """
 
@@ -15,7 +15,7 @@ import sympy as sp
 from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.pycode import PythonCodePrinter
 
-from fastslow.model.known_functions import refusal, slope_of, teach_functions, value_code
+from fastslow.model.known_functions import refusal, register_functions, slope_of, value_code
 from fastslow.results.stored.operations import (
     FUNCTION,
     LOGARITHM,
@@ -31,7 +31,7 @@ from fastslow.results.stored.operations import (
 
 
 class ScalarPrinter(PythonCodePrinter):
-    """Expressions of parameters as Python: every number a float, so that none overflows."""
+    """Printer of parameter expressions as Python, with every number a float."""
 
     def _print_Integer(self, expr: sp.Integer) -> str:
         return repr(float(expr))
@@ -55,11 +55,11 @@ class ScalarPrinter(PythonCodePrinter):
         return f"math.pow({inside}, {self._print(power)})"
 
 
-teach_functions(ScalarPrinter)
+register_functions(ScalarPrinter)
 
 
 def scalar_code(expression: sp.Expr) -> str:
-    """Python source of an expression of numbers, every number a float.
+    """Return the Python source of a scalar expression, with every number a float.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def scalar_code(expression: sp.Expr) -> str:
 
 @dataclass
 class Recurrences:
-    """The operations of several expressions, shared subexpressions once.
+    """Operations of several expressions, with common subexpressions evaluated once.
 
     Parameters
     ----------
@@ -88,9 +88,9 @@ class Recurrences:
         Symbol to row, for states and slow states.
     time : Symbol
     reserved : mapping
-        Expression to the row its series must occupy.
+        Expression to the row of its series.
     next : int
-        First row for everything else.
+        Next free row for all other expressions.
     """
 
     moving: Mapping[sp.Symbol, int]
@@ -106,23 +106,23 @@ class Recurrences:
         self.changing = {*self.moving, self.time}
 
     def name(self, symbol: sp.Symbol, row: int) -> None:
-        """Let a symbol stand for a row."""
+        """Assign a symbol to a row."""
         self.rows[symbol] = row
         self.changing.add(symbol)
 
     def is_scalar(self, expression: sp.Expr) -> bool:
-        """Whether an expression holds no state, slow quantity or time."""
+        """Check that an expression contains no state, slow quantity or time."""
         return not (expression.free_symbols & self.changing)
 
     def scalar(self, expression: sp.Expr) -> str:
-        """Name (or literal) of a parameter-only expression, computed once a call."""
+        """Return the name or literal of a parameter expression, computed once per call."""
         code = scalar_code(expression)
         if expression.is_Number or expression.is_Symbol:
             return f"({code})" if code.startswith("-") else code
         return self.scalars.setdefault(code, f"c{len(self.scalars)}")
 
     def row(self, expression: sp.Expr) -> int:
-        """The row that holds an expression's series, with all it needs emitted before it."""
+        """Return the row of an expression's series, after emitting the rows it depends on."""
         if expression in self.rows:
             return self.rows[expression]
         if self.is_scalar(expression):
@@ -216,7 +216,7 @@ class Recurrences:
         return row
 
     def _steady_rate(self, argument: sp.Expr) -> str:
-        """The constant rate of an argument that is affine in time, empty for others."""
+        """Constant rate of an argument that is affine in time, empty for others."""
         if argument.free_symbols & self.changing != {self.time}:
             return ""
         rate = argument.diff(self.time)

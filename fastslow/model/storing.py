@@ -1,4 +1,4 @@
-"""A model as it is kept in a file."""
+"""The form of a model that is stored in files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fastslow.results.stored.model import StoredModel, Validity
 
 
 def stored_form(model: Model) -> StoredModel:
-    """The model as operations and numbers, with what says where they hold.
+    """Return a model as operations and numbers, with the parameter values for which they are valid.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def _validity(model: Model) -> Validity:
     steady: set[str] = set()
 
     def texts(expressions: Iterable[sp.Expr]) -> tuple[str, ...]:
-        """Texts of expressions, or none: then their parameters must stay as they are."""
+        """Texts of expressions, or none: then the values of their parameters are fixed."""
         written = tuple(expressions)
         found = tuple(text_of(e, new) for e in written)
         if all(found):
@@ -63,7 +63,7 @@ def _validity(model: Model) -> Validity:
         slopes = [h.diff(z) for z in loose]
         inside = set().union(*(slope.free_symbols for slope in slopes))
         if inside & set(loose):
-            # at other values of what stands in its slopes it might be affine
+            # it may be affine at other values of the symbols in its slopes
             steady |= {s.name for s in inside | (h.free_symbols & set(loose))}
             rows.append(())
         else:

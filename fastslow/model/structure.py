@@ -1,4 +1,4 @@
-"""What is symbolic in a model, shared by all its parameter values."""
+"""The symbolic structure of a model, independent of its parameter values."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from fastslow.model.keyed import Keyed
 from fastslow.model.reading import (
     LONG,
     as_written,
-    both_ways,
     continuous,
     factorise,
+    signs_of_factors,
     smooth,
     switching_expressions,
     with_piecewise,
@@ -37,7 +37,7 @@ from fastslow.results.stored.sign_patterns import Pattern, possible_patterns, sc
 TIME = sp.Symbol("t", real=True)
 
 #: Functions with infinitely many jumps.
-STAIRS = (sp.floor, sp.ceiling, sp.frac, sp.Mod)
+STEP_FUNCTIONS = (sp.floor, sp.ceiling, sp.frac, sp.Mod)
 
 R = TypeVar("R")
 
@@ -47,17 +47,17 @@ Values = Mapping[sp.Symbol, float]
 
 @lru_cache(maxsize=4096)
 def real(name: str) -> sp.Symbol:
-    """The real symbol of a name: the one that every expression inside uses."""
+    """Return the real symbol with a name, as used in all expressions of models."""
     return sp.Symbol(normalised(name), real=True)
 
 
 def name_of(key: object, what: str = "a name") -> str:
-    """The name of a symbol, or a text, as it is kept.
+    """Return the normalised name of a symbol or text.
 
     Raises
     ------
     ModelError
-        For an empty name, and one that cannot be written to a file.
+        For an empty name, or one that cannot be encoded in a file.
 
     Examples
     --------
@@ -70,18 +70,18 @@ def name_of(key: object, what: str = "a name") -> str:
     return name
 
 
-#: Sets of regions that are remembered, and frozen structures.
+#: Numbers of cached partitions and frozen structures.
 PARTITIONS, FROZEN = 256, 64
 
 
 @dataclass(frozen=True)
 class Partition:
-    """All of a model but the values of its parameters: its regions where they are.
+    """The interfaces and regions of a model at some parameter values, without these values.
 
     Parameters
     ----------
     structure : Structure
-        With the names of these regions.
+        Includes the names of these regions.
     interfaces : NamedMapping of Interface
     regions : NamedMapping of Region
     """
@@ -98,21 +98,21 @@ class Partition:
         return self._hash
 
     def __getstate__(self) -> dict[str, Any]:
-        return fields_alone(self)
+        return fields_to_pickle(self)
 
 
-def fields_alone(one: Any) -> dict[str, Any]:
-    """What is pickled: not what follows from it, as hashes differ from process to process."""
+def fields_to_pickle(one: Any) -> dict[str, Any]:
+    """Return the fields to pickle, without cached values: hashes differ between processes."""
     return {n: v for n, v in one.__dict__.items() if n in one.__dataclass_fields__}
 
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """The equations with their interfaces, and the names given to regions so far.
+    """Equations with their interfaces, and the names assigned to regions so far.
 
-    ``continuous`` is whether the rates as they were written are seen to be continuous;
-    where they are not, the regions on both sides of an interface decide. Two structures
-    are equal when all of this is, in the same order.
+    ``continuous`` is True if the rates are continuous by the way they are written;
+    otherwise continuity is decided from the regions on both sides of an interface.
+    Structures are equal when all fields are, including order.
     """
 
     states: tuple[str, ...]
@@ -130,7 +130,7 @@ class Structure:
 
     @cached_property
     def content(self) -> tuple[Any, ...]:
-        """What is equal in equal structures."""
+        """Content by which structures are compared."""
         mappings = (self.rates, self.forcing, self.conditions, self.path, self.periodic)
         return (
             self.states,
@@ -156,7 +156,7 @@ class Structure:
         return self is other or (self._hash == other._hash and self.content == other.content)
 
     def __getstate__(self) -> dict[str, Any]:
-        return fields_alone(self)
+        return fields_to_pickle(self)
 
     @cached_property
     def lengths(self) -> NamedMapping[float]:
@@ -165,13 +165,13 @@ class Structure:
 
     @cached_property
     def moving(self) -> tuple[sp.Symbol, ...]:
-        """Symbols that change along a solution or that have no value: what interfaces depend on."""
+        """Symbols that change along a solution or have no value."""
         names = (*self.states, *self.slow_states, *self.forcing, *self.free)
         return (*(real(n) for n in names), TIME)
 
     @cached_property
     def deciding(self) -> tuple[str, ...]:
-        """Names of all symbols that decide, by their values, which regions there are."""
+        """Names of all symbols whose values determine which regions exist."""
         used = set().union(*(i.function.free_symbols for i in self.interfaces))
         used |= set().union(*(c.free_symbols for c in self.conditions.values()))
         for expression in (*self.rates.values(), *self.forcing.values()):
@@ -187,18 +187,18 @@ class Structure:
 
     @cached_property
     def timed(self) -> tuple[str, ...]:
-        """Names of all symbols in rates and laws that hold time."""
+        """Names of all symbols in time-dependent rates and laws."""
         written = (e.free_symbols for e in (*self.rates.values(), *self.forcing.values()))
         return tuple(sorted({s.name for symbols in written if TIME in symbols for s in symbols}))
 
     def partition(self, values: Mapping[str, float]) -> Partition:
-        """Interfaces and regions at parameter values, found once for those that decide."""
+        """Return the interfaces and regions at parameter values, cached by the deciding ones."""
         known = tuple((n, values[n]) for n in self.deciding if n in values)
         return _partition(self, known)
 
     @cached_property
     def scales(self) -> tuple[sp.Expr, ...]:
-        """Factors of switching expressions that hold parameters alone: their signs decide."""
+        """Factors of switching expressions in parameters alone, on whose signs branches depend."""
         written = [*self.rates.values(), *self.forcing.values()]
         written += map(_indicator, self.conditions.values())
         switching = [i.function for i in self.interfaces]
@@ -207,7 +207,7 @@ class Structure:
         return tuple(dict.fromkeys(factor for scales in found for factor, _ in scales))
 
     def patterns(self, values: Values) -> tuple[Pattern, ...]:
-        """The sign patterns of the interfaces that are not empty at parameter values."""
+        """Return the nonempty sign patterns of the interfaces at parameter values."""
         loose = [z for z in self.moving if z not in values]
         rows: list[NDArray[np.float64] | None] = []
         for interface, row in zip(self.interfaces, _rows(self, tuple(values)), strict=True):
@@ -223,13 +223,13 @@ class Structure:
         return tuple(possible_patterns(rows))
 
     def partition_of(self, patterns: Sequence[Pattern], values: Values) -> Partition:
-        """Interfaces and regions of sign patterns; values decide the signs of `scales` alone."""
+        """Return the interfaces and regions of sign patterns; values give the signs of `scales`."""
         functions = [i.function for i in self.interfaces]
         contents = {p: self._contents(functions, p, values) for p in patterns}
         keep = [
             j
             for j, interface in enumerate(self.interfaces)
-            if interface.name in self.given or not _idle(j, contents)
+            if interface.name in self.given or not _redundant(j, contents)
         ]
         interfaces = tuple(self.interfaces[j] for j in keep)
         cells: dict[Pattern, dict[str, sp.Expr]] = {}
@@ -251,9 +251,9 @@ class Structure:
         )
         cells_named = {_cell(interfaces, pattern): name for pattern, name in named.items()}
         names = tuple({**dict(self.names), **cells_named}.items())
-        return _shared_partition(
+        return _interned_partition(
             Partition(
-                self if names == self.names else shared(replace(self, names=names)),
+                self if names == self.names else interned(replace(self, names=names)),
                 NamedMapping("interface", {i.name: i for i in interfaces}),
                 NamedMapping("region", {r.name: r for r in regions}),
             )
@@ -262,7 +262,7 @@ class Structure:
     def _contents(
         self, functions: Sequence[sp.Expr], pattern: Pattern, values: Values
     ) -> dict[str, sp.Expr]:
-        signs = both_ways(zip(functions, pattern, strict=True), self.moving, values)
+        signs = signs_of_factors(zip(functions, pattern, strict=True), self.moving, values)
         written = {**self.rates, **self.forcing}
         return {n: smooth(e, signs, self.moving, values) for n, e in written.items()}
 
@@ -272,10 +272,10 @@ class Structure:
         patterns: Mapping[Pattern, list[Cell]],
         values: Values,
     ) -> dict[Pattern, str]:
-        """A name for each pattern: asked for, kept from before, or the next free number."""
+        """Name of each pattern: given by the user, assigned before, or the next free number."""
         named: dict[Pattern, str] = {}
         for pattern, whole in patterns.items():
-            signs = both_ways(_cell(interfaces, pattern), self.moving, values)
+            signs = signs_of_factors(_cell(interfaces, pattern), self.moving, values)
             asked = []
             for region, condition in self.conditions.items():
                 try:
@@ -297,7 +297,7 @@ class Structure:
                 named[pattern] = name
             elif asked:
                 raise ModelError(
-                    f"region {name!r} ({self.conditions[asked[0]]}) holds more than one sign "
+                    f"region {name!r} ({self.conditions[asked[0]]}) contains more than one sign "
                     "pattern of the interfaces; expected one condition for each region"
                 )
         known = {name for _, name in self.names}
@@ -318,7 +318,7 @@ class Structure:
     def frozen(
         self, path: Mapping[str, sp.Expr], values: Mapping[str, float]
     ) -> tuple[Structure, dict[str, float]]:
-        """The fast structure with slow quantities free, and the values that it still uses."""
+        """Return the fast structure with free slow quantities, and the values it still uses."""
         structure, used = _frozen(self, tuple(path.items()), tuple(values))
         return structure, {n: v for n, v in values.items() if n in used}
 
@@ -363,19 +363,19 @@ class Structure:
                 }.items()
             ),
         )
-        return shared(structure), frozenset(s.name for s in used)
+        return interned(structure), frozenset(s.name for s in used)
 
 
 _structures: WeakValueDictionary[Keyed[None], Structure] = WeakValueDictionary()
 _partitions: WeakValueDictionary[Keyed[None], Partition] = WeakValueDictionary()
 
 
-def shared(structure: Structure) -> Structure:
-    """The structure in use that is equal to this one, so that they are compared in no time."""
+def interned(structure: Structure) -> Structure:
+    """Return the existing structure equal to this one, so that comparison is by identity."""
     return _structures.setdefault(Keyed(structure.content, None), structure)
 
 
-def _shared_partition(one: Partition) -> Partition:
+def _interned_partition(one: Partition) -> Partition:
     content = (one.structure, tuple(one.interfaces.items()), tuple(one.regions.items()))
     return _partitions.setdefault(Keyed(content, None), one)
 
@@ -413,13 +413,13 @@ def _affine_row(function: sp.Expr, moving: Sequence[sp.Symbol]) -> NDArray[np.fl
 def _rows(
     structure: Structure, known: tuple[sp.Symbol, ...]
 ) -> tuple[Callable[..., list[float]] | None, ...]:
-    """Numbers for the known symbols to the slopes and the constant of each affine interface."""
+    """Functions of the known symbols that return slopes and constant of each affine interface."""
     loose = [z for z in structure.moving if z not in known]
     found: list[Callable[..., list[float]] | None] = []
     for interface in structure.interfaces:
         slopes = [interface.function.diff(z) for z in loose]
         if any(slope.free_symbols & set(loose) for slope in slopes):
-            # may yet be affine at some values
+            # may be affine at some values
             found.append(None)
         else:
             rest = interface.function.subs(dict.fromkeys(loose, 0))
@@ -443,7 +443,7 @@ def read_structure(
     free: tuple[str, ...],
     regions: Mapping[Any, Any],
 ) -> Structure:
-    """Check what the user wrote and find the interfaces in it.
+    """Validate the equations of a model and extract their interfaces.
 
     Raises
     ------
@@ -473,7 +473,7 @@ def read_structure(
     moving = (*moving, TIME)
     for what, written in (("rate of", equations), ("law of", laws)):
         for name, expression in written.items():
-            _refuse_stairs(f"{what} {name}", expression, moving)
+            _reject_step_functions(f"{what} {name}", expression, moving)
     listed = _named_by("interface", interfaces, lambda what, h: _checked(what, h, known))
     found = [Interface(n, _irreducible(n, h, moving)) for n, h in listed.items()]
     shapes = {_shape(i.function, moving) for i in found}
@@ -506,7 +506,7 @@ def read_structure(
 def _named_by(
     what: str, given: Mapping[Any, Any], read_one: Callable[[str, Any], R]
 ) -> dict[str, R]:
-    """What was written, by the names as they are kept."""
+    """Given expressions by their normalised names."""
     names = {name_of(key, what.removesuffix(" of")): value for key, value in given.items()}
     if len(names) < len(given):
         raise ModelError(f"{what} {', '.join(map(str, given))}: two have one name")
@@ -516,22 +516,22 @@ def _named_by(
 def sympified(
     what: str, given: Any, known: Collection[str] = (), *, exact: bool = False
 ) -> sp.Expr:
-    """An expression as it was written in SymPy, or of a text.
+    """Return a SymPy expression, or parse one from text.
 
     Parameters
     ----------
     what : str
-        What it is, for the error.
+        Description for the error message.
     given : Expr, number or str
     known : collection of str
-        Names that may stand in a text; a name that is none of them may be a constant.
+        Names that a text may contain; any other name may be a constant.
     exact : bool
-        Whether decimal numbers in a text become fractions.
+        Convert decimal numbers in a text to fractions.
 
     Raises
     ------
     ModelError
-        For what is no expression.
+        If it is not an expression.
     """
     expression = _sympified(what, given, known, exact)
     if not isinstance(expression, sp.Expr) or expression.is_Matrix:
@@ -540,26 +540,26 @@ def sympified(
 
 
 def _sympified(what: str, given: Any, known: Collection[str], exact: bool = False) -> Any:
-    """What SymPy makes of something, None where it makes nothing of it."""
+    """Convert an object to SymPy; None if it cannot be converted."""
     if isinstance(given, str):
         try:
             return read(given, real, known, exact)
         except ArgumentError as error:
             raise ModelError(f"{what}: {error}") from error
     try:
-        # strictly: SymPy would hand the text of other objects to Python
+        # strict: SymPy would evaluate the text of other objects as Python
         return sp.sympify(given, strict=True)
     except (sp.SympifyError, TypeError, ValueError, AttributeError):
         return None
 
 
 def read_expression(what: str, expression: Any, known: Collection[str] = ()) -> sp.Expr:
-    """An expression in real symbols.
+    """Return an expression in real symbols.
 
     Raises
     ------
     ModelError
-        For what is no expression, or not finite and real.
+        If it is not an expression, or not finite and real.
     """
     written = sympified(what, expression, known)
     written = written.xreplace({s: real(s.name) for s in written.free_symbols})
@@ -571,12 +571,12 @@ def read_expression(what: str, expression: Any, known: Collection[str] = ()) -> 
 def read_condition(
     what: str, condition: Any, known: Collection[str] = (), *, exact: bool = False
 ) -> Boolean:
-    """A condition as it was written in SymPy, or of a text; as `sympified`.
+    """Return a SymPy condition, or parse one from text; parameters as for `sympified`.
 
     Raises
     ------
     ModelError
-        For what is no condition.
+        If it is not a condition.
     """
     written = _sympified(what, condition, known, exact)
     if not isinstance(written, Boolean):
@@ -598,14 +598,14 @@ def _checked(what: str, expression: Any, known: set[str]) -> sp.Expr:
                 f"{what}: {reason}; every symbol is a state, a slow quantity, "
                 "a parameter with a value, or t"
             )
-    # SymPy writes a remainder of 1 into products without brackets
+    # SymPy prints frac in products without brackets
     written = written.replace(sp.frac, lambda argument: argument - sp.floor(argument))
     return with_piecewise(written)
 
 
-def _refuse_stairs(what: str, expression: sp.Expr, moving: Sequence[sp.Symbol]) -> None:
-    """Refuse what jumps without end along a solution."""
-    for part in sorted(expression.atoms(*STAIRS), key=str):
+def _reject_step_functions(what: str, expression: sp.Expr, moving: Sequence[sp.Symbol]) -> None:
+    """Raise for functions with infinitely many jumps along a solution."""
+    for part in sorted(expression.atoms(*STEP_FUNCTIONS), key=str):
         if part.free_symbols & set(moving):
             raise ModelError(
                 f"{what}: {part} jumps at infinitely many values, each of which would be an "
@@ -614,10 +614,10 @@ def _refuse_stairs(what: str, expression: sp.Expr, moving: Sequence[sp.Symbol]) 
 
 
 def _irreducible(name: str, function: sp.Expr, moving: Sequence[sp.Symbol]) -> sp.Expr:
-    """A given interface function as its one factor with zeros, oriented as given."""
+    """The only factor with zeros of a given interface function, oriented as given."""
     parts = factorise(function, moving)
     if len(parts.factors) != 1:
-        names = ", ".join(str(factor) for factor, _ in parts.factors) or "nothing that moves"
+        names = ", ".join(str(factor) for factor, _ in parts.factors) or "no moving symbol"
         raise ModelError(
             f"interface {name}: expected one irreducible switching function, received "
             f"{function}, which vanishes where one of these does: {names}"
@@ -637,13 +637,13 @@ def _checked_condition(what: str, condition: Any, known: set[str]) -> Boolean:
 
 
 def _shape(function: sp.Expr, moving: Sequence[sp.Symbol]) -> sp.Expr:
-    """One expression for all functions with the same zero set up to sign and factor."""
+    """Canonical expression of all functions that are equal up to sign and factor."""
     factors = factorise(function, moving).factors
     return sp.Mul(*(factor for factor, _ in factors)) if factors else function
 
 
 def _written(function: sp.Expr, moving: Sequence[sp.Symbol]) -> str:
-    """A function as it prints, moving symbols first."""
+    """Print a function with moving symbols first."""
     if not isinstance(function, sp.Add):
         return str(function)
     rank = {s: k for k, s in enumerate(moving)}
@@ -659,7 +659,7 @@ def _written(function: sp.Expr, moving: Sequence[sp.Symbol]) -> str:
 
 
 def _name(function: sp.Expr, moving: Sequence[sp.Symbol], taken: set[str]) -> str:
-    """What a function prints, where that is short, else a letter with the next free number."""
+    """The printed function if it is short, else a letter with the next free number."""
     text = _written(function, moving)
     if len(text) <= LONG:
         return text
@@ -670,8 +670,8 @@ def _cell(interfaces: Sequence[Interface], pattern: Pattern) -> Cell:
     return frozenset((i.function, s) for i, s in zip(interfaces, pattern, strict=True))
 
 
-def _idle(j: int, contents: Mapping[Pattern, dict[str, sp.Expr]]) -> bool:
-    """Whether crossing interface j never changes anything."""
+def _redundant(j: int, contents: Mapping[Pattern, dict[str, sp.Expr]]) -> bool:
+    """Check that no expression changes across interface j."""
     pairs = 0
     for pattern, content in contents.items():
         across = (*pattern[:j], -pattern[j], *pattern[j + 1 :])

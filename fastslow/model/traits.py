@@ -1,4 +1,4 @@
-"""What the outcome of a run needs of the equations, beside the steps."""
+"""Properties of the equations that classify the outcome of a run."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Mapping
 import sympy as sp
 
 from fastslow.errors import ModelError
-from fastslow.model.derived import once, partition_of, sloped
-from fastslow.model.invariance import factor_states, states_together
+from fastslow.model.derived import cached_by, partition_of, with_slopes
+from fastslow.model.invariance import invariant_states, jointly_invariant_states
 from fastslow.model.model import Model
 from fastslow.model.recurrences import scalar_code
 from fastslow.model.structure import TIME, real
 from fastslow.results.stored.model import Traits
 
 
-@once(sloped)
+@cached_by(with_slopes)
 def traits_of(model: Model) -> Traits:
-    """The traits of a model.
+    """Return the traits of a model.
 
     Parameters
     ----------
@@ -30,20 +30,20 @@ def traits_of(model: Model) -> Traits:
     >>> traits.vanishing, traits.names, traits.growth
     (('x',), ('k',), (('p0 - y1',),))
     """
-    vanishing, together, names, growth = _lasting(model)
+    vanishing, together, names, growth = _invariant_growth(model)
     functions = [i.function for i in model.interfaces.values()]
     rising = tuple(_growth(model, function) for function in functions)
     return Traits(vanishing, together, names, growth, _parallel(model), rising)
 
 
-@once(partition_of)
-def _lasting(
+@cached_by(partition_of)
+def _invariant_growth(
     model: Model,
 ) -> tuple[
     tuple[str, ...], tuple[tuple[str, ...], ...], tuple[str, ...], tuple[tuple[str, ...], ...]
 ]:
-    """States that stay zero, and how they grow there."""
-    vanishing, together = factor_states(model), states_together(model)
+    """States that remain zero, and their growth rates there."""
+    vanishing, together = invariant_states(model), jointly_invariant_states(model)
     rates = [
         [
             region.rates[name]
@@ -63,7 +63,7 @@ def _lasting(
 
 
 def text_of(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
-    """An expression as text in canonical names, empty where it has none."""
+    """Return an expression as text in canonical names, empty if it has none."""
     try:
         return scalar_code(expression.xreplace({s: real(n) for s, n in names.items()}))
     except ModelError:
@@ -71,7 +71,7 @@ def text_of(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
 
 
 def first_slope(model: Model, function: sp.Expr) -> sp.Expr | None:
-    """Slope of an interface function by the first symbol in it that moves, if there is one."""
+    """Return the derivative of an interface function by its first moving symbol, if any."""
     for symbol in model.structure.moving:
         if symbol in function.free_symbols:
             return function.diff(symbol)
@@ -79,7 +79,7 @@ def first_slope(model: Model, function: sp.Expr) -> sp.Expr | None:
 
 
 def _parallel(model: Model) -> bool:
-    """Whether there are two interfaces that differ by a constant, apart from a factor."""
+    """Check whether the two interfaces of a model are equal up to a constant and a factor."""
     if len(model.interfaces) != 2:
         return False
     one, other = (i.function for i in model.interfaces.values())
@@ -93,7 +93,7 @@ def _parallel(model: Model) -> bool:
 
 
 def _growth(model: Model, function: sp.Expr) -> int:
-    """Whether the first state in an interface function raises or lowers it."""
+    """Sign of the derivative of an interface function by its first state."""
     slope = first_slope(model, function)
     rate = sp.Integer(1) if slope is None else slope.subs(model.values)
     return -1 if rate.is_number and rate.is_negative else 1

@@ -1,4 +1,4 @@
-"""A model as LaTeX."""
+"""Typesetting of models in LaTeX."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Law = tuple[str, sp.Expr]
 def equations_text(
     rates: tuple[Law, ...], forcing: tuple[Law, ...], periodic: tuple[Law, ...] = ()
 ) -> str:
-    """Rates, laws of slow quantities and periods of states, one a line; written once."""
+    """Return rates, laws of slow quantities and periods of states as text, one per line."""
     lines = [f"{name}' = {rate}" for name, rate in rates]
     lines += [f"{name} = {law}" for name, law in forcing]
     return "\n".join([*lines, *(f"{name} modulo {period}" for name, period in periodic)])
 
 
-#: What LaTeX reads as more than a character, and how the character is written.
+#: Escape sequences of characters that are special in LaTeX.
 _ESCAPED = {
     "\\": r"\textbackslash{}",
     "^": r"\textasciicircum{}",
@@ -36,7 +36,7 @@ _ESCAPED = {
 
 
 def latex(expression: Any) -> str:
-    r"""An expression in LaTeX; a symbol whose name is no identifier is written as text.
+    r"""Return an expression in LaTeX; a symbol whose name is not an identifier is set as text.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def latex(expression: Any) -> str:
 
 
 def latex_text(name: str) -> str:
-    r"""A name as text of LaTeX, on one line.
+    r"""Return a name as LaTeX text, on one line.
 
     Examples
     --------

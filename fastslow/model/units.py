@@ -1,4 +1,4 @@
-"""Natural units of the states and parameters of a model, read off its equations."""
+"""Natural units of the states and parameters of a model, from its equations."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def natural_units(
     functions: Iterable[sp.Expr],
     values: Mapping[sp.Symbol, float],
 ) -> dict[str, float]:
-    """Units in which the terms of each sum in the equations are of comparable size.
+    """Return units in which the terms of each sum in the equations have comparable size.
 
     The logarithms of the units solve a linear least-squares problem: every term of a
     sum has the magnitude of the sum, and the argument of a transcendental function
@@ -35,13 +35,13 @@ def natural_units(
     Morgan (1987), which centres the logarithms of the coefficients, to other
     expressions. A state measured in another unit has its natural unit multiplied
     by the same factor, up to rounding to a power of two, so tolerances in
-    these units do not depend on the units of the model. A quantity whose size the
-    equations leave open, as in linear homogeneous rates, has unit 1.
+    these units do not depend on the units of the model. A quantity whose size is not
+    determined by the equations, as in linear homogeneous rates, has unit 1.
 
     Parameters
     ----------
     names : sequence of str
-        States and parameters; the unit of one with a value is its size.
+        States and parameters; the unit of a parameter with a value is its magnitude.
     regions : iterable of Region
     functions : iterable of sympy.Expr
         Switching functions.
@@ -75,7 +75,7 @@ def unit_equations(
     functions: Iterable[sp.Expr],
     values: Mapping[sp.Symbol, float],
 ) -> UnitEquations:
-    """The equations that `natural_units` solves, which hold at other parameter values too."""
+    """Return the equations that `natural_units` solves, valid for other parameter values too."""
     rates = (r for region in regions for r in (*region.rates.values(), *region.forcing.values()))
     expressions = (*rates, *functions)
     unknowns = tuple(n for n in names if real(n) not in values)
@@ -99,9 +99,9 @@ def _equations(
     gone: frozenset[sp.Symbol],
     fixed: tuple[tuple[sp.Symbol, float], ...],
 ) -> UnitEquations:
-    """The equations for all values of the parameters but those in exponents.
+    """Equations for all values of the parameters except those in exponents.
 
-    ``gone`` are the parameters that are too small or too large to count.
+    ``gone`` are the parameters of negligible or infinite size.
     """
     sums = _Sums(
         {real(n): n for n in unknowns},
@@ -130,14 +130,14 @@ def _equations(
     )
 
 
-#: A logarithm to base two as a linear form: unknown, number of a parameter or constant to its
+#: A logarithm to base two as a linear form: unknown, parameter index or constant to its
 #: coefficient.
 _Form = dict[str, float]
 
 
 @dataclass
 class _Sums:
-    """The equations that the magnitudes of the terms of every sum obey."""
+    """Equations for the magnitudes of the terms of every sum."""
 
     unknowns: dict[sp.Symbol, str]
     parameters: Mapping[sp.Symbol, _Form | None]
@@ -146,7 +146,7 @@ class _Sums:
     known: dict[sp.Expr, _Form | None] = field(default_factory=dict)
 
     def magnitude(self, expression: sp.Expr) -> _Form | None:
-        """The logarithm of the size of an expression; None where it is zero or unknown."""
+        """Return the logarithm of the size of an expression; None if it is zero or unknown."""
         if expression not in self.known:
             self.known[expression] = self._form(expression)
         return self.known[expression]

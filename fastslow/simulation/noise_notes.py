@@ -41,7 +41,7 @@ def with_noise(
         States that their rates have as a factor: only of those, and of those that vanish
         together, it is known what they leave.
     together : tuple of tuple of str
-        See `states_together`.
+        See `jointly_invariant_states`.
     steps : ndarray, shape (N, 4)
         Time, length and mode of every step, and at last of the end.
     columns : dict

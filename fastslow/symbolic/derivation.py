@@ -1,4 +1,4 @@
-"""The derivation of a frozen model: every region, and what joins them."""
+"""Symbolic derivation of the equilibria and bifurcations of a frozen model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastslow.model.structure import TIME, real
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.closed_forms.boundaries import BoundaryForm, boundary_forms
 from fastslow.symbolic.closed_forms.conserved import ConservedQuantity, conserved_quantities
-from fastslow.symbolic.closed_forms.critical import Setting
+from fastslow.symbolic.closed_forms.critical import RegionContext
 from fastslow.symbolic.closed_forms.equilibrium_sets import (
     EDGE,
     EquilibriumSetForm,
@@ -26,7 +26,7 @@ from fastslow.symbolic.closed_forms.forms import Continuum, CriticalPoint
 from fastslow.symbolic.closed_forms.regions import RegionForms, derive_region
 from fastslow.symbolic.closed_forms.symmetries import FreeDirection, free_directions
 from fastslow.symbolic.signs.assumptions import read_signs
-from fastslow.symbolic.signs.inequalities import needed
+from fastslow.symbolic.signs.inequalities import irredundant
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.candidates import Candidates
 from fastslow.symbolic.solving.verification import weakest
@@ -34,25 +34,25 @@ from fastslow.symbolic.solving.verification import weakest
 
 @dataclass(frozen=True)
 class Derivation:
-    """What SymPy derives from a frozen model.
+    """Equilibria, stability and bifurcations of a frozen model in closed form.
 
     Parameters
     ----------
     states : tuple of str
     free : tuple of str
-        The frozen slow quantities.
+        Frozen slow quantities.
     assumptions : tuple of relations
-        Signs of parameters that were assumed, such as D > 0.
+        Assumed signs of parameters, such as D > 0.
     regions : NamedMapping of RegionForms
-        Also reached as ``law["S1"]``.
+        Regions can also be accessed as ``derivation["S1"]``.
     boundary_equilibria : tuple of BoundaryForm
-        By interface.
+        Equilibria on interfaces.
     equilibrium_sets : tuple of EquilibriumSetForm
-        Sets of equilibria within discontinuities, such as a sticking band.
+        Sets of pseudo-equilibria on discontinuities, such as a sticking band.
     free_directions : tuple of FreeDirection
-        Shifts of the states that leave every rate as it is, with the reduction without them.
+        Translations of the states under which all rates are invariant, with the reduction.
     conserved_quantities : tuple of ConservedQuantity
-        Linear combinations of the states that never change, with the reduction by them.
+        Linear combinations of the states that are constant, with the reduction.
     """
 
     states: tuple[str, ...]
@@ -75,32 +75,32 @@ class Derivation:
 
     @property
     def folds(self) -> tuple[CriticalPoint, ...]:
-        """Of all regions."""
+        """Folds of all regions."""
         return tuple(p for r in self.regions.values() for p in r.folds)
 
     @property
     def hopf(self) -> tuple[CriticalPoint, ...]:
-        """Of all regions."""
+        """Hopf points of all regions."""
         return tuple(p for r in self.regions.values() for p in r.hopf)
 
     @property
     def continua(self) -> tuple[Continuum, ...]:
-        """Of all regions."""
+        """Continua of equilibria of all regions."""
         return tuple(c for r in self.regions.values() for c in r.continua)
 
     @property
     def verified(self) -> bool:
-        """Whether every complete closed form satisfies its equations on substitution."""
+        """True if every complete closed form satisfies its equations on substitution."""
         return bool(self.check)
 
     @property
     def check(self) -> str:
-        """How that is known: ``"exact"``, else ``"50 digits"`` (at points), or empty."""
+        """Method of verification: ``"exact"``, ``"50 digits"`` (at points), or empty for none."""
         points = [b.check for b in self.boundary_equilibria if not b.equations]
         return weakest([*(r.check for r in self.regions.values()), *points])
 
     def to_latex(self) -> str:
-        """All of it as LaTeX paragraphs with displayed formulas."""
+        """Return the derivation as LaTeX paragraphs with displayed formulas."""
         from fastslow.symbolic.report.typesetting import derivation_latex
 
         return derivation_latex(self)
@@ -120,27 +120,29 @@ class Derivation:
 def derive(model: Model, assume: Any = None, *, parameter: Any = None) -> Derivation:
     """Derive equilibria, stability, folds and boundary equilibria in closed form.
 
-    Signs of parameters are assumed as they are at the model's values and are
-    listed with the result. Conditions that hold or fail only because of such a
-    sign are given in general (``A < -D**2``), with ``possible`` saying what the
-    assumptions make of them. Signs of the parameters in interfaces are kept.
+    Parameters are assumed to have the signs of their values; the assumptions are
+    listed in the result. Conditions that are true or false only because of such a
+    sign are given in general form (``A < -D**2``), and ``possible`` states whether
+    they are compatible with the assumptions. Signs of the parameters in interfaces
+    are always assumed.
 
     Parameters
     ----------
     model : Model
         A frozen model, or one without forcing and slow states.
     assume : mapping, relation, str or an iterable of these, optional
-        Signs in place of those of the values: ``{"A": "negative"}``, ``"A < 0"``,
-        ``"A < -D**2"``; the word ``"real"`` assumes nothing.
+        Assumptions that override the signs of the values: ``{"A": "negative"}``,
+        ``"A < 0"``, ``"A < -D**2"``; ``"real"`` removes the sign of a parameter.
     parameter : str or Symbol, optional
-        What equilibria, folds, Hopf points and boundary equilibria are solved for first,
-        wherever that is possible in closed form. Default: the frozen slow quantities.
+        Parameter for which equilibria, folds, Hopf points and boundary equilibria are
+        solved first, where this is possible in closed form. Default: the frozen slow
+        quantities.
 
     Returns
     -------
     Derivation
-        Past a structural budget (degree, number of terms) a form stays
-        implicit and its note says so; the time taken plays no part.
+        Beyond a structural budget (degree, number of terms) a form remains implicit,
+        with a note; the result does not depend on computing time.
 
     Raises
     ------
@@ -152,9 +154,9 @@ def derive(model: Model, assume: Any = None, *, parameter: Any = None) -> Deriva
     Examples
     --------
     >>> x, w, k = sp.symbols("x w k")
-    >>> law = derive(Model({x: w - k * x**3}, forcing={w: sp.sin(sp.Symbol("t"))},
+    >>> found = derive(Model({x: w - k * x**3}, forcing={w: sp.sin(sp.Symbol("t"))},
     ...     parameters={k: 2}).frozen())
-    >>> law["S1"].equilibria[0].parameter["w"], law.assumptions
+    >>> found["S1"].equilibria[0].parameter["w"], found.assumptions
     (k*x**3, (k > 0,))
     >>> cubic = Model({x: w - k * x**3}, forcing={w: sp.sin(sp.Symbol("t"))}, parameters={k: 2})
     >>> derive(cubic.frozen(), parameter="k")["S1"].equilibria[0].parameter
@@ -163,24 +165,26 @@ def derive(model: Model, assume: Any = None, *, parameter: Any = None) -> Deriva
     slow = (*model.forcing, *model.slow_states)
     if slow:
         raise ArgumentError(
-            f"derive: {', '.join(slow)} still {'move' if len(slow) > 1 else 'moves'} in time; "
+            f"derive: {', '.join(slow)} still {'vary' if len(slow) > 1 else 'varies'} in time; "
             "expected a frozen model: derive(model.frozen())"
         )
     for name, rate in model.rates.items():
         if TIME in rate.free_symbols:
-            raise ArgumentError(f"derive: the rate of {name} contains time; expected none")
+            raise ArgumentError(
+                f"derive: the rate of {name} depends on time; expected an autonomous model"
+            )
     signs = read_signs(model.parameters, assume)
     functions = {n: _exact(i.function) for n, i in model.interfaces.items()}
-    settings = _settings(model, functions, signs, _candidates(model, parameter))
+    contexts = _contexts(model, functions, signs, _candidates(model, parameter))
     boundary: list[BoundaryForm] = []
     for name, function in functions.items():
         for above, below in _pairs(model, name):
-            sides = (settings[above], settings[below])
+            sides = (contexts[above], contexts[below])
             boundary += boundary_forms(name, function, sides, model.continuous[name])
     sets = equilibrium_set_forms(model, signs, _exact)
     found = tuple(b for b in dict.fromkeys(boundary) if not _always(b, sets))
     regions = {
-        name: _with_edges(derive_region(setting, found), sets) for name, setting in settings.items()
+        name: _with_edges(derive_region(context, found), sets) for name, context in contexts.items()
     }
     named = NamedMapping("region", regions)
     return Derivation(
@@ -200,22 +204,22 @@ def _edge(
     state: NamedMapping[sp.Expr],
     parameters: NamedMapping[sp.Expr],
 ) -> EquilibriumSetForm | None:
-    """The set on whose edge a state is, if there is one."""
+    """Return the equilibrium set on whose boundary a state is, if any."""
     return next((one for one in sets if one.on_edge(state, parameters)), None)
 
 
 def _always(form: BoundaryForm, sets: Sequence[EquilibriumSetForm]) -> bool:
-    """Whether a boundary equilibrium is the edge of a set, and at no certain parameter value."""
+    """Check that a boundary equilibrium bounds an equilibrium set for all parameter values."""
     if form.equations or _edge(sets, form.state, form.parameters) is None:
         return False
-    # a parameter that stands for itself stays free
+    # a parameter equal to its own symbol is free
     fixed = [e for n, e in form.parameters.items() if e != real(n)]
     used = set().union(set(), *(e.free_symbols for e in fixed))
     return not fixed or bool(used & {real(n) for n in form.state})
 
 
 def _with_edges(region: RegionForms, sets: Sequence[EquilibriumSetForm]) -> RegionForms:
-    """A region whose equilibria say of which sets they are edges."""
+    """Return a region whose equilibria are marked as edges of equilibrium sets."""
     forms = []
     for form in region.equilibria:
         closed = form.kind != "implicit" and not form.conditions
@@ -226,7 +230,7 @@ def _with_edges(region: RegionForms, sets: Sequence[EquilibriumSetForm]) -> Regi
 
 
 def _candidates(model: Model, parameter: Any) -> Candidates:
-    """Parameters to solve for: the one asked for, the frozen slow quantities, the others."""
+    """Parameters to solve for: the given one, the frozen slow quantities, all others."""
     valid = [*model.free, *(n for n in model.parameters if n not in model.free)]
     first = list(model.free)
     if parameter is not None:
@@ -237,18 +241,18 @@ def _candidates(model: Model, parameter: Any) -> Candidates:
     return Candidates(tuple(map(real, first)), tuple(map(real, others)))
 
 
-def _settings(
+def _contexts(
     model: Model, functions: dict[str, sp.Expr], signs: Signs, candidates: Candidates
-) -> dict[str, Setting]:
+) -> dict[str, RegionContext]:
     moving = {real(n) for n in (*model.states, *model.free)}
     used = set().union(set(), *(h.free_symbols for h in functions.values()))
     geometry = tuple(sorted(used - moving, key=lambda s: s.name))
-    settings = {}
+    contexts = {}
     for name, region in model.regions.items():
         written = [region.signs[i] * functions[i] for i in functions]
         forms = dict(zip(map(sp.expand, written), written, strict=True))
-        inside = tuple(needed(tuple(forms), signs))
-        settings[name] = Setting(
+        inside = tuple(irredundant(tuple(forms), signs))
+        contexts[name] = RegionContext(
             name,
             model.states,
             NamedMapping("state", {s: _exact(region.rates[s]) for s in model.states}),
@@ -258,11 +262,11 @@ def _settings(
             geometry,
             tuple(forms[e] for e in inside),
         )
-    return settings
+    return contexts
 
 
 def _pairs(model: Model, interface: str) -> list[tuple[str, str]]:
-    """Regions that differ in one interface alone, the one where it is positive first."""
+    """Pairs of regions that differ in one interface, the one where it is positive first."""
     return [
         (one.name, other.name)
         for one in model.regions.values()
@@ -273,5 +277,5 @@ def _pairs(model: Model, interface: str) -> list[tuple[str, str]]:
 
 
 def _exact(expression: sp.Expr) -> sp.Expr:
-    """With rational numbers in place of floats, so that polynomials factor."""
+    """Replace floats by rational numbers, so that polynomials factor."""
     return sp.nsimplify(expression, rational=True) if expression.has(sp.Float) else expression

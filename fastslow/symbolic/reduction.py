@@ -1,4 +1,4 @@
-"""Fewer states by symmetry: rates of combinations that form a system of their own."""
+"""Reduction of a system by a symmetry or by conserved quantities."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def reduce_states(
     *,
     conserved: Mapping[Any, Any] | None = None,
 ) -> NamedMapping[sp.Expr]:
-    """Rates of linear combinations of states, where these need no other state.
+    """Return the rates of linear combinations of states that form a closed system.
 
     Parameters
     ----------
@@ -30,8 +30,8 @@ def reduce_states(
     combinations : mapping
         New state to a linear combination of the old ones.
     conserved : mapping, optional
-        New parameter to a linear combination of the old states whose rate is zero; the
-        parameter is its value.
+        New parameter to a conserved linear combination of the old states, of which it is
+        the value.
 
     Returns
     -------
@@ -41,8 +41,8 @@ def reduce_states(
     Raises
     ------
     ArgumentError
-        If a combination is not linear, they are dependent, or their rates need another state,
-        and if what is given as conserved is not.
+        If a combination is not linear, if the combinations are linearly dependent or not
+        closed, or if a quantity in ``conserved`` is not conserved.
 
     Examples
     --------
@@ -59,7 +59,9 @@ def reduce_states(
     states = list(known.values())
     for symbol in totals:
         if symbol in new or symbol in states:
-            raise ArgumentError(f"{symbol} is a state; expected a new name for what is conserved")
+            raise ArgumentError(
+                f"{symbol} is a state; expected a new name for the conserved quantity"
+            )
     every = {**new, **totals}
     matrix = sp.Matrix([[e.diff(s) for s in states] for e in every.values()])
     if matrix.free_symbols & set(states):
@@ -70,11 +72,11 @@ def reduce_states(
             raise ArgumentError(f"{symbol} = {expression} is not conserved; its rate is {rate}")
     _, pivots = matrix.rref()
     if len(pivots) < len(every):
-        raise ArgumentError("the combinations depend on one another")
+        raise ArgumentError("the combinations are linearly dependent")
     kept = [states[k] for k in pivots]
     rest = [e.subs(dict.fromkeys(kept, 0), simultaneous=True) for e in every.values()]
     block = matrix.extract(list(range(len(every))), list(pivots))
-    # a new state may have the name of an old one
+    # new states may have names of old ones
     aside = {s: sp.Dummy(s.name, real=True) for s in every}
     values = [aside[s] - r for s, r in zip(every, rest, strict=True)]
     solution = block.inv() * sp.Matrix(values)
@@ -88,8 +90,8 @@ def reduce_states(
         others = sorted(rate.free_symbols & set(states), key=lambda s: s.name)
         if others:
             raise ArgumentError(
-                f"the rate of {symbol} = {expression} needs {', '.join(map(str, others))} as well; "
-                "add a combination that gives it"
+                f"the rate of {symbol} = {expression} also depends on "
+                f"{', '.join(map(str, others))}; add a combination that contains it"
             )
         reduced[symbol.name] = rate.xreplace(back)
     return NamedMapping("state", reduced)
@@ -100,7 +102,7 @@ def _real(expression: Any) -> sp.Expr:
 
 
 def _arguments_expanded(expression: sp.Expr) -> sp.Expr:
-    """Arguments of functions and of conditions expanded, so that what cancels does."""
+    """Expand the arguments of functions and conditions, so that terms cancel."""
     return sp.sympify(
         expression.replace(
             lambda e: (

@@ -1,4 +1,4 @@
-"""Scales that make chosen coefficients one, and what becomes of the parameters."""
+"""Nondimensionalisation: scales that normalise chosen coefficients to one."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import Any
 
 import sympy as sp
 
-from fastslow.arguments import formula, instance, items, mapping, refusal, text, validated
+from fastslow.arguments import formula, instance, items, mapping, refusal, validated, text
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real, sympified
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.symbolic.solving.algebra import light, spread
+from fastslow.symbolic.solving.algebra import spread, within_budget
 from fastslow.symbolic.solving.verification import vanishes
 
 
 def scale_symbol(name: str) -> sp.Symbol:
-    """Give the positive symbol that stands for a scale while it is sought."""
+    """Return the positive symbol of a scale."""
     return sp.Symbol(f"{name}_s", positive=True)
 
 
@@ -29,13 +29,13 @@ class Scaling:
     Parameters
     ----------
     time : sympy.Expr
-        The scale of time.
+        Scale of time.
     scales : NamedMapping of sympy.Expr
-        Of every state and slow quantity.
+        Scale of every state and slow quantity.
     regions : NamedMapping
-        Region name to the smooth rates of the scaled states in scaled time.
+        Region name to the rates of the scaled states in scaled time.
     interfaces : NamedMapping of sympy.Expr
-        Each switching function in scaled quantities, divided by its own scale.
+        Each switching function in scaled quantities, normalised.
     forcing : NamedMapping of sympy.Expr
         Law of each scaled slow quantity in scaled time.
     """
@@ -55,23 +55,23 @@ def nondimensionalise(
     region: str | None = None,
     replace: Mapping[Any, Any] | None = None,
 ) -> Scaling:
-    """Find the scales that make chosen coefficients one, and scale the model with them.
+    """Nondimensionalise a model such that chosen coefficients become one.
 
-    Every state, every slow quantity and time gets a scale. A coefficient is a
-    product of powers of scales, so that the conditions are linear in the
+    Every state, every slow quantity and time has a scale. The coefficients are
+    products of powers of the scales, so that the conditions are linear in the
     logarithms of the scales and are solved exactly.
 
     Parameters
     ----------
     model : Model
     unit_coefficients : iterable of (state, term)
-        The coefficient of the term (a product of states and slow quantities)
-        in the scaled rate of the state is to be one in size.
+        Terms (products of states and slow quantities) whose coefficients in the
+        scaled rates of the states are normalised to ±1.
     region : str, optional
-        Whose rates are meant; the first region by default.
+        Region of these rates; the first by default.
     replace : mapping, optional
-        Parameters to expressions that may hold scales (``theta_s`` for theta), to study
-        what a wrongly scaled factor does.
+        Parameters to expressions that may contain scales (``theta_s`` for theta), to study
+        the effect of a wrongly scaled factor.
 
     Returns
     -------
@@ -80,8 +80,8 @@ def nondimensionalise(
     Raises
     ------
     ArgumentError
-        If a term is missing from its rate, or the conditions leave a scale open
-        or contradict.
+        If a term is missing from its rate, or the conditions do not determine
+        every scale or are inconsistent.
     UnknownNameError
         For a state or region that the model does not have.
 
@@ -166,14 +166,14 @@ def _formula(given: Any, known: Collection[str]) -> sp.Expr:
 
 
 def _coefficient(rate: sp.Expr, monomial: sp.Expr, quantities: Iterable[sp.Symbol]) -> sp.Expr:
-    """Size of the coefficient of a monomial, as one product."""
+    """Absolute value of the coefficient of a monomial, as one product."""
     moving = list(quantities)
     total = sp.S.Zero
     for term in sp.Add.make_args(sp.expand(rate)):
         constant, rest = term.as_independent(*moving)
         if rest == monomial:
             total += constant
-    size = sp.powsimp(sp.factor(sp.together(total))) if light(total) else total
+    size = sp.powsimp(sp.factor(sp.together(total))) if within_budget(total) else total
     return sp.Mul(*(-f if f.is_negative else f for f in sp.Mul.make_args(size)))
 
 
@@ -184,7 +184,7 @@ def _solved(rows: list[list[sp.Expr]], sides: list[sp.Expr], names: list[str]) -
     if len(pivots) < len(names):
         loose = [n for k, n in enumerate(names) if k not in pivots]
         raise ArgumentError(
-            f"the conditions leave the scale of {', '.join(loose)} open; expected "
+            f"the conditions do not determine the scale of {', '.join(loose)}; expected "
             f"{len(names)} independent coefficients, received {len(rows)}"
         )
     if len(rows) > len(names):
@@ -199,7 +199,7 @@ def _solved(rows: list[list[sp.Expr]], sides: list[sp.Expr], names: list[str]) -
 
 
 def _unit(function: sp.Expr, moving: Iterable[sp.Symbol]) -> sp.Expr:
-    """Give a switching function divided by the coefficient of its first moving term."""
+    """Divide a switching function by the coefficient of its first moving term."""
     for symbol in moving:
         slope = sp.expand(function).diff(symbol)
         if slope != 0 and symbol not in slope.free_symbols:
@@ -208,21 +208,21 @@ def _unit(function: sp.Expr, moving: Iterable[sp.Symbol]) -> sp.Expr:
 
 
 def _neat(expression: sp.Expr) -> sp.Expr:
-    """Powers of positive symbols gathered, each term on its own."""
+    """Collect powers of positive symbols, term by term."""
     terms = [sp.powdenest(sp.powsimp(t)) for t in sp.Add.make_args(sp.expand(expression))]
     return sp.Add(*terms)
 
 
 @dataclass(frozen=True)
 class Identification:
-    """A scaled model compared with a dimensionless one, term by term.
+    """Comparison of a scaled model with a dimensionless one, term by term.
 
     Parameters
     ----------
     values : NamedMapping of sympy.Expr
         Parameter of the target to its expression in those of the scaled model.
     contradictions : tuple of sympy.Expr
-        What would have to vanish besides; empty where the two agree.
+        Further expressions that would have to vanish; empty if the models agree.
     """
 
     values: NamedMapping[sp.Expr]
@@ -230,6 +230,7 @@ class Identification:
 
     @property
     def agrees(self) -> bool:
+        """True if the models agree."""
         return not self.contradictions
 
 
@@ -240,16 +241,16 @@ def identify(
     *,
     regions: Mapping[str, str] | None = None,
 ) -> Identification:
-    """Read the parameters of a dimensionless model off a scaled one.
+    """Identify the parameters of a dimensionless model with those of a scaled one.
 
-    Rates, interfaces and laws are compared coefficient by coefficient.
+    Coefficients of rates, interfaces and laws of slow quantities are compared.
 
     Parameters
     ----------
     scaling : Scaling
     target : Model
     names : mapping
-        Quantity of the scaled model to that of the target; interfaces follow.
+        Quantity of the scaled model to that of the target.
     regions : mapping, optional
         Region of the scaled model to that of the target; the same name by default.
 
@@ -297,7 +298,7 @@ def _coefficients(difference: sp.Expr, moving: Iterable[sp.Symbol]) -> list[sp.E
 
 
 def _law_gaps(law: sp.Expr, other: sp.Expr) -> list[sp.Expr]:
-    """Amplitudes and arguments of two laws in time compared, term by term."""
+    """Differences of the amplitudes and arguments of two laws in time, term by term."""
     gaps = []
     mine, yours = _waves(law), _waves(other)
     for kind in dict.fromkeys([*mine, *yours]):
@@ -308,7 +309,7 @@ def _law_gaps(law: sp.Expr, other: sp.Expr) -> list[sp.Expr]:
 
 
 def _waves(law: sp.Expr) -> dict[Any, tuple[sp.Expr, sp.Expr]]:
-    """Terms of a law by the function of time in them: (amplitude, its argument)."""
+    """Map each function of time in a law to its amplitude and argument."""
     found: dict[Any, tuple[sp.Expr, sp.Expr]] = {}
     for term in sp.Add.make_args(sp.expand(law)):
         amplitude, wave = term.as_independent(TIME)
@@ -322,7 +323,7 @@ def _waves(law: sp.Expr) -> dict[Any, tuple[sp.Expr, sp.Expr]]:
 def _matched(
     gaps: list[sp.Expr], unknowns: list[sp.Symbol]
 ) -> tuple[dict[sp.Symbol, sp.Expr], list[sp.Expr]]:
-    """Solve the gaps one unknown at a time, the plainest first; what is left must vanish."""
+    """Solve the residuals for one unknown at a time; return the values and what remains."""
     values: dict[sp.Symbol, sp.Expr] = {}
     left = [sp.expand(g.subs(TIME, 1)) for g in gaps]
     while True:
@@ -344,7 +345,7 @@ def _matched(
 
 @validated(one=mapping, other=mapping)
 def compare_scalings(one: Mapping[str, Any], other: Mapping[str, Any]) -> NamedMapping[sp.Expr]:
-    """Ratios, other to one, of the entries of two scalings that differ.
+    """Return the ratios, other to one, of the entries in which two scalings differ.
 
     Parameters
     ----------
@@ -354,12 +355,12 @@ def compare_scalings(one: Mapping[str, Any], other: Mapping[str, Any]) -> NamedM
     Returns
     -------
     NamedMapping of sympy.Expr
-        Empty where both agree identically.
+        Empty if both agree identically.
 
     Raises
     ------
     UnknownNameError
-        If one has an entry that the other has not.
+        If ``other`` lacks an entry of ``one``.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Ready-made models: the harmonic gear and classics of the field, each with its source."""
+"""Ready-made models with their sources, and the slow-load criterion for gaps."""
 
 from fastslow.results.trajectory.slow_loads import SlowLoad
 from fastslow.systems.classics import (

@@ -1,4 +1,4 @@
-"""Smooth classics of bifurcation and fast-slow analysis."""
+"""Classical smooth models of bifurcation theory and fast-slow dynamics."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fastslow.model.model import Model
 
 
 def cusp(q: float = 1.0, a: float = 1.0, omega: float = 0.01) -> Model:
-    """The cusp normal form under a slow load: x' = p + q x − x³, p = a sin(ω t).
+    """The cusp normal form under slow forcing: x' = p + q x − x³, p = a sin(ω t).
 
     For q > 0 the frozen model has folds at p = ±2 (q/3)^(3/2), x = ∓√(q/3).
 
@@ -80,7 +80,7 @@ def van_der_pol(mu: float = 1.0, B: float = 0.0, C: float = 2.0, omega: float = 
 
 
 def van_der_pol_relaxation(a: float = 0.0, epsilon: float = 0.01) -> Model:
-    """The van der Pol oscillator in Liénard form, with a slow state.
+    """The van der Pol oscillator in Liénard form, a relaxation oscillator with one slow state.
 
     x' = y − x³/3 + x, y' = ε (a − x). The frozen model over y has folds at
     x = ±1, y = ∓2/3.

@@ -1,4 +1,4 @@
-"""Gears with a dead zone: the harmonic gear, dimensionless and from physical values, and a pair."""
+"""Gears with backlash: the harmonic gear and a spur gear pair."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SCALINGS = ("consistent", "printed")
 
 
 def dead_zone(x: sp.Expr, D: sp.Expr) -> sp.Expr:
-    """Piecewise linear: x − D for x > D, x + D for x < −D, and 0 between."""
+    """Return the dead-zone function: x − D for x > D, x + D for x < −D, and 0 between."""
     return sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
 
 
@@ -74,7 +74,7 @@ def harmonic_gear(
 
 @dataclass(frozen=True)
 class GearScales:
-    """What the harmonic gear's physical quantities are measured in.
+    """Physical scales of the harmonic gear.
 
     Parameters
     ----------
@@ -83,9 +83,9 @@ class GearScales:
     damping : float
         C_eq = 2 ξ √(J_eq K_HD), N m s/rad.
     time : float
-        t_s = J_eq/C_eq, s: dimensionless time 1.
+        t_s = J_eq/C_eq, s: unit of dimensionless time.
     angle : float
-        θ_s, rad: the twist of x = 1.
+        θ_s, rad: twist at x = 1.
     """
 
     inertia: float
@@ -113,12 +113,12 @@ def gear_scales(
     K_HD: float = 7200.0,
     k2: float = 21000.0,
 ) -> GearScales:
-    """Equivalent inertia and damping, and the scales of time and twist.
+    """Return the equivalent inertia and damping, and the scales of time and twist.
 
     Parameters
     ----------
     scaling : {"consistent", "printed"}
-        θ_s = C_eq/√(k2 J_eq), or the one that the printed numbers imply,
+        θ_s = C_eq/√(k2 J_eq), or the scale implied by the printed parameters,
         θ_s = C_eq²/(k2 J_eq).
     J_i, J_o : float
         Inertias of the input and the output side, kg m².
@@ -183,7 +183,7 @@ def harmonic_gear_from_physical(
     omega: float = 0.5,
     D: float | None = None,
 ) -> Model:
-    """The dimensionless harmonic gear with the parameters that physical values give.
+    """The dimensionless harmonic gear with parameters computed from physical values.
 
     Two inertias joined by a shaft with clearance, relative twist θ = θ_o − θ_i/N,
 
@@ -197,15 +197,15 @@ def harmonic_gear_from_physical(
 
     The source prints A = k1 k2 J_eq²/C_eq⁴, B = k2 J_eq² T_m/C_eq⁴ and
     C = k2 J_eq³ T_am/(C_eq⁴ J_o). All three follow if the factor θ_s in
-    f_h(θ) = θ_s f(x) is forgotten, and then θ_s = C_eq²/(k2 J_eq); a radian has
-    no dimension, so units do not show the slip. ``scaling="printed"`` gives
-    those values. Only the consistent D lies in the range that the source
+    f_h(θ) = θ_s f(x) is omitted, with θ_s = C_eq²/(k2 J_eq); as the radian is
+    dimensionless, the error does not show in the units. ``scaling="printed"`` gives
+    these values. Only the consistent D lies in the range that the source
     studies, 0.1 to 0.5.
 
     Parameters
     ----------
     scaling : {"consistent", "printed"}
-        Which of the two.
+        The scaling derived from the equations, or that printed in the source.
     J_i, J_o, N, xi, K_HD, k2 : float
         As for `gear_scales`.
     k1 : float
@@ -218,8 +218,8 @@ def harmonic_gear_from_physical(
     omega : float
         Angular frequency of the torque, rad/s. The source states 0 < ω < 1 only.
     D : float, optional
-        Half-width of the gap in units of x, set directly as the figures of the
-        source do; the default is φ/θ_s.
+        Half-width of the gap in units of x, as in the figures of the source; the
+        default is φ/θ_s.
 
     Returns
     -------

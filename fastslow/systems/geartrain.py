@@ -1,4 +1,4 @@
-"""The harmonic gear as two inertias, their twist, and the dimensionless equation by derivation.
+"""The harmonic gear as two inertias, their relative twist, and its nondimensionalisation.
 
 M. Ding, "Fast-slow Dynamical Analysis in Harmonic Gear Transmission System with
 Non-smooth Gear Clearance Condition", Current Journal of Applied Science and
@@ -27,7 +27,7 @@ from fastslow.symbolic.scaling import (
 from fastslow.symbolic.solving.verification import vanishes
 from fastslow.systems.gears import dead_zone, gear_scales, harmonic_gear
 
-#: What the physical values of the gear must be.
+#: Validators of the physical parameters.
 PHYSICAL = {
     "J_i": positive,
     "J_o": positive,
@@ -65,9 +65,9 @@ def harmonic_gear_two_inertias(
         J_o θ_o'' + C_eq θ' + (k1 + k2 θ²) f_h(θ) = w
         J_i θ_i'' − [C_eq θ' + (k1 + k2 θ²) f_h(θ)]/N = −T_m/N
 
-    with the load torque w = T_m + T_am sin(ω t). The motor's torque T_m is given on the
+    with the load torque w = T_m + T_am sin(ω t). The motor torque T_m refers to the
     output side. All angles may grow by θ_o + c, θ_i + N c: the gear turns as a whole and
-    has no equilibrium. `harmonic_gear_twist` is what remains without that motion.
+    has no equilibrium. `harmonic_gear_twist` is the model reduced by this symmetry.
 
     Parameters
     ----------
@@ -218,26 +218,26 @@ def _spring(twist: sp.Expr) -> sp.Expr:
 
 @dataclass(frozen=True)
 class GearScaling:
-    """The paper's scaling as it follows, and as it is printed.
+    """Scaling of the source as derived and as printed.
 
     Parameters
     ----------
     equation : sympy.Expr
         Acceleration of the relative twist, derived from the two inertias (2).
     reduced : bool
-        Whether that is equation (5) divided by J_eq = N² J_i J_o/(N² J_i + J_o).
+        True if it is equation (5) divided by J_eq = N² J_i J_o/(N² J_i + J_o).
     consistent : NamedMapping of sympy.Expr
-        A, B, C, D, omega as they follow from equation (5).
+        A, B, C, D, omega as derived from equation (5).
     printed : NamedMapping of sympy.Expr
-        A, B, C as the paper prints them.
+        A, B, C as printed.
     slip : NamedMapping of sympy.Expr
-        A, B, C, D, omega when the factor θ_s in f_h(θ) = θ_s f(x) is left out.
+        A, B, C, D, omega if the factor θ_s in f_h(θ) = θ_s f(x) is omitted.
     ratios : NamedMapping of sympy.Expr
-        Printed to consistent, for those that differ.
+        Ratios of printed to consistent parameters, where they differ.
     reproduced : bool
-        Whether the slip gives exactly the printed A, B and C.
+        True if the omission yields exactly the printed A, B and C.
     agrees : bool
-        Whether the consistent scaling turns (5) into (6) without contradiction.
+        True if the consistent scaling transforms (5) into (6).
     """
 
     equation: sp.Expr
@@ -251,7 +251,7 @@ class GearScaling:
 
 
 def twist_equation() -> sp.Expr:
-    """Acceleration of θ = θ_o − θ_i/N, derived from the two inertias (2).
+    """Return the acceleration of θ = θ_o − θ_i/N, derived from the two inertias (2).
 
     Returns
     -------
@@ -274,7 +274,7 @@ def twist_equation() -> sp.Expr:
 
 
 def gear_scaling() -> GearScaling:
-    """Derive equations (5) and (6), the parameters that follow, and the slip in the printed ones.
+    """Derive equations (5) and (6), their parameters, and the error in the printed ones.
 
     Examples
     --------
@@ -311,7 +311,7 @@ def gear_scaling() -> GearScaling:
 
 
 def _same(one: sp.Expr, other: sp.Expr) -> bool:
-    """Whether two rates agree, the dead zone taken as one quantity of its own."""
+    """Check that two rates are equal, with the dead zone as an independent quantity."""
     gap = sp.Dummy("f_h", real=True)
     bare = [e.replace(lambda p: isinstance(p, sp.Piecewise), lambda p: gap) for e in (one, other)]
     zones = [e.atoms(sp.Piecewise) for e in (one, other)]
@@ -319,7 +319,7 @@ def _same(one: sp.Expr, other: sp.Expr) -> bool:
 
 
 def _identified(slip: bool) -> Identification:
-    """Equation (5) in the scales of (6), without or with the slip in f_h(θ) = θ_s f(x)."""
+    """Equation (5) in the scales of (6), without or with the error in f_h(θ) = θ_s f(x)."""
     marked = _twist({**harmonic_gear_twist().parameters, "kappa": 1.0}, real("kappa"))
     factor = 1 / scale_symbol("theta") if slip else sp.S.One
     unit = [("theta", "v"), ("v", "v"), ("v", "theta**3"), ("v", "w")]

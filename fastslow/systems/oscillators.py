@@ -1,4 +1,4 @@
-"""Piecewise-smooth oscillators: one with a stop, one with dry friction."""
+"""Piecewise-smooth oscillators: a bilinear one with a stop, and one with dry friction."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ def bilinear_oscillator(
 ) -> Model:
     """A linear oscillator with a one-sided elastic stop at x = 1.
 
-    x'' + 2 ζ x' + x + β max(x − 1, 0) = w with w = f cos(ω t). Orbits that
-    never touch the stop graze it first at f = √((1 − ω²)² + (2 ζ ω)²).
+    x'' + 2 ζ x' + x + β max(x − 1, 0) = w with w = f cos(ω t). The
+    linear periodic orbit grazes the stop at f = √((1 − ω²)² + (2 ζ ω)²).
 
     Parameters
     ----------
@@ -48,18 +48,18 @@ def bilinear_oscillator(
 
 
 def stick_slip(F_s: float = 1.0, delta: float = 3.0, v_b: float = 0.2) -> Model:
-    """A mass on a moving belt with dry friction that falls with speed: a Filippov system.
+    """A mass on a moving belt with velocity-weakening dry friction: a Filippov system.
 
-    x'' + x = −F_s sign(x' − v_b)/(1 + δ |x' − v_b|). The interface v = v_b is
-    where the mass sticks to the belt. The equilibrium x = F_s/(1 + δ v_b) is an
+    x'' + x = −F_s sign(x' − v_b)/(1 + δ |x' − v_b|). The mass sticks to the belt on
+    the interface v = v_b. The equilibrium x = F_s/(1 + δ v_b) is an
     unstable focus.
 
     Parameters
     ----------
     F_s : float
-        Largest static friction force.
+        Maximal static friction force.
     delta : float
-        How fast friction falls with relative speed.
+        Rate at which friction decreases with relative velocity.
     v_b : float
         Speed of the belt.
 

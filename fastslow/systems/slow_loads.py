@@ -1,4 +1,4 @@
-"""Whether a slow load that changes sign carries the state of a system across a gap."""
+"""Crossing of a gap under a slow load that changes sign: a criterion in closed form."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from fastslow.arguments import (
     mapping,
     numbers,
     shown,
-    text,
     validated,
+    text,
 )
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.functions import numpy_function
@@ -40,55 +40,55 @@ def slow_load_gap(
     stiffness: ArrayLike = np.inf,
     exact: bool = False,
 ) -> Any:
-    r"""The widest gap, as half its width, that a slow load B + C sin(ω t) drives a state across.
+    r"""Return the largest half-width of a gap that is crossed under a load B + C sin(ω t).
 
-    In the gap x'' + c x' = w(t) = B + C sin(ω t). Integrated once from the time
-    t0 at which the state leaves the near side at speed v0 to the time t1 at
-    which it turns, the depth reached is −(v0 + ∫ w dt)/c. A contact of
-    stiffness k that follows the load (y = w/k − c w'/k² + …) is left at
-    w = −c s/k, where s = ω √(C² − B²) is the slope of the load at zero, with
-    v0 = −s/k; and x' = w/c − w'/c² + … turns 1/c after the load is positive
-    again. Hence, for C > B > 0 and ω → 0,
+    In the gap x'' + c x' = w(t) = B + C sin(ω t). Integration from the time t0, at
+    which the state separates from the near side with velocity v0, to the time t1, at
+    which its velocity vanishes, yields the depth −(v0 + ∫ w dt)/c. On a contact of
+    stiffness k, where the state tracks the load (y = w/k − c w'/k² + …), separation
+    occurs at w = −c s/k with v0 = −s/k, where s = ω √(C² − B²) is the slope of the
+    load at its zero; and x' = w/c − w'/c² + … vanishes 1/c after the load has become
+    positive again. Hence, for C > B > 0 and ω → 0,
 
     .. math:: 2 c D^* = \frac{2}{ω}\left[\sqrt{C^2 - B^2} - B \arccos\frac{B}{C}\right]
               - \frac{ω\sqrt{C^2 - B^2}}{2 c^2}\left(1 - \frac{c^2}{k}\right)^2 + O(ω^2).
 
     With ``exact`` the linear equation in the gap is solved instead, from the
-    state in which the steady response of the linear contact leaves it. What
-    remains is the curvature of the contact and the ringing of its last impact.
-    On the harmonic gear (k = A + D², A = 41.67, C/B = 1.03), against D* from
-    simulation, the formula is off by −4.3 % at ω = 0.1 and −0.029 % at ω = 0.02,
-    its first term alone by +9.0 % and +0.46 %, the exact one by 2e-9 and 2e-10.
+    separation of the steady-state response of the linear contact. This neglects
+    only the nonlinearity of the contact and transients of the last impact.
+    For the harmonic gear (k = A + D², A = 41.67, C/B = 1.03) the errors relative to
+    simulation are −4.3 % at ω = 0.1 and −0.029 % at ω = 0.02 for the formula, +9.0 %
+    and +0.46 % for its first term alone, 2e-9 and 2e-10 for the exact solution.
 
     Parameters
     ----------
     B, C : array_like
-        Mean and amplitude of the load; their signs do not matter.
+        Mean and amplitude of the load, of either sign.
     omega : array_like
         Angular frequency of the load, positive.
     damping : array_like
         c, positive.
     stiffness : array_like
-        k of the contact where it begins, positive; infinite for a rigid one.
+        Contact stiffness k at the interface, positive; infinite for a rigid contact.
     exact : bool
-        Whether to solve the motion in the gap instead of expanding it.
+        Solve the equation in the gap instead of expanding its solution for ω → 0.
 
     Returns
     -------
     float or ndarray
-        D*, broadcast: the far side is reached for half-widths up to it. 0 where
-        the near side is never left: for C ≤ \|B\|, with ``exact`` where the steady
-        response of the contact never lets go. NaN, only with ``exact``, where
-        the state does not turn before the load is negative again.
+        D*, broadcast: the far side is reached for half-widths up to D*. 0 if the
+        state never separates from the near side: for C ≤ \|B\|, with ``exact`` if the
+        steady-state response remains in contact. NaN, only with ``exact``, if the
+        velocity does not vanish before the load is negative again.
 
     Raises
     ------
     ArgumentError
-        For numbers that are not finite or not positive.
+        For a number that is not finite, or not positive where it must be.
 
     References
     ----------
-    Own derivation, as above.
+    Derivation above.
 
     Examples
     --------
@@ -118,10 +118,10 @@ def _expanded(B: Floats, C: Floats, omega: Floats, c: Floats, k: Floats) -> Floa
 
 
 def _exact(B: Floats, C: Floats, omega: Floats, c: Floats, k: Floats) -> Floats:
-    """The same from the closed form of the motion; times are phases of the load, ω t."""
+    """Solution of the linear equation in the gap; times are phases ω t of the load."""
     rigid = np.isinf(k)
     spring = np.where(rigid, 1.0, k)
-    # y = B/k + r sin(phase - lag) in contact; a rigid one is left where the load vanishes
+    # y = B/k + r sin(phase - lag) in contact; separation from a rigid one at zero load
     lag = np.where(rigid, 0.0, np.arctan2(c * omega, spring - omega**2))
     r = C / np.hypot(spring - omega**2, c * omega)
     sine = _quotient(B, np.where(rigid, C, spring * r))
@@ -138,9 +138,9 @@ def _exact(B: Floats, C: Floats, omega: Floats, c: Floats, k: Floats) -> Floats:
         decay = np.exp(-c * (phase - first) / omega)
         return np.asarray(steady(phase) + (speed - steady(first)) * decay)
 
-    # a load that stays positive may still throw a compliant contact off, for an instant
+    # even under a positive load a compliant contact may separate briefly
     falls = np.where(C > B, np.pi + np.arcsin(_quotient(B, C)), first + 2.0 * np.pi)
-    # the velocity can pass zero upwards only where the load is positive, and there only once
+    # the velocity increases through zero only under a positive load, and only once
     early = (first < falls) & (velocity(np.maximum(first, falls)) > 0.0)
     low = np.where(early, first, np.maximum(first, 3.0 * np.pi - falls))
     high = np.where(early, falls, falls + 2.0 * np.pi)
@@ -162,15 +162,15 @@ def slow_load_criterion(
     exact: bool = False,
     gap: str | None = None,
 ) -> SlowLoad:
-    """Predict how a slow load moves the state of a model in its gap, without simulation.
+    """Predict the regime of a model with a gap under a slow load, without simulation.
 
     The model has the states x and v = x', a gap between two values of x, where
-    v' = −c v + B + C sin(ω t + φ), and contacts that begin without a jump of
-    the force, of positive stiffness. The regime is that of `slow_load_gap`: the
-    state is held by the side to which the mean load pushes it, and reaches the
-    other one or does not. That is for slow loads: on the harmonic gear at
-    D = 0.25 the exact form is right everywhere up to ω = 0.17, and on nine
-    tenths of the plane 0.1 ≤ ω ≤ 3, 1.5 ≤ C ≤ 8, where ringing decides the rest.
+    v' = −c v + B + C sin(ω t + φ), and contacts of positive stiffness with a
+    continuous force. The prediction is that of `slow_load_gap`: the mean load
+    presses the state against one side, from which it reaches the other one or
+    not. The load must be slow: for the harmonic gear at D = 0.25 the exact form is
+    correct everywhere up to ω = 0.17, and in nine tenths of the plane
+    0.1 ≤ ω ≤ 3, 1.5 ≤ C ≤ 8; in the rest, transients decide.
 
     Parameters
     ----------
@@ -178,9 +178,9 @@ def slow_load_criterion(
     parameters : mapping, optional
         Parameter to its values, a number or an array, broadcast together.
     exact : bool
-        As in `slow_load_gap`.
+        Solve the equation in the gap, see `slow_load_gap`.
     gap : str, optional
-        The region inside, where it is not found by itself.
+        Region of the gap, if it cannot be identified automatically.
 
     Returns
     -------
@@ -189,9 +189,9 @@ def slow_load_criterion(
     Raises
     ------
     ArgumentError
-        If the model is not of this kind.
+        If the model does not have this form.
     UnknownNameError
-        For a parameter or region that is not in the model.
+        For an unknown parameter or region.
 
     Examples
     --------
@@ -252,7 +252,7 @@ def slow_load_criterion(
 def _gap_motion(
     model: Model, gap: str | None
 ) -> tuple[sp.Expr, sp.Expr, sp.Expr, tuple[sp.Expr, sp.Expr], tuple[sp.Expr, sp.Expr]]:
-    """Damping, load and its frequency in the gap; edges and stiffness below and above it."""
+    """Damping, load and its frequency in the gap; its boundaries and the contact stiffnesses."""
     between = gap_regions(model, gap)
     if between is None:
         raise ArgumentError("expected a model with a gap: three regions between two interfaces")

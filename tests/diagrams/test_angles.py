@@ -53,10 +53,10 @@ def test_periods_as_they_are_written(period):
 @pytest.mark.parametrize(
     ("rate", "period", "words"),
     [
-        (1 - theta, 2 * sp.pi, "the rate of theta, 1 - theta, does not repeat when theta grows"),
-        (sp.sin(theta), 3, "theta modulo 3: the rate of theta, sin\\(theta\\), does not repeat"),
-        (sp.sin(theta / 2), 2 * sp.pi, "does not repeat"),
-        (sp.sign(theta - 1), 2 * sp.pi, "does not repeat"),
+        (1 - theta, 2 * sp.pi, "the rate of theta, 1 - theta, is not periodic in theta"),
+        (sp.sin(theta), 3, "theta modulo 3: the rate of theta, sin\\(theta\\), is not periodic"),
+        (sp.sin(theta / 2), 2 * sp.pi, "is not periodic"),
+        (sp.sign(theta - 1), 2 * sp.pi, "is not periodic"),
         (sp.sin(theta), -1, "period of theta: expected a positive number"),
         (sp.sin(theta), theta, "period of theta: expected a positive number"),
         (sp.sin(theta), True, "period of theta: expected a positive number"),
@@ -69,7 +69,7 @@ def test_what_does_not_repeat(rate, period, words):
 
 
 def test_an_interface_that_does_not_repeat():
-    with pytest.raises(fs.ModelError, match="the interface edge, theta - 1, does not repeat"):
+    with pytest.raises(fs.ModelError, match="the interface edge, theta - 1, is not periodic"):
         fs.Model({theta: sp.sin(theta)}, interfaces={"edge": theta - 1}, periodic=TURN)
 
 

@@ -59,9 +59,9 @@ def test_a_model_that_is_not_frozen(verb):
 def test_singular_and_plural():
     one = fs.Model({x: w - x}, forcing={w: sp.sin(t)})
     two = fs.Model({x: w - x + u}, forcing={w: sp.sin(t), u: sp.cos(t)})
-    with pytest.raises(fs.ArgumentError, match="derive: w still moves in time"):
+    with pytest.raises(fs.ArgumentError, match="derive: w still varies in time"):
         fs.derive(one)
-    with pytest.raises(fs.ArgumentError, match="derive: w, u still move in time"):
+    with pytest.raises(fs.ArgumentError, match="derive: w, u still vary in time"):
         fs.derive(two)
 
 

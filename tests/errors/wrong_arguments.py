@@ -122,7 +122,7 @@ BY_FUNCTION = {
     ],
     "Model.periodic": [
         *MAPPING,
-        ({"x": 1}, BadModel, "x modulo 1: the rate of x, -k*x, does not repeat when x grows by 1"),
+        ({"x": 1}, BadModel, "x modulo 1: the rate of x, -k*x, is not periodic in x"),
         ({"x": NAN}, BadModel, "period of x: expected a positive number"),
         ({"x": "k"}, BadModel, "period of x: expected a positive number"),
         ({"omga": 1}, Unknown, "unknown state in periodic 'omga'"),
@@ -382,10 +382,10 @@ def rows_of(function, parameter):
     own = BY_FUNCTION.get(f"{function}.{parameter}")
     if own is not None:
         return own
-    if function.startswith("systems."):
-        return OF_SYSTEMS
     if parameter == "path":
         return (
             FIGURE if function.startswith("plot.") else SAVE if function.endswith("save") else PATH
         )
+    if parameter not in BY_PARAMETER and function.startswith("systems."):
+        return OF_SYSTEMS
     return BY_PARAMETER.get(parameter)

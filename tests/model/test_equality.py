@@ -1,4 +1,4 @@
-"""Models are equal by content, and what is derived from one serves all that are equal."""
+"""Equality of models by content, and results shared between equal models."""
 
 import copy
 import dataclasses

@@ -53,7 +53,7 @@ def test_freezing_along_a_path():
 
 
 def test_time_in_a_rate_cannot_be_frozen():
-    with pytest.raises(ModelError, match="the rate of x contains time itself"):
+    with pytest.raises(ModelError, match="the rate of x depends on time explicitly"):
         Model({x: sp.sin(t) - x}).frozen()
 
 

@@ -53,7 +53,7 @@ def test_weights_of_sliding_along_two_interfaces():
     left = [p - 2 * first - second, x + first - 3 * second]
     assert [sp.simplify(e) for e in left] == [0, 0]
     # each bound is the drift of one function while the other is slid along
-    one = {m.signs: m for m in motions_of(model, at_once=1).sliding}
+    one = {m.signs: m for m in motions_of(model, max_sliding=1).sliding}
     at = {x: 0, y: 0}
     assert sp.simplify((both.bounds[0] - one[1, 0].rates[0]).subs(at)) == 0
     assert sp.simplify((both.bounds[3] - one[0, -1].rates[1]).subs(at)) == 0
@@ -65,7 +65,7 @@ def test_products_of_signs_are_left_undecided():
     motions = motions_of(model)
     assert [m.signs.count(0) for m in motions.sliding] == [1, 1, 1, 1]
     assert motions.undecided == (
-        ("x = 0 and y = 0", "the rates there are no sum of one jump for each interface"),
+        ("x = 0 and y = 0", "the rates are not a sum of one jump for each interface"),
     )
 
 
@@ -78,7 +78,7 @@ def test_the_number_of_motions_has_a_limit():
     states = sp.symbols("x1:5")
     chain = fs.Model({s: -sp.sign(s) + sum(states) for s in states})
     assert len(motions_of(chain).sliding) == 3**4 - 2**4
-    few = motions_of(chain, most=60)
+    few = motions_of(chain, max_motions=60)
     assert np.unique([m.signs.count(0) for m in few.sliding]).tolist() == [1]
     assert "more than 60" in few.undecided[0][1]
 

@@ -1,4 +1,4 @@
-"""Quotients of polynomials with roots: the same value, nothing common left."""
+"""Quotients of polynomials with roots: equal values, no common factors."""
 
 import pytest
 import sympy as sp

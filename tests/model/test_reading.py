@@ -1,4 +1,4 @@
-"""Interfaces and regions read off the equations."""
+"""Interfaces and regions extracted from equations."""
 
 import numpy as np
 import pytest

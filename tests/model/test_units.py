@@ -1,4 +1,4 @@
-"""Units read off the equations, where the sizes of all terms are known by hand."""
+"""Natural units of equations whose terms have known sizes."""
 
 import pytest
 import sympy as sp

@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from fastslow.model.invariance import states_together
+from fastslow.model.invariance import jointly_invariant_states
 from fastslow.model.model import Model
 from fastslow.simulation.many import simulate_many
 from fastslow.simulation.one import simulate
@@ -280,7 +280,7 @@ def test_an_epidemic_passes_below_its_threshold_and_back(rtol):
         forcing={W: season},
         parameters={beta: 1, sigma: 0.5, gamma: 1},
     )
-    assert states_together(model) == (("E", "sick"),)
+    assert jointly_invariant_states(model) == (("E", "sick"),)
 
     def logarithms(s, u):
         force = (1 + 0.9 * np.cos(s / 40)) * u[0]
@@ -315,11 +315,13 @@ def test_an_epidemic_passes_below_its_threshold_and_back(rtol):
 
 
 def test_states_that_vanish_together_are_told_from_an_oscillation():
-    assert states_together(Model({x: v, v: -x, y: 1 - y})) == ()
+    assert jointly_invariant_states(Model({x: v, v: -x, y: 1 - y})) == ()
     # a power that is not known may be less than one
-    assert states_together(Model({x: v - x**a, v: x - v, y: 1 - y}, parameters={a: 2})) == ()
-    assert states_together(Model({x: v - x, v: x - 2 * v})) == ()
-    assert states_together(Model({x: v - x, v: x - 2 * v, y: 1 - y + x})) == (("x", "v"),)
+    assert (
+        jointly_invariant_states(Model({x: v - x**a, v: x - v, y: 1 - y}, parameters={a: 2})) == ()
+    )
+    assert jointly_invariant_states(Model({x: v - x, v: x - 2 * v})) == ()
+    assert jointly_invariant_states(Model({x: v - x, v: x - 2 * v, y: 1 - y + x})) == (("x", "v"),)
     fractions = Model({S: 1 - S * sick / (S + E), E: S * sick / (S + E) - E, sick: E - 2 * sick})
-    assert states_together(fractions) == (("E", "sick"),)
-    assert states_together(Model({x: y, y: z, z: x, v: -v + 1 + x})) == (("x", "y", "z"),)
+    assert jointly_invariant_states(fractions) == (("E", "sick"),)
+    assert jointly_invariant_states(Model({x: y, y: z, z: x, v: -v + 1 + x})) == (("x", "y", "z"),)

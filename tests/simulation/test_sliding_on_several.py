@@ -248,7 +248,7 @@ def test_rates_that_are_no_sum_of_jumps_end_the_run_with_the_reason():
     rates = {x1: -sp.sign(x1) * (2 + sp.sign(x2)), x2: -sp.sign(x2)}
     run = fs.simulate(fs.Model(rates), [1, 2], t=(0, 5))
     assert run.outcome.code == "not decided"
-    assert "no sum of one jump" in str(run.outcome)
+    assert "not a sum of one jump" in str(run.outcome)
     assert "smooth one of the signs" in str(run.outcome)
     assert run.span[1] == pytest.approx(2.0)
     many = fs.simulate_many(fs.Model(rates), [[1, 2], [1, 3]], t=(0, 2.5))

@@ -1,4 +1,4 @@
-"""Models past the budget: what is closed is given and holds, what is left is counted and said."""
+"""Models past the budget: closed forms are correct, remaining equations are reported."""
 
 import re
 from functools import cache

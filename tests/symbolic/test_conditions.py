@@ -1,4 +1,4 @@
-"""Combinations of inequalities are simplified without changing where they hold."""
+"""Combinations of inequalities are simplified without changing their truth values."""
 
 import itertools
 

@@ -1,4 +1,4 @@
-"""Numbers of many digits are printed as decimals, and the objects keep them exactly."""
+"""Long numbers are rounded in print and stored exactly."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Sets of equilibria within discontinuities in closed form."""
+"""Sets of pseudo-equilibria on discontinuities in closed form."""
 
 import numpy as np
 import pytest

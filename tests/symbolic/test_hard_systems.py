@@ -1,4 +1,4 @@
-"""Systems whose closed forms grow long: what is past the budget is implicit, and verified."""
+"""Systems with long closed forms: past the budget they are implicit, and verified."""
 
 import mpmath
 import numpy as np
@@ -42,7 +42,7 @@ def test_a_special_point_found_by_dividing_by_zero_is_left_out():
 def test_implicit_forms_say_so():
     region = law("quadratic")["S1"]
     assert [e.kind for e in region.equilibria] == ["implicit"]
-    assert any("equations are left" in note for note in region.notes)
+    assert any("equations remain" in note for note in region.notes)
 
 
 def test_conditions_past_the_budget_say_so():

@@ -1,4 +1,4 @@
-"""Hopf points and neutral saddles told apart in any number of states."""
+"""Distinction of Hopf points and neutral saddles in any number of states."""
 
 import numpy as np
 import pytest
@@ -80,7 +80,7 @@ def test_a_chain_of_ten_decays_is_stable_and_a_ring_of_ten_comes_back():
 
     region = fs.derive(chain(w))["S1"]
     assert region.equilibria[0].stability.verdict == "stable"
-    assert region.no_hopf == "every eigenvalue is real"
+    assert region.no_hopf == "all eigenvalues are real"
     derivation = fs.derive(chain(w / (1 + xs[9] ** 4)))
     (ring,) = derivation["S1"].equilibria
     assert ring.kind == "curve"
@@ -110,4 +110,4 @@ def test_what_was_divided_by_is_named_without_what_is_known():
         parameters={a: 1, b: 0.5},
     ).frozen()
     (note,) = fs.derive(model)["S1"].notes
-    assert note == "found where b - 1 ≠ 0"
+    assert note == "valid where b - 1 ≠ 0"

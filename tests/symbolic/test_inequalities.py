@@ -12,7 +12,7 @@ from fastslow.symbolic.signs.assumptions import read_signs
 from fastslow.symbolic.signs.inequalities import (
     conjunction,
     implied,
-    needed,
+    irredundant,
     positive,
     sign_within,
 )
@@ -98,7 +98,7 @@ def test_sign_within_bounds():
 
 
 def test_superfluous_conditions():
-    assert needed((x - D, x + D), Signs({D: 1})) == [x - D]
+    assert irredundant((x - D, x + D), Signs({D: 1})) == [x - D]
     assert conjunction([A <= D**2, A < -(D**2)], Signs({D: 1})) == (A < -(D**2))
     assert implied(A < -(D**2), Signs({A: 1, D: 1})) is False
     assert implied(sp.Or(A > B, A > 0), Signs({A: 1})) is True

@@ -45,7 +45,7 @@ def test_the_printed_formulas():
 
 
 def test_the_slip_alone_explains_what_is_printed():
-    """Printed A, B and C are what follows with θ_s left out, and not what follows."""
+    """Printed A, B and C follow if θ_s is omitted, and only then."""
     found = gear_scaling()
     k1, k2, j, c, mean, wave, outer = map(real, ["k1", "k2", "J_eq", "C_eq", "T_m", "T_am", "J_o"])
     stiff = sp.sqrt(k2 * j / c**2)

@@ -1,4 +1,4 @@
-"""Models that are not the gear go the whole path: derivation, diagram, run, overlay, figure."""
+"""Models other than the gear, from derivation and diagram to run, overlay and figure."""
 
 import math
 

@@ -13,7 +13,7 @@ from fastslow.systems import slow_load_criterion, slow_load_gap
 
 
 def deepest_rigid(B, C, omega, c):
-    """Half the way from a rigid contact to the turn in the gap, from an integral of the load."""
+    """Half the depth reached from a rigid contact, from an integral of the load."""
     with mpmath.workdps(30):
         B, C, omega, c = map(mpmath.mpf, (B, C, omega, c))
         first = (mpmath.pi + mpmath.asin(B / C)) / omega
@@ -124,10 +124,10 @@ def test_a_gap_with_other_damping_and_stiffness():
     names = {"zeta": 0.45, "Omega": 0.05, "Fm": 0.1, "D": 1.0}
     # the amplitude of the load is Fa Ω²
     model = pair.with_parameters(Fa=0.12 / 0.05**2, **names)
-    says = slow_load_criterion(model, exact=True)
-    assert (says.damping, says.stiffness) == (pytest.approx(0.9), 1)
-    assert says.amplitude == pytest.approx(0.12)
-    edge = float(says.widest)
+    found = slow_load_criterion(model, exact=True)
+    assert (found.damping, found.stiffness) == (pytest.approx(0.9), 1)
+    assert found.amplitude == pytest.approx(0.12)
+    edge = float(found.widest)
     widths = edge * np.array([1 - 1e-6, 1 + 1e-6])
     many = fs.simulate_many(
         model, [1, 0], parameters={"D": widths}, periods=4, integration=fs.Integration(rtol=1e-11)
@@ -193,16 +193,16 @@ def test_a_load_that_only_just_stays_positive(gear):
 def test_regimes(gear):
     gear = gear.with_parameters(omega=0.02)
     widths, loads = [0.5, 0.6, 0.25, 0.0, -0.1], [2.44316, 2.44316, 2.0, 3, 3]
-    says = slow_load_criterion(gear, {"D": widths, "C": loads})
+    found = slow_load_criterion(gear, {"D": widths, "C": loads})
     expected = ["bilateral", "unilateral upper", "meshed upper", "no gap", "no gap"]
-    assert says.regime.tolist() == expected
+    assert found.regime.tolist() == expected
     wide = {"D": widths[:3], "C": loads[:3]}
     assert (
         fs.simulate_many(gear, [0, 0], parameters=wide, periods=2).regime.tolist() == expected[:3]
     )
     mirrored = slow_load_criterion(gear.with_parameters(B=-2.372), {"D": widths, "C": loads})
     assert mirrored.regime.tolist()[:3] == ["bilateral", "unilateral lower", "meshed lower"]
-    assert "bilateral: 1, meshed upper: 1, no gap: 2, unilateral upper: 1" in repr(says)
+    assert "bilateral: 1, meshed upper: 1, no gap: 2, unilateral upper: 1" in repr(found)
     # negative stiffness in contact, or no mean load
     assert slow_load_criterion(gear, {"A": -0.6}).regime == "undecided"
     assert slow_load_criterion(gear, {"B": 0.0}).regime == "undecided"
@@ -217,10 +217,10 @@ def test_the_load_in_other_words(gear):
         forcing={w: 1 + sp.cos(t / 10) - 2 * sp.sin(t / 10)},
         parameters={D: 1},
     )
-    says = slow_load_criterion(model)
-    assert (says.mean, says.half_width, says.stiffness) == (3, 0.75, 10)
-    assert (says.damping, says.omega) == (2, 0.1)
-    assert says.amplitude == pytest.approx(3 * np.sqrt(5), rel=1e-14)
+    found = slow_load_criterion(model)
+    assert (found.mean, found.half_width, found.stiffness) == (3, 0.75, 10)
+    assert (found.damping, found.omega) == (2, 0.1)
+    assert found.amplitude == pytest.approx(3 * np.sqrt(5), rel=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fastslow.errors import ArgumentError
-from fastslow.model.invariance import factor_states, states_together
+from fastslow.model.invariance import invariant_states, jointly_invariant_states
 from fastslow.model.model import Model
 from fastslow.passage.delays.critical_modes import CriticalMode, critical_mode
 from fastslow.passage.delays.entry_exits import MEMORY, entry_exit, places
@@ -163,7 +163,7 @@ def _invariance(site: Site, before: Sheet, alone: bool) -> tuple[str, float] | N
     small = ZERO * np.abs(np.linalg.eigvals(jacobian)).max()
     model = site.field.model
     zero = [n for k, n in enumerate(names) if np.abs(states[:, k]).max() <= CONSTANT * size[k]]
-    for together in (*((n,) for n in factor_states(model)), *states_together(model)):
+    for together in (*((n,) for n in invariant_states(model)), *jointly_invariant_states(model)):
         if not set(together) <= set(zero):
             continue
         k = [names.index(n) for n in together]

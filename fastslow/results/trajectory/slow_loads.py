@@ -1,4 +1,4 @@
-"""What the slow-load criterion says of a gap."""
+"""Result of the slow-load criterion for a gap."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ UNDECIDED = "undecided"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SlowLoad(Result):
-    """A gap under a load B + C sin(ω t), and the widest gap that the load carries the state across.
+    """Prediction of whether a gap is crossed under a load B + C sin(ω t).
 
-    All arrays have the shape of the parameters asked for, () for one set.
+    All arrays have the shape of the given parameters, () for one set.
 
     Parameters
     ----------
     mean, amplitude, omega : ndarray
         B, C ≥ 0 and ω.
     damping : ndarray
-        In the gap, c in x'' + c x' = B + C sin(ω t).
+        c in the gap, where x'' + c x' = B + C sin(ω t).
     stiffness : ndarray
-        At the interface on the loaded side, in contact.
+        Contact stiffness at the interface on the loaded side.
     half_width : ndarray
-        Of the gap.
+        Half-width of the gap.
     widest : ndarray
-        The half-width up to which the far side is reached; 0 where the load
-        never lets go of the near side, NaN where the criterion says nothing.
+        Largest half-width that is crossed; 0 if the state never separates from the
+        near side, NaN if the criterion does not apply.
     exact : bool
-        Whether it is from the motion in the gap in closed form, else from the
-        expansion for ω → 0.
+        True for the closed-form solution in the gap, False for the expansion for
+        ω → 0.
     """
 
     mean: Floats
@@ -51,10 +51,10 @@ class SlowLoad(Result):
 
     @property
     def regime(self) -> NDArray[np.str_]:
-        """The regime predicted, in the words of `Trajectory.regime`.
+        """Predicted regime, with the labels of `Trajectory.regime`.
 
-        ``"undecided"`` where the mean load is zero or the criterion says
-        nothing, and ``"no gap"`` where the interfaces have met.
+        ``"undecided"`` if the mean load is zero or the criterion does not apply,
+        ``"no gap"`` if the half-width is not positive.
         """
         side = np.where(self.mean > 0.0, "upper", "lower")
         words = np.where(self.half_width <= self.widest, "bilateral", "unilateral ")

@@ -1,4 +1,4 @@
-"""Boundary equilibria in closed form, and the Clarke path through them."""
+"""Boundary equilibria in closed form, with the Clarke path of their Jacobians."""
 
 from __future__ import annotations
 
@@ -11,48 +11,48 @@ from sympy.logic.boolalg import Boolean
 
 from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.symbolic.closed_forms.critical import Setting
+from fastslow.symbolic.closed_forms.critical import RegionContext
 from fastslow.symbolic.closed_forms.stability import jacobian
 from fastslow.symbolic.signs.inequalities import conjunction, implied
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.algebra import adjugate, determinant, longer, spread, tidy, undefined
-from fastslow.symbolic.solving.candidates import Candidates, settled
+from fastslow.symbolic.solving.candidates import Candidates, solve_conditions
 from fastslow.symbolic.solving.location import neat
 from fastslow.symbolic.solving.solution_families import Family, families
 from fastslow.symbolic.solving.univariate import Root, roots, solved_for
 from fastslow.symbolic.solving.verification import OPEN, checked
 
-#: Equations longer than this, in parts of their tree, are solved for the first parameter only.
+#: Equations with more nodes are solved for the first parameter only.
 LONG = 120
 
-#: Kinds of boundary equilibria by the sign of their test.
+#: Types of boundary equilibria by the sign of their test.
 TYPES = {1: "persistence", -1: "non-smooth fold", 0: "degenerate"}
 
 
 @dataclass(frozen=True)
 class ClarkeForm:
-    """The path q J₁ + (1 − q) J₂ between the Jacobians on both sides, in closed form.
+    """Clarke path q J₁ + (1 − q) J₂ between the Jacobians on both sides, in closed form.
 
     Leine and Nijmeijer (2004); di Bernardo, Budd, Champneys, Kowalczyk (2008).
 
     Parameters
     ----------
     regions : tuple of str
-        q = 1 is ``regions[0]``.
+        The regions of q = 1 and q = 0.
     weight : Symbol
         q.
     jacobians : tuple of sympy.Matrix, each of shape (n, n)
     determinant, trace : sympy.Expr
-        Along the path.
+        Determinant and trace along the path.
     determinants : tuple of sympy.Expr
-        Of J₁ and J₂.
+        Determinants of J₁ and J₂.
     q_zero : sympy.Expr or None
-        Where the determinant vanishes along the line through J₁ and J₂; in (0, 1) exactly
-        for a non-smooth fold.
+        Zero of the determinant on the line through J₁ and J₂; in (0, 1) if and only
+        if the point is a non-smooth fold.
     q_hopf : sympy.Expr or None
-        Planar: where the trace vanishes, when both ends are not known to share its sign.
+        Planar systems: zero of the trace, unless both ends have traces of one sign.
     q_complex : tuple of sympy.Expr
-        Planar: where the eigenvalues change between real and complex.
+        Planar systems: transitions between real and complex eigenvalues.
     """
 
     regions: tuple[str, str]
@@ -67,7 +67,7 @@ class ClarkeForm:
 
     @property
     def matrix(self) -> sp.ImmutableDenseMatrix:
-        """Q J₁ + (1 − q) J₂, shape (n, n)."""
+        """The matrix q J₁ + (1 − q) J₂, shape (n, n)."""
         first, second = self.jacobians
         return sp.ImmutableDenseMatrix(
             (self.weight * first + (1 - self.weight) * second).applyfunc(sp.expand)
@@ -82,29 +82,29 @@ class BoundaryForm:
     ----------
     interface : str
     regions : tuple of str
-        The two it joins; in a Filippov model the first is the one whose rates vanish.
+        The adjacent regions; in a Filippov system the rates of the first vanish.
     state, parameters : NamedMapping of sympy.Expr
     equations : tuple of sympy.Expr
-        What is left to hold, = 0; empty when the closed form is complete.
+        Remaining equations, = 0; empty if the closed form is complete.
     type : str
         ``"persistence"``, ``"non-smooth fold"``, ``"degenerate"``, or ``"depends"``.
     test : sympy.Expr
         Positive for persistence, negative for a non-smooth fold: det J₁ det J₂,
-        or −CᵀN⁻¹E in a Filippov model. Where long equations are left the determinants
-        are not evaluated.
+        or −CᵀN⁻¹E in a Filippov system. The determinants are not evaluated if long
+        equations remain.
     continuous : bool
-        Whether the rates are continuous across the interface.
+        True if the rates are continuous across the interface.
     clarke : ClarkeForm or None
-        For a continuous field, unless long equations are left.
+        For a continuous vector field, unless long equations remain.
     singular : NamedMapping
-        Region to the condition on one parameter under which its Jacobian is
-        singular here: a fold of that region meets the interface.
+        Region to the condition on one parameter for a singular Jacobian, where a fold
+        of that region is on the interface.
     admissible : Boolean
-        When the point lies on the part of the interface between the regions.
+        Condition for the point to be on the common boundary of the regions.
     possible : bool or None
     check : str
-        How it is known that the rates and the switching function vanish on
-        substitution; empty where equations are left.
+        Method by which vanishing rates and switching function were verified; empty if
+        equations remain.
     """
 
     interface: str
@@ -123,24 +123,24 @@ class BoundaryForm:
 
     @property
     def verified(self) -> bool:
-        """Whether the closed form is complete and satisfies its equations."""
+        """True if the closed form is complete and verified to satisfy its equations."""
         return bool(self.check)
 
 
 def boundary_forms(
-    interface: str, function: sp.Expr, sides: tuple[Setting, Setting], continuous: bool
+    interface: str, function: sp.Expr, sides: tuple[RegionContext, RegionContext], continuous: bool
 ) -> list[BoundaryForm]:
-    """All boundary equilibria on an interface between two regions.
+    """Return all boundary equilibria on an interface between two regions.
 
     Parameters
     ----------
     interface : str
     function : sympy.Expr
-        h, exact coefficients.
-    sides : tuple of Setting
+        h, with exact coefficients.
+    sides : tuple of RegionContext
         The regions where h > 0 and where h < 0.
     continuous : bool
-        Of a continuous field one side is enough; of a Filippov field each has its own.
+        If the vector field is continuous, one side suffices; else each side has its own.
     """
     found: list[BoundaryForm] = []
     for own, other in (sides,) if continuous else (sides, sides[::-1]):
@@ -152,18 +152,18 @@ def boundary_forms(
 
 @dataclass(frozen=True)
 class _Place:
-    """Values of states and parameters, what must not be negative, and what is left to hold."""
+    """Values of states and parameters, nonnegative radicands, and remaining equations."""
 
     values: dict[sp.Symbol, sp.Expr]
     radicands: tuple[sp.Expr, ...]
     left: tuple[sp.Expr, ...]
 
 
-def _places(function: sp.Expr, own: Setting) -> list[_Place]:
-    """Where the rates of a region and h vanish: values of states and of parameters.
+def _places(function: sp.Expr, own: RegionContext) -> list[_Place]:
+    """Common zeros of the rates of a region and h, in states and parameters.
 
-    One parameter is solved for, and more where the equations ask for it. What
-    contradicts the assumed signs is left out.
+    One parameter is solved for, or more if the equations require it. Solutions that
+    contradict the assumed signs are omitted.
     """
     used = set().union(function.free_symbols, *(r.free_symbols for r in own.rates.values()))
     best: list[_Place] = []
@@ -186,7 +186,7 @@ def _places(function: sp.Expr, own: Setting) -> list[_Place]:
 
 
 def _contradicts(place: _Place, signs: Signs) -> bool:
-    """Whether the assumed signs of parameters exclude a place."""
+    """Check whether the assumed signs of parameters exclude a solution."""
     for symbol, value in place.values.items():
         side = signs.known.get(symbol)
         if side is not None and symbol != value and signs.sign(side * value) in (0, -1):
@@ -197,7 +197,7 @@ def _contradicts(place: _Place, signs: Signs) -> bool:
 
 
 def _solutions(
-    family: Family, names: tuple[str, ...], own: Setting, others: Candidates
+    family: Family, names: tuple[str, ...], own: RegionContext, others: Candidates
 ) -> list[_Place]:
     unknown = family.unknown
     options: list[Root | None] = list(family.roots) if family.roots is not None else [None]
@@ -207,7 +207,7 @@ def _solutions(
         state = family.elimination.state(inner, names)
         left = () if root is not None else family.equations
         under = root.radicands if root is not None else ()
-        for place, radicands, rest in settled(family.condition, others, own.signs):
+        for place, radicands, rest in solve_conditions(family.condition, others, own.signs):
             values = {
                 real(n): neat(e.subs(place)) for n, e in zip(names, state, strict=True)
             } | place
@@ -226,8 +226,8 @@ def _solutions(
 def _form(
     interface: str,
     outward: sp.Expr,
-    own: Setting,
-    other: Setting,
+    own: RegionContext,
+    other: RegionContext,
     continuous: bool,
     found: _Place,
 ) -> BoundaryForm:
@@ -239,7 +239,7 @@ def _form(
     matrices = [_at(jacobian(s.rates, s.states), place) for s in (own, other)]
     determinants = [tidy(determinant(m)) for m in matrices]
     if continuous and determinants[0] == 0 and determinants[1] != 0:
-        # q = 1 on the side that is not singular
+        # q = 1 is the nonsingular side
         names, matrices, determinants = names[::-1], matrices[::-1], determinants[::-1]
     if continuous:
         test = neat(determinants[0] * determinants[1])
@@ -256,7 +256,9 @@ def _form(
     sign = own.signs.sign(test)
     inside = [tidy(e.xreplace(place)) for e in own.inside]
     inside = [e for e in inside if e != 0 and not _among(e, left)]
-    admissible = conjunction((own.real(found.radicands), own.holds(inside)), own.signs)
+    admissible = conjunction(
+        (own.all_nonnegative(found.radicands), own.all_positive(inside)), own.signs
+    )
     zeros = [*own.rates.values(), outward]
     if continuous:
         zeros += other.rates.values()
@@ -277,8 +279,10 @@ def _form(
     )
 
 
-def _implicit(interface: str, own: Setting, other: Setting, found: _Place) -> BoundaryForm:
-    """Give a boundary equilibrium whose long equations are left, with nothing expanded."""
+def _implicit(
+    interface: str, own: RegionContext, other: RegionContext, found: _Place
+) -> BoundaryForm:
+    """Boundary equilibrium with long remaining equations, without expansion."""
     states = [real(n) for n in own.states]
     first, second = (
         sp.ImmutableDenseMatrix(
@@ -307,7 +311,7 @@ def _implicit(interface: str, own: Setting, other: Setting, found: _Place) -> Bo
 
 
 def _among(expression: sp.Expr, equations: tuple[sp.Expr, ...]) -> bool:
-    """Whether an expression or its negative is one of the equations, once expanded."""
+    """Check whether an expression or its negative is one of the equations, up to expansion."""
     both = (spread(expression), spread(-expression))
     return any(spread(e) in both for e in equations)
 
@@ -320,7 +324,7 @@ def _at(
 
 
 def _singular(
-    names: tuple[str, str], determinants: list[sp.Expr], own: Setting
+    names: tuple[str, str], determinants: list[sp.Expr], own: RegionContext
 ) -> NamedMapping[Boolean]:
     conditions: dict[str, Boolean] = {}
     order = sorted(own.candidates, key=lambda c: c in own.geometry)
@@ -336,7 +340,7 @@ def _singular(
 
 
 def _weight(taken: Collection[str]) -> sp.Symbol:
-    """The Clarke weight, q where the model has no q of its own.
+    """Symbol of the Clarke weight, q unless the model uses that name.
 
     Examples
     --------
@@ -351,13 +355,13 @@ def _clarke(
     names: tuple[str, str],
     matrices: list[sp.ImmutableDenseMatrix],
     determinants: list[sp.Expr],
-    own: Setting,
+    own: RegionContext,
 ) -> ClarkeForm:
     first, second = matrices
     weight = _weight({*own.states, *(c.name for c in own.candidates)})
     path = (weight * first + (1 - weight) * second).applyfunc(sp.expand)
     one, two = determinants
-    # the jump of the Jacobian has rank one, so the determinant is affine in q
+    # the jump of the Jacobian has rank one, so that the determinant is affine in q
     along = neat(weight * one + (1 - weight) * two)
     trace = spread(path.trace())
     difference = tidy(two - one)

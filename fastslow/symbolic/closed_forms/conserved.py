@@ -1,4 +1,4 @@
-"""Conserved quantities: linear combinations of the states that no motion changes."""
+"""Linear conserved quantities (first integrals)."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from fastslow.symbolic.solving.algebra import tidy
 
 @dataclass(frozen=True)
 class ConservedQuantity:
-    """A linear combination of the states whose rate is zero in every region.
+    """A linear combination of the states that is conserved in every region.
 
-    Where c·f = 0 for constants c, each value of c·x has equilibria of its own, so that none
+    If c·f = 0 for a constant vector c, each value of c·x has its own equilibria, so that none
     is isolated: the total population of an epidemic, an enzyme free and bound. With its
-    value as a parameter one state can be left out.
+    value as a parameter one state can be eliminated.
 
     Parameters
     ----------
     expression : sympy.Expr
         c·x, in the states.
     total : str
-        A name for its value that the model does not use.
+        Name of its value, not used in the model.
     eliminated : tuple of str
-        The states that all conserved quantities together give.
+        States eliminated by all conserved quantities together.
     combinations : NamedMapping of sympy.Expr
-        The states that are kept.
+        Remaining states.
     totals : NamedMapping of sympy.Expr
-        Every conserved quantity of the model, by the name of its value.
+        All conserved quantities of the model, by the names of their values.
 
     Examples
     --------
@@ -58,21 +58,21 @@ class ConservedQuantity:
         several = len(self.totals) > 1
         listed = ", ".join(f"{n} = {e}" for n, e in self.totals.items())
         head = (
-            f"conserved quantities: {listed} never change"
+            f"conserved quantities: {listed} are constant"
             if several
-            else (f"conserved quantity: {listed} never changes")
+            else (f"conserved quantity: {listed} is constant")
         )
         parameters = "parameters" if several else "a parameter"
         return (
             f"{head}, so no equilibrium is isolated; fs.reduce_states(model.rates, {{{kept}}}, "
-            f"conserved={{{given}}}) is the system without {' and '.join(self.eliminated)}, with "
+            f"conserved={{{given}}}) eliminates {' and '.join(self.eliminated)}, with "
             f"{' and '.join(self.totals)} as {parameters}"
         )
 
 
 @lru_cache(maxsize=64)
 def conserved_quantities(model: Model) -> tuple[ConservedQuantity, ...]:
-    """The linear conserved quantities of a frozen model, if it has at most `STATES` states.
+    """Return the linear conserved quantities of a frozen model with at most `STATES` states.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def conserved_quantities(model: Model) -> tuple[ConservedQuantity, ...]:
     found = constant_null_space(rows, states, values)
     if not found:
         return ()
-    # the last states are left out, which are products more often than what they come from
+    # the last states are eliminated: products are usually written after their sources
     reduced, pivots = sp.Matrix([row[::-1] for row in found]).rref(simplify=True)
     left_out = [states[len(states) - 1 - p] for p in pivots]
     weights = _not_negative(
@@ -109,7 +109,7 @@ def conserved_quantities(model: Model) -> tuple[ConservedQuantity, ...]:
 def _not_negative(
     rows: Sequence[Sequence[sp.Expr]], values: Mapping[sp.Symbol, float]
 ) -> list[list[sp.Expr]]:
-    """The same with no negative weight where one other row added to it gives that."""
+    """Add another row to a row with negative weights if that makes all weights nonnegative."""
     found = []
     for k, row in enumerate(rows):
         others = [r for j, r in enumerate(rows) if j != k]

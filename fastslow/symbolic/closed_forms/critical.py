@@ -13,7 +13,12 @@ from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.closed_forms.forms import CriticalPoint
 from fastslow.symbolic.closed_forms.stability import HopfTest, Stability
-from fastslow.symbolic.signs.inequalities import conjunction, general, implied, nonnegative
+from fastslow.symbolic.signs.inequalities import (
+    conjunction,
+    general_condition,
+    implied,
+    nonnegative,
+)
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.algebra import spread, tidy, undefined
 from fastslow.symbolic.solving.candidates import Candidates
@@ -23,8 +28,8 @@ from fastslow.symbolic.solving.verification import OPEN, all_vanish, checked
 
 
 @dataclass(frozen=True)
-class Setting:
-    """What all closed forms of one region are derived with.
+class RegionContext:
+    """Rates, assumptions and conditions from which the closed forms of a region are derived.
 
     Parameters
     ----------
@@ -33,14 +38,14 @@ class Setting:
     rates : NamedMapping of sympy.Expr
         Smooth, with exact coefficients.
     inside : tuple of sympy.Expr
-        Positive in the region.
+        Expressions that are positive in the region.
     signs : Signs
     candidates : Candidates
         Parameters to solve for, slow quantities first.
     geometry : tuple of Symbol
-        Parameters of the interfaces, whose signs are never set aside.
+        Parameters of the interfaces, whose signs are always assumed.
     written : tuple of sympy.Expr
-        As ``inside``, in the form in which the interfaces are written.
+        The expressions ``inside`` as the interfaces are written.
     """
 
     region: str
@@ -52,26 +57,29 @@ class Setting:
     geometry: tuple[sp.Symbol, ...]
     written: tuple[sp.Expr, ...]
 
-    def holds(self, expressions: Iterable[sp.Expr]) -> Boolean:
-        """When all expressions are positive, without assumptions that only decide it."""
-        order, kept = self.candidates, self.geometry
-        return conjunction((general(e, self.signs, order, kept) for e in expressions), self.signs)
-
-    def real(self, radicands: Iterable[sp.Expr]) -> Boolean:
-        """When none of the radicands is negative."""
+    def all_positive(self, expressions: Iterable[sp.Expr]) -> Boolean:
+        """Return the condition for all expressions to be positive, in general form."""
         order, kept = self.candidates, self.geometry
         return conjunction(
-            (general(r, self.signs, order, kept, nonnegative) for r in radicands), self.signs
+            (general_condition(e, self.signs, order, kept) for e in expressions), self.signs
+        )
+
+    def all_nonnegative(self, radicands: Iterable[sp.Expr]) -> Boolean:
+        """Return the condition for all radicands to be nonnegative."""
+        order, kept = self.candidates, self.geometry
+        return conjunction(
+            (general_condition(r, self.signs, order, kept, nonnegative) for r in radicands),
+            self.signs,
         )
 
 
 def state_at(
-    family: Family, setting: Setting, place: dict[sp.Symbol, sp.Expr]
+    family: Family, context: RegionContext, place: dict[sp.Symbol, sp.Expr]
 ) -> NamedMapping[sp.Expr]:
-    """Give the state vector of a family where some of its symbols have closed forms."""
-    values = family.elimination.state({}, setting.states)
+    """Return the state vector of a family, with closed forms substituted for symbols."""
+    values = family.elimination.state({}, context.states)
     return NamedMapping(
-        "state", {n: neat(_put(e, place)) for n, e in zip(setting.states, values, strict=True)}
+        "state", {n: neat(_put(e, place)) for n, e in zip(context.states, values, strict=True)}
     )
 
 
@@ -80,7 +88,7 @@ def _put(expression: sp.Expr, place: dict[sp.Symbol, sp.Expr]) -> sp.Expr:
 
 
 def fold_condition(family: Family) -> sp.Expr | None:
-    """Vanishes where two equilibria of a family meet; None where the family has no folds."""
+    """Return the expression that vanishes at folds of a family; None if it has none."""
     unknown = family.unknown
     if unknown is None:
         return None
@@ -93,39 +101,39 @@ def fold_condition(family: Family) -> sp.Expr | None:
 
 
 def folds(
-    family: Family, others: Sequence[Family], stability: Stability, setting: Setting
+    family: Family, others: Sequence[Family], stability: Stability, context: RegionContext
 ) -> list[CriticalPoint]:
-    """Where two equilibria of a family meet: folds, and branch points where another passes too.
+    """Return folds of a family, and branch points, where another family also passes.
 
     Parameters
     ----------
     family : Family
     others : sequence of Family
-        The other families of the region.
+        Other families of the region.
     stability : Stability
-        Of the region's Jacobian in states, to verify that the determinant vanishes.
-    setting : Setting
+        Stability of the region's Jacobian, to verify that the determinant vanishes.
+    context : RegionContext
     """
     condition = fold_condition(family)
     if condition is None:
-        return _meetings(family, others, stability, setting)
+        return _intersections(family, others, stability, context)
     if family.curve is None and family.roots is not None and family.discriminant is not None:
-        found = _double(family, setting)
+        found = _double(family, context)
     else:
-        found = locate(family, condition, setting.signs, setting.candidates)
+        found = locate(family, condition, context.signs, context.candidates)
     points = []
     for located in found:
-        point = critical_point("LP", family, located, stability.determinant, setting)
+        point = critical_point("LP", family, located, stability.determinant, context)
         if not _defined(point):
             continue
-        if any(_passes(other, point, setting) for other in others):
+        if any(_passes(other, point, context) for other in others):
             point = replace(point, code="BP")
         points.append(point)
     return points
 
 
-def _double(family: Family, setting: Setting) -> list[Located]:
-    """Where the polynomial of a family has a double root, by its discriminant."""
+def _double(family: Family, context: RegionContext) -> list[Located]:
+    """Locate double roots of the polynomial of a family by its discriminant."""
     unknown = family.unknown
     assert unknown is not None
     assert family.discriminant is not None
@@ -135,78 +143,80 @@ def _double(family: Family, setting: Setting) -> list[Located]:
         return [Located({}, equations=(equation, family.discriminant))]
     middle = -poly.nth(1) / (2 * poly.nth(2))
     return parameters_where(
-        family.discriminant, {unknown: middle}, (), setting.signs, setting.candidates
+        family.discriminant, {unknown: middle}, (), context.signs, context.candidates
     )
 
 
-def _meetings(
-    family: Family, others: Sequence[Family], stability: Stability, setting: Setting
+def _intersections(
+    family: Family, others: Sequence[Family], stability: Stability, context: RegionContext
 ) -> list[CriticalPoint]:
-    """Where an explicit equilibrium is singular because another family passes through it."""
+    """Branch points of an explicit equilibrium, where another family passes through it."""
     if family.unknown is not None or family.elimination.unknowns or not others:
         return []
-    found = locate(family, stability.determinant, setting.signs, setting.candidates)
+    found = locate(family, stability.determinant, context.signs, context.candidates)
     points = [
-        critical_point("BP", family, f, stability.determinant, setting)
+        critical_point("BP", family, f, stability.determinant, context)
         for f in found
         if not f.equations
     ]
-    return [p for p in points if _defined(p) and any(_passes(o, p, setting) for o in others)]
+    return [p for p in points if _defined(p) and any(_passes(o, p, context) for o in others)]
 
 
 def _defined(point: CriticalPoint) -> bool:
-    """Whether a point was not found by dividing by zero at the parameter values located."""
+    """Check that no expression of a point is undefined at the parameter values located."""
     return not any(undefined(e) for e in (*point.state.values(), *point.parameters.values()))
 
 
-def _passes(other: Family, point: CriticalPoint, setting: Setting) -> bool:
-    """Whether another family holds a point."""
+def _passes(other: Family, point: CriticalPoint, context: RegionContext) -> bool:
+    """Check that another family contains a point."""
     if point.equations or any(e.has(ComplexRootOf) for e in point.state.values()):
-        # roots of numbers alone are told apart by their polynomials
+        # numerical roots are distinguished by their polynomials
         return False
     place = {real(n): e for n, e in {**point.parameters, **point.state}.items()}
     gaps = [e.xreplace(place) for e in other.equations]
     for name, value in other.elimination.solved.items():
         gaps.append(sp.sympify(value.xreplace(place)) - point.state[name])
-    return all_vanish(gaps, setting.signs)
+    return all_vanish(gaps, context.signs)
 
 
-def cusps(family: Family, setting: Setting) -> list[CriticalPoint]:
-    """Where two folds of a curve meet: first and second derivative vanish along it."""
+def cusps(family: Family, context: RegionContext) -> list[CriticalPoint]:
+    """Return the cusps of a curve, where its first and second derivatives vanish."""
     unknown, curve, parameter = family.unknown, family.curve, family.parameter
     if unknown is None or curve is None or parameter is None or family.bent:
         return []
     first, second = tidy(curve.diff(unknown)), tidy(curve.diff(unknown, 2))
     points = []
-    others = setting.candidates.without(parameter)
-    for located in locate(family, second, setting.signs, setting.candidates):
+    others = context.candidates.without(parameter)
+    for located in locate(family, second, context.signs, context.candidates):
         if located.equations or unknown not in located.place:
             continue
         at = tidy(first.subs(unknown, located.place[unknown]))
         known, under = located.place, located.radicands
-        for further in parameters_where(at, known, under, setting.signs, others):
+        for further in parameters_where(at, known, under, context.signs, others):
             if not further.equations:
-                points.append(critical_point("CP", family, further, first, setting))
+                points.append(critical_point("CP", family, further, first, context))
     return [p for p in points if _defined(p)]
 
 
-def hopf_points(family: Family, stability: Stability, setting: Setting) -> list[CriticalPoint]:
-    """Where a pair of eigenvalues of a family is imaginary.
+def hopf_points(
+    family: Family, stability: Stability, context: RegionContext
+) -> list[CriticalPoint]:
+    """Return the Hopf points of a family.
 
-    The sign of the squared frequency is part of the condition, so that a neutral
-    saddle is never called Hopf.
+    The condition includes the sign of the squared frequency, which excludes neutral
+    saddles.
 
     Parameters
     ----------
     family : Family
     stability : Stability
-        Along the family, in states: a pair belongs to one of its blocks.
-    setting : Setting
+        Stability along the family; the eigenvalue pair belongs to one of its blocks.
+    context : RegionContext
     """
     points = []
     for one in stability.hopf_tests:
-        found = locate(family, one.test, setting.signs, setting.candidates)
-        points += [critical_point("HB", family, f, one.test, setting, one) for f in found]
+        found = locate(family, one.test, context.signs, context.candidates)
+        points += [critical_point("HB", family, f, one.test, context, one) for f in found]
     return [p for p in points if p.exists != sp.false and _defined(p)]
 
 
@@ -215,10 +225,10 @@ def critical_point(
     family: Family,
     located: Located,
     condition: sp.Expr,
-    setting: Setting,
+    context: RegionContext,
     hopf: HopfTest | None = None,
 ) -> CriticalPoint:
-    """Give a located place as a point: its state, when it exists and is admissible, verified.
+    """Return a located point with its state, its conditions and its verification.
 
     Parameters
     ----------
@@ -226,43 +236,43 @@ def critical_point(
     family : Family
     located : Located
     condition : sympy.Expr
-        What vanishes there besides the rates.
-    setting : Setting
+        Expression that vanishes there, in addition to the rates.
+    context : RegionContext
     hopf : HopfTest, optional
-        Given for a Hopf point.
+        For a Hopf point.
     """
-    state = state_at(family, setting, located.place)
-    states = {real(n) for n in setting.states}
+    state = state_at(family, context, located.place)
+    states = {real(n) for n in context.states}
     parameters = {s: e for s, e in located.place.items() if s not in states}
     if family.parameter is not None and family.parameter not in parameters:
         parameters[family.parameter] = _put(family.curve or sp.S.Zero, located.place)
     place = {**parameters, **{real(n): e for n, e in state.items()}}
-    exists = setting.real(located.radicands)
+    exists = context.all_nonnegative(located.radicands)
     frequency = None
     if hopf is not None:
         frequency = neat(tidy(_put(family.reduced(hopf.frequency_squared), place)))
-        exists = sp.And(exists, setting.holds([frequency]))
-    inside = [tidy(_put(e, place)) for e in setting.inside]
-    admissible = conjunction((exists, setting.holds(inside)), setting.signs)
-    zeros = (*setting.rates.values(), condition)
-    # an equation that is left holds by itself, so only its absence can be verified
-    check = OPEN if located.equations else checked(zeros, place, setting.signs)
+        exists = sp.And(exists, context.all_positive([frequency]))
+    inside = [tidy(_put(e, place)) for e in context.inside]
+    admissible = conjunction((exists, context.all_positive(inside)), context.signs)
+    zeros = (*context.rates.values(), condition)
+    # remaining equations define the point, so nothing can be verified
+    check = OPEN if located.equations else checked(zeros, place, context.signs)
     return CriticalPoint(
         code,
-        setting.region,
+        context.region,
         state,
         NamedMapping("parameter", {s.name: e for s, e in parameters.items()}),
         located.equations,
         exists,
         admissible,
-        implied(sp.And(admissible, *_agreeing(parameters, setting.signs)), setting.signs),
+        implied(sp.And(admissible, *_agreeing(parameters, context.signs)), context.signs),
         frequency,
         check,
     )
 
 
 def _agreeing(parameters: dict[sp.Symbol, sp.Expr], signs: Signs) -> list[Boolean]:
-    """Conditions for located parameters to have the signs that are assumed of them."""
+    """Conditions for located parameters to have their assumed signs."""
     if any(undefined(e) for e in parameters.values()):
         return [sp.false]
     return [sp.Gt(signs.known[s] * e, 0) for s, e in parameters.items() if s in signs.known]

@@ -1,4 +1,4 @@
-"""Sets of equilibria within discontinuities in closed form, such as a sticking band."""
+"""Sets of pseudo-equilibria on discontinuities in closed form, such as a sticking band."""
 
 from __future__ import annotations
 
@@ -14,39 +14,38 @@ from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.signs.signs import Signs
 
-#: Begins the note of a region's equilibrium that is the edge of a set, before the set's region.
+#: Note of an equilibrium that is the edge of a set, followed by the name of the set.
 EDGE = "edge of the equilibrium set"
 
 
 @dataclass(frozen=True)
 class EquilibriumSetForm:
-    """All equilibria of a Filippov field along some discontinuities, in closed form.
+    """Equilibria of a Filippov system on one or several discontinuities, in closed form.
 
-    Zero is in the convex hull of the fields around each of its points (Filippov 1988).
+    Zero is in the convex hull of the vector fields adjacent to each point (Filippov 1988).
 
     Parameters
     ----------
     region : str
         The sliding motion, such as ``"S1|S2"``.
     interfaces : tuple of str
-        Those that are slid along.
+        Sliding interfaces.
     free : tuple of Symbol
         States that vary within the set.
     state : NamedMapping of sympy.Expr
-        Every state; a free one stands for itself.
+        Every state; a free one is given by its own symbol.
     conditions : tuple of Boolean
-        What bounds the set: a friction force of no more than its full value, and where
-        other interfaces do.
+        Inequalities that bound the set, such as the limits of a friction force or other
+        interfaces.
     edges : tuple of NamedMapping
-        The states at the two ends of a set with one free state, where these have a
-        closed form.
+        States at the two ends of a set with one free state, if they have a closed form.
     attracting : bool or None
-        Whether the fields point at the interface: the contact sticks. None where the signs
-        that are assumed do not tell, and for several interfaces.
+        True if both vector fields point towards the interface (sticking). None if the
+        assumed signs do not decide it, and for several interfaces.
     weights : tuple of sympy.Expr
-        Those of the fields, one for each interface, between −1 and 1 in the set.
+        Weight of the jump across each interface, between −1 and 1 in the set.
     heights : tuple of sympy.Expr
-        The functions of the interfaces.
+        Switching functions of the interfaces.
     """
 
     region: str
@@ -60,7 +59,7 @@ class EquilibriumSetForm:
     heights: tuple[sp.Expr, ...]
 
     def on_edge(self, state: Mapping[str, sp.Expr], parameters: Mapping[str, sp.Expr]) -> bool:
-        """Whether a state is on the edge of the set, at some parameters and for all others."""
+        """Check that a state is on the edge of the set, for all other parameter values."""
         at = {real(n): e for n, e in state.items()}
         given = {real(n): e for n, e in parameters.items()}
 
@@ -73,15 +72,15 @@ class EquilibriumSetForm:
 def equilibrium_set_forms(
     model: Model, signs: Signs, exact: Callable[[sp.Expr], sp.Expr]
 ) -> tuple[EquilibriumSetForm, ...]:
-    """The sets of equilibria of all sliding motions of a frozen model.
+    """Return the equilibrium sets of all sliding motions of a frozen model.
 
     Parameters
     ----------
     model : Model
     signs : Signs
-        What is assumed of the parameters.
+        Assumed signs of the parameters.
     exact : callable
-        Puts rational numbers in the place of floats.
+        Replaces floats by rational numbers.
 
     Examples
     --------
@@ -107,7 +106,7 @@ def _form(
     solved, free = parts[0], parts[1]
     others = [sp.expand(s * functions[j].subs(solved)) for j, s in enumerate(motion.signs) if s]
     if any(h == 0 for h in others):
-        # the edge of a set within one more interface
+        # the edge of a set on one more interface
         return None
     weights = tuple(sp.cancel(exact(s).subs(solved)) for s in motion.weights)
     bounds = [_bound(weight, free, signs) for weight in weights]
@@ -135,7 +134,7 @@ def _form(
 def _bound(
     weight: sp.Expr, free: Sequence[sp.Symbol], signs: Signs
 ) -> tuple[Boolean, tuple[sp.Expr, sp.Expr]]:
-    """|s| ≤ 1 as |e| ≤ f, with e and f; e is monic in the first free state it is affine in."""
+    """Write |s| ≤ 1 as |e| ≤ f, with e monic in its first free state; return also (e, f)."""
     top, below = sp.fraction(sp.cancel(weight))
     slope = next((c for s in free if (c := top.diff(s)) != 0), sp.Integer(1))
     if slope.free_symbols & set(free):
@@ -152,7 +151,7 @@ def _edges(
     free: Sequence[sp.Symbol],
     names: Sequence[str],
 ) -> tuple[NamedMapping[sp.Expr], ...]:
-    """The states at which |e| = f, if e is affine in the only free state."""
+    """States at which |e| = f, if e is affine in the only free state."""
     (symbol,), (top, below) = free, bound
     slope = top.diff(symbol)
     if slope == 0 or slope.has(symbol) or below.has(symbol):
@@ -173,16 +172,16 @@ def solved_along(
 ) -> tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Symbol, ...] | None] | None:
     """Solve h = 0 and f = 0 for as many states as they determine.
 
-    Equations that are affine in a state are solved for it one after the other where
-    ``nonzero`` says that its coefficient does not vanish, by default where it is a number.
+    Equations that are affine in a state are solved for it successively if its coefficient
+    is nonzero according to ``nonzero``, by default if it is a number.
 
     Returns
     -------
     solved : dict
         States as functions of the free ones.
     free : tuple of Symbol or None
-        None where an equation is left that is not solved so. None in place of both where
-        the equations contradict each other.
+        None if an unsolved equation remains. None is returned in place of both if the
+        equations are inconsistent.
 
     Examples
     --------
@@ -199,7 +198,7 @@ def solved_along(
             break
         if any(not (e.free_symbols & set(states)) for e in left):
             return None
-        # what the interfaces give comes first, then the last states: positions stay free
+        # interfaces first, then the last states, so that positions remain free
         pick = next(
             (
                 (e, s)

@@ -1,4 +1,4 @@
-"""What a derivation gives back: equilibria, critical points and continua in closed form."""
+"""Equilibria, critical points and continua in closed form."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ class EquilibriumForm:
         ``"explicit"``: the state in parameters; ``"curve"``: a parameter in
         terms of one unknown state; ``"implicit"``: equations are left.
     state : NamedMapping of sympy.Expr
-        Every state; one that is an unknown stands for itself.
+        Every state; an unknown is given by its own symbol.
     unknowns : tuple of Symbol
-        The unknown states that the rest is expressed by.
+        Unknown states in which the other quantities are expressed.
     equations : tuple of sympy.Expr
-        What the unknowns satisfy, = 0.
+        Equations for the unknowns, = 0.
     parameter : NamedMapping of sympy.Expr
         The parameter solved for and its value along the family; may be empty.
     exists, admissible : Boolean
-        When it is real, and when it is real and lies in its region.
+        Conditions for it to be real, and to be real and inside its region.
     possible : bool or None
-        Whether the latter holds under the assumptions; None where that is open.
+        Truth value of ``admissible`` under the assumptions; None if undecided.
     parameter_range : Boolean or None
-        The admissible part of a monotone curve as a condition on its parameter.
+        The admissible segment of a monotone curve as a condition on its parameter.
     stability : Stability
     discriminant : sympy.Expr or None
-        Of the equation of the unknown.
+        Discriminant of the equation for the unknown.
     check : str
-        How it is known that the rates vanish on substitution: ``"exact"``,
-        ``"50 digits"`` (at fixed points), or empty where it is not known.
+        Method by which vanishing rates were verified: ``"exact"``,
+        ``"50 digits"`` (at fixed points), or empty for none.
     note : str
     conditions : tuple of sympy.Expr
-        What the parameters must fulfil besides, = 0.
+        Further conditions on the parameters, = 0.
     """
 
     region: str
@@ -64,29 +64,29 @@ class EquilibriumForm:
 
     @property
     def verified(self) -> bool:
-        """Whether the rates vanish on substitution."""
+        """True if the rates are verified to vanish on substitution."""
         return bool(self.check)
 
 
 @dataclass(frozen=True)
 class Continuum:
-    """A set of equilibria that are not isolated, in a singular region.
+    """A continuum of non-isolated equilibria in a region.
 
     Parameters
     ----------
     region : str
     free : tuple of Symbol
-        States that take any value.
+        States with arbitrary values.
     state : NamedMapping of sympy.Expr
     parameters : NamedMapping of sympy.Expr
-        Parameter values at which it exists; empty where it exists for all.
+        Parameter values at which it exists; empty if it exists for all.
     equations : tuple of sympy.Expr
-        What else must vanish.
+        Further equations, = 0.
     conditions : tuple of Boolean
-        Where the free states stay in the region; its closure belongs to it in
-        a continuous model.
+        Conditions for the free states to be inside the region; for a continuous model
+        the continuum includes the closure.
     eigenvalues : tuple of sympy.Expr
-        Those with a short closed form; zero is among them.
+        Eigenvalues with a short closed form, including zero.
     check : str
         As in `EquilibriumForm`.
     """
@@ -102,7 +102,7 @@ class Continuum:
 
     @property
     def verified(self) -> bool:
-        """Whether the closed form is complete and satisfies its equations."""
+        """True if the closed form is complete and verified to satisfy its equations."""
         return bool(self.check)
 
 
@@ -116,22 +116,22 @@ class CriticalPoint:
         LP, BP, CP or HB.
     region : str
     state : NamedMapping of sympy.Expr
-        A state that could not be solved for stands for itself.
+        A state that was not solved for is given by its own symbol.
     parameters : NamedMapping of sympy.Expr
-        The parameters solved for.
+        Parameters solved for.
     equations : tuple of sympy.Expr
-        What is left to hold, = 0; empty when the closed form is complete.
+        Remaining equations, = 0; empty if the closed form is complete.
     exists : Boolean
-        When the point is real (and, for a Hopf point, has a frequency).
+        Condition for the point to be real (and, for a Hopf point, to have a frequency).
     admissible : Boolean
-        When it exists and lies in its region.
+        Condition for it to exist inside its region.
     possible : bool or None
-        Whether that holds under the assumptions; None where that is open.
+        Truth value of ``admissible`` under the assumptions; None if undecided.
     frequency_squared : sympy.Expr or None
-        At a Hopf point.
+        Squared frequency of a Hopf point.
     check : str
         As in `EquilibriumForm`, for the rates and the defining condition; empty
-        where equations are left.
+        if equations remain.
     """
 
     code: str
@@ -147,5 +147,5 @@ class CriticalPoint:
 
     @property
     def verified(self) -> bool:
-        """Whether the closed form is complete and satisfies its equations."""
+        """True if the closed form is complete and verified to satisfy its equations."""
         return bool(self.check)

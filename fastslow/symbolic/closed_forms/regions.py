@@ -1,4 +1,4 @@
-"""Everything that is derived inside one region."""
+"""Equilibria, stability and bifurcations of one region in closed form."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.point_types import point_name
 from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
 from fastslow.symbolic.closed_forms.critical import (
-    Setting,
+    RegionContext,
     cusps,
     folds,
     hopf_points,
@@ -40,44 +40,44 @@ from fastslow.symbolic.signs.inequalities import (
 )
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.algebra import irrational, longer, spread, tidy
-from fastslow.symbolic.solving.candidates import settled
+from fastslow.symbolic.solving.candidates import solve_conditions
 from fastslow.symbolic.solving.location import neat
 from fastslow.symbolic.solving.solution_families import Family, families
 from fastslow.symbolic.solving.univariate import Root, roots
 from fastslow.symbolic.solving.verification import OPEN, checked, weakest
 
-#: Routh-Hurwitz expressions of more parts, with an explicit state put in, are formed again.
+#: Routh-Hurwitz expressions with more nodes at an explicit state are recomputed there.
 LONG = 600
 
-#: In more symbols it takes longer to form them from quotients.
+#: Largest number of symbols for which this is faster.
 FEW = 3
 
 
 @dataclass(frozen=True)
 class RegionForms:
-    """What SymPy derives in one region.
+    """Equilibria, stability and bifurcations of one region in closed form.
 
     Parameters
     ----------
     name : str
     conditions : tuple of Boolean
-        The inequalities that describe the region; those that follow from the
-        others under the assumptions are left out.
+        Inequalities that define the region, without those implied by the others
+        under the assumptions.
     rates : NamedMapping of sympy.Expr
     equations : tuple of sympy.Expr
-        The eliminated equations, family by family, = 0.
+        Equations after elimination, family by family, = 0.
     equilibria : tuple of EquilibriumForm
     continua : tuple of Continuum
     jacobian : sympy.Matrix, shape (n, n)
     stability : Stability
-        Of the Jacobian anywhere in the region, in states.
+        Stability of the Jacobian as a function of the states.
     folds, branch_points, cusps, hopf : tuple of CriticalPoint
     no_hopf : str
-        Why there is no Hopf point, where that is proved; else empty.
+        Proof that there is no Hopf point; empty if there is none.
     boundary_equilibria : tuple of BoundaryForm
-        Those that join this region to another.
+        Equilibria on the boundary of this region.
     notes : tuple of str
-        What stayed implicit, and why.
+        Forms that remain implicit, with the reason.
     """
 
     name: str
@@ -98,27 +98,27 @@ class RegionForms:
 
     @property
     def trace(self) -> sp.Expr:
-        """Of the Jacobian."""
+        """Trace of the Jacobian."""
         return self.stability.trace
 
     @property
     def determinant(self) -> sp.Expr:
-        """Of the Jacobian."""
+        """Determinant of the Jacobian."""
         return self.stability.determinant
 
     @property
     def characteristic_polynomial(self) -> sp.Expr:
-        """Of the Jacobian, in λ."""
+        """Characteristic polynomial of the Jacobian, in λ."""
         return self.stability.characteristic_polynomial
 
     @property
     def routh_hurwitz(self) -> tuple[sp.Expr, ...]:
-        """All positive iff an equilibrium is asymptotically stable."""
+        """Expressions that are all positive iff an equilibrium is asymptotically stable."""
         return self.stability.routh_hurwitz
 
     @property
     def check(self) -> str:
-        """How it is known that every complete closed form satisfies its equations."""
+        """Method by which all complete closed forms were verified, empty for none."""
         points = (*self.folds, *self.branch_points, *self.cusps, *self.hopf)
         checks = [e.check for e in self.equilibria]
         checks += [c.check for c in self.continua if not c.equations]
@@ -126,22 +126,22 @@ class RegionForms:
 
     @property
     def verified(self) -> bool:
-        """Whether every complete closed form satisfies its equations."""
+        """True if every complete closed form is verified to satisfy its equations."""
         return bool(self.check)
 
 
-def derive_region(setting: Setting, boundary: tuple[BoundaryForm, ...]) -> RegionForms:
-    """Derive one region.
+def derive_region(context: RegionContext, boundary: tuple[BoundaryForm, ...]) -> RegionForms:
+    """Derive the closed forms of one region.
 
     Parameters
     ----------
-    setting : Setting
+    context : RegionContext
     boundary : tuple of BoundaryForm
-        The boundary equilibria of its interfaces.
+        Boundary equilibria on its interfaces.
     """
-    signs = setting.signs
-    found = families(setting.rates, setting.states, signs, setting.candidates)
-    matrix = jacobian(setting.rates, setting.states)
+    signs = context.signs
+    found = families(context.rates, context.states, signs, context.candidates)
+    matrix = jacobian(context.rates, context.states)
     whole = stability_of_matrix(matrix, signs.sign, lambda e: isolated(e, signs, ()))
     isolated_ones = [f for f in found if not _continuous(f)]
     forms: list[EquilibriumForm] = []
@@ -149,16 +149,16 @@ def derive_region(setting: Setting, boundary: tuple[BoundaryForm, ...]) -> Regio
     reasons: list[str] = []
     for family in isolated_ones:
         along = _blocks_along(family, whole, matrix)
-        inner = _stability_along(family, along, setting)
-        forms += _equilibria(family, inner, setting)
-        # the other root of the same equation is no other family
+        inner = _stability_along(family, along, context)
+        forms += _equilibria(family, inner, context)
+        # another root of the same equation is the same family
         others = [f for f in isolated_ones if f.elimination is not family.elimination]
-        points += folds(family, others, along, setting) + cusps(family, setting)
+        points += folds(family, others, along, context) + cusps(family, context)
         reason = _no_hopf(inner)
         if reason:
             reasons.append(reason)
         else:
-            points += hopf_points(family, along, setting)
+            points += hopf_points(family, along, context)
     points = list(dict.fromkeys(points))
     no_hopf = reasons[0] if reasons and len(reasons) == len(isolated_ones) else ""
     if not isolated_ones:
@@ -168,12 +168,12 @@ def derive_region(setting: Setting, boundary: tuple[BoundaryForm, ...]) -> Regio
         return tuple(p for p in points if p.code == code)
 
     return RegionForms(
-        setting.region,
-        region_conditions(setting),
-        setting.rates,
+        context.region,
+        region_conditions(context),
+        context.rates,
         tuple(dict.fromkeys(e for f in found for e in (*f.equations, *f.condition))),
         tuple(forms),
-        tuple(c for f in found if _continuous(f) for c in _continua(f, whole, setting)),
+        tuple(c for f in found if _continuous(f) for c in _continua(f, whole, context)),
         matrix,
         whole,
         coded("LP"),
@@ -181,26 +181,26 @@ def derive_region(setting: Setting, boundary: tuple[BoundaryForm, ...]) -> Regio
         coded("CP"),
         coded("HB"),
         no_hopf,
-        tuple(b for b in boundary if setting.region in b.regions),
+        tuple(b for b in boundary if context.region in b.regions),
         _notes(found, points, whole),
     )
 
 
 def _notes(found: list[Family], points: list[CriticalPoint], whole: Stability) -> tuple[str, ...]:
-    """What stayed implicit, each once."""
+    """Distinct notes on forms that remain implicit."""
     kept = [f.note for f in found if f.note]
     implicit = [point_name(p.code) for p in points if p.equations]
     sets = [f"the {name} set is given by its equations" for name in implicit]
     return tuple(dict.fromkeys([*kept, *sets, *whole.notes]))
 
 
-def region_conditions(setting: Setting) -> tuple[Boolean, ...]:
-    """Give the region's inequalities without those that follow from the others."""
-    order = [*map(real, setting.states), *setting.candidates]
+def region_conditions(context: RegionContext) -> tuple[Boolean, ...]:
+    """Return the region's inequalities without those implied by the others."""
+    order = [*map(real, context.states), *context.candidates]
     found = []
-    for expression, written in zip(setting.inside, setting.written, strict=True):
-        condition = isolated(expression, setting.signs, order)
-        # what is not solved for a symbol keeps the form in which it is written
+    for expression, written in zip(context.inside, context.written, strict=True):
+        condition = isolated(expression, context.signs, order)
+        # an inequality that is not solved for a symbol is given as written
         as_it_is = condition.is_Relational and condition.rhs == 0
         shorter = written.count_ops() < expression.count_ops()
         found.append(above_zero(written) if as_it_is and shorter else condition)
@@ -212,14 +212,14 @@ def _continuous(family: Family) -> bool:
 
 
 def _blocks_along(family: Family, whole: Stability, matrix: sp.ImmutableDenseMatrix) -> Stability:
-    """Give the stability of a family in states, by the blocks of the Jacobian there.
+    """Return the stability along a family, by the irreducible blocks of the Jacobian there.
 
-    Entries that vanish all along the family may make it reducible.
+    The Jacobian may be reducible because entries vanish along the family.
     """
     if len(family.elimination.unknowns) == matrix.rows or matrix.rows == 1:
         return whole
     if not family.elimination.unknowns and _past(family, whole):
-        # shorter where the state is put in before the determinants are formed
+        # shorter if the state is substituted before the determinants are formed
         there = matrix.applyfunc(family.reduced)
     else:
         there = matrix.applyfunc(lambda e: sp.S.Zero if e == 0 or family.reduced(e) == 0 else e)
@@ -230,30 +230,30 @@ def _blocks_along(family: Family, whole: Stability, matrix: sp.ImmutableDenseMat
 
 
 def _past(family: Family, whole: Stability) -> bool:
-    """Whether a test is too long to be cancelled at an equilibrium in few parameters."""
+    """Check whether a test is too long to be simplified at an equilibrium in few parameters."""
     place = {real(n): e for n, e in family.elimination.solved.items()}
     tests = [e.xreplace(place) for e in whole.routh_hurwitz]
     used = set().union(*(e.free_symbols for e in tests))
     return len(used) <= FEW and any(longer(e, LONG) for e in tests)
 
 
-def _stability_along(family: Family, whole: Stability, setting: Setting) -> Stability:
-    """Give the stability of a family, with signs that hold all along it inside the region."""
-    if len(family.elimination.unknowns) == len(setting.states) > 1:
-        # nothing is solved for, so the Jacobian in states is all there is
+def _stability_along(family: Family, whole: Stability, context: RegionContext) -> Stability:
+    """Return the stability of a family, with signs valid along it inside the region."""
+    if len(family.elimination.unknowns) == len(context.states) > 1:
+        # no state is solved for
         return whole
     unknown = family.unknown
-    inside = [family.reduced(e) for e in setting.inside]
+    inside = [family.reduced(e) for e in context.inside]
 
     def sign(expression: sp.Expr) -> int | None:
         if unknown is None:
-            return setting.signs.with_positive(*_open(inside, setting.signs)).sign(expression)
-        return sign_within(expression, unknown, inside, setting.signs)
+            return context.signs.with_positive(*_open(inside, context.signs)).sign(expression)
+        return sign_within(expression, unknown, inside, context.signs)
 
     def condition(expression: sp.Expr) -> Boolean:
         if family.elimination.unknowns:
             return above_zero(expression)
-        return positive(expression, setting.signs, setting.candidates)
+        return positive(expression, context.signs, context.candidates)
 
     tests = tuple(family.reduced(e) for e in whole.routh_hurwitz)
     blocks = tuple(tuple(map(family.reduced, b)) for b in whole.blocks)
@@ -265,9 +265,9 @@ def _open(inside: list[sp.Expr], signs: Signs) -> list[sp.Expr]:
 
 
 def _no_hopf(stability: Stability) -> str:
-    """Why no pair of eigenvalues of a family can be imaginary inside the region."""
+    """Reason why no eigenvalues of a family are imaginary inside the region, else empty."""
     if stability.dimension == 1:
-        return "one state has one real eigenvalue"
+        return "the only eigenvalue is real"
     reasons = []
     for one in stability.hopf_tests:
         coefficients = stability.routh_hurwitz[one.position :]
@@ -280,54 +280,56 @@ def _no_hopf(stability: Stability) -> str:
             reasons.append(f"the determinant {coefficients[1]} is negative in the region")
         else:
             return ""
-    return "; ".join(reasons) or "every eigenvalue is real"
+    return "; ".join(reasons) or "all eigenvalues are real"
 
 
-def _equilibria(family: Family, inner: Stability, setting: Setting) -> list[EquilibriumForm]:
-    """One form for each closed root, else one for the whole family."""
+def _equilibria(family: Family, inner: Stability, context: RegionContext) -> list[EquilibriumForm]:
+    """One form for each root in closed form, else one for the family."""
     if family.unknown is None:
-        return [_form(family, None, inner, setting)]
+        return [_form(family, None, inner, context)]
     if family.roots is None or (family.curve is not None and not _short(family)):
-        return [_form(family, None, inner, setting)]
-    return [_form(family, root, inner, setting) for root in family.roots]
+        return [_form(family, None, inner, context)]
+    return [_form(family, root, inner, context) for root in family.roots]
 
 
 def _short(family: Family) -> bool:
-    """Whether the equation of a family is at most quadratic in its unknown."""
+    """Check that the equation of a family is at most quadratic in its unknown."""
     unknown = family.unknown
     (equation,) = family.equations
     return unknown is not None and bool(sp.degree(equation, unknown) <= 2)
 
 
-def _form(family: Family, root: Root | None, inner: Stability, setting: Setting) -> EquilibriumForm:
-    unknown, signs = family.unknown, setting.signs
+def _form(
+    family: Family, root: Root | None, inner: Stability, context: RegionContext
+) -> EquilibriumForm:
+    unknown, signs = family.unknown, context.signs
     place = {} if root is None or unknown is None else {unknown: root.value}
-    state = state_at(family, setting, place)
+    state = state_at(family, context, place)
     curve = {} if family.parameter is None else {family.parameter: family.curve}
     explicit = root is not None or not family.elimination.unknowns
     values = {real(n): e for n, e in state.items()}
     if explicit:
-        exists = setting.real(root.radicands) if root is not None else sp.true
-        inside = [tidy(e.xreplace(values)) for e in setting.inside]
-        admissible = conjunction((exists, setting.holds(inside)), signs)
-        check = checked(setting.rates.values(), values, signs)
-        stability = _at(inner, place, setting, inside) if place else inner
+        exists = context.all_nonnegative(root.radicands) if root is not None else sp.true
+        inside = [tidy(e.xreplace(values)) for e in context.inside]
+        admissible = conjunction((exists, context.all_positive(inside)), signs)
+        check = checked(context.rates.values(), values, signs)
+        stability = _at(inner, place, context, inside) if place else inner
         possible = implied(admissible, signs)
     else:
         stability, possible = inner, None
-        inside = [family.reduced(e) for e in setting.inside]
-        order = [*family.elimination.unknowns, *setting.candidates]
+        inside = [family.reduced(e) for e in context.inside]
+        order = [*family.elimination.unknowns, *context.candidates]
         exists = sp.And(*(nonnegative(e, signs, order) for e in family.radicands))
         admissible = conjunction((exists, *(_inside(e, signs, order) for e in inside)), signs)
         curve_at = {s: e for s, e in curve.items() if e is not None}
         equations = () if curve_at else family.equations
         unknowns = family.elimination.unknowns
-        # a state may be written with the slow parameter, which has its own value on the curve
+        # a state may depend on the slow parameter, which is a function on the curve
         place = {**{n: e.xreplace(curve_at) for n, e in values.items()}, **curve_at}
-        check = checked(setting.rates.values(), place, signs, equations, unknowns)
+        check = checked(context.rates.values(), place, signs, equations, unknowns)
     kind = "explicit" if explicit else "curve" if family.curve is not None else "implicit"
     return EquilibriumForm(
-        setting.region,
+        context.region,
         kind,
         state,
         () if explicit else family.elimination.unknowns,
@@ -338,7 +340,7 @@ def _form(family: Family, root: Root | None, inner: Stability, setting: Setting)
         exists,
         admissible,
         possible,
-        None if explicit else _range(family, inside, setting),
+        None if explicit else _range(family, inside, context),
         stability,
         family.discriminant,
         check,
@@ -348,34 +350,34 @@ def _form(family: Family, root: Root | None, inner: Stability, setting: Setting)
 
 
 def _inside(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean:
-    """When an expression along a curve is positive, by its factors where it has no radicals."""
+    """Condition for an expression along a curve to be positive."""
     return (isolated if irrational(expression) else positive)(expression, signs, order)
 
 
 def _at(
-    inner: Stability, place: dict[sp.Symbol, sp.Expr], setting: Setting, inside: list[sp.Expr]
+    inner: Stability, place: dict[sp.Symbol, sp.Expr], context: RegionContext, inside: list[sp.Expr]
 ) -> Stability:
-    """Stability at a closed root, with what holds all along the family kept."""
-    known = setting.signs.with_positive(*_open(inside, setting.signs))
+    """Stability at a root in closed form, with the signs valid along the family."""
+    known = context.signs.with_positive(*_open(inside, context.signs))
     tests = tuple(tidy(e.subs(place)) for e in inner.routh_hurwitz)
     settled = {e: s for e, s in zip(tests, inner.signs, strict=True) if s is not None}
     return stability_of_tests(
         tuple(tuple(tidy(a.subs(place)) for a in b) for b in inner.blocks),
         tests,
         lambda e: settled[e] if e in settled else known.sign(e),
-        lambda e: positive(e, setting.signs, setting.candidates),
+        lambda e: positive(e, context.signs, context.candidates),
     )
 
 
-def _range(family: Family, inside: list[sp.Expr], setting: Setting) -> Boolean | None:
-    """Give the admissible part of a curve that is monotone in its region, by its parameter."""
+def _range(family: Family, inside: list[sp.Expr], context: RegionContext) -> Boolean | None:
+    """Admissible parameter range of a curve that is monotone in its region."""
     unknown, curve, parameter = family.unknown, family.curve, family.parameter
     if unknown is None or curve is None or parameter is None or family.bent:
         return None
-    rising = sign_within(tidy(curve.diff(unknown)), unknown, inside, setting.signs)
+    rising = sign_within(tidy(curve.diff(unknown)), unknown, inside, context.signs)
     if rising not in (1, -1):
         return None
-    lower, upper = bounds(unknown, inside, setting.signs)
+    lower, upper = bounds(unknown, inside, context.signs)
     conditions = []
     for ends, above in ((lower, rising > 0), (upper, rising < 0)):
         for end in ends:
@@ -384,42 +386,42 @@ def _range(family: Family, inside: list[sp.Expr], setting: Setting) -> Boolean |
     return sp.And(*conditions) if conditions else None
 
 
-def _continua(family: Family, whole: Stability, setting: Setting) -> list[Continuum]:
-    """Every way in which a family of equilibria that are not isolated exists."""
-    ways = settled(family.condition, setting.candidates, setting.signs)
-    return [_continuum(family, whole, setting, *way) for way in ways]
+def _continua(family: Family, whole: Stability, context: RegionContext) -> list[Continuum]:
+    """All continua of a family of non-isolated equilibria."""
+    ways = solve_conditions(family.condition, context.candidates, context.signs)
+    return [_continuum(family, whole, context, *way) for way in ways]
 
 
 def _continuum(
     family: Family,
     whole: Stability,
-    setting: Setting,
+    context: RegionContext,
     place: dict[sp.Symbol, sp.Expr],
     radicands: tuple[sp.Expr, ...],
     left: tuple[sp.Expr, ...],
 ) -> Continuum:
-    state = state_at(family, setting, place)
+    state = state_at(family, context, place)
     values = {**place, **{real(n): e for n, e in state.items()}}
-    inside = tuple(tidy(e.xreplace(values)) for e in setting.inside)
-    order = [*family.elimination.unknowns, *setting.candidates]
+    inside = tuple(tidy(e.xreplace(values)) for e in context.inside)
+    order = [*family.elimination.unknowns, *context.candidates]
     polynomial = tidy(whole.characteristic_polynomial.xreplace(values))
     eigenvalues: list[sp.Expr] = []
     for factor, power in sp.factor_list(polynomial, EIGENVALUE)[1]:
         if factor.has(EIGENVALUE):
-            closed = roots(factor, EIGENVALUE, setting.signs)
+            closed = roots(factor, EIGENVALUE, context.signs)
             eigenvalues += [r.value for r in closed or () for _ in range(power)]
     equations = tuple(e.subs(place) for e in family.equations)
-    conditions = [isolated(e, setting.signs, order) for e in inside]
+    conditions = [isolated(e, context.signs, order) for e in inside]
     check = OPEN
     if not left and not equations:
-        check = checked(setting.rates.values(), values, setting.signs)
+        check = checked(context.rates.values(), values, context.signs)
     return Continuum(
-        setting.region,
+        context.region,
         family.elimination.unknowns,
         state,
         NamedMapping("parameter", {s.name: e for s, e in place.items()}),
         (*left, *equations),
-        tuple(c for c in (*conditions, setting.real(radicands)) if c != sp.true),
+        tuple(c for c in (*conditions, context.all_nonnegative(radicands)) if c != sp.true),
         tuple(eigenvalues),
         check,
     )

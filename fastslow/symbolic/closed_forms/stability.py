@@ -23,13 +23,13 @@ from fastslow.symbolic.solving.algebra import (
     tidy,
 )
 
-#: The variable of characteristic polynomials.
+#: Variable of characteristic polynomials.
 EIGENVALUE = sp.Symbol("lambda")
 
-#: A Hurwitz determinant that may have more terms than this is not expanded.
+#: Bound on the terms of a Hurwitz determinant that is expanded.
 HURWITZ = 400
 
-#: A Hurwitz determinant of more products times parts of a coefficient stays a determinant.
+#: Bound on products times nodes, beyond which a Hurwitz determinant is not evaluated.
 PRODUCTS = 20_000
 
 SignOf = Callable[[sp.Expr], "int | None"]
@@ -38,16 +38,16 @@ ConditionOf = Callable[[sp.Expr], Boolean]
 
 @dataclass(frozen=True)
 class HopfTest:
-    """When a pair of eigenvalues of one irreducible block of the Jacobian has sum zero.
+    """Test for a pair of eigenvalues with zero sum in one irreducible block of the Jacobian.
 
     Parameters
     ----------
     test : sympy.Expr
-        The last but one Hurwitz determinant, zero there (Orlando 1911).
+        The last but one Hurwitz determinant, which vanishes there (Orlando 1911).
     position : int
-        Of the test among the Routh-Hurwitz expressions.
+        Index of the test among the Routh-Hurwitz expressions.
     block : tuple of sympy.Expr
-        Coefficients of the block.
+        Coefficients of the characteristic polynomial of the block.
     """
 
     test: sp.Expr
@@ -56,12 +56,12 @@ class HopfTest:
 
     @property
     def size(self) -> int:
-        """States in the block."""
+        """Number of states in the block."""
         return len(self.block) - 1
 
     @property
     def frequency_squared(self) -> sp.Expr:
-        """ω² of that pair where it is the only one.
+        """Squared frequency ω² of the pair, if it is the only one.
 
         Positive at a Hopf point, negative at a neutral saddle.
         """
@@ -70,7 +70,7 @@ class HopfTest:
 
 @dataclass(frozen=True)
 class Stability:
-    """The characteristic polynomial and when all its roots lie in the left half plane.
+    """The characteristic polynomial and its Routh-Hurwitz conditions.
 
     Parameters
     ----------
@@ -78,14 +78,14 @@ class Stability:
         1, a1, …, an of λⁿ + a1 λⁿ⁻¹ + … + an for each irreducible diagonal block of the
         Jacobian; their product is the characteristic polynomial.
     routh_hurwitz : tuple of sympy.Expr
-        Block by block; all of them are positive iff the equilibrium is asymptotically
+        Expressions block by block, all positive iff the equilibrium is asymptotically
         stable (Liénard and Chipart 1914: every coefficient and every second Hurwitz
         determinant, counted down from the last but one). A determinant past the
-        budget is left as products of coefficients, or as an unevaluated determinant.
+        budget is given as products of coefficients, or unevaluated.
     signs : tuple of int or None
-        Sign of each under the assumptions and in the region; None where open.
+        Sign of each in the region under the assumptions; None if undecided.
     conditions : tuple of Boolean
-        The inequalities among them that the assumptions leave open.
+        Inequalities that the assumptions do not decide.
     """
 
     blocks: tuple[tuple[sp.Expr, ...], ...]
@@ -95,11 +95,12 @@ class Stability:
 
     @property
     def dimension(self) -> int:
+        """Number of states."""
         return sum(len(b) - 1 for b in self.blocks)
 
     @cached_property
     def coefficients(self) -> tuple[sp.Expr, ...]:
-        """1, a1, …, an of the whole characteristic polynomial, expanded."""
+        """Expanded coefficients 1, a1, …, an of the characteristic polynomial."""
         whole: tuple[sp.Expr, ...] = (sp.S.One,)
         for block in self.blocks:
             total = [sp.S.Zero] * (len(whole) + len(block) - 1)
@@ -110,15 +111,17 @@ class Stability:
 
     @property
     def trace(self) -> sp.Expr:
+        """Trace of the Jacobian."""
         return spread(-sp.Add(*(b[1] for b in self.blocks)))
 
     @property
     def determinant(self) -> sp.Expr:
+        """Determinant of the Jacobian."""
         return spread((-1) ** self.dimension * sp.Mul(*(b[-1] for b in self.blocks)))
 
     @property
     def characteristic_polynomial(self) -> sp.Expr:
-        """In λ (``EIGENVALUE``), a product of one factor for each block."""
+        """Characteristic polynomial in λ (``EIGENVALUE``), with one factor for each block."""
         return sp.Mul(
             *(
                 sp.Add(*(a * EIGENVALUE ** (len(b) - 1 - k) for k, a in enumerate(b)))
@@ -139,7 +142,7 @@ class Stability:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """How many of the Routh-Hurwitz expressions are not expanded, past the budget."""
+        """Remark on the number of Routh-Hurwitz expressions that are not expanded."""
         left = [e for e in self.routh_hurwitz if e.has(sp.Determinant) or compressed(e)]
         if not left:
             return ()
@@ -147,12 +150,12 @@ class Stability:
         kept = "determinants" if any(e.has(sp.Determinant) for e in left) else "products"
         return (
             f"{len(left)} of the {whole} Routh-Hurwitz expressions are past the budget of "
-            f"expansion; stability.routh_hurwitz has them as {kept} of coefficients",
+            f"expansion; stability.routh_hurwitz gives them as {kept} of coefficients",
         )
 
     @cached_property
     def hopf_tests(self) -> tuple[HopfTest, ...]:
-        """One for each block of two states and more; eigenvalues of one state are real."""
+        """One test for each block of two or more states."""
         found = []
         position = 0
         for block in self.blocks:
@@ -165,14 +168,14 @@ class Stability:
 
     @property
     def focus_test(self) -> sp.Expr | None:
-        """Planar: positive where the eigenvalues are complex, 4 det − trace²; else None."""
+        """4 det − trace² of a planar system, positive for complex eigenvalues; else None."""
         if self.dimension != 2:
             return None
         return spread(4 * self.coefficients[2] - self.coefficients[1] ** 2)
 
 
 def jacobian(rates: Mapping[str, sp.Expr], states: Sequence[str]) -> sp.ImmutableDenseMatrix:
-    """Give derivatives of the rates, shape (n, n), in the order of the states.
+    """Return the Jacobian of the rates, shape (n, n), in the order of the states.
 
     Examples
     --------
@@ -187,7 +190,7 @@ def jacobian(rates: Mapping[str, sp.Expr], states: Sequence[str]) -> sp.Immutabl
 
 
 def irreducible_blocks(matrix: sp.MatrixBase) -> list[tuple[int, ...]]:
-    """Rows of the irreducible diagonal blocks, to which a permutation brings a matrix.
+    """Return the rows of the irreducible diagonal blocks of a matrix, up to permutation.
 
     Examples
     --------
@@ -200,15 +203,15 @@ def irreducible_blocks(matrix: sp.MatrixBase) -> list[tuple[int, ...]]:
 
 
 def stability_of_matrix(matrix: sp.MatrixBase, sign: SignOf, positive: ConditionOf) -> Stability:
-    """Characteristic polynomial and Routh-Hurwitz conditions of a matrix.
+    """Return the characteristic polynomial and Routh-Hurwitz conditions of a matrix.
 
     Parameters
     ----------
     matrix : sympy.Matrix, shape (n, n)
     sign : callable
-        Expression to +1, 0, −1, or None where its sign is open.
+        Expression to its sign +1, 0 or −1, None if undecided.
     positive : callable
-        Expression to the condition for its being positive.
+        Expression to the condition for it to be positive.
 
     Examples
     --------
@@ -224,7 +227,7 @@ def stability_of_matrix(matrix: sp.MatrixBase, sign: SignOf, positive: Condition
 def expressions_of_matrix(
     matrix: sp.MatrixBase,
 ) -> tuple[tuple[tuple[sp.Expr, ...], ...], tuple[sp.Expr, ...]]:
-    """Coefficients of the blocks of a matrix, and their Routh-Hurwitz expressions."""
+    """Return the coefficients of the blocks of a matrix and the Routh-Hurwitz expressions."""
     each = [
         _of_block(sp.ImmutableDenseMatrix(matrix.extract(list(rows), list(rows))))
         for rows in irreducible_blocks(matrix)
@@ -233,7 +236,7 @@ def expressions_of_matrix(
 
 
 def _count(size: int) -> int:
-    """Routh-Hurwitz expressions of a block."""
+    """Number of Routh-Hurwitz expressions of a block."""
     return size + len(range(size - 1, 1, -2))
 
 
@@ -259,7 +262,7 @@ def stability_of_tests(
     sign: SignOf,
     positive: ConditionOf,
 ) -> Stability:
-    """Stability from given Routh-Hurwitz expressions."""
+    """Return the stability for given Routh-Hurwitz expressions."""
     signs: list[int | None] = []
     open_ones: list[Boolean] = []
     for test in tests:
@@ -274,7 +277,7 @@ def stability_of_tests(
 
 
 def frequency_squared(coefficients: Sequence[sp.Expr]) -> sp.Expr:
-    """ω² of the pair of eigenvalues with sum zero, where the last but one Hurwitz test vanishes.
+    """Return ω² of the eigenvalue pair with zero sum, on the zeros of the Hurwitz test.
 
     With λ² = z the characteristic polynomial is E(z) + λ O(z), and such a pair is a common
     root z = −ω² of both: the root of their first subresultant, where there is just one pair
@@ -302,7 +305,7 @@ def frequency_squared(coefficients: Sequence[sp.Expr]) -> sp.Expr:
 
 
 def _first_subresultant(size: int) -> list[list[list[int | None]]]:
-    """Matrices, in numbers of coefficients, of the constant and slope of that subresultant."""
+    """Matrices (indices of coefficients) of the constant and slope of the subresultant."""
     one, two = range(size % 2, size + 1, 2), range(1 - size % 2, size + 1, 2)
     width = len(one) + len(two) - 3
     rows: list[list[int | None]] = []
@@ -318,7 +321,7 @@ def _first_subresultant(size: int) -> list[list[list[int | None]]]:
 def _in_coefficients(
     rows: Sequence[Sequence[int | None]], coefficients: Sequence[sp.Expr]
 ) -> sp.Expr:
-    """Determinant of a matrix of coefficients of a polynomial, given by their numbers."""
+    """Determinant of a matrix of polynomial coefficients, given by their indices."""
     names, expanded = _determinant_of(tuple(map(tuple, rows)))
     if not rows:
         return expanded
@@ -333,7 +336,7 @@ def _in_coefficients(
 def _determinant_of(
     rows: tuple[tuple[int | None, ...], ...],
 ) -> tuple[dict[int, sp.Symbol], sp.Expr]:
-    """Symbols for the numbers in a matrix, with number 0 for one, and its determinant in them."""
+    """Symbols for the indices in a matrix, where 0 denotes one, and its determinant."""
     numbers = sorted({k for row in rows for k in row if k})
     names = {k: sp.Dummy(f"a{k}", real=True) for k in numbers}
     ring = PolyRing(list(names.values()), ZZ)
@@ -356,7 +359,7 @@ def _determinant_of(
 
 
 def hurwitz(coefficients: Sequence[sp.Expr], order: int) -> sp.Expr:
-    """Leading Hurwitz determinant of an order, from 1, a1, …, an.
+    """Return the leading Hurwitz determinant of an order, from 1, a1, …, an.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Free directions: shifts of the states that leave every rate as it is."""
+"""Free directions: translations of the states under which all rates are invariant."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import sympy as sp
 
 from fastslow.errors import ArgumentError
-from fastslow.model.derived import once, partition_of
+from fastslow.model.derived import cached_by, partition_of
 from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.structure import real
@@ -19,10 +19,10 @@ from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.reduction import reduce_states
 from fastslow.symbolic.solving.algebra import tidy
 
-#: States up to which free directions are looked for.
+#: Largest number of states for which free directions are computed.
 STATES = 24
 
-#: States, at least, at which rows are evaluated; with all rows twice as many as columns.
+#: Least number of states at which rows are evaluated; in total at least 2n rows are formed.
 POINTS = 3
 
 #: Singular values below this, relative to the largest, count as zero.
@@ -31,18 +31,18 @@ NULL = 1e-11
 
 @dataclass(frozen=True)
 class FreeDirection:
-    """A shift of the states under which no rate and no interface changes.
+    """A translation of the states under which all rates and interfaces are invariant.
 
-    Where a shift by c leaves the rates as they are, an equilibrium is never isolated, and
-    where the shifted states drift along c there is none: a rigid-body mode. The
-    combinations that the shift does not change form a system of their own.
+    Equilibria of such a system are not isolated, and there is none if the states drift
+    along the direction (a rigid-body mode). The invariant combinations of the states form
+    a reduced system.
 
     Parameters
     ----------
     shift : NamedMapping of sympy.Expr
-        State to its share of the shift.
+        State to its component of the translation.
     combinations : NamedMapping of sympy.Expr
-        New states, those that no free direction is left in, in terms of the old ones.
+        States of the reduced system, without free directions, in terms of the old ones.
 
     Examples
     --------
@@ -61,14 +61,14 @@ class FreeDirection:
         moved = ", ".join(f"{n} + {sp.Symbol(c) * e}" for n, e in self.shift.items())
         given = ", ".join(f'"{n}": {e}' for n, e in self.combinations.items())
         return (
-            f"free direction: the shift {moved} leaves every rate as it is, so no equilibrium "
-            f"is isolated; fs.reduce_states(model.rates, {{{given}}}) is the system without it"
+            f"free direction: all rates are invariant under {moved}, so no equilibrium "
+            f"is isolated; fs.reduce_states(model.rates, {{{given}}}) returns the reduced system"
         )
 
 
 @lru_cache(maxsize=64)
 def free_directions(model: Model) -> tuple[FreeDirection, ...]:
-    """The free directions of a frozen model; none are looked for past `STATES` states.
+    """Return the free directions of a frozen model with at most `STATES` states.
 
     Parameters
     ----------
@@ -101,9 +101,9 @@ def free_directions(model: Model) -> tuple[FreeDirection, ...]:
     )
 
 
-@once(partition_of)
+@cached_by(partition_of)
 def _slopes_of(model: Model) -> list[list[sp.Expr]]:
-    """Slopes of all rates and interface functions, by the states."""
+    """Gradients of all rates and interface functions."""
     functions = [r.rates[n] for r in model.regions.values() for n in model.states]
     functions += [i.function for i in model.interfaces.values()]
     return _slopes(functions, [real(n) for n in model.states])
@@ -112,7 +112,7 @@ def _slopes_of(model: Model) -> list[list[sp.Expr]]:
 def _reduced(
     model: Model, states: Sequence[sp.Symbol], values: Mapping[sp.Symbol, float]
 ) -> NamedMapping[sp.Expr]:
-    """Combinations that no free direction changes, as often as one is left."""
+    """Invariant combinations, reduced repeatedly until no free direction remains."""
     whole: dict[sp.Symbol, sp.Expr] = {s: s for s in states}
     rates = {s: model.rates[s.name] for s in states}
     while True:
@@ -137,7 +137,7 @@ def _reduced(
 
 
 def _branches(expression: sp.Expr) -> list[sp.Expr]:
-    """Every smooth expression that a rate with Piecewise may be, and what decides it."""
+    """All smooth branches of a rate with Piecewise, and the expressions that select them."""
     pieces = [p for p in sp.preorder_traversal(expression) if isinstance(p, sp.Piecewise)]
     if not pieces:
         return [expression]
@@ -157,7 +157,7 @@ def constant_null_space(
     states: Sequence[sp.Symbol],
     values: Mapping[sp.Symbol, float],
 ) -> list[list[sp.Expr]]:
-    """Vectors without states in them that are orthogonal to every row at every state.
+    """Return constant vectors that are orthogonal to every row at every state.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def constant_null_space(
         Each with as many entries as there are states.
     states : sequence of Symbol
     values : mapping
-        Parameter to its value, for a first look with numbers.
+        Parameter to its value, for a numerical preselection.
 
     Examples
     --------
@@ -182,7 +182,7 @@ def constant_null_space(
     null = right[rank:]
     if not len(null):
         return []
-    # only the columns that take part are looked at symbolically
+    # only the columns involved are treated symbolically
     moving = [k for k in range(len(states)) if np.abs(null[:, k]).max() > 1e-9]
     few = [[sp.nsimplify(row[k], rational=True) for k in moving] for row in _few(distinct, moving)]
     matrix = sp.Matrix([part for row in few for part in _by_kernels(row, states)])
@@ -200,14 +200,14 @@ def constant_null_space(
 
 @lru_cache(maxsize=64)
 def _distinct(rows: tuple[tuple[sp.Expr, ...], ...]) -> tuple[tuple[sp.Expr, ...], ...]:
-    """Every row that is not zero, once."""
+    """Distinct nonzero rows."""
     return tuple(row for row in dict.fromkeys(rows) if any(e != 0 for e in row))
 
 
 def _by_kernels(row: Sequence[sp.Expr], states: Sequence[sp.Symbol]) -> list[list[sp.Expr]]:
-    """A row as one of coefficients for each function of the states in it.
+    """Split a row into one row of coefficients for each function of the states in it.
 
-    What is constant in the states vanishes with the row where it does with all of them.
+    A constant vector is orthogonal to the row if and only if it is to all of these.
     """
     found: dict[sp.Expr, list[sp.Expr]] = {}
     for k, entry in enumerate(row):
@@ -222,7 +222,7 @@ def _by_kernels(row: Sequence[sp.Expr], states: Sequence[sp.Symbol]) -> list[lis
 
 
 def _few(slopes: Sequence[Sequence[sp.Expr]], columns: Sequence[int]) -> list[Sequence[sp.Expr]]:
-    """Rows that say something of the columns, each once, the shortest first."""
+    """Rows with entries in the columns, the shortest first."""
     inside = [row for row in slopes if any(row[k] != 0 for k in columns)]
     return sorted(inside, key=lambda row: sum(sp.count_ops(row[k]) for k in columns))[:12]
 
@@ -231,14 +231,14 @@ def _few(slopes: Sequence[Sequence[sp.Expr]], columns: Sequence[int]) -> list[Se
 def _function_of(
     slopes: tuple[tuple[sp.Expr, ...], ...],
 ) -> tuple[list[sp.Symbol], Callable[..., Any]]:
-    """The symbols in slopes, and the slopes as a function of these."""
+    """Symbols of the gradients, and the gradients as a function of these."""
     symbols = sorted(set().union(*(e.free_symbols for r in slopes for e in r)), key=str)
     return symbols, numpy_function(symbols, [list(r) for r in slopes])
 
 
 @cache
 def _number(point: int, place: int) -> float:
-    """A quotient of primes for every place of a point."""
+    """A quotient of primes for each coordinate of a point."""
     return float(sp.prime(3 * point + 2 * place + 5)) / float(sp.prime(place + 4))
 
 
@@ -247,14 +247,14 @@ def _numbers(
     states: Sequence[sp.Symbol],
     values: Mapping[sp.Symbol, float],
 ) -> np.ndarray:
-    """The slopes at a few states, each row scaled to its largest entry."""
+    """Gradients at a few states, each row scaled to its largest entry."""
     symbols, function = _function_of(slopes)
     rows = []
     for k in range(max(POINTS, -(-2 * len(states) // len(slopes)))):
-        # in the states' and free parameters' own order
+        # in the order of states and free parameters
         place = [values[s] if s in values else _number(k, j) for j, s in enumerate(symbols)]
         with np.errstate(all="ignore"):
-            # as NumPy's numbers: a division by zero is no error here
+            # as NumPy numbers, for which a division by zero raises nothing
             rows.append(np.array(function(*map(np.float64, place)), dtype=float))
     numbers = np.vstack(rows)
     numbers = numbers[np.isfinite(numbers).all(axis=1)]
@@ -263,7 +263,7 @@ def _numbers(
 
 
 def _invariants(shifts: Sequence[Sequence[sp.Expr]], states: Sequence[sp.Symbol]) -> list[sp.Expr]:
-    """Linear combinations that no shift changes, in the order of the states."""
+    """Linear combinations invariant under all translations, in the order of the states."""
     matrix = sp.Matrix([list(s) for s in shifts])
     reduced, pivots = matrix.rref(simplify=True)
     found = []

@@ -1,7 +1,7 @@
-"""Numbers of many digits as decimals in printed formulas; the objects keep them exact.
+"""Rounding of long rational numbers in printed formulas.
 
-Decimals in the rates are rational numbers to a derivation, and what is cleared of
-denominators has coefficients of thirty digits, which no reader takes in.
+A derivation converts decimals to rational numbers; clearing denominators then yields
+coefficients of thirty digits. They are rounded in print only.
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ from fastslow.symbolic.solving.algebra import longer
 
 Formula = TypeVar("Formula", bound=sp.Basic)
 
-#: Digits of a numerator or denominator up to which it is printed as it is.
+#: Digits of a numerator or denominator up to which it is printed exactly.
 EXACT = 9
 
-#: Significant digits of a longer one.
+#: Significant digits of longer numbers.
 SHOWN = 6
 
-#: Sums whose largest coefficient is between these are not divided by it.
+#: Range of the largest coefficient of a sum that is not normalised.
 LEAST, MOST = 1e-3, 1e6
 
-#: Digits that are computed.
+#: Digits of intermediate results.
 COMPUTED = 20
 
-#: Longer formulas, in parts of their tree, are not printed, unless they are numbers.
+#: Formulas with more nodes are not printed, unless they are numbers.
 PARTS = 2000
 
 
 @lru_cache(maxsize=2048)
 def readable(formula: Formula) -> Formula:
-    """Give a formula with numbers of many digits rounded to six.
+    """Return a formula with long numbers rounded to six digits.
 
-    A sum of terms with long coefficients is divided by the largest of them where that is
-    a factor of a product, or where the sum is compared with zero.
+    A sum of terms with long coefficients is divided by the largest coefficient if it is
+    a factor of a product or is compared with zero.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def readable(formula: Formula) -> Formula:
 
 
 def rounds(formula: sp.Basic) -> bool:
-    """Whether numbers of a formula are rounded when it is printed.
+    """Check whether numbers of a formula are rounded when it is printed.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def rounds(formula: sp.Basic) -> bool:
 
 
 def without_scale(formula: sp.Expr) -> sp.Expr:
-    """Give a formula that is zero where the given one is, without long common factors.
+    """Return a formula with the same zeros, without long common factors.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def _digits(number: sp.Rational) -> int:
 
 
 def _converted(formula: sp.Basic) -> sp.Basic:
-    """With floats in place of long numbers."""
+    """Replace long numbers by floats."""
     if isinstance(formula, sp.Expr) and formula.is_number:
         value = sp.N(formula, COMPUTED) if _long(formula) else formula
         return value if value.is_Float or value.is_Rational else formula
@@ -129,7 +129,7 @@ def _short_number(number: sp.Expr) -> sp.Expr:
 
 
 def _scaled(formula: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """A number, positive where it is taken out of a sum, and the rest with floats in it."""
+    """Split off a number, positive for a sum; the rest contains floats."""
     if formula.is_number:
         return _converted(formula), sp.S.One
     if not formula.is_Add or not _long(formula):
@@ -139,7 +139,7 @@ def _scaled(formula: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
     if not _long(rest):
         return content, rest
     terms = [_converted(t).as_coeff_Mul() for t in rest.args]
-    # numbers such as the square root of two have the coefficient one
+    # SymPy gives numbers such as √2 the coefficient one
     sizes = [abs(sp.N(n * (r if r.is_number else 1), COMPUTED)) for n, r in terms]
     largest = max(sizes)
     if LEAST <= content * largest <= MOST:
@@ -164,7 +164,7 @@ def _compared(relation: Relational) -> Relational:
 
 
 def _rounded(formula: sp.Basic) -> sp.Basic:
-    """With six digits in every float, and whole numbers whole."""
+    """Round every float to six digits; integral values become integers."""
     place = {}
     for number in formula.atoms(sp.Float):
         shown = float(format(float(number), f".{SHOWN}g"))

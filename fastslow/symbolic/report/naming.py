@@ -1,4 +1,4 @@
-"""Names for what a printed formula repeats, so that its lines stay short."""
+"""Names for repeated subexpressions of printed formulas."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from sympy.printing.str import StrPrinter
 from fastslow.model.rational import quotient
 from fastslow.symbolic.solving.algebra import irrational, longer, shortest, whole
 
-#: Longest line of text, and the longest formula that is printed at all.
+#: Longest line of text, and longest formula that is printed.
 WIDTH = 180
 
-#: What is shorter, in characters, gets no name.
+#: Length in characters from which a subexpression is named.
 WORTH = 24
 
-#: Longer expressions, in parts of their tree, are not looked at.
+#: Expressions with more nodes are not searched.
 PARTS = 600
 
-#: Most names for one formula.
+#: Largest number of names for one formula.
 NAMES = 6
 
-#: Sums of so many terms are left as they are.
+#: Sums with at most so many terms are not rewritten.
 FEW = 4
 
-#: Sums of more terms are too long for their forms to be compared.
+#: Largest number of terms of sums that are rewritten.
 MANY = 24
 
-#: Letters that stand for subexpressions, those not in use first.
+#: Letters for subexpressions, those not in use first.
 LETTERS = "PQRSTUWXYZ"
 
 
@@ -39,7 +39,7 @@ class _Text(StrPrinter):
 
 
 def text(expression: object) -> str:
-    """Give an expression as text.
+    """Return an expression as text.
 
     Examples
     --------
@@ -52,7 +52,7 @@ def text(expression: object) -> str:
 
 
 def free_names(taken: Iterable[str]) -> Iterator[sp.Symbol]:
-    """Symbols for subexpressions that the model does not use.
+    """Yield symbols for subexpressions that the model does not use.
 
     Examples
     --------
@@ -74,9 +74,9 @@ def free_names(taken: Iterable[str]) -> Iterator[sp.Symbol]:
 def named(
     expressions: Sequence[sp.Basic], taken: Iterable[str]
 ) -> tuple[list[sp.Basic], list[tuple[sp.Symbol, sp.Basic]]]:
-    """Give expressions with names in place of what they repeat, and what the names stand for.
+    """Return expressions with named subexpressions, and the definitions of the names.
 
-    Radicands come first, then sums and other subexpressions that occur more than once.
+    Radicands are named first, then sums and other subexpressions that occur repeatedly.
 
     Examples
     --------
@@ -103,13 +103,13 @@ def named(
 
 
 def _best(expressions: Sequence[sp.Basic]) -> sp.Expr | None:
-    """The subexpression to be named next."""
+    """The next subexpression to name."""
     counts: dict[sp.Expr, int] = {}
     for expression in expressions:
         walk = sp.preorder_traversal(expression)
         for node in walk:
             if isinstance(node, ComplexRootOf):
-                # a number whose polynomial and index are no formulas
+                # a number: its polynomial and index are not formulas
                 walk.skip()
                 continue
             if isinstance(node, sp.Expr) and (node.is_Add or node.is_Mul or node.is_Pow):
@@ -129,7 +129,7 @@ def _best(expressions: Sequence[sp.Basic]) -> sp.Expr | None:
 
 
 def compact(expression: sp.Basic) -> sp.Basic:
-    """Long sums factored, or with a square completed, where that is shorter.
+    """Factor long sums or complete squares, where that is shorter.
 
     Examples
     --------
@@ -156,7 +156,7 @@ def compact(expression: sp.Basic) -> sp.Basic:
 
 
 def _completed(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr | None:
-    """A quadratic a s² + b s + c as a (s + b/2a)² or (√a s + b/2√a)², with what is left."""
+    """Complete the square of a s² + b s + c as a (s + b/2a)² or (√a s + b/2√a)²."""
     if not expression.is_polynomial(symbol):
         return None
     poly = sp.Poly(expression, symbol)

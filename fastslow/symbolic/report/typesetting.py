@@ -1,4 +1,4 @@
-"""A derivation as LaTeX."""
+"""Typesetting of derivations in LaTeX."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fastslow.symbolic.closed_forms.forms import Continuum, CriticalPoint, Equil
 from fastslow.symbolic.closed_forms.stability import Stability
 from fastslow.symbolic.report.decimals import readable
 from fastslow.symbolic.report.naming import WIDTH, named, text
-from fastslow.symbolic.report.wording import folds, names_of
+from fastslow.symbolic.report.wording import names_of, too_long
 
 if TYPE_CHECKING:
     from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 #: A heading and its formulas.
 Block = tuple[str, list[str]]
 
-#: What stands before a formula, the formula, and what stands behind it.
+#: Text before a formula, the formula, and text after it.
 Item = tuple[str, sp.Basic, str]
 
 
 def derivation_latex(law: Derivation) -> str:
-    """Paragraphs with displayed formulas, for a LaTeX document with amsmath."""
+    """Return paragraphs with displayed formulas, for a LaTeX document with amsmath."""
     parts = []
     for heading, formulas in _blocks(law):
         body = " \\\\\n".join(f"  & {f}" for f in formulas)
@@ -39,7 +39,7 @@ def derivation_latex(law: Derivation) -> str:
 
 
 def derivation_display(law: Derivation) -> str:
-    """One displayed formula, as notebooks show it."""
+    """Return one displayed formula, for notebooks."""
     rows = []
     for heading, formulas in _blocks(law):
         rows.append(f"\\textbf{{{heading}}}")
@@ -123,7 +123,7 @@ def _set(
     exists: sp.Basic = sp.true,
     admissible: sp.Basic = sp.true,
 ) -> list[str]:
-    """One line, or several where it is long, with names for what it repeats."""
+    """One line, or several for a long entry, with names for repeated subexpressions."""
     plain = admissible not in (sp.true, sp.false)
     admissible = readable(admissible)
     formulas = [readable(e) for _, e, _ in items] + ([admissible] if plain else [])
@@ -213,6 +213,6 @@ def _comma(conditions: Iterable[sp.Basic]) -> str:
 def _tex(expression: sp.Basic) -> str:
     matrix = isinstance(expression, sp.MatrixBase)
     expression = expression.applyfunc(readable) if matrix else readable(expression)
-    if not matrix and folds(expression):
+    if not matrix and too_long(expression):
         return r"\langle\text{a long expression}\rangle"
     return latex(expression)

@@ -1,4 +1,4 @@
-"""A derivation as text, in lines that can be read."""
+"""Plain-text report of a derivation."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
     from fastslow.symbolic.closed_forms.regions import RegionForms
     from fastslow.symbolic.derivation import Derivation
 
-#: Longer expressions, in parts of their tree, are not printed; the objects hold them whole.
+#: Expressions with more nodes are not printed; the objects contain them in full.
 PARTS = 600
 
-#: What is said where numbers are rounded.
-ROUNDED = f"Long numbers are printed to {SHOWN} digits; the objects have them exactly."
+#: Remark printed if numbers are rounded.
+ROUNDED = f"Long numbers are rounded to {SHOWN} digits in print and stored exactly."
 
 
 @dataclass(frozen=True)
-class Piece:
-    """A stretch of text around at most one formula.
+class Fragment:
+    """A fragment of text with at most one formula.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Piece:
     formula : sympy.Basic or None
     after : str
     separator : str
-        Between this piece and the one before it.
+        Text between the previous fragment and this one.
     """
 
     before: str
@@ -48,10 +48,10 @@ class Piece:
     separator: str = ", "
 
     def shown(self, formula: sp.Basic | None) -> str:
-        """The text with the formula given in place of its own."""
+        """Return the text, with another formula in place of its own."""
         if formula is None:
             return self.before
-        if not folds(formula):
+        if not too_long(formula):
             printed = text(formula)
         else:
             kind = "condition" if isinstance(formula, sp.logic.boolalg.Boolean) else "expression"
@@ -60,7 +60,7 @@ class Piece:
 
 
 def summary(law: Derivation) -> str:
-    """Give what was derived, region by region."""
+    """Return the report of a derivation, region by region."""
     frozen = f" with {', '.join(law.free)} frozen" if law.free else ""
     assumed = ", ".join(map(str, law.assumptions)) or "nothing"
     taken = names_of(law)
@@ -81,7 +81,7 @@ def summary(law: Derivation) -> str:
 
 
 def _formulas(law: Derivation) -> Iterator[sp.Basic]:
-    """What the entries of a derivation print."""
+    """Yield the formulas printed for a derivation."""
     for region in law.regions.values():
         yield from region.conditions
         points = (*region.folds, *region.branch_points, *region.cusps, *region.hopf)
@@ -96,7 +96,7 @@ def _formulas(law: Derivation) -> Iterator[sp.Basic]:
 
 
 def names_of(law: Derivation) -> set[str]:
-    """Names that the model uses, which no subexpression may get."""
+    """Return the names used by the model, which are excluded for subexpressions."""
     names = {*law.states, *law.free, *law.regions}
     for region in law.regions.values():
         for rate in region.rates.values():
@@ -109,79 +109,79 @@ def names_of(law: Derivation) -> set[str]:
     return names
 
 
-def entry(pieces: Sequence[Piece], taken: set[str], indent: str) -> list[str]:
-    """Lines of one entry; what a long one repeats is given a name in a last line.
+def entry(fragments: Sequence[Fragment], taken: set[str], indent: str) -> list[str]:
+    """Return the lines of one entry, with repeated subexpressions defined in a last line.
 
     Examples
     --------
     >>> a = sp.Symbol("a")
-    >>> entry([Piece("fold: x = ", a + 1), Piece("y = ", a - 1)], {"a"}, "  ")
+    >>> entry([Fragment("fold: x = ", a + 1), Fragment("y = ", a - 1)], {"a"}, "  ")
     ['  fold: x = a + 1, y = a - 1']
     """
-    pieces = [_readable(p) for p in pieces]
-    formulas = [p.formula for p in pieces]
-    whole = _joined(pieces, [p.shown(f) for p, f in zip(pieces, formulas, strict=True)])
-    folded = any(f is not None and folds(f) for f in formulas)
-    if len(indent) + len(whole) <= WIDTH and not folded:
+    fragments = [_readable(p) for p in fragments]
+    formulas = [p.formula for p in fragments]
+    whole = _joined(fragments, [p.shown(f) for p, f in zip(fragments, formulas, strict=True)])
+    abridged = any(f is not None and too_long(f) for f in formulas)
+    if len(indent) + len(whole) <= WIDTH and not abridged:
         return [indent + whole]
     inside = [f for f in formulas if f is not None]
     short, defined = named(inside, taken)
     replaced = iter(short)
-    texts = [p.shown(None if p.formula is None else next(replaced)) for p in pieces]
-    lines = _lines(pieces, texts, indent)
-    used = set().union(set(), *(e.free_symbols for e in short if not folds(e)))
+    texts = [p.shown(None if p.formula is None else next(replaced)) for p in fragments]
+    lines = _lines(fragments, texts, indent)
+    used = set().union(set(), *(e.free_symbols for e in short if not too_long(e)))
     meaning = []
     for symbol, value in reversed(defined):
         if symbol in used:
             used |= value.free_symbols
-            meaning.append(Piece(f"{symbol} = ", value))
+            meaning.append(Fragment(f"{symbol} = ", value))
     meaning.reverse()
     if meaning:
-        first = Piece(f"with {meaning[0].before}", meaning[0].formula)
+        first = Fragment(f"with {meaning[0].before}", meaning[0].formula)
         parts = [first, *meaning[1:]]
         lines += _lines(parts, [p.shown(p.formula) for p in parts], indent + "    ")
     return lines
 
 
-def _readable(piece: Piece) -> Piece:
-    if piece.formula is None:
-        return piece
-    zero = piece.after == " = 0" and isinstance(piece.formula, sp.Expr)
-    return replace(piece, formula=(without_scale if zero else readable)(piece.formula))
+def _readable(fragment: Fragment) -> Fragment:
+    if fragment.formula is None:
+        return fragment
+    zero = fragment.after == " = 0" and isinstance(fragment.formula, sp.Expr)
+    return replace(fragment, formula=(without_scale if zero else readable)(fragment.formula))
 
 
-def folds(formula: sp.Basic) -> bool:
-    """Whether a formula is too long to be printed."""
+def too_long(formula: sp.Basic) -> bool:
+    """Check whether a formula is too long to be printed."""
     return longer(formula, PARTS) or len(text(formula)) > WIDTH
 
 
-def _joined(pieces: Sequence[Piece], texts: Sequence[str]) -> str:
+def _joined(fragments: Sequence[Fragment], texts: Sequence[str]) -> str:
     result = texts[0]
-    for piece, part in zip(pieces[1:], texts[1:], strict=True):
-        result += piece.separator + part
+    for fragment, part in zip(fragments[1:], texts[1:], strict=True):
+        result += fragment.separator + part
     return result
 
 
-def _lines(pieces: Sequence[Piece], texts: Sequence[str], indent: str) -> list[str]:
-    """Pieces one after another, with a new line where one does not fit."""
+def _lines(fragments: Sequence[Fragment], texts: Sequence[str], indent: str) -> list[str]:
+    """Join fragments, with line breaks between them."""
     lines = [indent + texts[0]]
-    for piece, part in zip(pieces[1:], texts[1:], strict=True):
-        if len(lines[-1]) + len(piece.separator) + len(part) <= WIDTH:
-            lines[-1] += piece.separator + part
+    for fragment, part in zip(fragments[1:], texts[1:], strict=True):
+        if len(lines[-1]) + len(fragment.separator) + len(part) <= WIDTH:
+            lines[-1] += fragment.separator + part
         else:
-            lines[-1] += piece.separator.rstrip()
+            lines[-1] += fragment.separator.rstrip()
             lines.append(f"{indent}    {part}")
     return lines
 
 
 def _wrapped(head: str, words: Sequence[str], indent: str) -> list[str]:
-    pieces = [Piece(f"{head} {words[0]}"), *(Piece(w) for w in words[1:])]
-    lines = _lines(pieces, [p.before for p in pieces], "")
+    fragments = [Fragment(f"{head} {words[0]}"), *(Fragment(w) for w in words[1:])]
+    lines = _lines(fragments, [p.before for p in fragments], "")
     return [lines[0], *(indent + line for line in lines[1:])]
 
 
 def _region(region: RegionForms, taken: set[str]) -> list[str]:
-    where = [Piece("", c).shown(readable(c)) for c in region.conditions] or ["everywhere"]
+    where = [Fragment("", c).shown(readable(c)) for c in region.conditions] or ["everywhere"]
     lines = _wrapped(f"  {region.name}:", where, "  ")
     for form in region.equilibria:
         lines += entry(_equilibrium(form), taken, "    ")
@@ -198,104 +198,104 @@ def _region(region: RegionForms, taken: set[str]) -> list[str]:
 
 def _sentence(head: str, sentence: str, indent: str = "    ") -> list[str]:
     words = sentence.split(" ")
-    pieces = [Piece(head + words[0]), *(Piece(w, separator=" ") for w in words[1:])]
-    return _lines(pieces, [p.before for p in pieces], indent)
+    fragments = [Fragment(head + words[0]), *(Fragment(w, separator=" ") for w in words[1:])]
+    return _lines(fragments, [p.before for p in fragments], indent)
 
 
-def _values(head: str, values: Sequence[tuple[str, sp.Expr]]) -> list[Piece]:
-    """Each value after its name, the first after the head."""
-    pieces = [Piece(f"{n} = ", e) for n, e in values if e != real(n)]
-    if not pieces:
-        return [Piece(head.rstrip(": "))]
-    return [Piece(head + pieces[0].before, pieces[0].formula), *pieces[1:]]
+def _values(head: str, values: Sequence[tuple[str, sp.Expr]]) -> list[Fragment]:
+    """Fragments ``name = value``, the first one after a heading."""
+    fragments = [Fragment(f"{n} = ", e) for n, e in values if e != real(n)]
+    if not fragments:
+        return [Fragment(head.rstrip(": "))]
+    return [Fragment(head + fragments[0].before, fragments[0].formula), *fragments[1:]]
 
 
-def _zeros(equations: Sequence[sp.Expr]) -> list[Piece]:
-    return [Piece("", e, " = 0", ", " if k else "; where ") for k, e in enumerate(equations)]
+def _zeros(equations: Sequence[sp.Expr]) -> list[Fragment]:
+    return [Fragment("", e, " = 0", ", " if k else "; where ") for k, e in enumerate(equations)]
 
 
-def _equilibrium(form: EquilibriumForm) -> list[Piece]:
+def _equilibrium(form: EquilibriumForm) -> list[Fragment]:
     given = () if form.kind == "implicit" else form.parameter.items()
-    pieces = _values("equilibrium: ", [*given, *form.state.items()])
+    fragments = _values("equilibrium: ", [*given, *form.state.items()])
     if form.kind == "implicit":
-        pieces += _zeros(form.equations)
-    pieces += _zeros(form.conditions)
+        fragments += _zeros(form.equations)
+    fragments += _zeros(form.conditions)
     verdict = form.stability.verdict
     if verdict == "depends":
-        short = [c for c in map(readable, form.stability.conditions) if not folds(c)]
+        short = [c for c in map(readable, form.stability.conditions) if not too_long(c)]
         long = len(form.stability.conditions) - len(short)
-        pieces += [
-            Piece("" if k else "depends on ", c, separator=", " if k else "; ")
+        fragments += [
+            Fragment("" if k else "depends on ", c, separator=", " if k else "; ")
             for k, c in enumerate(short)
         ]
         if long:
             one = "1 long condition" if long == 1 else f"{long} long conditions"
-            pieces.append(
-                Piece(f"and on {one}", separator=" ")
+            fragments.append(
+                Fragment(f"and on {one}", separator=" ")
                 if short
-                else Piece(f"depends on {one}", separator="; ")
+                else Fragment(f"depends on {one}", separator="; ")
             )
     else:
-        pieces.append(Piece(verdict, separator="; "))
+        fragments.append(Fragment(verdict, separator="; "))
     if form.note.startswith(EDGE):
-        return [*pieces, Piece(form.note, separator="; ")]
-    return [*pieces, *_when(form.exists, form.admissible)]
+        return [*fragments, Fragment(form.note, separator="; ")]
+    return [*fragments, *_when(form.exists, form.admissible)]
 
 
-def _equilibrium_set(form: EquilibriumSetForm) -> list[Piece]:
+def _equilibrium_set(form: EquilibriumSetForm) -> list[Fragment]:
     kinds = {True: " (sticking)", False: " (escaping)", None: ""}
     where = ", ".join(f"{name} = 0" for name in form.interfaces)
     first, *others = form.conditions
     head = f"equilibrium set{kinds[form.attracting]} {form.region} on {where}: "
-    pieces = [Piece(head, first), *(Piece("", condition) for condition in others)]
-    pieces += [Piece(f"{n} = ", e) for n, e in form.state.items() if e != real(n)]
+    fragments = [Fragment(head, first), *(Fragment("", condition) for condition in others)]
+    fragments += [Fragment(f"{n} = ", e) for n, e in form.state.items() if e != real(n)]
     for k, edge in enumerate(form.edges):
         (free,) = form.free
         name = "edges " if k == 0 else ""
         separator = "; " if k == 0 else " and "
-        pieces.append(Piece(f"{name}{free} = ", edge[free.name], separator=separator))
-    return pieces
+        fragments.append(Fragment(f"{name}{free} = ", edge[free.name], separator=separator))
+    return fragments
 
 
-def _when(exists: sp.Basic, admissible: sp.Basic) -> list[Piece]:
+def _when(exists: sp.Basic, admissible: sp.Basic) -> list[Fragment]:
     if admissible == sp.false:
-        return [Piece("virtual" if exists != sp.false else "never real", separator="; ")]
+        return [Fragment("virtual" if exists != sp.false else "never real", separator="; ")]
     if admissible == sp.true:
         return []
-    return [Piece("admissible iff ", admissible, separator="; ")]
+    return [Fragment("admissible iff ", admissible, separator="; ")]
 
 
-def _continuum(continuum: Continuum) -> list[Piece]:
+def _continuum(continuum: Continuum) -> list[Fragment]:
     at = _values("continuum at ", list(continuum.parameters.items()))
     if len(at) == 1 and at[0].formula is None:
-        at = [Piece("continuum at all parameters")]
+        at = [Fragment("continuum at all parameter values")]
     bound = set().union(set(), *(e.free_symbols for e in continuum.equations))
     free = [str(s) for s in continuum.free if s not in bound]
-    pieces = [*at]
+    fragments = [*at]
     values = [(n, e) for n, e in continuum.state.items() if e != real(n)]
-    first = [Piece(f"any {', '.join(free)}")] if free else []
-    rest = [*first, *(Piece(f"{n} = ", e) for n, e in values)]
+    first = [Fragment(f"{', '.join(free)} arbitrary")] if free else []
+    rest = [*first, *(Fragment(f"{n} = ", e) for n, e in values)]
     if rest:
-        rest[0] = Piece(rest[0].before, rest[0].formula, separator=": ")
-    return [*pieces, *rest, *_zeros(continuum.equations)]
+        rest[0] = Fragment(rest[0].before, rest[0].formula, separator=": ")
+    return [*fragments, *rest, *_zeros(continuum.equations)]
 
 
-def _point(point: CriticalPoint) -> list[Piece]:
+def _point(point: CriticalPoint) -> list[Fragment]:
     name = point_name(point.code)
-    pieces = _values(f"{name}: ", [*point.parameters.items(), *point.state.items()])
-    return [*pieces, *_zeros(point.equations), *_when(point.exists, point.admissible)]
+    fragments = _values(f"{name}: ", [*point.parameters.items(), *point.state.items()])
+    return [*fragments, *_zeros(point.equations), *_when(point.exists, point.admissible)]
 
 
-def _boundary(form: BoundaryForm) -> list[Piece]:
+def _boundary(form: BoundaryForm) -> list[Fragment]:
     head = f"boundary equilibrium on {form.interface} = 0 ({' | '.join(form.regions)}): "
-    pieces = _values(head, [*form.parameters.items(), *form.state.items()])
+    fragments = _values(head, [*form.parameters.items(), *form.state.items()])
     bound = set().union(set(), *(e.free_symbols for e in (*form.equations, *form.state.values())))
     free = [n for n, e in form.state.items() if e == real(n) and real(n) not in bound - {e}]
     left = set().union(set(), *(e.free_symbols for e in form.equations))
     free = [n for n in free if real(n) not in left]
     if free:
-        pieces.append(Piece(f"any {', '.join(free)}"))
-    pieces += _zeros(form.equations)
+        fragments.append(Fragment(f"{', '.join(free)} arbitrary"))
+    fragments += _zeros(form.equations)
     if form.clarke is not None:
-        pieces.append(Piece("Clarke determinant ", form.clarke.determinant, separator="; "))
-    return [*pieces, Piece(form.type, separator="; "), *_when(sp.true, form.admissible)]
+        fragments.append(Fragment("Clarke determinant ", form.clarke.determinant, separator="; "))
+    return [*fragments, Fragment(form.type, separator="; "), *_when(sp.true, form.admissible)]

@@ -1,4 +1,4 @@
-"""Assumptions on the signs of parameters, read from values, words, relations and text."""
+"""Assumptions on the signs of parameters, from values, words, relations and text."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ EXPECTED = "a strict inequality such as A > 0, or a parameter with a word such a
 
 
 def read_signs(values: Mapping[str, float], assume: Any = None) -> Signs:
-    """Signs as the parameter values have them, with the given ones in their place.
+    """Return the signs of the parameter values, overridden by given assumptions.
 
     Parameters
     ----------
     values : mapping
-        Parameter name to value; one that is zero is left without a sign.
+        Parameter name to value; a zero value gives no sign.
     assume : mapping, relation, str or an iterable of these, optional
         ``{"A": "negative"}``, ``A < 0``, ``"A < -D**2"``. A name with the
-        word ``"real"`` (or None) is left without a sign. A relation other than
-        a sign is kept as a fact, and the parameters in it lose the signs that
-        their values gave them where the two contradict.
+        word ``"real"`` (or None) has no sign. A relation other than a sign is
+        assumed as a fact; signs of parameter values that contradict it are
+        dropped.
 
     Raises
     ------
     UnknownNameError
-        For a name that is no parameter.
+        For a name that is not a parameter.
     ArgumentError
         For an assumption that is not a strict inequality or a known word.
 
@@ -84,7 +84,7 @@ def _named(values: Mapping[str, float], name: Any, word: Any) -> tuple[sp.Symbol
 
 
 def _positive_part(item: Any, values: Mapping[str, float]) -> sp.Expr:
-    """Give the expression that an assumed strict inequality says is positive."""
+    """The expression that is positive by an assumed strict inequality."""
     relation = item
     if isinstance(item, str):
         try:

@@ -1,4 +1,4 @@
-"""Combinations of inequalities without what follows from the others or contradicts them."""
+"""Simplification of combinations of inequalities."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from sympy.logic.boolalg import Boolean
 
 from fastslow.symbolic.solving.algebra import irrational, longer, spread, whole
 
-#: Longer expressions, in parts of their tree, are compared as they stand.
+#: Expressions with more nodes are compared without expansion.
 PARTS = 250
 
-#: Relations of a combination up to which it is looked at.
+#: Largest number of relations of a combination that is simplified.
 MANY = 60
 
-#: Passes over a combination, each of which may decide more.
+#: Largest number of passes over a combination.
 PASSES = 4
 
-#: Values of an expression, by the expression.
+#: Possible values of expressions.
 Known = dict[sp.Expr, sp.Set]
 
 
 def simplified(condition: Boolean) -> Boolean:
-    """Give a condition without relations that the others decide.
+    """Return a condition without relations decided by the others.
 
-    Relations between an expression and numbers, a > b and b > a among them, are sets of
-    values of the same expression.
+    Relations that compare the same expression with numbers are treated as sets of its
+    values.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def simplified(condition: Boolean) -> Boolean:
 
 
 def _reduced(condition: Boolean, known: Known) -> Boolean:
-    """A condition where some expressions are known to have values in sets."""
+    """Simplify a condition, given sets of possible values of some expressions."""
     if isinstance(condition, Relational):
         return _decided(condition, known)
     if not isinstance(condition, (sp.And, sp.Or)):
@@ -65,7 +65,7 @@ def _reduced(condition: Boolean, known: Known) -> Boolean:
     kept = _without_implied([r for r in decided if isinstance(r, Relational)], both)
     if kept is None:
         return sp.false if both else sp.true
-    # a term of a disjunction matters only where the other terms do not hold
+    # a term of a disjunction matters only where the other terms are false
     assumed = dict(known)
     for relation in kept:
         found = _values(relation)
@@ -88,7 +88,7 @@ def _decided(relation: Boolean, known: Known) -> Boolean:
 
 
 def _without_implied(relations: Iterable[Boolean], both: bool) -> list[Boolean] | None:
-    """Relations that no other one decides; None where they contradict or exhaust each other."""
+    """Relations not implied by others; None if they are contradictory or exhaustive."""
     listed = list(dict.fromkeys(relations))
     values = [_values(r) for r in listed]
     whole_of: Known = {}
@@ -108,7 +108,7 @@ def _without_implied(relations: Iterable[Boolean], both: bool) -> list[Boolean] 
             for j, other in enumerate(values)
             if found is not None and other is not None and j != k and other[0] == found[0]
         ]
-        # of two with the same values the first is kept
+        # of two with equal values the first is kept
         if not any(
             (r.is_subset(found[1]) if both else found[1].is_subset(r)) and (r != found[1] or j < k)
             for j, r in rivals
@@ -119,13 +119,13 @@ def _without_implied(relations: Iterable[Boolean], both: bool) -> list[Boolean] 
 
 
 def _values(relation: Boolean) -> tuple[sp.Expr, sp.Set] | None:
-    """An expression without its constant term and the values that a relation allows it."""
+    """An expression without its constant term, and its values by a relation."""
     if not isinstance(relation, Relational) or isinstance(relation, sp.Eq):
         return None
     if longer(relation, PARTS):
         return None
     gap = spread(relation.lhs - relation.rhs)
-    # a complement says something only of what is real everywhere
+    # complements require expressions that are real everywhere
     if irrational(gap) or not whole(gap) or not gap.free_symbols:
         return None
     constant, rest = gap.as_coeff_Add()

@@ -1,7 +1,7 @@
-"""When an expression is positive, decided by signs of factors and of radicals.
+"""Conditions for expressions to be positive, from signs of factors and radicals.
 
-SymPy's own inequality solvers do not settle statements such as "the fold is
-admissible iff A < −D²", so they are not used.
+SymPy's inequality solvers do not derive conditions such as "the fold is admissible
+iff A < −D²", so they are not used.
 """
 
 from __future__ import annotations
@@ -13,32 +13,32 @@ from sympy.logic.boolalg import Boolean
 
 from fastslow.symbolic.signs.conditions import simplified
 from fastslow.symbolic.signs.signs import Signs, parts
-from fastslow.symbolic.solving.algebra import light, longer, spread, tidy, undefined
+from fastslow.symbolic.solving.algebra import longer, spread, tidy, undefined, within_budget
 
-#: A radical with more terms under it is left as it is.
+#: Largest number of terms of a radicand that is squared.
 TERMS = 60
 
-#: A longer expression, in parts of its tree, is said to be positive as it stands.
+#: Inequalities with more nodes are not simplified.
 PARTS = 250
 
 
 def positive(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol] = ()) -> Boolean:
-    """Give the condition under which a real expression is positive.
+    """Return the condition for a real expression to be positive.
 
     Parameters
     ----------
     expression : sympy.Expr
-        In parameters; may hold square roots, which are taken to be real.
+        Expression in parameters; square roots in it are assumed real.
     signs : Signs
-        What is known of the parameters.
+        Assumptions on the parameters.
     order : sequence of Symbol
         Symbols to solve a condition for, best first.
 
     Returns
     -------
     Boolean
-        ``true``, ``false``, an inequality solved for one symbol where it is
-        affine in it, or a combination of inequalities.
+        ``true``, ``false``, an inequality solved for a symbol in which it is
+        affine, or a combination of inequalities.
 
     Examples
     --------
@@ -79,17 +79,17 @@ def positive(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol] = ())
         main = sp.Or(both, none)
     else:
         main = sp.Gt(sp.Mul(flip, *open_parts), 0)
-    return plain(sp.And(main, *avoided))
+    return as_intervals(sp.And(main, *avoided))
 
 
-def plain(condition: Boolean) -> Boolean:
-    """A condition that only compares one symbol with numbers, as its intervals.
+def as_intervals(condition: Boolean) -> Boolean:
+    """Return a condition that compares one symbol with numbers as a union of intervals.
 
     Examples
     --------
     >>> from fastslow.model.structure import real
     >>> w = real("w")
-    >>> plain(((w > -1) & (w > 1)) | ((w < -1) & (w < 1)))
+    >>> as_intervals(((w > -1) & (w > 1)) | ((w < -1) & (w < 1)))
     (w > 1) | (w < -1)
     """
     if not isinstance(condition, (sp.And, sp.Or)) or len(condition.free_symbols) != 1:
@@ -124,7 +124,7 @@ def _one(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean:
             return real_root
         if p < 0 and q < 0:
             return sp.false
-        # Q²R > P² already makes R positive
+        # Q²R > P² implies R > 0
         return larger if q > 0 else sp.And(real_root, smaller)
     p_up, q_up = positive(rest, signs, order), positive(slope, signs, order)
     both = sp.And(real_root, p_up, q_up)
@@ -132,7 +132,7 @@ def _one(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean:
 
 
 def nonnegative(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol] = ()) -> Boolean:
-    """As `positive`, with equality allowed.
+    """Return the condition for a real expression to be nonnegative.
 
     Examples
     --------
@@ -149,7 +149,7 @@ def nonnegative(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol] = 
 
 
 def isolated(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean:
-    """Part > 0, solved for the first symbol that it is affine in with a known slope.
+    """Return part > 0, solved for the first symbol in which it is affine with known sign.
 
     Examples
     --------
@@ -176,7 +176,7 @@ def isolated(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean
 
 
 def above_zero(expression: sp.Expr) -> Boolean:
-    """Expression > 0 as it stands; a long one is not looked at by SymPy.
+    """Return expression > 0, which SymPy evaluates only if it is short.
 
     Examples
     --------
@@ -189,7 +189,7 @@ def above_zero(expression: sp.Expr) -> Boolean:
 
 
 def radical(expression: sp.Expr) -> sp.Pow | None:
-    """Give the square root with symbols under it, if an expression holds just one."""
+    """Return the square root with symbols in it, if an expression contains exactly one."""
     found = {
         p for p in expression.atoms(sp.Pow) if p.exp == sp.Rational(1, 2) and p.base.free_symbols
     }
@@ -201,14 +201,14 @@ def radical(expression: sp.Expr) -> sp.Pow | None:
     return found.pop() if len(found) == 1 and not others else None
 
 
-def general(
+def general_condition(
     expression: sp.Expr,
     signs: Signs,
     order: Sequence[sp.Symbol],
     kept: Sequence[sp.Symbol],
     decide: Callable[..., Boolean] = positive,
 ) -> Boolean:
-    """Give the condition for a positive expression, without the assumptions that only decide it.
+    """Return the condition for a positive expression in general form.
 
     Where the assumed signs settle the question, a condition on one parameter
     says more: the sign of that parameter alone is set aside. Signs of the
@@ -219,7 +219,7 @@ def general(
     --------
     >>> from fastslow.model.structure import real
     >>> A, D = real("A"), real("D")
-    >>> general(-A - D**2, Signs({A: 1, D: 1}), [A], [D])
+    >>> general_condition(-A - D**2, Signs({A: 1, D: 1}), [A], [D])
     A < -D**2
     """
     whole = decide(expression, signs, order)
@@ -235,7 +235,7 @@ def general(
 
 
 def conjunction(conditions: Iterable[Boolean], signs: Signs) -> Boolean:
-    """All conditions together, without bounds on a symbol that a tighter one makes superfluous.
+    """Return the conjunction of conditions, without bounds implied by tighter ones.
 
     Examples
     --------
@@ -253,7 +253,7 @@ def conjunction(conditions: Iterable[Boolean], signs: Signs) -> Boolean:
 
 
 def _tighter(one: Boolean, other: Boolean, signs: Signs) -> bool:
-    """Whether one bound on a symbol is strictly inside the other."""
+    """Check whether one bound on a symbol is stricter than the other."""
     if isinstance(other, sp.Ne) and isinstance(one, (sp.Gt, sp.Lt)):
         return (other.lhs, other.rhs) in ((one.lhs, one.rhs), (one.rhs, one.lhs))
     for upper in (True, False):
@@ -268,7 +268,7 @@ def _tighter(one: Boolean, other: Boolean, signs: Signs) -> bool:
 
 
 def implied(condition: Boolean, signs: Signs) -> bool | None:
-    """Whether the assumptions make a condition true or false; None where they leave it open.
+    """Return the truth value of a condition under the assumptions, None if undecided.
 
     Examples
     --------
@@ -299,7 +299,7 @@ def implied(condition: Boolean, signs: Signs) -> bool | None:
 def sign_within(
     expression: sp.Expr, symbol: sp.Symbol, conditions: Sequence[sp.Expr], signs: Signs
 ) -> int | None:
-    """Sign of an expression where a symbol moves freely between bounds, if it has just one.
+    """Return the sign of an expression for a symbol between bounds, None if it changes.
 
     Parameters
     ----------
@@ -334,7 +334,9 @@ def sign_within(
     ]
     for place in places:
         moved = expression.subs(symbol, place)
-        over, under = sp.together(moved).as_numer_denom() if light(moved) else (moved, sp.S.One)
+        over, under = (
+            sp.together(moved).as_numer_denom() if within_budget(moved) else (moved, sp.S.One)
+        )
         one, two = free.sign(spread(over)), free.sign(spread(under))
         if one is not None and two is not None:
             return one * two
@@ -344,7 +346,7 @@ def sign_within(
 def bounds(
     symbol: sp.Symbol, conditions: Sequence[sp.Expr], signs: Signs
 ) -> tuple[list[sp.Expr], list[sp.Expr]]:
-    """Lower and upper bounds of a symbol from expressions that are positive.
+    """Return lower and upper bounds of a symbol from positive expressions.
 
     Examples
     --------
@@ -364,14 +366,14 @@ def bounds(
     return lower, upper
 
 
-def needed(inside: tuple[sp.Expr, ...], signs: Signs) -> list[sp.Expr]:
-    """Expressions whose being positive does not follow from another one's.
+def irredundant(inside: tuple[sp.Expr, ...], signs: Signs) -> list[sp.Expr]:
+    """Return the expressions whose positivity is not implied by that of another one.
 
     Examples
     --------
     >>> from fastslow.model.structure import real
     >>> x, D = real("x"), real("D")
-    >>> needed((x - D, x + D), Signs({D: 1}))
+    >>> irredundant((x - D, x + D), Signs({D: 1}))
     [-D + x]
     """
     return [

@@ -1,4 +1,4 @@
-"""What is assumed of the signs of parameters, and the signs that follow from it."""
+"""Assumed signs of parameters, and the signs of expressions that follow from them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,16 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from fastslow.model.rational import quotient
-from fastslow.symbolic.solving.algebra import factors, light, longer, spread, tidy, undefined
+from fastslow.symbolic.solving.algebra import (
+    factors,
+    longer,
+    spread,
+    tidy,
+    undefined,
+    within_budget,
+)
 
-#: Parts of an expression up to which more than the signs of its terms is tried.
+#: Largest number of nodes of an expression for which more than signs of terms is tried.
 PARTS = 300
 
 #: Degree up to which the real roots of a polynomial in one parameter are counted.
@@ -20,14 +27,14 @@ DEGREE = 24
 
 @dataclass(frozen=True)
 class Signs:
-    """Signs of parameters, and other expressions known to be positive.
+    """Assumed signs of parameters and further expressions assumed positive.
 
     Parameters
     ----------
     known : mapping
         Symbol to +1 or −1.
     facts : tuple of sympy.Expr
-        Further expressions that are positive.
+        Further expressions assumed positive.
     """
 
     known: Mapping[sp.Symbol, int]
@@ -43,7 +50,7 @@ class Signs:
         return (*signs, *(sp.Gt(fact, 0) for fact in self.facts))
 
     def without(self, *symbols: sp.Symbol) -> Signs:
-        """Give the same with some parameters left without a sign.
+        """Return the assumptions without those on some parameters.
 
         Examples
         --------
@@ -58,11 +65,11 @@ class Signs:
         )
 
     def with_positive(self, *facts: sp.Expr) -> Signs:
-        """Give the same with more expressions taken as positive."""
+        """Return the assumptions with further expressions assumed positive."""
         return with_facts(self, facts)
 
     def sign(self, expression: sp.Expr) -> int | None:
-        """Sign of a real expression where the assumptions settle it, else None.
+        """Return the sign of a real expression under the assumptions, None if undecided.
 
         Examples
         --------
@@ -78,7 +85,7 @@ class Signs:
         return self._memory[expression]
 
     def nonzero(self, expression: sp.Expr) -> bool:
-        """Whether the assumptions show that an expression does not vanish."""
+        """Check whether an expression is nonzero under the assumptions."""
         if longer(expression, PARTS // 4):
             return abs(term_bound(expression, self.known) or 0) == 2
         return bool(expression.is_nonzero) or self.sign(expression) in (1, -1)
@@ -98,7 +105,7 @@ class Signs:
         return sign
 
     def _by_terms(self, expression: sp.Expr) -> int | None:
-        """Sign of a sum whose terms all have one sign, as it stands, expanded, or by rates."""
+        """Sign of a sum whose terms have one sign, as given, expanded, or by gating rates."""
         found = _definite(term_bound(expression, self.known))
         if found is not None or not expression.is_Add or longer(expression, PARTS):
             return found
@@ -108,7 +115,7 @@ class Signs:
         return self._by_rates(expanded) if found is None else found
 
     def _by_rates(self, expanded: sp.Expr) -> int | None:
-        """Sign of a sum in which u/(1 − exp(u)), negative for every real u, is spread out.
+        """Sign of a sum with expanded terms u/(1 − exp(u)), negative for every real u.
 
         The opening rate of a gate (Hodgkin and Huxley 1952, eq. 12) is such a quotient.
         """
@@ -143,7 +150,7 @@ class Signs:
         return self._by_counting(part)
 
     def _by_counting(self, part: sp.Expr) -> int | None:
-        """Sign of a polynomial in one parameter that has no root where the parameter may lie."""
+        """Sign of a polynomial in one parameter without roots in the parameter's interval."""
         if len(part.free_symbols) != 1:
             return None
         (symbol,) = part.free_symbols
@@ -158,7 +165,7 @@ class Signs:
         return definite_within(polynomial, low, high)
 
     def interval(self, symbol: sp.Symbol) -> tuple[sp.Expr, sp.Expr]:
-        """Open interval of one parameter, from its sign and from facts about it alone.
+        """Return the open interval of one parameter, from its sign and from facts about it.
 
         Examples
         --------
@@ -180,9 +187,9 @@ class Signs:
 
 
 def definite_within(polynomial: sp.Poly, low: sp.Expr, high: sp.Expr) -> int | None:
-    """Sign of a polynomial with rational coefficients on an open interval, if it has just one.
+    """Return the sign of a rational polynomial on an open interval, None if it changes.
 
-    Real roots are counted by Sturm's theorem; none is computed.
+    Real roots are counted by Sturm's theorem.
 
     Examples
     --------
@@ -198,7 +205,7 @@ def definite_within(polynomial: sp.Poly, low: sp.Expr, high: sp.Expr) -> int | N
     for end in (low, high):
         while end.is_finite and polynomial.degree() > 0 and polynomial.eval(end) == 0:
             polynomial = polynomial.quo(sp.Poly(symbol - end, symbol))
-            # what was divided out is negative on the whole interval below its end
+            # the factor divided out is negative on the interval below its end
             polynomial = -polynomial if end == high else polynomial
     if polynomial.degree() > 0 and polynomial.count_roots(low, high) > 0:
         return None
@@ -210,10 +217,10 @@ def definite_within(polynomial: sp.Poly, low: sp.Expr, high: sp.Expr) -> int | N
 
 
 def term_bound(expression: sp.Expr, known: Mapping[sp.Symbol, int]) -> int | None:
-    """What the signs of symbols say of an expression without rewriting it.
+    """Return a bound on an expression from the signs of symbols, without rewriting it.
 
-    2 positive, 1 not negative, 0 zero, −1 not positive, −2 negative, None open.
-    One pass over the tree, so that it is cheap for long sums too.
+    2 positive, 1 nonnegative, 0 zero, −1 nonpositive, −2 negative, None undecided.
+    One pass over the expression tree.
 
     Examples
     --------
@@ -249,7 +256,7 @@ def term_bound(expression: sp.Expr, known: Mapping[sp.Symbol, int]) -> int | Non
 
 
 def _real(expression: sp.Expr) -> bool:
-    """Whether an expression is real wherever it is defined."""
+    """Check that an expression is real wherever it is defined."""
     if expression.is_real:
         return True
     symbols = expression.free_symbols
@@ -258,7 +265,7 @@ def _real(expression: sp.Expr) -> bool:
 
 
 def _sum_bound(terms: Iterable[sp.Expr], known: Mapping[sp.Symbol, int]) -> int | None:
-    """Bound of a sum: open as soon as one term is, or two have opposite signs."""
+    """Bound of a sum, undecided if a term is or if two terms have opposite signs."""
     total = 0
     for term in terms:
         one = term_bound(term, known)
@@ -284,7 +291,7 @@ def _power_bound(base: sp.Expr, power: sp.Expr, known: Mapping[sp.Symbol, int]) 
 
 
 def _assumed(expression: sp.Expr) -> int | None:
-    """Bound from what SymPy knows."""
+    """Bound from SymPy's assumptions."""
     if expression.is_positive:
         return 2
     if expression.is_negative:
@@ -297,7 +304,7 @@ def _definite(bound: int | None) -> int | None:
 
 
 def _multiples(part: sp.Expr, fact: sp.Expr) -> list[sp.Expr]:
-    """Numbers k for which part − k fact is free of a symbol that both are affine in."""
+    """Numbers k for which part − k fact is independent of a symbol in which both are affine."""
     found = [sp.S.One, sp.S.NegativeOne]
     for symbol in sorted(part.free_symbols & fact.free_symbols, key=lambda s: s.name):
         one, two = part.diff(symbol), fact.diff(symbol)
@@ -307,7 +314,7 @@ def _multiples(part: sp.Expr, fact: sp.Expr) -> list[sp.Expr]:
 
 
 def parts(expression: sp.Expr) -> list[tuple[sp.Expr, int]]:
-    """Factors with their powers; those of a denominator count as well, for signs they are alike.
+    """Return the factors of numerator and denominator with positive powers, for signs.
 
     Examples
     --------
@@ -319,16 +326,16 @@ def parts(expression: sp.Expr) -> list[tuple[sp.Expr, int]]:
     if quotient(expression) is not None:
         constant, pieces = factors(expression)
         return [(f, abs(p)) for f, p in ((constant, 1), *pieces) if f != 1]
-    ready = sp.together(expression) if light(expression) else expression
+    ready = sp.together(expression) if within_budget(expression) else expression
     found: list[tuple[sp.Expr, int]] = []
-    for part in ready.as_numer_denom() if light(expression) else (ready,):
+    for part in ready.as_numer_denom() if within_budget(expression) else (ready,):
         constant, pieces = factors(part)
         found += [(constant, 1), *pieces]
     return [(f, p) for f, p in found if f != 1]
 
 
 def with_facts(signs: Signs, facts: Iterable[sp.Expr]) -> Signs:
-    """Give signs with more positive expressions; those that contradict a sign set it aside.
+    """Add positive expressions to the assumptions; signs that contradict them are dropped.
 
     Examples
     --------
@@ -350,7 +357,7 @@ def with_facts(signs: Signs, facts: Iterable[sp.Expr]) -> Signs:
 
 
 def _deduced(signs: Signs, fact: sp.Expr) -> dict[sp.Symbol, int]:
-    """Signs of symbols that a fact forces: from −A − D² > 0 that A is negative."""
+    """Signs of symbols implied by a fact, such as A < 0 by −A − D² > 0."""
     found = {}
     for symbol in fact.free_symbols - set(signs.known):
         slope = fact.diff(symbol)

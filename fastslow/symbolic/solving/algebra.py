@@ -1,7 +1,7 @@
-"""Expansion, cancelling and factoring within a budget that depends on structure alone.
+"""Expansion, cancellation and factoring within a structural budget.
 
-The same expression is treated the same way on every machine: what is past the
-budget is only expanded, and what is past expansion is left as it is.
+The budget counts terms, symbols and degrees, so that results do not depend on the
+machine. Expressions past the budget are only expanded, and longer ones unchanged.
 """
 
 from __future__ import annotations
@@ -25,30 +25,29 @@ Entry = TypeVar("Entry", bound=Any)
 #: Longest sum, in terms, that is factored or cancelled.
 TERMS = 200
 
-#: In more than three symbols, at most this many terms times symbols.
+#: Largest number of terms times symbols, for more than three symbols.
 TERMS_MANY = 160
 
-#: With roots of symbols, which count as symbols when factoring.
+#: Longest sum with roots of symbols, which count as symbols in factoring.
 TERMS_RADICAL = 16
 
 #: Highest total degree that is factored or cancelled.
 DEGREE = 24
 
-#: Parts (nodes of the tree) of an expression that is still expanded.
+#: Largest number of nodes of an expression that is expanded.
 PARTS = 600
 
-#: Most terms that an expansion may be expected to give.
+#: Largest expected number of terms of an expansion.
 EXPANDED = 800
 
-#: Factored and shortened expressions that are kept for the next question about them.
+#: Number of cached factorisations and shortened expressions.
 MEMORY = 2048
 
 
 def spread(expression: sp.Expr) -> sp.Expr:
-    """Expand with exponentials kept whole; too long an expression is left as it is.
+    """Expand an expression without splitting exponentials; long expressions are unchanged.
 
-    A sum in a denominator stays below the whole numerator, so that a quotient does not
-    become a sum of quotients.
+    A quotient whose denominator is a sum remains one quotient.
 
     Examples
     --------
@@ -66,14 +65,14 @@ def spread(expression: sp.Expr) -> sp.Expr:
         for p in expression.atoms(sp.Pow)
         if p.exp.is_Rational and not p.exp.is_Integer and p.base.is_Add
     }
-    # SymPy takes whole powers out of a root and multiplies them out
+    # SymPy would extract integer powers from roots and expand them
     bare = expression.xreplace(kept)
     expanded = sp.expand(bare, power_exp=False, log=False)
     return expanded.xreplace({new: p for p, new in kept.items()})
 
 
 def longer(expression: sp.Basic, parts: int) -> bool:
-    """Whether the tree of an expression has more than so many parts, counted no further.
+    """Check whether the tree of an expression has more than a number of nodes.
 
     Examples
     --------
@@ -85,7 +84,7 @@ def longer(expression: sp.Basic, parts: int) -> bool:
 
 
 def compressed(expression: sp.Expr) -> bool:
-    """Whether products or powers of sums stand above a denominator.
+    """Check whether a numerator contains products or powers of sums.
 
     Examples
     --------
@@ -105,7 +104,7 @@ def compressed(expression: sp.Expr) -> bool:
 
 
 def growth(expression: sp.Expr) -> float:
-    """Give an upper bound for the number of terms after expansion.
+    """Return an upper bound on the number of terms after expansion.
 
     Examples
     --------
@@ -124,19 +123,19 @@ def growth(expression: sp.Expr) -> float:
 
 
 def generators(expression: sp.Expr) -> set[sp.Basic]:
-    """Transcendental functions in an expression."""
+    """Return the transcendental functions in an expression."""
     return {f for f in expression.atoms(sp.Function, sp.exp) if f.free_symbols}
 
 
-def light(expression: sp.Expr) -> bool:
-    """Whether an expression is within the budget of factoring and cancelling.
+def within_budget(expression: sp.Expr) -> bool:
+    """Check whether an expression is within the budget of factoring and cancellation.
 
-    One transcendental function at most, counted as one more symbol.
+    At most one transcendental function is allowed, counted as a symbol.
 
     Examples
     --------
     >>> x = sp.Symbol("x")
-    >>> light(x**3 - sp.exp(x)), light(sp.tanh(x) - sp.cosh(x / 2))
+    >>> within_budget(x**3 - sp.exp(x)), within_budget(sp.tanh(x) - sp.cosh(x / 2))
     (True, False)
     """
     if not generators(expression) and not irrational(expression):
@@ -167,7 +166,7 @@ def _degree(expression: sp.Expr) -> float:
 
 
 def tidy(expression: sp.Expr) -> sp.Expr:
-    """Expand over one denominator and cancel where that is within the budget.
+    """Expand over one denominator and cancel, within the budget.
 
     Examples
     --------
@@ -181,18 +180,18 @@ def tidy(expression: sp.Expr) -> sp.Expr:
     if longer(expression, PARTS):
         return expression
     expanded = spread(sp.sympify(expression))
-    if whole(expanded) or not light(expression):
+    if whole(expanded) or not within_budget(expression):
         return expanded
     return spread(sp.cancel(sp.together(expanded)))
 
 
 def whole(expression: sp.Expr) -> bool:
-    """Whether no sum stands in a denominator."""
+    """Check that no denominator is a sum."""
     return all(not p.exp.is_negative or p.base.is_Symbol for p in expression.atoms(sp.Pow))
 
 
 def numerator(expression: sp.Expr) -> sp.Expr:
-    """Give the expression times its denominators.
+    """Return the numerator of an expression over its common denominator.
 
     Examples
     --------
@@ -204,16 +203,16 @@ def numerator(expression: sp.Expr) -> sp.Expr:
     if found is not None:
         return found.numerator.as_expr()
     expanded = spread(sp.sympify(expression))
-    if all(not p.exp.is_negative for p in expanded.atoms(sp.Pow)) or not light(expression):
+    if all(not p.exp.is_negative for p in expanded.atoms(sp.Pow)) or not within_budget(expression):
         return expanded
     return spread(sp.together(expanded).as_numer_denom()[0])
 
 
 @functools.lru_cache(maxsize=MEMORY)
 def factors(expression: sp.Expr) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ...]]:
-    """Constant and irreducible factors with powers, those of a denominator with negative ones.
+    """Return the constant and the irreducible factors, with negative powers in denominators.
 
-    Past the budget it is the expression itself.
+    Past the budget the expression itself is the only factor.
 
     Examples
     --------
@@ -229,7 +228,7 @@ def factors(expression: sp.Expr) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ..
             return found.factors()
         except PastBudgetError:
             return sp.S.One, ((expression, 1),)
-    if not light(expression):
+    if not within_budget(expression):
         pieces: list[tuple[sp.Expr, int]] = []
         constant = sp.S.One
         for part in sp.Mul.make_args(expression):
@@ -249,13 +248,13 @@ def factors(expression: sp.Expr) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ..
 
 
 def undefined(expression: sp.Expr) -> bool:
-    """Whether a division by zero stands in an expression."""
+    """Check whether an expression contains a division by zero."""
     return bool(expression.has(sp.nan, sp.zoo, sp.oo, -sp.oo))
 
 
 @functools.lru_cache(maxsize=MEMORY)
 def shortest(expression: sp.Expr) -> sp.Expr:
-    """Factored or expanded, whichever takes fewer operations; as it is when past the budget.
+    """Return the factored or expanded form with the fewest operations, within the budget.
 
     Examples
     --------
@@ -266,11 +265,11 @@ def shortest(expression: sp.Expr) -> sp.Expr:
     found = quotient(expression)
     if found is not None:
         forms = [expression, found.expanded()]
-        # what is over the budget of factoring is long in any form
+        # past the budget of factoring every form is long
         with contextlib.suppress(PastBudgetError):
             forms.append(found.factored())
         return min(forms[::-1], key=lambda e: (sp.count_ops(e), len(str(e))))
-    if not light(expression):
+    if not within_budget(expression):
         return expression
     if generators(expression) or irrational(expression):
         forms = [expression, spread(expression), sp.factor_terms(expression)]
@@ -280,12 +279,12 @@ def shortest(expression: sp.Expr) -> sp.Expr:
 
 
 def irrational(expression: sp.Expr) -> bool:
-    """Whether roots of symbols stand in an expression."""
+    """Check whether an expression contains roots of symbols."""
     return any(not p.exp.is_integer for p in expression.atoms(sp.Pow) if p.base.free_symbols)
 
 
 def determinant(matrix: sp.MatrixBase) -> sp.Expr:
-    """Give determinant of a small matrix by its first row; SymPy's own simplifies without bound.
+    """Return the determinant of a small matrix, by expansion along rows, within the budget.
 
     Examples
     --------
@@ -298,7 +297,7 @@ def determinant(matrix: sp.MatrixBase) -> sp.Expr:
 
 
 class _Minors(Generic[Entry]):
-    """Determinants of rows and columns of a matrix, each formed once."""
+    """Minors of a matrix, each computed once."""
 
     def __init__(
         self,
@@ -311,7 +310,7 @@ class _Minors(Generic[Entry]):
         self._known: dict[tuple[tuple[int, ...], tuple[int, ...]], Entry] = {((), ()): one}
 
     def minor(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> Entry:
-        """By the first row; SymPy's own determinants simplify without bound."""
+        """Return a minor, by expansion along its first row."""
         if (rows, columns) not in self._known:
             total = self._zero
             for k, column in enumerate(columns):
@@ -323,7 +322,7 @@ class _Minors(Generic[Entry]):
         return self._known[rows, columns]
 
     def characteristic(self, size: int) -> list[Entry]:
-        """1, a1, …, an of the characteristic polynomial."""
+        """Return the coefficients 1, a1, …, an of the characteristic polynomial."""
         found = []
         for k in range(size + 1):
             total = self._zero
@@ -334,7 +333,7 @@ class _Minors(Generic[Entry]):
 
 
 def adjugate(matrix: sp.MatrixBase) -> sp.MatrixBase:
-    """Transposed cofactors, so that matrix * adjugate = determinant * identity.
+    """Return the adjugate, with matrix * adjugate = determinant * identity.
 
     Examples
     --------
@@ -350,7 +349,7 @@ def adjugate(matrix: sp.MatrixBase) -> sp.MatrixBase:
 
 
 def characteristic_coefficients(matrix: sp.MatrixBase) -> tuple[sp.Expr, ...]:
-    """1, a1, …, an of the characteristic polynomial, by principal minors.
+    """Return the coefficients 1, a1, …, an of the characteristic polynomial.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Which symbols an equation is solved for, and in which order."""
+"""Choice of the symbols for which equations are solved."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import light
+from fastslow.symbolic.solving.algebra import within_budget
 from fastslow.symbolic.solving.isolation import isolate
 from fastslow.symbolic.solving.univariate import Root, factors_in, roots, solved_for
 
@@ -21,10 +21,10 @@ class Candidates(Sequence[sp.Symbol]):
     Parameters
     ----------
     first : tuple of Symbol
-        The frozen slow quantities, or the parameter asked for: solved for wherever that
-        is possible in closed form.
+        The frozen slow quantities, or a given parameter: solved for wherever a closed
+        form exists.
     others : tuple of Symbol
-        Of these the first that stands affinely with a known sign is taken.
+        The first of these that occurs affinely with a coefficient of known sign is chosen.
 
     Examples
     --------
@@ -48,11 +48,11 @@ class Candidates(Sequence[sp.Symbol]):
 
     @classmethod
     def of(cls, symbols: Iterable[sp.Symbol]) -> Candidates:
-        """Give candidates as they are, other symbols as candidates of equal rank."""
+        """Return candidates unchanged, other symbols as candidates of equal rank."""
         return symbols if isinstance(symbols, Candidates) else cls((), tuple(symbols))
 
     def without(self, *symbols: sp.Symbol | None) -> Candidates:
-        """Give the same without some of them."""
+        """Return the candidates without some symbols."""
         return Candidates(
             tuple(s for s in self.first if s not in symbols),
             tuple(s for s in self.others if s not in symbols),
@@ -61,15 +61,15 @@ class Candidates(Sequence[sp.Symbol]):
 
 @dataclass(frozen=True)
 class Choice:
-    """A symbol with its values.
+    """The symbol chosen, with its values.
 
     Parameters
     ----------
     symbol : Symbol
     values : tuple of Root
-        Empty where no real value has the sign that is assumed of the symbol.
+        Empty if no real value has the assumed sign of the symbol.
     slope : sympy.Expr or None
-        What was divided by where the symbol stands affinely.
+        Coefficient divided by, if the symbol occurs affinely.
     """
 
     symbol: sp.Symbol
@@ -77,17 +77,17 @@ class Choice:
     slope: sp.Expr | None
 
 
-def chosen(equation: sp.Expr, candidates: Candidates, signs: Signs) -> Choice | None:
+def choose_symbol(equation: sp.Expr, candidates: Candidates, signs: Signs) -> Choice | None:
     """Solve an irreducible equation for the best candidate.
 
     Examples
     --------
     >>> from fastslow.model.structure import real
     >>> w, a, b = map(real, "wab")
-    >>> found = chosen(a * b - w**2, Candidates((w,), (a, b)), Signs({a: 1, b: 1}))
+    >>> found = choose_symbol(a * b - w**2, Candidates((w,), (a, b)), Signs({a: 1, b: 1}))
     >>> found.symbol, [r.value for r in found.values]
     (w, [sqrt(a*b), -sqrt(a*b)])
-    >>> chosen(a * b - w**2, Candidates((), (w, a, b)), Signs({a: 1, b: 1})).symbol
+    >>> choose_symbol(a * b - w**2, Candidates((), (w, a, b)), Signs({a: 1, b: 1})).symbol
     a
     """
     for symbol in candidates.first:
@@ -96,11 +96,11 @@ def chosen(equation: sp.Expr, candidates: Candidates, signs: Signs) -> Choice | 
             slope = equation.diff(symbol)
             affine = symbol not in slope.free_symbols
             return Choice(symbol, tuple(values), slope if affine else None)
-    # the others are better with what must not vanish known
+    # for the others a coefficient known to be nonzero is preferred
     affinely = solved_for(equation, candidates, signs)
     if affinely is not None:
         return Choice(affinely[0], (Root(affinely[1]),), affinely[2])
-    for symbol in candidates if light(equation) else ():
+    for symbol in candidates if within_budget(equation) else ():
         if symbol in equation.free_symbols:
             closed = roots(equation, symbol, signs)
             if closed is not None:
@@ -108,25 +108,25 @@ def chosen(equation: sp.Expr, candidates: Candidates, signs: Signs) -> Choice | 
     return None
 
 
-def settled(
+def solve_conditions(
     equations: Sequence[sp.Expr], candidates: Candidates, signs: Signs
 ) -> list[tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Expr, ...], tuple[sp.Expr, ...]]]:
-    """Solve conditions on parameters one after another.
+    """Solve conditions on parameters successively.
 
     Returns
     -------
     list of (place, radicands, left)
-        Every way to fulfil them: values of parameters, what must not be negative, and
-        the equations that are left. Empty where they contradict one another or the
-        assumed signs.
+        All solutions: values of parameters, nonnegative radicands, and remaining
+        equations. Empty if the conditions contradict one another or the assumed
+        signs.
 
     Examples
     --------
     >>> from fastslow.model.structure import real
     >>> w, T = real("w"), real("T")
-    >>> settled([w, w - T], Candidates((w,), (T,)), Signs({T: 1}))
+    >>> solve_conditions([w, w - T], Candidates((w,), (T,)), Signs({T: 1}))
     []
-    >>> settled([w, w - T], Candidates((w,), (T,)), Signs({}))
+    >>> solve_conditions([w, w - T], Candidates((w,), (T,)), Signs({}))
     [({w: 0, T: 0}, (), ())]
     """
     Way = tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Expr, ...], tuple[sp.Expr, ...]]
@@ -143,7 +143,7 @@ def settled(
             for part, _ in factors_in(here, tuple(here.free_symbols)) or [(here, 1)]:
                 if signs.nonzero(part):
                     continue
-                choice = chosen(part, candidates.without(*place), signs)
+                choice = choose_symbol(part, candidates.without(*place), signs)
                 if choice is None:
                     further.append((place, radicands, (*left, part)))
                     continue

@@ -1,4 +1,4 @@
-"""Equilibrium equations with as many unknowns as possible solved for and left out."""
+"""Elimination of states from the equilibrium equations."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.solving.algebra import (
     generators,
     growth,
-    light,
     longer,
     numerator,
     spread,
     tidy,
     whole,
+    within_budget,
 )
 
-#: Orders of elimination that are compared before the best so far is taken.
+#: Largest number of elimination orders that are compared.
 ORDERS = 40
 
-#: An equation longer than this is not substituted into any further.
+#: Largest number of terms of an equation that is solved for a state.
 TERMS = 400
 
-#: A substitution that may give more terms than this is not made.
+#: Bound on the terms after a substitution.
 LONGEST = 120
 
-#: Parts of a longer equation up to which it is kept unexpanded where it is no polynomial.
+#: Largest number of nodes of a longer, unexpanded equation that is not a polynomial.
 PARTS = 400
 
-#: Longer nonlinear parts of two equations, in terms, are not compared.
+#: Largest number of nonlinear terms of equations that are compared.
 SHARED = 30
 
 Nonzero = Callable[[sp.Expr], bool]
@@ -41,19 +41,19 @@ Nonzero = Callable[[sp.Expr], bool]
 
 @dataclass(frozen=True)
 class Elimination:
-    """What is left of the equations rate = 0, and the states expressed by what is left.
+    """Remaining equations of rate = 0, and the states eliminated by the others.
 
     Parameters
     ----------
     remaining : tuple of sympy.Expr
-        Equations remaining = 0 in the unknowns and parameters; one without any
-        unknown is a condition on the parameters.
+        Equations in the unknowns and parameters, = 0; one without unknowns is a
+        condition on the parameters.
     unknowns : tuple of sympy.Symbol
-        States that were not solved for, in the order of the state vector.
+        States not eliminated, in the order of the state vector.
     solved : NamedMapping of sympy.Expr
-        Every other state in terms of unknowns and parameters.
+        All other states in terms of unknowns and parameters.
     divisors : tuple of sympy.Expr
-        What was divided by, taken to be nonzero.
+        Expressions divided by, assumed nonzero.
 
     Examples
     --------
@@ -70,24 +70,24 @@ class Elimination:
 
     @property
     def is_univariate(self) -> bool:
-        """Whether one equation in one unknown is left."""
+        """True if one equation in one unknown remains."""
         return len(self.remaining) == 1 and len(self.unknowns) == 1
 
     @property
     def is_polynomial(self) -> bool:
-        """Whether every remaining equation is a polynomial in the unknowns."""
+        """True if every remaining equation is a polynomial in the unknowns."""
         return all(e.is_polynomial(*self.unknowns) for e in self.remaining)
 
     def state(
         self, values: Mapping[sp.Symbol, sp.Expr], names: Sequence[str]
     ) -> tuple[sp.Expr, ...]:
-        """Give the full state vector, in the order of names, at values of the unknowns."""
+        """Return the state vector, in the order of names, at values of the unknowns."""
         whole = {u: values.get(u, u) for u in self.unknowns}
         solved = {n: e.xreplace(whole) for n, e in self.solved.items()}
         return tuple(sp.sympify(solved.get(n, whole.get(real(n)))) for n in names)
 
     def at(self, values: Mapping[sp.Symbol, sp.Expr]) -> Elimination:
-        """With values of parameters at which no divisor vanishes."""
+        """Substitute parameter values at which no divisor vanishes."""
         remaining = (sp.expand(e.subs(values)) for e in self.remaining)
         solved = {n: e.subs(values) for n, e in self.solved.items()}
         return Elimination(
@@ -101,22 +101,22 @@ class Elimination:
 def eliminate(
     rates: Mapping[str, sp.Expr], states: Sequence[str], *, nonzero: Nonzero | None = None
 ) -> Elimination:
-    """Solve the equations rate = 0 one after another for states they are affine in.
+    """Solve the equations rate = 0 successively for states in which they are affine.
 
-    A state is solved for where its coefficient is known not to vanish, so that
-    no equilibrium is lost and none is added. Among all orders (as many as
-    `ORDERS`) the one is taken that leaves the fewest equations, then the
-    lowest degree, the fewest terms, and the first-named states as unknowns.
+    A state is eliminated if its coefficient is known to be nonzero, so that no
+    equilibrium is lost or added. Among the elimination orders (at most `ORDERS`),
+    the one with the fewest remaining equations is chosen, then the lowest degree,
+    the fewest terms, and the first-named states as unknowns.
 
     Parameters
     ----------
     rates : mapping
         State name to its smooth rate, in real symbols.
     states : sequence of str
-        The states to solve for; other symbols count as parameters.
+        States to solve for; other symbols are parameters.
     nonzero : callable, optional
-        Whether an expression in parameters and states is known not to vanish.
-        Default: what SymPy knows of real symbols.
+        Predicate for expressions known to be nonzero. Default: SymPy's assumptions
+        on real symbols.
 
     Returns
     -------
@@ -171,7 +171,7 @@ class _Step:
 
     @property
     def cost(self) -> tuple[int, ...]:
-        """Equations, their degree and length, divisors, and where the solved states stood."""
+        """Numbers of unknowns, degrees, terms and divisors, and the unknowns' positions."""
         left = self.left
         degree = sum(_degree(e, left) for e in self.equations)
         length = sum(_length(e) for e in self.equations)
@@ -183,9 +183,9 @@ class _Step:
 def _combined(
     equations: list[sp.Expr], symbols: Sequence[sp.Symbol], nonzero: Nonzero
 ) -> tuple[sp.Expr, ...]:
-    """Give the equations with nonlinear terms shared by two of them taken out of the second."""
+    """Cancel common nonlinear terms of pairs of equations in the second one."""
     bent = [_nonlinear(e, symbols) for e in equations]
-    # a ratio without states needs the same states above and below
+    # a ratio is free of states only if both have the same states
     inside = [part.free_symbols & set(symbols) for part in bent]
     for row, part in enumerate(bent):
         for other in range(row + 1, len(bent)):
@@ -193,7 +193,7 @@ def _combined(
                 continue
             if max(_length(part), _length(bent[other])) > SHARED:
                 continue
-            if not (light(part) and light(bent[other])):
+            if not (within_budget(part) and within_budget(bent[other])):
                 continue
             ratio = sp.cancel(bent[other] / part)
             under = ratio.as_numer_denom()[1]
@@ -205,7 +205,7 @@ def _combined(
 
 
 def _nonlinear(equation: sp.Expr, symbols: Sequence[sp.Symbol]) -> sp.Expr:
-    """Give the sum of all terms that are not affine in the symbols taken together."""
+    """Sum of all terms that are nonlinear in the symbols."""
     terms = sp.Add.make_args(equation)
     bent = []
     for term in terms:
@@ -232,7 +232,7 @@ def _best(start: _Step, nonzero: Nonzero) -> _Step:
 
 
 def _further(step: _Step, nonzero: Nonzero) -> list[_Step]:
-    """Every way to solve one more equation for one more state."""
+    """All eliminations of one more state."""
     found = []
     left = step.left
     for row, equation in enumerate(step.equations):
@@ -262,7 +262,7 @@ def _further(step: _Step, nonzero: Nonzero) -> list[_Step]:
 def _put(
     equation: sp.Expr, symbol: sp.Symbol, value: sp.Expr, unknowns: Sequence[sp.Symbol]
 ) -> sp.Expr | None:
-    """Substitute and expand; past the budget as it stands if that is no polynomial, else None."""
+    """Substitute and expand; past the budget, unexpanded if not a polynomial, else None."""
     if symbol not in equation.free_symbols:
         return equation
     inside = equation.subs(symbol, value)
@@ -274,7 +274,7 @@ def _put(
 
 
 def _compact(expression: sp.Expr) -> sp.Expr:
-    """Flat, or with common factors taken out where transcendental functions make that shorter."""
+    """Expand, or extract common factors if transcendental functions make that shorter."""
     flat = _flat(expression)
     if not generators(expression):
         return flat
@@ -282,15 +282,15 @@ def _compact(expression: sp.Expr) -> sp.Expr:
 
 
 def _flat(expression: sp.Expr) -> sp.Expr:
-    """Expand where the denominator allows it, else put over one denominator."""
+    """Expand if no denominator is a sum, else write over one denominator."""
     expanded = spread(expression)
-    if whole(expanded) or not light(expression):
+    if whole(expanded) or not within_budget(expression):
         return expanded
     return tidy(expression)
 
 
 def _tidy(equation: sp.Expr) -> sp.Expr:
-    """Give the equation expanded, multiplied by its denominators where they hold a sum."""
+    """Expand an equation, after multiplication by denominators that are sums."""
     expanded = spread(equation)
     return expanded if whole(expanded) else numerator(expanded)
 
@@ -300,14 +300,14 @@ def _length(expression: sp.Expr) -> int:
 
 
 def _degree(equation: sp.Expr, symbols: Sequence[sp.Symbol]) -> int:
-    """Total degree in the symbols; 99 where the equation is no polynomial in them."""
+    """Total degree in the symbols; 99 if the equation is not a polynomial in them."""
     present = equation.free_symbols
     inside = [s for s in symbols if s in present]
     if not inside:
         return 0
     if not equation.is_polynomial(*inside):
         return 99
-    # the equation is expanded already, so its terms show their degrees
+    # the equation is already expanded
     return max(
         sum(int(p) for b, p in term.as_powers_dict().items() if b in inside)
         for term in sp.Add.make_args(equation)

@@ -1,4 +1,4 @@
-"""One symbol out of one equation, by undoing one operation after another."""
+"""Solution of an equation for a symbol by successive inversion of operations."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.algebra import longer, numerator, shortest, spread, tidy
 from fastslow.symbolic.solving.univariate import Root, roots
 
-#: A longer equation, in parts of its tree, is not solved.
+#: Equations with more nodes are not solved.
 PARTS = 150
 
-#: Functions that take each value once, with their inverse.
+#: Injective functions with their inverses.
 INVERSES: dict[type, Callable[[sp.Expr], sp.Expr]] = {
     sp.exp: sp.log,
     sp.log: sp.exp,
@@ -25,10 +25,10 @@ INVERSES: dict[type, Callable[[sp.Expr], sp.Expr]] = {
 
 
 def isolate(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root] | None:
-    """All real values of a symbol that satisfy equation = 0, None where there is no short form.
+    """Return all real solutions of equation = 0 for a symbol, None if there is no short form.
 
-    A polynomial of degree one or two is solved, and an equation in which the symbol
-    stands once is undone from outside in: sums, products, powers, exponentials.
+    Polynomials of degree one or two are solved; if the symbol occurs once, sums,
+    products, powers and exponentials are inverted from the outside in.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def isolate(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root] | 
         Irreducible.
     symbol : Symbol
     signs : Signs
-        Values against the known sign of the symbol are left out.
+        Values that contradict the assumed sign of the symbol are omitted.
 
     Examples
     --------
@@ -76,7 +76,7 @@ def _polynomial(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root
 
 
 def _undone(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root] | None:
-    """Values of a symbol that stands once in an equation, or inside one repeated function."""
+    """Solve for a symbol that occurs once, or only within one repeated function."""
     kernels = _kernels(equation, symbol)
     if kernels is not None and len(kernels) == 1:
         (kernel,) = kernels
@@ -106,7 +106,7 @@ def _undone(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root] | 
 
 
 def _kernels(equation: sp.Expr, symbol: sp.Symbol) -> set[sp.Expr] | None:
-    """Functions and broken powers that a symbol stands in; None where it stands outside too."""
+    """Functions and fractional powers that contain a symbol; None if it also occurs outside."""
     found: set[sp.Expr] = set()
     waiting: list[sp.Expr] = [equation]
     while waiting:
@@ -125,7 +125,7 @@ def _kernels(equation: sp.Expr, symbol: sp.Symbol) -> set[sp.Expr] | None:
 def _outermost(
     left: sp.Expr, right: Root, symbol: sp.Symbol, signs: Signs
 ) -> list[tuple[sp.Expr, Root]] | None:
-    """Undo the outermost operation of left = right; None where that is not known."""
+    """Invert the outermost operation of left = right; None if no inverse is known."""
 
     def now(value: sp.Expr, *conditions: sp.Expr) -> Root:
         return Root(tidy(value), further=(*right.radicands, *conditions))
@@ -145,7 +145,7 @@ def _outermost(
             side = signs.sign(left.base)
             return both if side is None else both[:1] if side > 0 else both[1:]
         if over % 2 and under % 2:
-            # an odd root of a negative number is not what SymPy takes it for
+            # SymPy returns a complex odd root of a negative number
             side = signs.sign(level)
             if side is None:
                 value = sp.sign(level) * sp.Abs(level) ** (1 / left.exp)

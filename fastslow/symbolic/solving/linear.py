@@ -1,4 +1,4 @@
-"""Regions that are linear in their states: Cramer's rule within a budget, else left as they are."""
+"""Regions with linear rates, solved by Cramer's rule within a budget."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import sympy as sp
 from fastslow.model.structure import real
 from fastslow.symbolic.solving.algebra import adjugate, determinant, growth, spread
 
-#: A determinant of at most so many terms leaves the system to elimination, which gives short forms.
+#: Terms of a determinant up to which elimination is used, which gives shorter forms.
 SPARSE = 8
 
-#: A determinant that may have more terms than this is not formed.
+#: Bound on the terms of a determinant that is formed.
 DENSE = 400
 
-#: Entries in a row, on average, up to which a system is sparse.
+#: Mean number of entries per row up to which a system is sparse.
 ENTRIES = 3
 
 NOTE = "linear system with a determinant past the budget, solved numerically"
@@ -25,7 +25,7 @@ NOTE = "linear system with a determinant past the budget, solved numerically"
 def cramer(
     rates: Mapping[str, sp.Expr], states: Sequence[str]
 ) -> tuple[dict[str, sp.Expr], sp.Expr] | str | None:
-    """Solve rates that are dense and linear in the states.
+    """Solve a dense linear system of rates for the states.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ def cramer(
     Returns
     -------
     tuple, None or str
-        Values of the states with the determinant they were divided by; None
-        where the rates are not linear, singular, or sparse enough to eliminate;
-        a note where the determinant is past the budget.
+        Values of the states, with the determinant; None if the rates are not
+        linear, singular, or sparse enough for elimination; a note if the
+        determinant is past the budget.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def cramer(
     if terms <= SPARSE:
         return None
     if terms > DENSE:
-        # with few entries in each row elimination finds its way
+        # sparse systems are solved by elimination
         entries = sum(1 for e in matrix if e != 0)
         return None if entries <= ENTRIES * matrix.rows else NOTE
     below = determinant(matrix)
@@ -69,7 +69,7 @@ def cramer(
 
 
 def _terms(matrix: sp.MatrixBase) -> float:
-    """Give an upper bound for the terms of a determinant, without forming it."""
+    """Upper bound on the number of terms of a determinant."""
     sizes = [[0.0 if e == 0 else growth(e) for e in matrix.row(k)] for k in range(matrix.rows)]
 
     @cache

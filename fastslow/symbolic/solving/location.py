@@ -1,4 +1,4 @@
-"""Where on a family of equilibria a condition vanishes."""
+"""Zeros of a condition on a family of equilibria."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.algebra import (
     generators,
     irrational,
-    light,
     longer,
     numerator,
     shortest,
     spread,
     tidy,
     undefined,
+    within_budget,
 )
-from fastslow.symbolic.solving.candidates import Candidates, chosen
+from fastslow.symbolic.solving.candidates import Candidates, choose_symbol
 from fastslow.symbolic.solving.solution_families import Family
 from fastslow.symbolic.solving.univariate import Root, factors_in, roots, solved_for
 from fastslow.symbolic.solving.verification import vanishes
 
-#: A longer condition, in parts of its tree, is left as an equation.
+#: Conditions with more nodes remain equations.
 PARTS = 500
 
-#: A root longer than this, in parts of its tree, is not put into a condition.
+#: Roots with more nodes are not substituted into a condition.
 BENT = 150
 
-#: Resultants are formed up to this degree of the eliminated unknown.
+#: Largest degree in the eliminated unknown for which a resultant is formed.
 RESULTANT = 6
 
-#: A quotient of products is given where it has so many times the operations of a sum.
+#: Ratio of operations below which a quotient of products is preferred to a sum.
 SHORTER = 0.75
 
 Place = dict[sp.Symbol, sp.Expr]
@@ -42,16 +42,16 @@ Place = dict[sp.Symbol, sp.Expr]
 
 @dataclass(frozen=True)
 class Located:
-    """Values of the unknown and of parameters, and what they leave open.
+    """Values of the unknown and of parameters, with the remaining conditions.
 
     Parameters
     ----------
     place : dict
         Symbol to value.
     radicands : tuple of sympy.Expr
-        None of them negative where the point is real.
+        Expressions that are nonnegative if the point is real.
     equations : tuple of sympy.Expr
-        Still to hold, = 0.
+        Remaining equations, = 0.
     """
 
     place: Place
@@ -62,13 +62,13 @@ class Located:
 def locate(
     family: Family, condition: sp.Expr, signs: Signs, candidates: Iterable[sp.Symbol]
 ) -> list[Located]:
-    """Solve condition = 0 on a family, for its unknown or for one more parameter.
+    """Solve condition = 0 on a family for its unknown or for one more parameter.
 
     Parameters
     ----------
     family : Family
     condition : sympy.Expr
-        In states and parameters.
+        Expression in states and parameters.
     signs : Signs
     candidates : Candidates or iterable of Symbol
         Parameters to solve for, best first.
@@ -76,7 +76,7 @@ def locate(
     Returns
     -------
     list of Located
-        Empty where the condition cannot vanish.
+        Empty if the condition has no zeros.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def locate(
 def _by_another(
     family: Family, condition: sp.Expr, signs: Signs, candidates: Candidates
 ) -> list[Located]:
-    """With a parameter that stands affinely in the equation, the unknown left free."""
+    """Solve for a parameter that occurs affinely, with the unknown free."""
     (equation,) = family.equations
     other = solved_for(equation, candidates.without(family.unknown), signs)
     if other is None:
@@ -154,9 +154,9 @@ def _on_curve(
 def _on_bent_curve(
     family: Family, condition: sp.Expr, signs: Signs, candidates: Candidates
 ) -> list[Located]:
-    """On a curve given by a root: from the two equations, with the parameter eliminated.
+    """Zeros on a curve given by a root, by elimination of the parameter.
 
-    What belongs to the other root does not fulfil the condition here and is left out.
+    Solutions on the other root are discarded.
     """
     unknown, parameter, curve = family.unknown, family.parameter, family.curve
     assert unknown is not None
@@ -206,7 +206,7 @@ def _at_root(
     return [
         point
         for point in found
-        # a root of the resultant may belong to another root of the unknown
+        # a zero of the resultant may belong to another root
         if point.equations or vanishes(reduced.subs(point.place).subs(point.place), signs)
     ]
 
@@ -218,7 +218,7 @@ def parameters_where(
     signs: Signs,
     candidates: Iterable[sp.Symbol],
 ) -> list[Located]:
-    """Solve a condition on parameters alone for one of them, and put it into what is known.
+    """Solve a condition on parameters for one of them, and substitute it into known values.
 
     Examples
     --------
@@ -232,7 +232,7 @@ def parameters_where(
     candidates = Candidates.of(candidates)
     result = []
     for factor in _open(condition, list(candidates), signs):
-        choice = chosen(factor, candidates, signs)
+        choice = choose_symbol(factor, candidates, signs)
         if choice is None:
             result.append(Located(dict(known), radicands, (factor,)))
             continue
@@ -250,7 +250,7 @@ def _open(condition: sp.Expr, symbols: Sequence[sp.Symbol], signs: Signs) -> lis
 
 
 def neat(expression: sp.Expr) -> sp.Expr:
-    """Short, with radicals expanded; as it is when long.
+    """Return a short form with expanded radicals; long expressions are unchanged.
 
     Examples
     --------
@@ -264,7 +264,7 @@ def neat(expression: sp.Expr) -> sp.Expr:
     if found is not None:
         flat, whole = found.expanded(), found.factored()
         return whole if sp.count_ops(whole) < SHORTER * sp.count_ops(flat) else flat
-    if irrational(expression) and light(expression) and not generators(expression):
+    if irrational(expression) and within_budget(expression) and not generators(expression):
         expanded = spread(expression)
         return min(expanded, spread(sp.together(expanded)), key=sp.count_ops)
     return shortest(expression)

@@ -1,4 +1,4 @@
-"""Systems of polynomial equations of lower degree with the same solutions."""
+"""Equivalent systems of polynomial equations of lower degree."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import sympy as sp
 
 from fastslow.symbolic.solving.algebra import growth
 
-#: How often equations are combined to lower their degrees.
+#: Number of combinations that lower degrees.
 ROUNDS = 4
 
-#: Terms of all equations together, up to which they are combined.
+#: Largest total number of terms of equations that are combined.
 TERMS = 400
 
 
 def lower_degrees(
     equations: Sequence[sp.Expr], states: Sequence[sp.Symbol], rounds: int = ROUNDS
 ) -> list[tuple[sp.Expr, ...]]:
-    """Systems that together have the solutions of one, where terms of highest degree cancel.
+    """Return systems with the same solutions in total, with terms of highest degree cancelled.
 
-    Where the terms of highest degree of one equation are a multiple of those of another, it is
-    replaced by the combination without these, and by each of its factors.
+    If the terms of highest degree of one equation are a multiple of those of another, it is
+    replaced by each factor of the combination in which they cancel.
 
     Examples
     --------
@@ -47,9 +47,9 @@ def lower_degrees(
             continue
         rest = polynomials[other] - ratio * polynomials[one]
         factors = [f.as_expr() for f, _ in rest.factor_list()[1]]
-        # where a factor without states vanishes, so does the whole
+        # a factor without states remains in every system
         common = sp.Mul(*(f for f in factors if not f.has(*states)))
-        # a multiple says nothing more, and a constant that there is no solution
+        # zero is redundant, and a nonzero constant has no solution
         choices = [sp.expand(common * f) for f in factors if f.has(*states)] or [rest.as_expr()]
         each = [(*equations[:other], f, *equations[other + 1 :]) for f in choices]
         if rounds == 1:

@@ -1,4 +1,4 @@
-"""Families of equilibria: the equations rate = 0 split into irreducible parts and solved."""
+"""Families of equilibria: irreducible components of rate = 0, solved in closed form."""
 
 from __future__ import annotations
 
@@ -19,69 +19,69 @@ from fastslow.symbolic.solving.algebra import (
     generators,
     growth,
     irrational,
-    light,
     longer,
     numerator,
     shortest,
     spread,
     tidy,
     undefined,
+    within_budget,
 )
-from fastslow.symbolic.solving.candidates import Candidates, chosen
+from fastslow.symbolic.solving.candidates import Candidates, choose_symbol
 from fastslow.symbolic.solving.elimination import Elimination, Nonzero, eliminate
 from fastslow.symbolic.solving.linear import cramer
 from fastslow.symbolic.solving.lowering import lower_degrees
 from fastslow.symbolic.solving.univariate import DEGREE, Root, factors_in, roots
 
-#: Terms in all coefficients together, up to which a discriminant is formed.
+#: Largest number of terms in all coefficients for which a discriminant is formed.
 COEFFICIENTS = 12
 
-#: Longer divisors, in parts of their tree, are not written out in a note.
+#: Divisors with more nodes are not printed in a note.
 PARTS = 100
 
-#: Rates that may have more terms than this once expanded are left as they are.
+#: Bound on the terms of rates that are expanded.
 EXPANDED = 300
 
-#: With roots of symbols, which make every later step longer.
+#: The bound for rates with roots of symbols.
 EXPANDED_RADICAL = 60
 
-#: Of several equations together, which elimination makes longer.
+#: The bound for several equations together, before elimination.
 EXPANDED_SEVERAL = 120
 
-#: What is said of equations that are left.
+#: Beginning of notes on remaining equations.
 OPEN = "not solved in closed form:"
 
-#: What is said of rates past the budget.
+#: Note on rates past the budget.
 PAST = f"{OPEN} rates past the budget of expansion"
 
-#: More branches of one set of equations than this are not split any further.
+#: Largest number of components into which equations are split.
 BRANCHES = 32
 
 
 @dataclass(frozen=True)
 class Family:
-    """One irreducible set of solutions of rate = 0, or of any equations in the states.
+    """An irreducible component of the solutions of rate = 0, or of other equations.
 
     Parameters
     ----------
     elimination : Elimination
-        Irreducible remaining equations, unknowns, and every other state.
+        Irreducible remaining equations, unknowns, and all other states.
     parameter : Symbol or None
-        The parameter that the equation was solved for.
+        The parameter for which the equation was solved.
     curve : sympy.Expr or None
-        Its value along the family, in the unknown and the other parameters.
+        Its value along the family, as a function of the unknown and other parameters.
     roots : tuple of Root or None
-        The unknown in closed form; None where there is no short one.
+        The unknown in closed form; None if there is no short form.
     discriminant : sympy.Expr or None
-        Of the remaining polynomial in its unknown, from degree two on.
+        Discriminant of the remaining polynomial, for degree two or more.
     condition : tuple of sympy.Expr
-        Equations without any unknown: the family exists only where they vanish.
+        Equations without unknowns, necessary for the family to exist.
     note : str
-        Why it stayed implicit, and what was divided by.
+        Reason why the family is implicit, and divisors assumed nonzero.
     bent : bool
-        Whether the parameter does not stand affinely, so that the curve is one of several.
+        True if the parameter occurs nonlinearly, so that there are several curves.
     radicands : tuple of sympy.Expr
-        None of them negative along the curve.
+        Expressions that are nonnegative along the curve.
     """
 
     elimination: Elimination
@@ -96,16 +96,16 @@ class Family:
 
     @property
     def unknown(self) -> sp.Symbol | None:
-        """The one unknown of a univariate family."""
+        """The unknown of a univariate family, else None."""
         return self.elimination.unknowns[0] if self.elimination.is_univariate else None
 
     @property
     def equations(self) -> tuple[sp.Expr, ...]:
-        """What is left to hold, = 0."""
+        """Remaining equations, = 0."""
         return self.elimination.remaining
 
     def reduced(self, expression: sp.Expr) -> sp.Expr:
-        """Give an expression in the states as one in the unknowns, the parameter replaced."""
+        """Restrict an expression in the states to the family, as a function of the unknowns."""
         solved = {real(n): e for n, e in self.elimination.solved.items()}
         inside = expression.xreplace(solved)
         if self.parameter is not None and self.curve is not None:
@@ -121,20 +121,20 @@ def families(
     *,
     populations: bool = True,
 ) -> list[Family]:
-    """All families of solutions of rate = 0.
+    """Return all families of solutions of rate = 0.
 
     Parameters
     ----------
     rates : mapping
-        State to smooth rate, exact coefficients.
+        State to smooth rate with exact coefficients.
     states : sequence of str
     signs : Signs
-        Used to tell which coefficients may be divided by.
+        Assumptions that decide which coefficients are nonzero.
     candidates : Candidates or iterable of Symbol
-        Parameters that a family may be solved for, best first.
+        Parameters to solve for, best first.
     populations : bool
-        Whether rates x g(x, …) are taken apart first. With further equations, one of which
-        may imply g = 0, that would list places of a continuum.
+        Factor rates x g(x, …) first. With further equations, one of which may imply
+        g = 0, this would list points of a continuum.
 
     Returns
     -------
@@ -173,9 +173,9 @@ def families(
 def _growth_rates(
     rates: Mapping[str, sp.Expr], states: Sequence[str]
 ) -> dict[str, list[sp.Expr]] | None:
-    """Each rate as it is, or as its own state and what this is multiplied by.
+    """Factor each rate into its own state and a growth rate, where it is such a product.
 
-    None where no rate is such a product, and past the budget of branches.
+    None if no rate is such a product, or past the budget of components.
     """
     unknowns = tuple(real(n) for n in states)
     choices = {}
@@ -195,7 +195,7 @@ def _of_populations(
     signs: Signs,
     candidates: Candidates,
 ) -> list[Family]:
-    """Families of rates x g(x, …): one for each choice of states that are absent."""
+    """Families of rates x g(x, …), one for each choice of vanishing states."""
     found: list[Family] = []
     for picked in itertools.product(*growths.values()):
         absent = {real(n): sp.S.Zero for n, e in zip(states, picked, strict=True) if e == real(n)}
@@ -223,7 +223,7 @@ def _of_populations(
 
 
 def _past(rate: sp.Expr) -> bool:
-    """Whether a rate is too long to be expanded."""
+    """Check whether a rate is too long to be expanded."""
     if generators(rate):
         return False
     return growth(rate) > (EXPANDED_RADICAL if irrational(rate) else EXPANDED)
@@ -232,10 +232,10 @@ def _past(rate: sp.Expr) -> bool:
 def _by_factors(
     rates: Mapping[str, sp.Expr], states: Sequence[str], signs: Signs, candidates: Candidates
 ) -> list[Family]:
-    """Families of rates past the budget, one for each choice of a factor that vanishes.
+    """Families of rates past the budget, one for each choice of vanishing factors.
 
-    A factor that is a state alone makes the other rates shorter, so that they may be
-    within the budget; what is not stays as it is.
+    A factor that is a single state shortens the other rates, possibly below the budget;
+    otherwise they remain unsolved.
     """
     unknowns = tuple(real(n) for n in states)
     choices = [_factors_as_written(rates[n], unknowns) for n in states]
@@ -267,7 +267,7 @@ def _by_factors(
 
 
 def _factors_as_written(rate: sp.Expr, unknowns: Sequence[sp.Symbol]) -> list[sp.Expr]:
-    """Factors of a product with an unknown in them, or the whole where there are none."""
+    """Factors of a product that contain an unknown, or the whole product."""
     bases = [f.as_base_exp() for f in sp.Mul.make_args(rate)]
     found = [b for b, e in bases if e.is_positive and b.free_symbols & set(unknowns)]
     poles = [b for b, e in bases if not e.is_positive and b.free_symbols & set(unknowns)]
@@ -275,7 +275,7 @@ def _factors_as_written(rate: sp.Expr, unknowns: Sequence[sp.Symbol]) -> list[sp
 
 
 def _poles(rates: Mapping[str, sp.Expr], states: Sequence[str]) -> list[sp.Expr]:
-    """Denominators with states in them; where one vanishes there is no equilibrium."""
+    """Denominators that contain states; an equilibrium is not a zero of one."""
     moving = {real(n) for n in states}
     found = {
         p.base
@@ -287,7 +287,7 @@ def _poles(rates: Mapping[str, sp.Expr], states: Sequence[str]) -> list[sp.Expr]
 
 
 def split(rates: Mapping[str, sp.Expr], states: Sequence[str], signs: Signs) -> list[Elimination]:
-    """Eliminate, and take reducible equations apart, until every equation is irreducible.
+    """Eliminate states and factor equations until every equation is irreducible.
 
     Examples
     --------
@@ -357,7 +357,7 @@ def _joined(current: Elimination, equations: Sequence[sp.Expr], nonzero: Nonzero
 
 
 def _generic(found: list[Elimination], signs: Signs) -> list[Elimination]:
-    """Where several polynomial equations are left, divide by coefficients with states in them."""
+    """Divide by coefficients that contain states, if several polynomial equations remain."""
     result: list[Elimination] = []
     for current in found:
         several = len(current.remaining) > 1 and len(current.unknowns) > 1
@@ -375,13 +375,15 @@ def _generic(found: list[Elimination], signs: Signs) -> list[Elimination]:
 
 
 def _keeps(elimination: Elimination, divided: Sequence[sp.Expr]) -> bool:
-    """Whether no divisor vanishes all along the family, which would make it spurious."""
+    """Check that no divisor vanishes identically on a family, which would be spurious."""
     place = {real(n): e for n, e in elimination.solved.items()}
     left = [tidy(d.xreplace(place)) for d in divided]
     if elimination.is_univariate:
         (equation,), unknowns = elimination.remaining, elimination.unknowns
-        both = [e for e in left if equation.is_polynomial(*unknowns) and light(e) and e != 0]
-        above = [numerator(e) for e in both if light(equation)]
+        both = [
+            e for e in left if equation.is_polynomial(*unknowns) and within_budget(e) and e != 0
+        ]
+        above = [numerator(e) for e in both if within_budget(equation)]
         left += [sp.rem(e, equation, *unknowns) for e in above if e.is_polynomial(*unknowns)]
     return all(e != 0 and not undefined(e) for e in left)
 
@@ -394,26 +396,26 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
     note = ""
     divided = list(dict.fromkeys(f for d in elimination.divisors for f in _open(d, signs)))
     if divided:
-        note = "found where " + ", ".join(f"{_short(d)} ≠ 0" for d in divided)
+        note = "valid where " + ", ".join(f"{_short(d)} ≠ 0" for d in divided)
     if not slim.is_univariate:
         if bound:
-            many = f"{OPEN} {len(bound)} equations are left"
-            note = _and(note, "1 equation is left" if len(bound) == 1 else many)
+            many = f"{OPEN} {len(bound)} equations remain"
+            note = _and(note, "1 equation remains" if len(bound) == 1 else many)
         return [Family(slim, condition=tuple(free), note=note)]
     (equation,), (unknown,) = slim.remaining, unknowns
     closed = roots(equation, unknown, signs)
     if closed is not None and sp.degree(equation, unknown) == 1:
         return [_linear(slim, closed[0].value, free, note, signs)]
-    choice = chosen(equation, candidates.without(unknown), signs)
+    choice = choose_symbol(equation, candidates.without(unknown), signs)
     bent = choice is not None and choice.slope is None
     if choice is not None and (not choice.values or (bent and closed is not None)):
-        # the unknown has a closed form; a root of the parameter would only be longer
+        # the unknown has a closed form, shorter than a root of the parameter
         choice = None
     parameter = choice.symbol if choice is not None else None
     curve = choice.values[0].value if choice is not None else None
     slope = choice.slope if choice is not None else None
     if slope is not None and not signs.nonzero(slope) and slope.free_symbols & {unknown}:
-        note = _and(note, f"the curve holds where {_short(slope)} ≠ 0")
+        note = _and(note, f"the curve is valid where {_short(slope)} ≠ 0")
     discriminant = None
     if equation.is_polynomial(unknown):
         poly = sp.Poly(equation, unknown)
@@ -445,7 +447,7 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
 def _linear(
     slim: Elimination, value: sp.Expr, free: list[sp.Expr], note: str, signs: Signs
 ) -> Family:
-    """Give a family whose last unknown has one value, except where its slope vanishes."""
+    """Family whose last unknown has a unique value where its coefficient is nonzero."""
     (equation,), (unknown,) = slim.remaining, slim.unknowns
     slope = spread(equation).diff(unknown)
     solved = {n: tidy(e.subs(unknown, value)) for n, e in slim.solved.items()}
@@ -453,12 +455,12 @@ def _linear(
         (), (), NamedMapping("solved state", {**solved, unknown.name: value}), slim.divisors
     )
     for factor in _open(slope, signs):
-        note = _and(note, f"found where {_short(factor)} ≠ 0")
+        note = _and(note, f"valid where {_short(factor)} ≠ 0")
     return Family(whole, condition=tuple(free), note=note)
 
 
 def _open(divisor: sp.Expr, signs: Signs) -> list[sp.Expr]:
-    """Factors of a divisor that may vanish, without their numbers."""
+    """Factors of a divisor that may vanish, without numerical factors."""
     if signs.nonzero(divisor):
         return []
     if longer(divisor, PARTS):

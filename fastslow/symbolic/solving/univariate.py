@@ -1,4 +1,4 @@
-"""Short closed forms: roots of one polynomial, and one symbol out of one equation."""
+"""Roots of a polynomial, and solution of an affine equation, in short closed form."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import sympy as sp
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.algebra import factors, longer, numerator, shortest, spread
 
-#: A longer equation, in parts of its tree, is not solved for a symbol.
+#: Equations with more nodes are not solved.
 PARTS = 400
 
-#: Polynomials of a higher degree stay implicit.
+#: Polynomials of higher degree are not solved.
 DEGREE = 16
 
 
 @dataclass(frozen=True)
 class Root:
-    """One root of an equation in closed form.
+    """A root of an equation in closed form.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ class Root:
 
     @property
     def radicands(self) -> tuple[sp.Expr, ...]:
-        """All that must not be negative, without what is a positive number."""
+        """Expressions that are nonnegative for a real root, without positive numbers."""
         return tuple(e for e in (self.radicand, *self.further) if not e.is_positive)
 
 
 def factors_in(equation: sp.Expr, unknowns: Sequence[sp.Symbol]) -> list[tuple[sp.Expr, int]]:
-    """Irreducible factors with an unknown in them; an equation past the budget is one factor.
+    """Return irreducible factors that contain an unknown; one factor past the budget.
 
     Examples
     --------
@@ -62,10 +62,10 @@ def factors_in(equation: sp.Expr, unknowns: Sequence[sp.Symbol]) -> list[tuple[s
 
 
 def roots(factor: sp.Expr, unknown: sp.Symbol, signs: Signs) -> list[Root] | None:
-    """All real roots of an irreducible factor where they have a short form, else None.
+    """Return all real roots of an irreducible factor, None if they have no short form.
 
-    Degree one and two in radicals, powers x**n = c, and any degree as CRootOf
-    where the coefficients are numbers.
+    Degrees one and two and x**n = c are solved by radicals, polynomials with numerical
+    coefficients by CRootOf.
 
     Examples
     --------
@@ -109,7 +109,7 @@ def _quadratic(a: sp.Expr, b: sp.Expr, c: sp.Expr, signs: Signs) -> list[Root]:
 
 def _power(level: sp.Expr, degree: int, signs: Signs) -> list[Root]:
     if degree % 2:
-        # the real odd root, whichever sign the level has
+        # the real odd root, for either sign
         side = signs.sign(level)
         if side is None:
             return [Root(sp.sign(level) * sp.Abs(level) ** sp.Rational(1, degree))]
@@ -119,7 +119,7 @@ def _power(level: sp.Expr, degree: int, signs: Signs) -> list[Root]:
 
 
 def squares_out(radicand: sp.Expr, signs: Signs) -> tuple[sp.Expr, sp.Expr]:
-    """Split R = s² r, so that √R = s √r up to the sign of s, s holding all square factors.
+    """Write R = s² r with all square factors in s, so that √R = |s| √r.
 
     Examples
     --------
@@ -150,9 +150,9 @@ def squares_out(radicand: sp.Expr, signs: Signs) -> tuple[sp.Expr, sp.Expr]:
 def solved_for(
     equation: sp.Expr, candidates: Iterable[sp.Symbol], signs: Signs
 ) -> tuple[sp.Symbol, sp.Expr, sp.Expr] | None:
-    """Give the first candidate that stands affinely in an equation: (symbol, value, slope).
+    """Solve an equation for the first candidate in which it is affine: (symbol, value, slope).
 
-    One whose slope is known not to vanish goes before the others.
+    Candidates whose coefficient is known to be nonzero are preferred.
 
     Examples
     --------

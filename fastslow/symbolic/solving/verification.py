@@ -1,4 +1,4 @@
-"""Whether closed forms satisfy their equations: exactly where that is cheap, else at points."""
+"""Verification of closed forms by substitution, exactly or numerically at points."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from fastslow.model.rational import quotient
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.algebra import longer, numerator, spread, undefined
 
-#: Points at which an expression that does not reduce exactly is evaluated.
+#: Points at which an expression is evaluated if it is not reduced exactly.
 POINTS = 4
 
-#: Digits of that evaluation; what is left must be below 10**-(DIGITS - 15) of the largest term.
+#: Digits of the evaluation; residuals are below 10**-(DIGITS - 15) of the largest term.
 DIGITS = 50
 
-#: Longer expressions, in parts of their tree, are only evaluated.
+#: Expressions with more nodes are only evaluated.
 PARTS = 400
 
 #: Newton steps from one start.
 STEPS = 40
 
-#: Points without a root, after which equations are not searched any further.
+#: Points without a root after which the search ends.
 ROOTLESS = 2
 
-#: How something was verified, the stronger first; the empty string where it was not.
+#: Methods of verification, the stronger first; empty for none.
 EXACT, NUMERIC, OPEN = "exact", f"{DIGITS} digits", ""
 
 Place = Mapping[sp.Symbol, sp.Expr]
 
 
 def vanishes(expression: sp.Expr, signs: Signs | None = None) -> bool:
-    """Whether an expression is zero for all values that the assumptions allow.
+    """Check that an expression vanishes for all values allowed by the assumptions.
 
-    Expansion over one denominator settles rational expressions and single
-    radicals. What is left over is evaluated with 50 digits at four fixed
+    Expansion over one denominator is exact for rational expressions and single
+    radicals. Other expressions are evaluated with 50 digits at four fixed
     points.
 
     Examples
@@ -50,12 +50,12 @@ def vanishes(expression: sp.Expr, signs: Signs | None = None) -> bool:
 
 
 def all_vanish(expressions: Iterable[sp.Expr], signs: Signs | None = None) -> bool:
-    """Whether every one of them does."""
+    """Check that all expressions vanish for all values allowed by the assumptions."""
     return checked(expressions, {}, signs) != OPEN
 
 
 def weakest(checks: Iterable[str]) -> str:
-    """Give the weakest of several ways of verification.
+    """Return the weakest of several methods of verification.
 
     Examples
     --------
@@ -73,7 +73,7 @@ def checked(
     equations: Sequence[sp.Expr] = (),
     unknowns: Sequence[sp.Symbol] = (),
 ) -> str:
-    """Say how it is known that expressions vanish where symbols have the values of a closed form.
+    """Return the method that verifies that expressions vanish at a closed form.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def checked(
     Returns
     -------
     str
-        ``"exact"``, ``"50 digits"`` or, where it does not hold or is not known, ``""``.
+        ``"exact"``, ``"50 digits"`` or, if it is false or undecided, ``""``.
 
     Examples
     --------
@@ -108,7 +108,7 @@ def checked(
 
 
 def _multiple(expression: sp.Expr, equation: sp.Expr, unknowns: Sequence[sp.Symbol]) -> bool:
-    """Whether an expression holds an equation as a factor, above any poles."""
+    """Check whether the numerator of an expression has an equation as a factor."""
     over, under = quotient(expression), quotient(equation)
     if over is None or under is None:
         return False
@@ -180,7 +180,7 @@ def _at_points(
 
 
 def _left_over(expression: sp.Expr, point: Place) -> bool | None:
-    """Whether the terms of a sum, or of a factor, cancel at a point; None where undefined."""
+    """Check whether the terms of a sum or factor cancel at a point; None if undefined."""
     if expression.is_Mul:
         each = [_left_over(factor, point) for factor in expression.args]
         return None if None in each else any(each)
@@ -195,7 +195,7 @@ def _left_over(expression: sp.Expr, point: Place) -> bool | None:
 def _root(
     equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol], start: int
 ) -> dict[sp.Symbol, sp.Expr] | None:
-    """One root, real or complex, by Newton's method with extra digits; None where it fails."""
+    """Compute a real or complex root by Newton's method; None if it does not converge."""
     with mpmath.workdps(DIGITS + 10):
         function = sp.lambdify(list(unknowns), list(equations), "mpmath")
         for attempt in range(3):
