@@ -8,7 +8,7 @@ from typing import Any
 
 import sympy as sp
 
-from fastslow.arguments import formula, instance, items, mapping, refusal, validated, text
+from fastslow.arguments import formula, instance, items, mapping, refusal, text, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real, sympified

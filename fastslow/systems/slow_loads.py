@@ -16,8 +16,8 @@ from fastslow.arguments import (
     mapping,
     numbers,
     shown,
-    validated,
     text,
+    validated,
 )
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.functions import numpy_function
