@@ -117,7 +117,7 @@ def test_van_der_pol_scaling():
 def test_reduction_needs_a_closed_set():
     p, q = sp.symbols("p q")
     assert dict(reduce_states({p: q, q: -p}, {"u": p, "s": q})) == {"u": real("s"), "s": -real("u")}
-    with pytest.raises(ArgumentError, match="needs q"):
+    with pytest.raises(ArgumentError, match="also depends on q"):
         reduce_states({p: q, q: -p}, {"u": p})
     with pytest.raises(ArgumentError, match="depend"):
         reduce_states({p: q, q: -p}, {"u": p, "s": 2 * p})
@@ -127,7 +127,7 @@ def test_reduction_needs_a_closed_set():
 
 def test_bad_scaling_requests():
     model = harmonic_gear()
-    with pytest.raises(ArgumentError, match="open"):
+    with pytest.raises(ArgumentError, match="do not determine the scale"):
         nondimensionalise(model, [("x", "v")])
     with pytest.raises(ArgumentError, match="no term"):
         nondimensionalise(model, [("x", "x**7")])
