@@ -1,4 +1,4 @@
-"""The page on which every claim stands with its verdict, its numbers and its figures."""
+"""The page of all claims with verdicts, numbers and figures."""
 
 from __future__ import annotations
 
@@ -39,46 +39,48 @@ SOURCES = (
     negative_stiffness,
 )
 
-#: What each figure shows.
+#: Captions of the figures.
 CAPTIONS = {
-    "dead_zone": "The dead zone of Fig. 1.",
+    "dead_zone": "The dead zone (Fig. 1).",
     "physical_route": "One motion in four models, ω = 1 rad/s. (a) The angle of the load side, "
-    "from two inertias. (b) The twist under both scalings, brought back to rad. (c) Largest "
-    "distance so far of the twist from that of the two inertias; dashed, 1e-9.",
+    "from two inertias. (b) The twist under both scalings, converted to rad. (c) Largest deviation "
+    "up to the given time of the twist from that of the two inertias; dashed, 1e-9.",
     "physical_overlay": "The overlay in physical units: the twist of the gear in milliradians over "
     "the load torque in N m, ω = 1 rad/s, on its frozen equilibria.",
     "gap_width_consistent": "Fig. 3 under the consistent scaling: time series, phase portraits, "
     "overlays on the frozen equilibria.",
     "gap_width_printed": "Fig. 3 under the printed scaling.",
-    "gap_region": "Where the three widths of Fig. 3 behave as stated; each point is three runs. "
-    "Dashed: the slow-load criterion for D = 0.5 (upper) and 0.25 (lower).",
+    "gap_region": "Region in which the three widths of Fig. 3 behave as stated; each point is "
+    "three simulations. Dashed: the slow-load criterion for D = 0.5 (upper) and 0.25 (lower).",
     "regimes_width": "Regimes over D and C/B at ω_o = 0.01; dashed, the slow-load criterion.",
     "regimes_frequency": "Regimes over ω_o and C/B at D = 0.25; dashed, the slow-load criterion.",
     "map_width_load": "Regimes over D and C/B − 1 at ω_o = 0.01, with the cases of Fig. 3 (by D) "
     "and of Fig. 5 (by T_am; 10 N m has C < B).",
     "map_frequency_width": "Regimes over ω_o and D at T_am = 15 N m, with the cases of Fig. 3.",
-    "map_stiffness_torque": "Regimes over k1 and T_am at D = 0.25, ω_o = 0.01, near the lightest "
-    "case of Fig. 5; the others, and those of Fig. 4 at 15 N m, lie above.",
+    "map_stiffness_torque": "Regimes over k1 and T_am at D = 0.25, ω_o = 0.01, near the case "
+    "of smallest load of Fig. 5; the others, and those of Fig. 4 at 15 N m, are above this range.",
     "resonances": "Loads no longer slow against the vibration in contact, at T_am = 15 N m: "
     "regimes over ω_o and D under the consistent scaling, and at the three widths under the "
-    "printed one, from rest. Bar below (a): where all three are as Fig. 3 states; nowhere in (b).",
+    "printed one, from rest. Bar below (a): frequencies at which all three behave as stated for "
+    "Fig. 3; none in (b).",
     "passages": "The last period of every case beside the gap: the overlays of Figs. 3 to 5, "
-    "enlarged. Black: the frozen equilibria. The gear leaves each side where the load changes "
-    "sign, arrives late on the other, and vibrates there.",
+    "enlarged. Black: the frozen equilibria. The gear separates from each side when the load "
+    "changes sign, makes contact on the other side with a delay, and vibrates there.",
     "stiffness_consistent": "Fig. 4 under the consistent scaling.",
     "stiffness_printed": "Fig. 4 under the printed scaling.",
     "contact_frequency": "Frequency in contact over the load: lines, √(3x² − 2Dx + A − 1/4); "
-    "circles, timed on the trajectories. Dashed: from here on k1 = 1000 is faster than 7000.",
+    "circles, measured on the trajectories. Dashed: above this load k1 = 1000 has a higher "
+    "frequency than 7000.",
     "load_amplitude_consistent": "Fig. 5 under the consistent scaling, its gap taken as D = 0.25.",
     "load_amplitude_printed": "Fig. 5 under the printed scaling, its gap taken as D = 0.25.",
-    "responses": "Time in the gap (a to c) and twist (d to f) over D, k1 and T_am; lines, laws.",
+    "responses": "Time in the gap (a to c) and twist (d to f) over D, k1 and T_am; lines, "
+    "predictions.",
     "equilibria": "The frozen equilibria of every case.",
     "eigenvalues": "Eigenvalues along the equilibria, (a) of the source's gear, (b) of a soft one "
     "that has nodes beside the gap.",
-    "negative_stiffness": "A gear with A < −D²: it follows a stable branch past its fold and "
-    "jumps.",
+    "negative_stiffness": "A gear with A < −D² follows a stable branch past its fold and jumps.",
     "relaxation": "(a) The folds over load and stiffness end on the interfaces at A = −D². "
-    "(b) Where a load C sin(ω t) makes relaxation oscillations (bilateral).",
+    "(b) Region in which a load C sin(ω t) causes relaxation oscillations (bilateral).",
 }
 
 HEAD = r"""# The paper, claim by claim
@@ -87,34 +89,34 @@ M. Ding, "Fast-slow Dynamical Analysis in Harmonic Gear Transmission System with
 Clearance Condition", Current Journal of Applied Science and Technology 42(7), 66-75, 2023,
 doi [10.9734/CJAST/2023/v42i74082](https://doi.org/10.9734/CJAST/2023/v42i74082) (CC BY 4.0).
 
-Each figure of the paper and each of its sentences that can be tested stands here with what was
-computed for it, a verdict, and the numbers. Quotations are the paper's words. Claims B1 to B4 are
-results that it does not have.
+This page lists each figure of the paper and each of its testable sentences with the computation
+that tests it, a verdict, and numerical evidence. Text in quotation marks is from the paper. Claims
+B1 to B4 are results that are not in the paper.
 
 The dimensionless gear is $\ddot x + \dot x + (x^2 + A) f(x) = w$ with the load
 $w = B + C\sin(\omega_\mathrm{o} t)$ and the dead zone $f$ of half-width $D$; S1 is contact on
 the upper side, $x > D$, S2 the gap, S3 contact on the lower side, $x < -D$.
 
 - *Two scalings.* The paper's $A$, $B$ and $C$ do not follow from its equations: a factor
-  θ_s was forgotten. Every claim is tested with the values that follow (*consistent*) and with
-  those printed (*printed*).
-- *What is left out.* The paper gives no frequency of the load but $0 < \omega < 1$ rad/s, no
-  initial states and no time spans. They are scanned where they matter; single runs have
-  ω_o = 0.01 and three periods from rest. The gap of Fig. 5 is not stated; it is taken as
+  θ_s is missing. Every claim is tested with the values that follow from the equations
+  (*consistent*) and with those printed (*printed*).
+- *Unstated values.* The paper states only $0 < \omega < 1$ rad/s for the frequency of the load,
+  and neither initial states nor time spans. They are varied where they matter; single simulations
+  have ω_o = 0.01 and three periods from rest. The gap of Fig. 5 is not stated; it is taken as
   D = 0.25, the middle one of Fig. 3.
 - *Verdicts*: a claim holds, does not hold, or holds conditionally: at other values of the
-  parameters, at some of the paper's, or one half of the sentence only. The column "at the paper's
-  values" tells these apart: *no*, at none of the values that the paper states it for; *in part*,
+  parameters, at some of the paper's, or for one half of the sentence only. The column "at the
+  paper's values" distinguishes these: *no*, at none of the values stated in the paper; *in part*,
   at some of them, in one half, or for one reading of them.
-- *Impacts* are bilateral if both sides are met in every period of the second half of a run,
-  unilateral if contact is lost and found on one side only; meshed is contact that is never lost.
-  A motion whose largest Lyapunov exponent is positive is chaotic, and has no regime; one whose
-  periods differ otherwise is not settled.
-- *The frozen gear* has its load held fixed. Its equilibria over the load are what a slow load
-  drags the gear along; laying a run over them shows what is followed, and what comes late.
-- *The slow-load criterion*: the far side is met if $D$ is not larger than
-  $D^* = [\sqrt{C^2 - B^2} - B\arccos(B/C)]/\omega_\mathrm{o} - \dots$, how far the load pushes
-  the gear while it is negative.
+- *Impacts* are bilateral if contact is made on both sides in every period of the second half of a
+  simulation, and unilateral if contact is lost and regained on one side only; meshed is contact
+  without separation. A motion with a positive largest Lyapunov exponent is chaotic, and has no
+  regime; one with periods that differ otherwise is not settled.
+- *The frozen gear* is the gear under a constant load. Under a slow load the gear follows its
+  equilibria; the overlay of a trajectory shows which branch is followed, and with what delay.
+- *The slow-load criterion*: contact is made on the far side if $D$ is at most
+  $D^* = [\sqrt{C^2 - B^2} - B\arccos(B/C)]/\omega_\mathrm{o} - \dots$, the distance
+  that the gear moves while the load is negative.
 
 The page is written by `python -m analyses --docs`.
 """
