@@ -33,7 +33,7 @@ from fastslow.plot.layout.style import (
     new_figure,
     styled_axes,
 )
-from fastslow.results.overlay.delays import GapTransit
+from fastslow.results.overlay.delays import GapCrossing
 from fastslow.systems.gears import SCALINGS
 
 FIGURES = ("gap_width", "stiffness", "load_amplitude")
@@ -89,13 +89,13 @@ def story(case: Case) -> Story:
     lay = case.lay
     shares, found = lay.shares(), lay.transitions
     nan = float("nan")
-    arrivals = {t.from_sheet: t.land.value for t in reversed(found) if t.land is not None}
+    arrivals = {t.from_branch: t.land.value for t in reversed(found) if t.land is not None}
     measured, law = nan, nan
     if found:
         law = found[0].predicted
         measured = found[0].delay
-        if isinstance(found[0].law, GapTransit):
-            measured, law = found[0].duration, found[0].law.transit_time
+        if isinstance(found[0].law, GapCrossing):
+            measured, law = found[0].duration, found[0].law.duration
     return Story(
         case.setting.title,
         shares.get("S1", 0.0),

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from fastslow.interactive.pointers import pick
     from fastslow.model.model import Model
     from fastslow.passage.delays.delay_laws import predict_delay
-    from fastslow.passage.delays.hopf_delays import hopf_exit
     from fastslow.passage.delays.scaling_runs import delay_scaling
     from fastslow.passage.overlay.overlays import overlay
     from fastslow.passage.regimes import classify_regime, regime_map
@@ -108,7 +107,6 @@ _HOME = {
     "equilibria": "diagrams.solve.solving",
     "explore": "interactive.explorers",
     "export": "exporters.formats",
-    "hopf_exit": "passage.delays.hopf_delays",
     "pick": "interactive.pointers",
     "load": "results.io.files",
     "lyapunov_exponent": "simulation.lyapunov",
@@ -170,7 +168,6 @@ __all__ = [
     "equilibria",
     "explore",
     "export",
-    "hopf_exit",
     "load",
     "lyapunov_exponent",
     "nondimensionalise",

@@ -53,8 +53,8 @@ def test_van_der_pol(van_der_pol):
     np.testing.assert_allclose(run(times[before]), peer.y[:, before], rtol=0, atol=1e-10)
 
     lay = fs.overlay(diagram, run)
-    assert {s.region for s in lay.sheets} == {"S1"}
-    assert len(lay.sheets) == 2
+    assert {s.region for s in lay.stable_branches} == {"S1"}
+    assert len(lay.stable_branches) == 2
     first = lay.transitions[0]
     assert first.special.code == "HB"
     assert drawn(lay) > 2
@@ -101,9 +101,9 @@ def test_piecewise_linear_with_two_interfaces(beam):
     np.testing.assert_allclose(run(times), peer.y, atol=1e-8)
 
     lay = fs.overlay(diagram, run)
-    assert {lay.sheets[k].region for k in lay.followed} == {"S1", "S2", "S3"}
+    assert {lay.stable_branches[k].region for k in lay.followed} == {"S1", "S2", "S3"}
     order = ["S2", "S1", "S2", "S3", "S2", "S1", "S2", "S3", "S2"]
-    assert [lay.transitions[0].from_sheet, *(t.to_sheet for t in lay.transitions)] == order
+    assert [lay.transitions[0].from_branch, *(t.to_branch for t in lay.transitions)] == order
     # on S1, X = (w + 3)/4 solves x'' + x'/2 + 4x = w + 3 with lag −X'/8 + (1/64 − 1/4) X'' + …
     load, slope, bend = 6 * np.sin(1), 0.06 * np.cos(1), -6e-4 * np.sin(1)
     expected = (load + 3) / 4 - slope / 4 / 8 + (1 / 64 - 1 / 4) * bend / 4

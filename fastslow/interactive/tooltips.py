@@ -66,7 +66,7 @@ def text_of(point: Any, parameter: str = "") -> str:
         lines = [
             point.kind if point.special is None else f"{point.kind} at {point.special.label}",
             numbers(["t", parameter], [point.time, point.value]),
-            f"{point.from_sheet} → {point.to_sheet or 'end of run'}",
+            f"{point.from_branch} → {point.to_branch or 'end of run'}",
         ]
     else:
         lines = [

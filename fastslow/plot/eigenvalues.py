@@ -228,16 +228,16 @@ def clarke_path(
 
 def _followed(lay: Overlay) -> list[tuple[Branch, slice]]:
     """Return the rows of each branch from the first to the last row that is followed."""
-    used = [lay.sheets[k] for k in np.unique(lay.followed) if k >= 0]
+    used = [lay.stable_branches[k] for k in np.unique(lay.followed) if k >= 0]
     if not used:
         raise ArgumentError(
             "this trajectory follows no stable branch: there are no eigenvalues to draw"
         )
     low, high = float(lay.slow.min()), float(lay.slow.max())
     parts = []
-    for number in dict.fromkeys(sheet.branch for sheet in used):
+    for number in dict.fromkeys(s.branch for s in used):
         branch = lay.diagram.branches[number]
-        own = [sheet for sheet in used if sheet.branch == number]
+        own = [s for s in used if s.branch == number]
         start, stop = min(s.start for s in own), max(s.stop for s in own)
         inside = (branch.parameter >= low) & (branch.parameter <= high)
         rows = start + np.flatnonzero(inside[start:stop])

@@ -93,7 +93,7 @@ def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text], renderer: Rende
 def _text(phase: Phase) -> str:
     if phase.kind == "quasi-static":
         # along the edge of a band of equilibria
-        names = ("edge" if name.startswith("edge of ") else name for name in phase.sheets)
+        names = ("edge" if name.startswith("edge of ") else name for name in phase.stable_branches)
         return plain(" ".join(names))
     if phase.kind == "oscillating":
         return f"{phase.oscillations} oscillations"

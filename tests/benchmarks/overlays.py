@@ -14,7 +14,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.passage.delays.local_field import site_of
+from fastslow.passage.delays.local_field import local_field_at
 from fastslow.passage.delays.local_passages import Event, Place, reached_delay
 from tests.benchmarks.measuring import Line, used
 
@@ -52,17 +52,17 @@ def passages() -> tuple[float, float, float]:
     """ms of a passage past the cusp's fold, and by SciPy, and how far apart they are."""
     fast = fs.systems.cusp().frozen()
     fold = fs.continue_equilibria(fast, "p", over=(-1, 1)).folds[0]
-    site, rate = site_of(fold, None, None), 1e-3
+    local, rate = local_field_at(fold, None, None), 1e-3
     way = -1.0 if fold["x"] > 0 else 1.0
     state = [-1.3 * way, -way * 0.5]
-    place = Place(0, np.array(state) - site.u, 0.0)
+    place = Place(0, np.array(state) - local.u, 0.0)
     stop = Event((0, 0.5 * way))
 
     def ours() -> float:
-        return reached_delay(site, fs.Drift(way * rate), place, stop, 1e4)[0]
+        return reached_delay(local, fs.Drift(way * rate), place, stop, 1e4)[0]
 
     def rates(t: float, z: np.ndarray) -> np.ndarray:
-        values, _, _, _ = site.field.evaluate(0, site.u + z)
+        values, _, _, _ = local.field.evaluate(0, local.u + z)
         return np.append(values, way * rate)
 
     def level(t: float, z: np.ndarray) -> float:

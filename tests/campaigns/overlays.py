@@ -155,7 +155,7 @@ def check(report, case):
     for t in lay.transitions:
         here = solution(t.time)[rows]
         away = np.abs(here - t.state)
-        if "oscillating" in (t.from_sheet, t.to_sheet):
+        if "oscillating" in (t.from_branch, t.to_branch):
             # of many oscillations the phase is lost in a delay
             continue
         worst = max(worst, float((away / extent[rows]).max()))

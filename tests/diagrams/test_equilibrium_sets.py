@@ -193,8 +193,8 @@ def test_an_overlay_knows_when_the_block_sticks_and_when_it_slips_along_the_edge
         state = run(time)
         assert abs(2 * math.sin(time / 100) - state[0]) == pytest.approx(0.5, abs=1e-8)
     assert "in S1|S2 (sticking): 3 times" in overlay.summary()
-    assert overlay.at(t=200.0)[0].sheet == "S1|S2 (sticking)"
-    assert len(overlay.select(sheet="edge of S1|S2")) == 3
+    assert overlay.at(t=200.0)[0].stable_branch == "S1|S2 (sticking)"
+    assert len(overlay.select(stable_branch="edge of S1|S2")) == 3
 
 
 def test_a_friction_oscillator_with_a_filter_has_a_band_that_is_stable_across():

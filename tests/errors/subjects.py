@@ -107,7 +107,6 @@ def results():
         "gap": gap,
         "corner": backlash.boundary_equilibria[0],
         "turning": turning,
-        "hopf": turning.special("HB")[0],
         "many": many,
         "swept": fs.bifurcation_sweep(gear, "C", [2.0, 2.5], [0, 0], settle=1, keep=1),
         "map": fs.refined_map(
@@ -209,7 +208,6 @@ def analyses(r):
         "reduce_states": {"rates": {a: -k * (a - b), b: k * (a - b)}, "combinations": {u: a - b}},
         "export": {"model": logistic(), "format": "numpy"},
         "predict_delay": {"point": fold, "rate": 1e-3},
-        "hopf_exit": {"diagram": r["turning"], "point": r["hopf"], "entry": -1, "rate": 0.05},
         "overlay": {"diagram": r["diagram"], "run": r["run"]},
         "load": {"path": "nothing.npz"},
         "read_auto": {"path": "b.nothing"},

@@ -270,7 +270,6 @@ BY_FUNCTION = {
     ],
     "export.path": [(3, Wrong, "path = 3; expected the path of a file")],
     "export.start": [*MAPPING, ({"y": 0.0}, Unknown, "unknown state 'y'")],
-    "hopf_exit.rate": [*NUMBER, (-0.05, Wrong, "expected rate > 0")],
     "lyapunov_exponent.discard": [
         *NUMBER,
         (2.0, Wrong, "discard = 2; expected a number from 0 below the length of the run, 1"),

@@ -71,7 +71,6 @@ BY_PARAMETER = {
     ],
     "dpi": [(0, Wrong, "dpi = 0; expected a number from 10"), (NAN, Wrong, "dpi = nan")],
     "drawing": [(None, Wrong, "cannot pick in a NoneType of a Diagram")],
-    "entry": [*NUMBER, (5, Wrong, "entry = 5; expected a value of p on the sheet before HB1")],
     "exact": FLAG,
     "expression": COLUMN,
     "figure": [("omga", Wrong, "figure: expected a Figure, received a str")],
@@ -155,7 +154,6 @@ BY_PARAMETER = {
     "continuation": [(3, Wrong, "continuation: expected a Continuation, received an int")],
     "settle": [(-1, Wrong, "settle = -1"), ("5", Wrong, "settle = '5'; expected")],
     "since": [*NUMBER, (-5, Wrong, "since = -5 is outside the run, which is [0,")],
-    "sheet": [*TEXT, ("S9", Unknown, "unknown sheet 'S9'")],
     "size": POSITIVE,
     "sliders": [
         *MAPPING,
@@ -169,6 +167,7 @@ BY_PARAMETER = {
     "source": [("omga", Wrong, "source: expected an Overlay or Branch, received a str")],
     "spectrum": a("Spectrum"),
     "stable": FLAG,
+    "stable_branch": [*TEXT, ("S9", Unknown, "unknown stable branch 'S9'")],
     "state": [
         ([0.0], Wrong, "the initial state has shape (1,); expected 2 values, for x, v"),
         ([0.0, NAN], Wrong, "initial v = nan; expected a finite number"),

@@ -14,7 +14,7 @@ def cusp():
 
 @pytest.fixture(scope="session")
 def cusp_fold(cusp):
-    """Its fold at x = −1/√3, where p rises off the lower sheet."""
+    """Its fold at x = −1/√3, where p rises off the lower branch."""
     diagram = fs.continue_equilibria(cusp, "p", over=(-1, 1))
     return next(f for f in diagram.folds if f["x"] < 0)
 

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 import fastslow as fs
 from fastslow.passage.delays import boundary_delays
-from fastslow.passage.delays.boundary_delays import boundary_delay, gap_transit
+from fastslow.passage.delays.boundary_delays import boundary_delay, gap_crossing
 
 
 def corner_point(model):
@@ -124,16 +124,16 @@ def test_a_level_on_the_interface(corner):
 
 def test_wrong_boundary_points(corner, gap, cusp_fold):
     point = corner_point(corner)
-    with pytest.raises(fs.ArgumentError, match=r"with p falling no stable sheet ends at BE1"):
+    with pytest.raises(fs.ArgumentError, match=r"with p falling no stable branch ends at BE1"):
         boundary_delay(point, -0.01, level={"x": 1})
     with pytest.raises(fs.ArgumentError, match="give level="):
         boundary_delay(point, 0.01)
     with pytest.raises(fs.ArgumentError, match=r"degenerate .* received BE1, non-smooth"):
-        gap_transit(point, 0.01)
+        gap_crossing(point, 0.01)
     with pytest.raises(fs.ArgumentError, match="at a point BE"):
         boundary_delay(cusp_fold, 0.01)
     upper = gap_point(gap, 1)
-    with pytest.raises(fs.ArgumentError, match="a degenerate one; see gap_transit"):
+    with pytest.raises(fs.ArgumentError, match="a degenerate one; see gap_crossing"):
         boundary_delay(upper, -0.01)
     unstable = corner_point(corner.with_parameters(k=1, u=2))
     with pytest.raises(fs.ArgumentError, match="before the interface an eigenvalue has real part"):
@@ -146,7 +146,7 @@ def test_a_flat_corner_is_no_gap(corner):
     diagram = fs.continue_equilibria(flat, "p", over=(-1, 1))
     point = next(p for p in diagram.boundary_equilibria if p.subtype == "degenerate")
     with pytest.raises(fs.ArgumentError, match="ends at no other interface"):
-        gap_transit(point, 0.01)
+        gap_crossing(point, 0.01)
 
 
 def test_a_filippov_corner_has_another_law():
@@ -180,14 +180,14 @@ def gap_state(t, s, c, k, width):
 
 @pytest.mark.parametrize(("c", "k", "width", "s"), [(1, 4, 0.25, 1e-3), (0.4, 2, 0.1, 0.02)])
 def test_the_gap_in_closed_form(gap, c, k, width, s):
-    law = gap_transit(gap_point(gap.with_parameters(c=c, k=k, D=width), 1), -s)
+    law = gap_crossing(gap_point(gap.with_parameters(c=c, k=k, D=width), 1), -s)
     assert law.lag == pytest.approx(s * c / k, rel=1e-12)
     end = mpmath.findroot(lambda t: gap_state(t, s, c, k, width) + width, law.time)
     assert law.time == pytest.approx(float(end), rel=1e-12)
     assert law.asymptotic == pytest.approx(2 * math.sqrt(c * width * s) + s / c, rel=1e-12)
     assert (law.length, law.relaxation) == pytest.approx((2 * width, 1 / c), rel=1e-12)
     assert law.interfaces == ("x - D", "x + D")
-    assert law.transit_time == pytest.approx(law.time - c / k, rel=1e-12)
+    assert law.duration == pytest.approx(law.time - c / k, rel=1e-12)
 
 
 def test_a_gap_that_moves_with_the_load():
@@ -201,7 +201,7 @@ def test_a_gap_that_moves_with_the_load():
     contact = sp.Piecewise((u - width, u > width), (u + width, u < -width), (0, True))
     model = fs.Model({x: v, v: w - c * v - k * contact}, parameters={w: 0})
     s = 1e-6
-    law = gap_transit(gap_point(model, 1), -s)
+    law = gap_crossing(gap_point(model, 1), -s)
     assert law.relaxation == pytest.approx(1 / c + c * m, rel=1e-12)
     assert law.asymptotic == pytest.approx(2 * math.sqrt(c * width * s) + s * law.relaxation)
     # what is left out is smaller by √s
@@ -209,12 +209,12 @@ def test_a_gap_that_moves_with_the_load():
 
 
 def test_the_gap_is_the_same_from_both_sides(gap):
-    down, up = gap_transit(gap_point(gap, 1), -0.01), gap_transit(gap_point(gap, -1), 0.01)
+    down, up = gap_crossing(gap_point(gap, 1), -0.01), gap_crossing(gap_point(gap, -1), 0.01)
     assert up.delay == pytest.approx(down.delay, rel=1e-13)
     assert up.interfaces == down.interfaces[::-1]
     assert up.value == pytest.approx(-down.value, rel=1e-13)
-    with pytest.raises(fs.ArgumentError, match="with w rising no stable sheet"):
-        gap_transit(gap_point(gap, 1), 0.01)
+    with pytest.raises(fs.ArgumentError, match="with w rising no stable branch"):
+        gap_crossing(gap_point(gap, 1), 0.01)
 
 
 def test_a_drift_along_the_interface(gap):
@@ -222,7 +222,7 @@ def test_a_drift_along_the_interface(gap):
     point = gap_point(gap, 1)
     for rate in (0.01, -0.01):
         with pytest.raises(fs.ArgumentError, match="a drift of D leaves the equilibrium at BE2 on"):
-            gap_transit(point, rate, parameter="D")
+            gap_crossing(point, rate, parameter="D")
 
 
 def test_the_law_of_the_gear_under_its_sine(gear):
@@ -250,4 +250,4 @@ def test_the_law_of_the_gear_under_its_sine(gear):
     diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-1, 1))
     upper = next(p for p in diagram.boundary_equilibria if p["x"] > 0)
     for s, time in zip(speeds, times, strict=True):
-        assert gap_transit(upper, -s).transit_time == pytest.approx(time, rel=0.01)
+        assert gap_crossing(upper, -s).duration == pytest.approx(time, rel=0.01)

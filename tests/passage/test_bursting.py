@@ -30,10 +30,10 @@ def hindmarsh_rose():
 @pytest.mark.parametrize("r", [0.001, 0.003, 0.006])
 def test_hindmarsh_rose_is_quasi_static_up_to_the_fold(hindmarsh_rose, r):
     lay = hindmarsh_rose[r]
-    starts = [t for t in lay.transitions if t.to_sheet == "oscillating"][1:]
+    starts = [t for t in lay.transitions if t.to_branch == "oscillating"][1:]
     assert len(starts) >= 2
     for start in starts:
-        assert (start.kind, start.from_sheet, start.special.code) == ("jump", "S1", "LP")
+        assert (start.kind, start.from_branch, start.special.code) == ("jump", "S1", "LP")
         assert start.special["z"] == pytest.approx(FOLD_HR, abs=1e-12)
         # past the fold, which is passed with z falling
         assert start.delay > 0
@@ -59,7 +59,7 @@ def test_the_end_of_a_burst_is_no_bifurcation_of_equilibria(hindmarsh_rose):
     assert str(lay.bursting) == "fold/homoclinic bursting"
     evidence = " ".join(lay.bursting.evidence)
     assert "a bifurcation of the cycle, not of equilibria" in evidence
-    assert "passes a saddle at" in evidence
+    assert "passes a saddle within" in evidence
     for phase in [p for p in lay.phases if p.kind == "oscillating"][1:-1]:
         # towards a saddle the period grows, the amplitude does not
         assert np.all(np.diff(phase.intervals) > 0)
@@ -76,7 +76,7 @@ def test_with_two_oscillations_the_frozen_cycle_tells_how_it_ends(hindmarsh_rose
     lay = hindmarsh_rose[r]
     assert str(lay.bursting) == "fold/homoclinic bursting"
     # z at which the frozen cycle ends, to the digits that are printed
-    (end,) = [sentence for sentence in lay.bursting.evidence if sentence.startswith("ends")]
+    (end,) = [sentence for sentence in lay.bursting.evidence if sentence.startswith("end")]
     value = float(end.split("up to z = ")[1].split(";")[0])
     assert value == pytest.approx(homoclinic_value(), abs=2e-5)
 
@@ -123,7 +123,7 @@ def test_without_its_model_a_run_shows_candidates_only(hindmarsh_rose):
         for r, lay in hindmarsh_rose.items()
     }
     assert names[0.001] == "fold/homoclinic (candidate) bursting"
-    assert names[0.006] == "unclassified bursting (starts: fold)"
+    assert names[0.006] == "unclassified bursting (onset: fold)"
 
 
 def test_the_square_wave_burster_of_morris_and_lecar():
@@ -215,7 +215,7 @@ def test_fitzhugh_nagumo_under_a_ramp():
     assert leaving.slope == pytest.approx(1 / 5000, rel=1e-9)
     assert 0 < leaving.delay < 0.15
     assert lay.phases[-1].kind == "oscillating"
-    assert lay.transitions[-1].to_sheet == "oscillating"
+    assert lay.transitions[-1].to_branch == "oscillating"
 
 
 def test_relaxation_is_no_bursting():
@@ -241,10 +241,12 @@ def test_settling_by_oscillations_is_point_point_bursting():
     settling = [p for p in lay.phases if p.kind == "oscillating"]
     assert {p.attractor for p in settling} == {"equilibrium"}
     assert {t_.kind for t_ in lay.transitions} == {"jump"}
-    # what settles follows the sheet that it settles on
+    # what settles follows the branch that it settles on
     for phase in settling:
         late = (lay.time > phase.start + 0.8 * phase.duration) & (lay.time < phase.end)
-        assert {lay.sheets[k].label for k in lay.followed[late]} == set(phase.sheets)
+        assert {lay.stable_branches[k].label for k in lay.followed[late]} == set(
+            phase.stable_branches
+        )
 
 
 def test_a_cycle_that_reaches_an_interface():

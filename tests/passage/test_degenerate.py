@@ -1,4 +1,4 @@
-"""Overlays of what has no sheet, no forcing, no dense output, or no common range."""
+"""Overlays of what has no stable branch, no forcing, no dense output, or no common range."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_one_stable_sheet(gear):
     low = gear.with_parameters(B=3.0, C=0.5)
     only = fs.continue_equilibria(low.frozen(), "w", over=(2, 4))
     lay = fs.overlay(only, fs.simulate(low, [0.3, 0], periods=1))
-    assert [s.label for s in lay.sheets] == ["S1"]
+    assert [s.label for s in lay.stable_branches] == ["S1"]
     assert lay.transitions == ()
     assert lay.bursting is None
     covers(lay)
@@ -51,14 +51,14 @@ def test_no_stable_sheet_on_a_cycle():
     model = fs.Model({x: v, v: (1 - x**2) * v - x + w}, forcing={w: sp.sin(t / 100) / 2})
     none = fs.continue_equilibria(model.frozen(), "w", over=(-0.6, 0.6))
     lay = fs.overlay(none, fs.simulate(model, [0.5, 0.0], periods=1))
-    assert lay.sheets == ()
+    assert lay.stable_branches == ()
     assert np.all(lay.followed == -1)
     assert np.isinf(lay.distance).all()
     (phase,) = lay.phases
     assert (phase.kind, phase.attractor) == ("oscillating", "cycle")
     # the period of the cycle at μ = 1 is 6.663 for w = 0
     assert np.median(phase.intervals) == pytest.approx(6.66, rel=0.03)
-    assert "the diagram has no stable sheet" in lay.summary()
+    assert "the diagram has no stable branch" in lay.summary()
 
 
 def test_no_stable_sheet_and_no_cycle():
@@ -74,7 +74,7 @@ def test_a_run_that_leaves_the_range_of_the_diagram(cusp, lay):
     assert cut.outcome.code == "outside the diagram"
     low, high = cut.slow.min(), cut.slow.max()
     assert (low, high) == (pytest.approx(-1, abs=1e-3), pytest.approx(1, abs=1e-3))
-    assert f"p runs from {low:.6g} to {high:.6g}, the diagram from -0.7 to 1.2" in cut.summary()
+    assert f"p varies from {low:.6g} to {high:.6g}, the diagram covers -0.7 to 1.2" in cut.summary()
     outside = cut.slow < -0.7
     assert np.all(cut.followed[outside] == -1)
     assert np.isnan(cut.lag[outside]).all()
@@ -202,7 +202,7 @@ def test_a_run_that_ends_in_a_jump(cusp, diagram, lay):
     (leaving,) = short.transitions
     assert leaving.land is None
     assert np.isnan(leaving.duration)
-    assert leaving.to_sheet == ""
+    assert leaving.to_branch == ""
     assert leaving.special.label == first.special.label
     assert "end of run" in short.summary()
     covers(short)
@@ -224,7 +224,7 @@ def test_a_run_that_grows_without_bound():
     assert not run.outcome
     lay = fs.overlay(fs.continue_equilibria(model.frozen(), "w", over=(-1.2, 1.2)), run)
     (leaving,) = lay.transitions
-    assert (leaving.kind, leaving.to_sheet, leaving.land) == ("jump", "", None)
+    assert (leaving.kind, leaving.to_branch, leaving.land) == ("jump", "", None)
     assert 0 < leaving.delay < 2.338 * (1 / 50) ** (2 / 3)
     assert np.isfinite(lay.lag[lay.slow < -0.1]).all()
     covers(lay)

@@ -93,7 +93,7 @@ def test_levels_and_drifts_that_do_not_fit():
     with pytest.raises(fs.UnknownNameError, match="unknown state of the drift 'y'"):
         fs.predict_delay(point, fs.Drift(1e-3, by_state={"y": 1e-3}))
     corner, _ = special(slow_models.van_der_pol_linear())
-    with pytest.raises(fs.ArgumentError, match="is not slow beside the sheet"):
+    with pytest.raises(fs.ArgumentError, match="is not slow beside the branch"):
         fs.predict_delay(corner, fs.Drift(-1.0, by_state={"x": -9.0}), level="turn")
 
 

@@ -24,7 +24,7 @@ def test_the_oregonator_turns_past_both_folds():
     model = fs.Model({x: fast}, slow={z: x - z})
     diagram = fs.continue_equilibria(model.frozen(), "z", over=(1e-3, 0.6), window={"x": (q, 2)})
     lay = fs.overlay(diagram, fs.simulate(model, {"x": 0.01, "z": 0.3}, t=(0, 20)))
-    jumps = lay.special("jump")
+    jumps = lay.transitions("jump")
     assert len(jumps) >= 6
     assert all(jump.turned and jump.delay > 0 for jump in jumps)
 
@@ -52,7 +52,7 @@ def test_mckean_turns_past_both_corners():
         return [bent - u[1] + 0.5, (u[0] - 0.5) / 100]
 
     low, high = extremes(rates, [0.1, 0.3], 800, 1, 300)
-    jumps = lay.special("jump")
+    jumps = lay.transitions("jump")
     assert all(jump.turned for jump in jumps)
     for jump in jumps[-2:]:
         expected = 0.25 - low if jump.value < 0.5 else high - 0.75
@@ -73,7 +73,7 @@ def test_tracking_lost_to_a_fast_drift_is_named():
     assert tipping.special is None
     assert np.isnan(tipping.delay)
     assert tipping.leave.time <= tipping.time <= tipping.land.time
-    assert "stays stable" in tipping.note
+    assert "remains stable" in tipping.note
     kept = fs.overlay(diagram, fs.simulate(model.with_parameters(r=0.1), [1.0], t=(-60, 60)))
     assert kept.transitions == ()
     assert fs.overlay(diagram, fs.simulate(model, [-1.0], t=(-20, 20))).transitions == ()
@@ -87,7 +87,7 @@ def test_a_blow_up_that_the_drift_causes_is_named():
     lay = fs.overlay(diagram, run)
     (tipping,) = lay.transitions
     assert tipping.kind == "rate-induced"
-    assert tipping.to_sheet == ""
+    assert tipping.to_branch == ""
     assert not lay.outcome
     assert "the run ended early" in lay.summary()
 
@@ -102,7 +102,7 @@ def test_a_landing_that_overshoots_is_one_transition():
     start = diagram.at(w=1.0)[0].state
     lay = fs.overlay(diagram, fs.simulate(model, start, t=(0, 4000)))
     assert [t_.kind for t_ in lay.transitions] == ["jump"] * 3
-    assert {t_.to_sheet for t_ in lay.transitions} == {"S1", "S2"}
+    assert {t_.to_branch for t_ in lay.transitions} == {"S1", "S2"}
 
 
 def test_a_state_that_is_constant_along_the_branch_hides_nothing():
@@ -122,7 +122,7 @@ def test_no_lag_is_given_in_a_jump_or_an_oscillation():
     model = fs.systems.cusp(omega=0.002)
     diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
     lay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=2))
-    for jump in lay.special("jump"):
+    for jump in lay.transitions("jump"):
         inside = (lay.time > jump.leave.time) & (lay.time < jump.land.time)
         assert np.isnan(lay.lag[inside]).all()
     # to first order the lag is the relaxation time of the frozen state

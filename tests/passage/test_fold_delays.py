@@ -22,7 +22,7 @@ from fastslow.passage.delays.fold_delays import (
     jump_time,
     slow_part,
 )
-from fastslow.passage.delays.local_field import site_of
+from fastslow.passage.delays.local_field import local_field_at
 
 x, y, p, q = sp.symbols("x y p q")
 
@@ -104,7 +104,7 @@ def test_the_law_does_not_depend_on_coordinates(sheared, cusp_fold):
     fold = next(f for f in diagram.folds if f["y"] < 0)
     law, plain = fold_delay(fold, 1e-6), fold_delay(cusp_fold, 1e-6)
     assert law.coefficients[:2] == pytest.approx(plain.coefficients[:2], rel=1e-10)
-    # y = (x − y)/2 on the slow sheet; in the jump it follows late
+    # y = (x − y)/2 on the slow branch; in the jump it follows late
     with_level = fold_delay(fold, 1e-6, level={"y": 0.25})
     late = fold_delay(cusp_fold, 1e-6, level={"x": 0.5})
     assert with_level.delay > late.delay
@@ -116,7 +116,7 @@ def test_a_parameter_that_also_bends_the_fold():
     k = sp.Symbol("k")
     model = fs.Model({x: p * (1 + k * x) + x**2}, parameters={p: -1, k: 0.7})
     fold = fs.continue_equilibria(model, "p", over=(-1, 1)).folds[0]
-    form = fold_form_of(site_of(fold, "p", None))
+    form = fold_form_of(local_field_at(fold, "p", None))
     assert (form.a, form.b, form.c, form.g) == pytest.approx((1, 1, 0, 0.7), abs=1e-13)
     assert form.slowest == math.inf
     law = fold_delay(fold, 1e-6, level={"x": 10.0})
@@ -134,7 +134,7 @@ def test_a_point_from_a_file_needs_its_model(cusp, cusp_fold):
 
 
 def test_wrong_arguments(cusp_fold, corner):
-    with pytest.raises(fs.ArgumentError, match=r"with p falling no stable sheet .* rate > 0"):
+    with pytest.raises(fs.ArgumentError, match=r"with p falling no stable branch .* rate > 0"):
         fold_delay(cusp_fold, -1e-3)
     for rate in (0, math.nan, "fast"):
         with pytest.raises(fs.ArgumentError, match="expected a finite rate of drift"):
@@ -193,7 +193,7 @@ def test_the_slow_part_to_first_order(eta):
             return z[0] - eta
 
         end.terminal = True
-        # near the stable sheet of the whole equation: far before it the terms would be large
+        # near the stable branch of the whole equation: far before it the terms would be large
         start = -9.65
         run = solve_ivp(
             flow, (start, 9), [-((-start) ** 0.5), start], events=end, method="LSODA", rtol=1e-12,
@@ -212,11 +212,11 @@ def test_the_time_of_a_jump_in_closed_form(feedback, level):
     u = x + sp.Rational(4, 3)
     model = fs.Model({x: sp.expand(p + u**2 + 3 * u**4)}, parameters={p: -1})
     fold = fs.continue_equilibria(model, "p", over=(-0.5, 0.5)).folds[0]
-    site = site_of(fold, None, None)
+    local = local_field_at(fold, None, None)
     drift = fs.Drift(1e-4, by_state={"x": 1e-4 * feedback})
     end = level if level != "turn" else -1.0 / feedback
     known = level if level == "turn" else (0, level)
-    found = jump_time(site, fold_form_of(site), drift, feedback, known)
+    found = jump_time(local, fold_form_of(local), drift, feedback, known)
     root = np.sqrt(3.0)
     exact = -1.0 / end - root * np.arctan(root * end)
     exact += feedback * (np.log(end) - 0.5 * np.log(1.0 + 3.0 * end**2))

@@ -23,7 +23,7 @@ def turned(turning):
 
 
 @pytest.fixture(scope="module")
-def with_ramp(turning):
+def ramped(turning):
     """Entered at p = −1 with |z| = 0.001; the smallest amplitude is 4.5e-8."""
     ramp = turning.with_ramp("p", EPS, start=-1.0)
     return fs.simulate(
@@ -40,7 +40,7 @@ def bernoulli(p):
 
 def test_the_exit_mirrors_the_entry(turned, ramped):
     """Measured, in closed form, and as predicted: p = 1 but for the cubic term."""
-    law = fs.hopf_exit(turned, turned.special("HB")[0], entry=-1, rate=EPS)
+    law = fs.predict_delay(turned.special("HB")[0], EPS, diagram=turned, entry=-1)
     assert law.value == pytest.approx(1.0, abs=1e-12)
     assert law.decay == pytest.approx(1 / (2 * EPS), rel=1e-12)
     out = ramped.section("x**2 + y**2", level=RADIUS**2, direction=1)
@@ -51,28 +51,28 @@ def test_the_exit_mirrors_the_entry(turned, ramped):
 
 def test_a_gain_of_amplitude(turned, ramped):
     """|z| ten times as large: p² = 1 + 2ε ln 10."""
-    law = fs.hopf_exit(turned, turned.special("HB")[0], entry=-1, rate=EPS, gain=10)
+    law = fs.predict_delay(turned.special("HB")[0], EPS, diagram=turned, entry=-1, gain=10)
     assert law.value == pytest.approx(math.sqrt(1 + 2 * EPS * math.log(10)), abs=1e-12)
     out = ramped.section("x**2 + y**2", level=1e2 * RADIUS**2, direction=1)
     assert out["p"][-1] == pytest.approx(law.value, abs=1e-5)
 
 
 def test_rounding_decides(turned):
-    law = fs.hopf_exit(turned, turned.special("HB")[0], entry=-1, rate=0.01)
+    law = fs.predict_delay(turned.special("HB")[0], 0.01, diagram=turned, entry=-1)
     assert law.decay == pytest.approx(50, rel=1e-12)
-    assert "rounding decides" in law.validity
+    assert "limited by rounding" in law.validity
     assert "exp(−50)" in law.validity
 
 
 def test_growth_that_does_not_suffice(turned):
-    law = fs.hopf_exit(turned, turned.special("HB")[0], entry=-2, rate=0.2, gain=1.1)
+    law = fs.predict_delay(turned.special("HB")[0], 0.2, diagram=turned, entry=-2, gain=1.1)
     assert math.isnan(law.delay)
     assert law.validity.startswith("none: the branch ends")
 
 
 def test_a_diagram_from_a_file_interpolates(turned):
     stored = pickle.loads(pickle.dumps(turned))
-    law = fs.hopf_exit(stored, turned.special("HB")[0], entry=-1, rate=EPS)
+    law = fs.predict_delay(turned.special("HB")[0], EPS, diagram=stored, entry=-1)
     assert law.value == pytest.approx(1.0, abs=1e-12)
     assert "interpolated" in law.validity
 
@@ -80,16 +80,16 @@ def test_a_diagram_from_a_file_interpolates(turned):
 def test_wrong_arguments(turned, cusp_fold):
     hopf = turned.special("HB")[0]
     with pytest.raises(fs.ArgumentError, match="before HB1 is not stable in this direction"):
-        fs.hopf_exit(turned, hopf, entry=1, rate=-EPS)
+        fs.predict_delay(hopf, -EPS, diagram=turned, entry=1)
     with pytest.raises(fs.ArgumentError, match=r"entry = 1; expected .* from -2 to 0"):
-        fs.hopf_exit(turned, hopf, entry=1, rate=EPS)
+        fs.predict_delay(hopf, EPS, diagram=turned, entry=1)
     with pytest.raises(fs.ArgumentError, match="gain = 0; expected a positive number"):
-        fs.hopf_exit(turned, hopf, entry=-1, rate=EPS, gain=0)
-    with pytest.raises(fs.ArgumentError, match="at a point HB"):
-        fs.hopf_exit(turned, cusp_fold, entry=-1, rate=EPS)
+        fs.predict_delay(hopf, EPS, diagram=turned, entry=-1, gain=0)
+    with pytest.raises(fs.ArgumentError, match="diagram= and entry= go with a Hopf"):
+        fs.predict_delay(cusp_fold, EPS, diagram=turned, entry=-1)
     other = fs.continue_equilibria(fs.systems.van_der_pol().frozen(), "w", over=(-2, 2))
     with pytest.raises(fs.ArgumentError, match="is not a point of this diagram"):
-        fs.hopf_exit(turned, other.special("HB")[0], entry=-1, rate=EPS)
+        fs.predict_delay(other.special("HB")[0], EPS, diagram=turned, entry=-1)
     with pytest.raises(fs.ArgumentError, match="give diagram= and entry="):
         fs.predict_delay(hopf, EPS)
 
@@ -107,7 +107,7 @@ def test_the_integral_on_fitzhugh_nagumo(neuron):
     """∫ Re λ dI from the closed form of the trace, while the pair is complex: Re λ = trace/2."""
     _, diagram = neuron
     hopf = diagram.special("HB")[0]
-    law = fs.hopf_exit(diagram, hopf, entry=hopf["I"] - EDGE, rate=0.001)
+    law = fs.predict_delay(hopf, 0.001, diagram=diagram, entry=hopf["I"] - EDGE)
 
     def real_part(current):
         # v − v³/3 − (v + a)/b + I = 0
@@ -122,9 +122,9 @@ def test_the_integral_on_fitzhugh_nagumo(neuron):
 
 
 def part_at(fast, diagram, law):
-    """Where the difference of two runs from both sides of the sheet is as large as at the entry.
+    """Where the difference of two runs from both sides of the branch is as large as at the entry.
 
-    For the linear motion r'' − T r' + Δ r = 0 beside the sheet, T the trace, the
+    For the linear motion r'' − T r' + Δ r = 0 beside the branch, T the trace, the
     amplitude that WKB conserves is √Ω |(r, (r' − T r/2)/Ω)|, Ω² = Δ − T²/4.
     """
     entry, rate = law.entry, law.rate
@@ -149,12 +149,12 @@ def part_at(fast, diagram, law):
 
 
 def test_two_runs_of_fitzhugh_nagumo_part_at_the_exit(neuron):
-    """What the law leaves out, the lag behind the sheet, is of the order of the rate."""
+    """What the law leaves out, the lag behind the branch, is of the order of the rate."""
     fast, diagram = neuron
     hopf = diagram.special("HB")[0]
     late = []
     for rate in (2e-4, 1e-4):
-        law = fs.hopf_exit(diagram, hopf, entry=hopf["I"] - EDGE, rate=rate)
+        law = fs.predict_delay(hopf, rate, diagram=diagram, entry=hopf["I"] - EDGE)
         assert 2 < law.decay < 30
         late.append(part_at(fast, diagram, law) - law.value)
     assert abs(late[0]) < 0.01
@@ -182,7 +182,7 @@ def test_an_entry_on_a_node_does_not_depend_on_the_rows_of_the_branch(neuron, la
     diagram = fs.continue_equilibria(neuron[0], "I", over=(-0.5, 2), continuation=settings)
     hopf = diagram.special("HB")[0]
     entry = hopf["I"] - 0.6
-    law = fs.hopf_exit(diagram, hopf, entry=entry, rate=0.1)
+    law = fs.predict_delay(hopf, 0.1, diagram=diagram, entry=entry)
     grid = np.linspace(entry, law.value, 501)
     real = np.array([neuron_at(current)[1] > 0 for current in grid])
     assert real[0]
@@ -206,14 +206,14 @@ def test_the_buffer_point_bounds_the_delay(moving):
     """M. A. Shishkova, Doklady Akademii Nauk SSSR 209, 576-579, 1973: no exit beyond p = ω."""
     diagram = fs.continue_equilibria(moving, "p", over=(-3, 3))
     hopf = diagram.special("HB")[0]
-    late = fs.hopf_exit(diagram, hopf, entry=-2, rate=0.1)
+    late = fs.predict_delay(hopf, 0.1, diagram=diagram, entry=-2)
     assert late.value == pytest.approx(1.0, abs=1e-5)
     assert late.buffer == late.value
-    assert "the buffer point decides" in late.validity
-    early = fs.hopf_exit(diagram, hopf, entry=-0.9, rate=0.1)
+    assert "limited by the buffer point" in late.validity
+    early = fs.predict_delay(hopf, 0.1, diagram=diagram, entry=-0.9)
     assert early.value == pytest.approx(0.9, abs=1e-9)
     assert math.isnan(early.buffer)
-    assert "lies beyond" in early.validity
+    assert "is beyond" in early.validity
 
 
 def test_runs_leave_at_the_buffer_point(moving):
@@ -234,7 +234,7 @@ def test_runs_leave_at_the_buffer_point(moving):
 
 
 def test_no_buffer_point_is_told_where_none_is_known(turned):
-    law = fs.hopf_exit(turned, turned.special("HB")[0], entry=-1.5, rate=EPS)
+    law = fs.predict_delay(turned.special("HB")[0], EPS, diagram=turned, entry=-1.5)
     assert "does not move" in law.validity
     assert law.value == pytest.approx(1.5, abs=1e-12)
 
@@ -247,7 +247,7 @@ def test_a_drift_that_changes_takes_the_error_away(turned):
     assert law.value == plain.value
     assert plain.error < 1e-6
     assert math.isnan(law.error)
-    assert "the change of the drift left aside" in law.validity
+    assert "the change of the drift is neglected" in law.validity
 
 
 def test_a_level_that_the_branch_does_not_reach_is_nowhere(turned):
@@ -259,4 +259,4 @@ def test_a_level_that_the_branch_does_not_reach_is_nowhere(turned):
     assert curves.focal(0.5)
     assert all(map(math.isnan, curves.ends(2.5)))
     assert not curves.focal(2.5)
-    assert not curves.leads_back(2.5)
+    assert not curves.connects(2.5)

@@ -27,13 +27,16 @@ def test_a_state_at_rest_along_the_branch_has_the_unit_of_the_mode_there():
 
 
 def test_the_gear_changes_sides_at_the_gap(lay):
-    assert [(t.from_sheet, t.to_sheet) for t in lay.transitions] == [("S1", "S3"), ("S3", "S1")] * 3
+    assert [(t.from_branch, t.to_branch) for t in lay.transitions] == [
+        ("S1", "S3"),
+        ("S3", "S1"),
+    ] * 3
     assert {t.kind for t in lay.transitions} == {"gap crossing"}
     assert {t.special.code for t in lay.transitions} == {"BE"}
 
 
 def test_the_delay_lies_between_touching_off_and_landing(lay):
-    """Each change of sheet falls between the crossings of the two interfaces."""
+    """Each change of branch falls between the crossings of the two interfaces."""
     for transition in lay.transitions:
         before = [c for c in lay.run.crossings if c.time <= transition.time][-1]
         after = next(c for c in lay.run.crossings if c.time > transition.time)
@@ -44,9 +47,9 @@ def test_the_delay_lies_between_touching_off_and_landing(lay):
 
 
 def test_the_change_is_where_two_thirds_of_the_way_are_done(lay, gear):
-    """Recomputed from the closed form of both sheets; v = 0 on both, so x alone counts."""
+    """Recomputed from the closed form of both branches; v = 0 on both, so x alone counts."""
     for transition in lay.transitions:
-        side = 1 if transition.from_sheet == "S1" else -1
+        side = 1 if transition.from_branch == "S1" else -1
         a, load = gear.parameters["A"], side * transition.value
         roots = np.roots([1, 0.25, a, 0.25 * a - load])
         (landing,) = roots[np.abs(roots.imag) < 1e-9].real
@@ -58,7 +61,9 @@ def test_distance_is_that_to_the_closed_form(lay, gear):
     """On S1, x solves (x² + A)(x − D) = w; rows in between are interpolated to six digits."""
     a = gear.parameters["A"]
     extent = lay.extent
-    on = [k for k in range(0, len(lay.time), 40) if lay.sheets[lay.followed[k]].label == "S1"]
+    on = [
+        k for k in range(0, len(lay.time), 40) if lay.stable_branches[lay.followed[k]].label == "S1"
+    ]
     on = [k for k in on if 0 < lay.slow[k] < 6]
     assert len(on) > 20
     for k in on:
@@ -119,12 +124,12 @@ def test_wrong_pairs_are_refused(lay, gear):
     with pytest.raises(fs.FastSlowError, match="unknown slow quantity of the trajectory 'A'"):
         fs.overlay(frozen, lay.run)
     still = fs.simulate(gear.frozen().with_parameters(w=1), [0, 0], t=(0, 1))
-    with pytest.raises(fs.ArgumentError, match=r"varies slowly.*forcing=\{A: \.\.\.\}"):
+    with pytest.raises(fs.ArgumentError, match=r"no slow quantity.*forcing=\{A: \.\.\.\}"):
         fs.overlay(frozen, still)
 
 
 def test_at_equal_distances_the_sheet_that_the_motion_turns_to_is_the_first():
-    """From x = 0 the sheets at ±1 of x' = x − x³ + w are as near; the load goes up."""
+    """From x = 0 the branches at ±1 of x' = x − x³ + w are as near; the load goes up."""
     x, w, t = sp.symbols("x w t")
     model = fs.Model({x: x - x**3 + w}, forcing={w: sp.sin(t / 100) / 10})
     diagram = fs.continue_equilibria(model.frozen(), "w", (-0.2, 0.2))

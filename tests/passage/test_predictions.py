@@ -30,9 +30,9 @@ def test_the_gap_is_crossed_as_its_law_says(gear):
     transits = [t_ for t_ in lay.transitions if t_.kind == "gap crossing"]
     assert len(transits) == 2
     for t_ in transits:
-        assert t_.predicted == t_.law.transit
+        assert t_.predicted == t_.law.width
         assert t_.width == pytest.approx(t_.predicted, rel=1e-6)
-        assert t_.duration == pytest.approx(t_.law.transit_time, rel=1e-6)
+        assert t_.duration == pytest.approx(t_.law.duration, rel=1e-6)
         slow_limit = 2 * np.sqrt(0.25 * t_.slope) + t_.slope
         assert t_.law.asymptotic == pytest.approx(slow_limit, rel=1e-6)
         assert "(predicted " in t_.describe("w")

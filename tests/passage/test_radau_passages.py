@@ -12,7 +12,7 @@ from fastslow.diagrams.field import FrozenField
 from fastslow.passage.delays import local_passages
 from fastslow.passage.delays.drift_laws import drift_law
 from fastslow.passage.delays.fold_delays import airy_passage
-from fastslow.passage.delays.local_field import TURN, Site
+from fastslow.passage.delays.local_field import TURN, LocalField
 from fastslow.passage.delays.local_passages import Event, Place, follow, reached_delay
 
 x, y, p = sp.symbols("x y p")
@@ -20,11 +20,11 @@ x, y, p = sp.symbols("x y p")
 EPS = 1e-3
 
 
-def site(model, state):
+def local(model, state):
     """The field of a model about a place, with p = 0 there."""
     field = FrozenField(model, "p")
     point = SimpleNamespace(source=SimpleNamespace(unit=np.ones(len(state))))
-    return Site(point, field, np.array([*state, 0.0]))
+    return LocalField(point, field, np.array([*state, 0.0]))
 
 
 def passed(rates, law, stop, start, direction=1.0):
@@ -49,10 +49,10 @@ def test_a_fold_is_passed_by_the_airy_function(stiffness):
         rates[y] = stiffness * (x - y)
     model = fs.Model(rates, parameters={p: 0})
     before = -9.65 * EPS ** (2 / 3)
-    # −A'/A ends where it is looked for on a sheet that is followed from as far before the fold
+    # −A'/A ends where it is looked for on a branch that is followed from as far before the fold
     start = -np.sqrt(-before) + 0.25 * EPS / before
     state = [start] if stiffness is None else [start, start]
-    here = site(model, [0.0] * len(state))
+    here = local(model, [0.0] * len(state))
     place = Place(0, np.array([*state, before]), 0.0)
     delay, time = reached_delay(here, fs.Drift(EPS), place, Event((0, 10.0)), 1e5)
     exact = EPS ** (2 / 3) * airy_passage(10.0 / EPS ** (1 / 3))
@@ -73,7 +73,7 @@ def test_a_fold_is_passed_by_the_airy_function(stiffness):
     ],
 )
 def test_a_law_in_time_or_in_the_states_is_followed(text, law):
-    here = site(fs.Model({x: p + x**2}, parameters={p: 0}), [0.0])
+    here = local(fs.Model({x: p + x**2}, parameters={p: 0}), [0.0])
     place = Place(0, np.array([-1e-2, 0.0]), 0.0)
     found, _ = follow(here, fs.Drift(EPS, law=text), place, Event((0, 3.0)), span=1e4)
     slow, time = passed(
@@ -83,7 +83,7 @@ def test_a_law_in_time_or_in_the_states_is_followed(text, law):
 
 
 def test_a_turn_of_the_slow_quantity_ends_a_passage():
-    here = site(fs.Model({x: p + x**2}, parameters={p: 0}), [0.0])
+    here = local(fs.Model({x: p + x**2}, parameters={p: 0}), [0.0])
     drift = fs.Drift(EPS, by_state={"x": -EPS})
     place = Place(0, np.array([-1e-2, 0.0]), 0.0)
     found, reason = follow(here, drift, place, Event(TURN), span=1e4)
@@ -96,7 +96,7 @@ def test_interfaces_are_met_in_their_order_and_to_rounding():
     near, far = sp.Rational(1, 2), sp.Rational(995, 1000)
     terms = [sp.Piecewise((x - h, x > h), (0, True)) for h in (near, far)]
     model = fs.Model({x: y, y: -x + p * sum(terms)}, parameters={p: 0})
-    here = site(model, [0.0, 0.0])
+    here = local(model, [0.0, 0.0])
     heights = here.field.evaluate(0, np.zeros(3))[2]
     region = next(k for k, s in enumerate(here.field.signs) if (s * heights > 0).all())
     place = Place(region, np.array([0.0, 1.0, 0.0]), 0.0)
@@ -110,12 +110,12 @@ def test_interfaces_are_met_in_their_order_and_to_rounding():
 
 
 def test_what_does_not_end_says_why():
-    here = site(fs.Model({x: -x + p}, parameters={p: 0}), [0.0])
+    here = local(fs.Model({x: -x + p}, parameters={p: 0}), [0.0])
     place = Place(0, np.array([0.0, 0.0]), 0.0)
     _, reason = follow(here, fs.Drift(EPS), place, Event((0, 10.0)), span=100.0)
     assert reason == local_passages.TOO_LONG
     # x' = 1 + x² is infinite before t = 2
-    here = site(fs.Model({x: 1 + x**2 + p}, parameters={p: 0}), [0.0])
+    here = local(fs.Model({x: 1 + x**2 + p}, parameters={p: 0}), [0.0])
     _, reason = follow(here, fs.Drift(EPS), place, Event((0, np.inf)), span=100.0)
     assert reason == local_passages.FAILED
 
@@ -134,7 +134,7 @@ def test_a_table_follows_a_law_with_a_kink():
 
 def test_a_level_is_reached_to_rounding_wherever_it_is():
     """x' = x: the level c is reached at t = ln(c/c₀)."""
-    here = site(fs.Model({x: x + p}, parameters={p: 0}), [0.0])
+    here = local(fs.Model({x: x + p}, parameters={p: 0}), [0.0])
     place = Place(0, np.array([0.01, 0.0]), 0.0)
     levels = np.linspace(0.05, 2.0, 40)
     found = [follow(here, fs.Drift(1e-12), place, Event((0, c)), span=1e3)[0] for c in levels]

@@ -8,7 +8,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.results.overlay.delays import GapTransit
+from fastslow.results.overlay.delays import GapCrossing
 
 SLOW = np.logspace(-7, -5, 5)
 
@@ -91,7 +91,7 @@ def test_the_corner_to_all_digits(corner):
     assert math.isnan(scaling.exponent)
     assert math.isnan(scaling.law_exponent)
     assert scaling.predicted_coefficients[0] == pytest.approx(1.0)
-    assert "no power of eps: non-smooth fold" in repr(scaling)
+    assert "not a power of eps: non-smooth fold" in repr(scaling)
     # the logarithm shows: exponents that creep up to one
     assert 0.8 < scaling.local_exponents[0] < scaling.local_exponents[1] < 1
     backwards = corner.with_parameters(b=-1)
@@ -121,7 +121,7 @@ def test_the_gap_of_the_gear(gear):
     assert scaling.offset == pytest.approx(1.0, rel=1e-12)
     assert scaling.exponent == pytest.approx(0.5, abs=0.005)
     assert scaling.local_exponents == pytest.approx(0.5, abs=0.005)
-    laws = [law for law in scaling.laws if isinstance(law, GapTransit)]
+    laws = [law for law in scaling.laws if isinstance(law, GapCrossing)]
     transits = scaling.delay - [law.lag for law in laws]
     assert transits == pytest.approx(2 * np.sqrt(0.25 * scaling.eps) + scaling.eps, rel=0.01)
     assert scaling.delay == pytest.approx([law.asymptotic for law in laws], rel=0.01)
@@ -137,12 +137,12 @@ def test_a_start_that_is_given(cusp, cusp_fold, cusp_scaling):
 
 
 def test_a_sheet_that_is_too_short(corner):
-    """With q x² the sheet before the fold ends at another one."""
+    """With q x² the branch before the fold ends at another one."""
     x, p = sp.symbols("x p")
     model = fs.Model({x: p + x**2 - x**4 / 4 + x**3}, parameters={p: 0})
     diagram = fs.continue_equilibria(model, "p", over=(-5, 1))
     fold = next(f for f in diagram.folds if abs(f["x"]) < 1e-9)
-    with pytest.raises(fs.ArgumentError, match=r"the stable sheet before .* goes from"):
+    with pytest.raises(fs.ArgumentError, match=r"stable branch before .* extends from"):
         fs.delay_scaling(model, fold, [1.0, 0.1], level={"x": 0.5}, parameter="p")
 
 
@@ -176,7 +176,7 @@ def test_wrong_arguments(cusp, cusp_fold, turning):
 def test_a_scaling_reads_well_and_pickles(cusp_scaling):
     text = repr(pickle.loads(pickle.dumps(cusp_scaling)))
     assert text.startswith("DelayScaling past LP1 with p rising, to x = 0.5: 5 rates from 1e-07")
-    assert "the law has 0.6667" in text
+    assert "predicted exponent 0.6667" in text
     assert "coefficient of eps^(2/3): 1.94" in text
     assert "predicted 1.9469\n" in text
     law = repr(cusp_scaling.laws[0])

@@ -76,7 +76,7 @@ def test_a_path_gone_over_twice_is_refused():
     model = fs.Model({x: w1 - x}, forcing={w1: sp.cos(t / 500) ** 2})
     diagram = fs.continue_equilibria(model.frozen(slow={w1: g**2}), "g", over=(-1, 1))
     run = fs.simulate(model, [1.0], periods=1)
-    with pytest.raises(fs.ArgumentError, match="passes every place twice"):
+    with pytest.raises(fs.ArgumentError, match="takes every value twice"):
         fs.overlay(diagram, run)
 
 
@@ -85,7 +85,7 @@ def test_a_parameter_that_is_no_slow_quantity_is_refused(two_forcings, run):
     held = fs.continue_equilibria(fast, "w2", over=(0, 2))
     lay = fs.overlay(held, run)
     assert lay.outcome.code == "another slow quantity"
-    assert "holds w1 = 0.1, in the run it goes from -" in lay.summary()
+    assert "w1 = 0.1 in the diagram, but varies from -" in lay.summary()
 
 
 @pytest.fixture(scope="module")

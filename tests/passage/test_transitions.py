@@ -47,7 +47,7 @@ def test_a_steep_slope_is_no_bifurcation(steep):
     for t_ in lay.transitions:
         assert t_.special is None
         assert np.isnan(t_.delay)
-        assert t_.from_sheet == t_.to_sheet == "S1"
+        assert t_.from_branch == t_.to_branch == "S1"
         # |dX/dw| |dw/dt| / |λ| is 23 · 0.05 at w = 0, between two samples
         assert 0.9 < t_.steepness / (23 * 0.05 / lay.extent[0]) <= 1
         assert t_.leave.time < t_.time < t_.land.time
@@ -93,9 +93,9 @@ def test_a_gap_entered_and_left_on_the_same_side(gear):
     lay = laid(light, "w", (-2, 2), [0.51, 0], periods=2)
     assert lay.run.regime == "unilateral upper"
     for t_ in lay.transitions:
-        assert (t_.kind, t_.from_sheet, t_.to_sheet) == ("excursion", "S1", "S1")
+        assert (t_.kind, t_.from_branch, t_.to_branch) == ("excursion", "S1", "S1")
         assert t_.special.code == "BE"
-        assert t_.note == "past the end of the sheet and back"
+        assert t_.note == "past the end of the branch and back"
         assert 0 < t_.delay < 0.1
         inside = lay.run(np.linspace(t_.leave.time, t_.time + 1, 9))[0]
         assert np.all(np.abs(inside) < 0.5)
@@ -121,11 +121,11 @@ def test_negative_stiffness_jumps_late_at_its_folds(folded_gear):
 
 
 def test_a_persistent_boundary_equilibrium_is_passed_on():
-    """x' = w − x − (x)₊: the slope of the sheet changes at x = 0, the lag shows in the delay."""
+    """x' = w − x − (x)₊: the slope of the branch changes at x = 0, the lag shows in the delay."""
     model = fs.Model({x: w - x - sp.Max(x, 0)}, forcing={w: sp.sin(t / 50)})
     # a little less than a period, whose end would be at w = 0 again
     lay = laid(model, "w", (-1.2, 1.2), [-0.02], periods=0.99)
-    assert [(t_.kind, t_.from_sheet, t_.to_sheet) for t_ in lay.transitions] == [
+    assert [(t_.kind, t_.from_branch, t_.to_branch) for t_ in lay.transitions] == [
         ("crossing", "S2", "S1"),
         ("crossing", "S1", "S2"),
     ]
@@ -134,7 +134,7 @@ def test_a_persistent_boundary_equilibrium_is_passed_on():
         assert t_.delay == pytest.approx(abs(np.sin(crossing.time / 50)), abs=1e-12)
         assert 0 < t_.delay < 0.03
     assert [p.kind for p in lay.phases] == ["quasi-static"]
-    assert lay.phases[0].sheets == ("S2", "S1")
+    assert lay.phases[0].stable_branches == ("S2", "S1")
 
 
 def test_a_non_smooth_fold():
@@ -153,11 +153,13 @@ def test_pseudo_equilibria_are_sheets():
     model = fs.Model({x: w - sp.sign(x) - x / 4}, forcing={w: 3 * sp.sin(t / 100)})
     lay = laid(model, "w", (-3.2, 3.2), [0.5], periods=2)
     order = ["S1|S2", "S1", "S1|S2", "S2", "S1|S2", "S1", "S1|S2", "S2", "S1|S2"]
-    assert [lay.transitions[0].from_sheet, *(t_.to_sheet for t_ in lay.transitions)] == order
+    assert [lay.transitions[0].from_branch, *(t_.to_branch for t_ in lay.transitions)] == order
     assert {t_.kind for t_ in lay.transitions} == {"crossing"}
-    off = [t_ for t_ in lay.transitions if t_.from_sheet == "S1|S2"]
+    off = [t_ for t_ in lay.transitions if t_.from_branch == "S1|S2"]
     assert all(t_.delay == 0.0 for t_ in off)
-    sliding = lay.followed == next(k for k, s in enumerate(lay.sheets) if s.label == "S1|S2")
+    sliding = lay.followed == next(
+        k for k, s in enumerate(lay.stable_branches) if s.label == "S1|S2"
+    )
     assert np.abs(lay.state[sliding & (lay.time > 2)]).max() < 1e-12
 
 
@@ -178,21 +180,21 @@ def test_a_short_unstable_stretch_is_followed_all_along():
     lay = laid(model, "w", (-2.1, 2.1), [-2, 0.05], t=(0, 80))
     (passage,) = lay.transitions
     assert (passage.kind, passage.special.code) == ("Hopf", "HB")
-    assert "all along its unstable stretch" in passage.note
+    assert "along its entire unstable part" in passage.note
     assert passage.special["w"] == pytest.approx(-1, abs=1e-9)
     assert passage.delay == pytest.approx(2, abs=1e-6)
     assert [p.kind for p in lay.phases] == ["quasi-static"]
 
 
 def test_a_transition_is_where_two_thirds_of_the_way_are_done_even_after_landing():
-    # a soft contact: the radius about the new sheet is wider than the last third of the gap
+    # a soft contact: the radius about the new branch is wider than the last third of the gap
     gear = fs.systems.harmonic_gear(A=13.8889, B=2.372, C=3.5455, D=0.1, omega=0.01)
     diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6))
     lay = fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=1))
     down, up = (t for t in lay.transitions if t.kind == "gap crossing")
-    for transit, corner in ((down, 0.1), (up, -0.1)):
-        (new,) = diagram.at(w=transit.value, stable=True)
-        way = (transit.state[0] - corner) / (new["x"] - corner)
+    for width, corner in ((down, 0.1), (up, -0.1)):
+        (new,) = diagram.at(w=width.value, stable=True)
+        way = (width.state[0] - corner) / (new["x"] - corner)
         assert way == pytest.approx(2 / 3, abs=1e-6)
 
 
@@ -212,7 +214,7 @@ def test_two_clearances_are_crossed_each_by_its_law():
     model = fs.Model(rates, forcing={w: 3 * sp.sin(t / 200)})
     lay = laid(model, "w", (-3.2, 3.2), [0.2, 0, -0.5, 0], t=(0, 1500))
     # once the start is forgotten: the wide gap downwards, the narrow one twice, the wide one
-    assert [(t_.from_sheet, t_.to_sheet) for t_ in lay.transitions] == [
+    assert [(t_.from_branch, t_.to_branch) for t_ in lay.transitions] == [
         ("S3", "S1"),
         ("S1", "S3"),
         ("S3", "S9"),
@@ -221,11 +223,11 @@ def test_two_clearances_are_crossed_each_by_its_law():
     ]
     for t_ in lay.transitions:
         assert t_.kind == "gap crossing"
-        half = 0.5 if "S1" in (t_.from_sheet, t_.to_sheet) else 0.25
+        half = 0.5 if "S1" in (t_.from_branch, t_.to_branch) else 0.25
         speed = 3 / 200 * np.sqrt(1 - (t_.special["w"] / 3) ** 2)
         assert t_.slope == pytest.approx(speed, rel=1e-6)
         assert t_.duration == pytest.approx(np.sqrt(4 * half / speed) + 1, rel=0.03)
-        assert t_.duration == pytest.approx(t_.law.transit_time, rel=1e-4)
+        assert t_.duration == pytest.approx(t_.law.duration, rel=1e-4)
     words = " ".join(lay.bursting.evidence)
     assert "symmetric" not in words
 

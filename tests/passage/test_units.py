@@ -23,7 +23,7 @@ def passage(system, units):
     span = (0, (high - low) / rate / time)
     run = fs.simulate(ramp, start.state, t=span, integration=fine)
     overlay = fs.overlay(diagram, run)
-    words = [(t.kind, t.from_sheet, t.to_sheet) for t in overlay.transitions]
+    words = [(t.kind, t.from_branch, t.to_branch) for t in overlay.transitions]
     delays = [t.delay * factor for t in overlay.transitions if np.isfinite(t.delay)]
     delays += [t.law.delay * factor for t in overlay.transitions if t.law is not None]
     return (run.itinerary, words), [*delays, *overlay.shares().values()]
@@ -81,4 +81,4 @@ def test_a_point_of_another_diagram_is_refused_in_any_unit(unit):
         diagrams.append(fs.continue_equilibria(model, "p", (-2 * unit, 2 * unit)))
     one, other = diagrams
     with pytest.raises(fs.ArgumentError, match="not a point of this diagram"):
-        fs.hopf_exit(other, one.special("HB")[1], entry=-0.5 * unit, rate=-0.1 * unit)
+        fs.predict_delay(one.special("HB")[1], -0.1 * unit, diagram=other, entry=-0.5 * unit)

@@ -103,7 +103,7 @@ def test_turning_points_are_marked(gear_lay):
 def test_a_head_in_every_jump_of_the_last_period(folded_lay):
     drawn = fs.plot.overlay(folded_lay)
     tips = np.array([a.xy for a in drawn.arrows])
-    # a head in the gap, halfway between the sheets, both ways
+    # a head in the gap, halfway between the branches, both ways
     assert (np.abs(tips[:, 1]) < 0.3).sum() == 2
 
 

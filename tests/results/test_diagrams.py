@@ -32,14 +32,14 @@ def test_stability_goes_by_region(gear_diagram):
     assert np.all(branch.stable == (branch.region != "S2"))
 
 
-def test_sheets(gear_diagram, folded):
+def test_monotone_pieces(gear_diagram, folded):
     (branch,) = gear_diagram.branches
-    assert [s.region for s in branch.sheets()] == ["S3", "S1"]
+    assert [s.region for s in branch.monotone_pieces()] == ["S3", "S1"]
     (branch,) = folded.branches
-    sheets = list(branch.sheets())
-    assert [s.region for s in sheets] == ["S3", "S3", "S1", "S1"]
-    for sheet in sheets:
-        steps = np.diff(branch.parameter[sheet.start : sheet.stop])
+    monotone_pieces = list(branch.monotone_pieces())
+    assert [s.region for s in monotone_pieces] == ["S3", "S3", "S1", "S1"]
+    for piece in monotone_pieces:
+        steps = np.diff(branch.parameter[piece.start : piece.stop])
         assert np.all(steps > 0) or np.all(steps < 0)
 
 

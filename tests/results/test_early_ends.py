@@ -30,7 +30,7 @@ def test_an_overlay_says_that_its_run_ended_early():
     diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
     short = fs.Integration(max_steps=20)
     overlay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=1, integration=short))
-    assert "the run ended early, what follows is not known: stopped at t = " in overlay.summary()
+    assert "the run ended early: stopped at t = " in overlay.summary()
     whole = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=1))
     assert "ended early" not in whole.summary()
 

@@ -1,4 +1,4 @@
-"""What an overlay answers at a value, in a part, and near a point."""
+"""Queries of an overlay: at a value, in an interval, and near a point."""
 
 from itertools import pairwise
 
@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fastslow as fs
+from fastslow.results.overlay.transitions import Transitions
 
 x, t, g, w, omega = sp.symbols("x t g w omega")
 
@@ -40,40 +41,46 @@ def test_the_slow_quantity_is_passed_at_known_times(lay):
     assert [m.value for m in found] == pytest.approx([0.5] * 4, abs=1e-12)
     falling, rising = lay.at(w=0.0)[:2]
     assert falling["x"] > 0 > rising["x"]
-    assert falling.sheet != rising.sheet
-    assert [m.sheet for m in lay.at(w=0.0)] == [falling.sheet, rising.sheet] * 2
-    on_lower = lay.at(w=0.0, sheet=rising.sheet)
+    assert falling.stable_branch != rising.stable_branch
+    assert [m.stable_branch for m in lay.at(w=0.0)] == [
+        falling.stable_branch,
+        rising.stable_branch,
+    ] * 2
+    on_lower = lay.at(w=0.0, stable_branch=rising.stable_branch)
     assert [m.time for m in on_lower] == [m.time for m in lay.at(w=0.0, direction=1)]
 
 
-def test_a_moment_says_what_is_followed(lay):
-    (moment,) = lay.at(t=100.0)
+def test_a_state_carries_the_stable_branch_followed(lay):
+    (point,) = lay.at(t=100.0)
     row = int(np.argmin(np.abs(lay.time - 100)))
-    sheet = lay.sheets[lay.followed[row]]
-    assert (moment.sheet, moment.branch) == (sheet.label, sheet.branch)
-    assert moment.distance == pytest.approx(lay.distance[row], rel=0.1)
-    assert moment.value == moment["w"] == pytest.approx(np.cos(0.2), abs=1e-12)
-    assert moment["omega"] == 0.002
-    assert moment["t"] == 100.0
-    assert f"on {sheet.label}" in repr(moment)
+    stable_branch = lay.stable_branches[lay.followed[row]]
+    assert (point.stable_branch, point.branch) == (
+        stable_branch.label,
+        stable_branch.branch,
+    )
+    assert point.distance == pytest.approx(lay.distance[row], rel=0.1)
+    assert point.value == point["w"] == pytest.approx(np.cos(0.2), abs=1e-12)
+    assert point["omega"] == 0.002
+    assert point["t"] == 100.0
+    assert f"on {stable_branch.label}" in repr(point)
 
 
 @settings(max_examples=30, deadline=None)
 @given(part=st.floats(0, 1))
 def test_a_moment_of_the_overlay_is_that_of_the_run(lay, part):
     when = part * lay.run.span[1]
-    (moment,) = lay.at(t=when)
-    assert np.array_equal(moment.state, lay.run(when))
+    (point,) = lay.at(t=when)
+    assert np.array_equal(point.state, lay.run(when))
     row = np.searchsorted(lay.time, when, side="right") - 1
     number = lay.followed[row]
-    assert moment.sheet == ("" if number < 0 else lay.sheets[number].label)
+    assert point.stable_branch == ("" if number < 0 else lay.stable_branches[number].label)
 
 
 def test_samples_by_number(lay):
-    moments = list(lay)
-    assert len(moments) == len(lay)
-    assert [m.distance for m in moments] == lay.distance.tolist()
-    assert [m.value for m in moments] == pytest.approx(lay.slow, abs=1e-15)
+    points = list(lay)
+    assert len(points) == len(lay)
+    assert [m.distance for m in points] == lay.distance.tolist()
+    assert [m.value for m in points] == pytest.approx(lay.slow, abs=1e-15)
     assert lay[-1].time == lay.time[-1]
     with pytest.raises(fs.OutOfRangeError, match="no sample"):
         lay[len(lay)]
@@ -96,21 +103,21 @@ def test_slices_joined_are_the_whole(lay, data):
     assert sum(len(p.transitions) for p in parts) + len(between) == len(lay.transitions)
 
 
-def test_stays_on_a_sheet(lay):
-    labels = [sheet.label for sheet in lay.sheets]
-    stays = [lay.select(sheet=label) for label in labels]
-    assert [len(part) for part in stays] == [2, 3]
-    for label, parts in zip(labels, stays, strict=True):
+def test_selections_on_a_stable_branch(lay):
+    labels = [stable_branch.label for stable_branch in lay.stable_branches]
+    episodes = [lay.select(stable_branch=label) for label in labels]
+    assert [len(part) for part in episodes] == [2, 3]
+    for label, parts in zip(labels, episodes, strict=True):
         assert all(part.shares() == {label: 1.0} for part in parts)
         assert sum(map(len, parts)) == np.isin(lay.followed, labels.index(label)).sum()
     assert lay.select() == (lay,)
-    assert lay.select(sheet="") == ()
+    assert lay.select(stable_branch="") == ()
 
 
 def test_phases_of_a_kind(lay):
     jumps = lay.select(kind="jump")
-    assert len(jumps) == len(lay.special("jump")) == 4
-    for part, transition in zip(jumps, lay.special("jump"), strict=True):
+    assert len(jumps) == len(lay.transitions("jump")) == 4
+    for part, transition in zip(jumps, lay.transitions("jump"), strict=True):
         assert part.transitions == (transition,)
         assert transition.leave.time <= part.time[0] < part.time[-1] <= transition.land.time
         assert [phase.kind for phase in part.phases] == ["jump"]
@@ -122,8 +129,12 @@ def test_one_sample(lay):
     one = lay[7:8]
     assert (len(one), one.phases, one.transitions) == (1, (), ())
     assert one.select(kind="jump") == ()
-    assert one.select(sheet=lay[7].sheet) == (one,)
-    assert one.at(t=lay.time[7])[0].sheet == one.nearest(x=3).sheet == lay[7].sheet
+    assert one.select(stable_branch=lay[7].stable_branch) == (one,)
+    assert (
+        one.at(t=lay.time[7])[0].stable_branch
+        == one.nearest(x=3).stable_branch
+        == lay[7].stable_branch
+    )
 
 
 def test_between_times(lay):
@@ -139,14 +150,14 @@ def test_a_part_is_kept_in_a_file(lay, tmp_path, same):
     part.save(tmp_path / "part.npz")
     again = fs.load(tmp_path / "part.npz")
     assert same(again, part)
-    assert again.at(t=part.time[1])[0].sheet == part.at(t=part.time[1])[0].sheet
+    assert again.at(t=part.time[1])[0].stable_branch == part.at(t=part.time[1])[0].stable_branch
 
 
 def test_transitions_of_a_kind(lay):
-    assert tuple(lay.special) == lay.transitions
-    assert lay.special("Hopf") == ()
+    assert isinstance(lay.transitions, Transitions)
+    assert lay.transitions("Hopf") == ()
     with pytest.raises(fs.UnknownNameError, match="did you mean 'jump'"):
-        lay.special("jmp")
+        lay.transitions("jmp")
 
 
 def test_the_parameter_of_a_path(lay, on_path):
@@ -165,6 +176,6 @@ def test_the_parameter_of_a_path(lay, on_path):
 def test_nearest(lay):
     found = lay.nearest(w=0.0, x=1.0)
     assert found["x"] == pytest.approx(1.0, abs=1e-2)
-    assert found.sheet == lay.at(w=0.0)[0].sheet
+    assert found.stable_branch == lay.at(w=0.0)[0].stable_branch
     with pytest.raises(fs.UnknownNameError, match="unknown column 'q'"):
         lay.nearest(q=0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fastslow as fs
-from fastslow.results.overlay.transitions import Phase, StableSheet, Transition
+from fastslow.results.overlay.transitions import Phase, StableBranch, Transition
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.state_at import StatePoint
 
@@ -18,13 +18,13 @@ def special(code):
     )  # fmt: skip
 
 
-def moment(time, value):
+def state_at(time, value):
     return StatePoint(time, ("x",), np.ones(1), {"w": value}, parameter="w")
 
 
 def transition(code, kind, **more):
     point = special(code) if code else None
-    leave = moment(2.5, 0.55)
+    leave = state_at(2.5, 0.55)
     return Transition(
         3.0, 0.6, np.ones(1), "S1", "S2", point, 0.1 if code else np.nan, kind, leave, **more
     )
@@ -38,13 +38,13 @@ def lay(gear):
 
 
 def test_duration_and_width():
-    landed = transition("LP", "jump", land=moment(4.0, 0.7))
+    landed = transition("LP", "jump", land=state_at(4.0, 0.7))
     assert (landed.duration, landed.width) == pytest.approx((1.5, 0.15))
     assert np.isnan(transition("LP", "jump").duration)
 
 
 def test_sentences():
-    text = transition("LP", "jump", land=moment(4.0, 0.7)).describe("w")
+    text = transition("LP", "jump", land=state_at(4.0, 0.7)).describe("w")
     assert text == (
         "t = 3, w = 0.6: S1 → S2, jump at LP1, w = 0.5; delay 0.1; lands at w = 0.7, t = 4"
     )
@@ -54,13 +54,13 @@ def test_sentences():
 
 
 def test_shares_and_summary(lay):
-    sheets = (StableSheet("S3", 0, 0, 5, "S3"), StableSheet("S1", 0, 9, 12, "S1"))
+    stable_branches = (StableBranch("S3", 0, 0, 5, "S3"), StableBranch("S1", 0, 9, 12, "S1"))
     time = np.linspace(0, 10, 11)
     made = replace(
         lay,
         time=time,
         slow=time / 10,
-        sheets=sheets,
+        stable_branches=stable_branches,
         followed=np.array([0] * 3 + [1] * 6 + [-1] * 2),
         lag=np.full(11, -0.5),
         phases=(
@@ -73,9 +73,9 @@ def test_shares_and_summary(lay):
     assert made.shares() == pytest.approx({"": 0.1, "S3": 0.3, "S1": 0.6})
     lines = made.summary().splitlines()
     assert lines[0] == "14 transitions over t = 0 to 10, w from 0 to 1"
-    assert "  on no sheet: 10.0% of the time" in lines
+    assert "  on no stable branch: 10.0% of the time" in lines
     assert "  on S3: 30.0% of the time, median lag -0.5" in lines
-    assert "  1 oscillating phase on a cycle: 4 oscillations, 2 long" in lines
+    assert "  1 oscillating phase on a cycle: 4 oscillations, duration 2" in lines
     assert lines[-1] == "  and 2 more, in transitions"
     assert made.delays == pytest.approx([0.1] * 14)
 

@@ -330,7 +330,7 @@ def test_branches_of_a_diagram(pitchfork):
 
 
 def test_sheets_of_a_long_branch_are_those_of_every_row(branch):
-    assert [(s.start, s.stop) for s in branch.sheets()] == [
+    assert [(s.start, s.stop) for s in branch.monotone_pieces()] == [
         (0, branch.special_rows[1] + 1),
         (branch.special_rows[1], branch.special_rows[2] + 1),
         (branch.special_rows[2], len(branch)),

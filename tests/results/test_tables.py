@@ -75,8 +75,8 @@ def test_what_stands_in_them(results, diagram, run):
     many = results["ensemble"].to_frame()
     assert many["hits x - D upwards"].tolist() == results["ensemble"].hits[:, 0, 0].tolist()
     assert results["ensemble"].to_xarray().attrs["D"] == 0.25
-    sheets = results["overlay"].to_dict()["sheet"]
-    assert set(sheets) <= {"", *(s.label for s in results["overlay"].sheets)}
+    stable_branches = results["overlay"].to_dict()["stable_branch"]
+    assert set(stable_branches) <= {"", *(s.label for s in results["overlay"].stable_branches)}
     points = diagram.special.to_frame()
     assert points["label"].tolist() == [p.label for p in diagram.special]
     assert points["A"].unique().tolist() == [-0.6]

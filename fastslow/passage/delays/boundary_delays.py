@@ -16,12 +16,12 @@ from fastslow.model.model import Model
 from fastslow.passage.delays.linear_flow import LinearFlow
 from fastslow.passage.delays.local_field import (
     TURN,
-    Site,
+    LocalField,
     drift_of,
     level_of,
+    local_field_at,
     named_level,
     require_code,
-    site_of,
     wrong_way,
 )
 from fastslow.passage.delays.local_passages import (
@@ -34,7 +34,7 @@ from fastslow.passage.delays.local_passages import (
     reached_delay,
     rounding,
 )
-from fastslow.results.overlay.delays import BoundaryDelay, GapTransit
+from fastslow.results.overlay.delays import BoundaryDelay, GapCrossing
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.points import SpecialPoint
 
@@ -56,7 +56,7 @@ FORGOTTEN = (36.0, 24.0, 12.0, 6.0)
 
 @dataclass(frozen=True, eq=False)
 class Approach:
-    """The stable sheet followed up to an interface.
+    """The stable branch followed up to an interface.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def boundary_delay(
     ------
     ArgumentError
         For a point of another code or subtype, a rate of zero or towards the
-        stable sheet, or a missing level.
+        stable branch, or a missing level.
 
     Examples
     --------
@@ -153,41 +153,41 @@ def boundary_delay(
     require_code(point, "BE", "the delay of a boundary equilibrium")
     if point.clarke is None or point.subtype not in ("persistence", "non-smooth fold"):
         kind = "a degenerate one" if point.subtype == "degenerate" else "one of a Filippov field"
-        hint = "; see gap_transit" if point.subtype == "degenerate" else ""
+        hint = "; see gap_crossing" if point.subtype == "degenerate" else ""
         raise ArgumentError(
             f"expected a boundary equilibrium of a continuous field with persistence or a "
             f"non-smooth fold, received {point.label}, {kind}{hint}"
         )
-    site = site_of(point, parameter, model)
-    drift = drift_of(site, rate)
-    height = level_of(site, level, drift)
-    way = approach_of(site, drift)
-    jacobian, _ = site.slopes(way.behind)
+    local = local_field_at(point, parameter, model)
+    drift = drift_of(local, rate)
+    height = level_of(local, level, drift)
+    way = approach_of(local, drift)
+    jacobian, _ = local.slopes(way.behind)
     unstable = float(np.linalg.eigvals(jacobian).real.max())
     stop = Event(interface=way.interface)
     sense, delay, time, words, error = drift.way, drift.way * way.mu, way.time, "", math.nan
     if point.subtype == "persistence":
-        words, error = _judged(site, drift, way, stop, delay, linear=site.affine(way.before))
+        words, error = _judged(local, drift, way, stop, delay, linear=local.affine(way.before))
         words = f"no delay but a lag, {words}"
         if unstable >= 0:
-            words += "; the sheet behind the interface is not stable"
+            words += "; the branch behind the interface is not stable"
     elif height is None:
         raise ArgumentError(
             "the delay of a non-smooth fold is that of reaching a level; give level={state: value}"
         )
     else:
         stop = Event(height)
-        place, reason, linear = _behind(site, drift, way, stop, 40.0 / max(unstable, -way.stable))
+        place, reason, linear = _behind(local, drift, way, stop, 40.0 / max(unstable, -way.stable))
         delay, time = sense * float(place.z[-1]), place.time
         if reason:
             delay = time = math.nan
             words = f"none: {reason}"
         else:
-            linear &= site.affine(way.before)
-            words, error = _judged(site, drift, way, stop, delay, linear=linear)
+            linear &= local.affine(way.before)
+            words, error = _judged(local, drift, way, stop, delay, linear=linear)
     return BoundaryDelay(
         point=point,
-        parameter=site.field.parameter,
+        parameter=local.field.parameter,
         rate=drift.rate,
         delay=delay,
         validity=words,
@@ -197,58 +197,60 @@ def boundary_delay(
         lag=sense * way.mu,
         stable=way.stable,
         unstable=unstable,
-        level=named_level(site, height),
+        level=named_level(local, height),
     )
 
 
 def _judged(
-    site: Site, drift: Drift, way: Approach, stop: Event, delay: float, *, linear: bool
+    local: LocalField, drift: Drift, way: Approach, stop: Event, delay: float, *, linear: bool
 ) -> tuple[str, float]:
     """How good a passage is, in words and by its error."""
     if linear and not drift.law:
         if not drift.complete:
             return "exact at a drift of this form, whose other terms are not known", math.nan
-        return "exact: the rates and the drift are linear", EXACT * abs(delay) + rounding(site)
+        return "exact: the rates and the drift are linear", EXACT * abs(delay) + rounding(local)
     words = "from the rates linearised before the interface"
     words += "" if stop.level is None else ", integrated behind it"
     passed = math.nan
     for count in FORGOTTEN:
         mu = -count * drift.rate / -way.stable
-        start = quasi_static(site, drift, way.before, mu, way.first * mu)
+        start = quasi_static(local, drift, way.before, mu, way.first * mu)
         if start is not None:
             span = 4.0 * (count / -way.stable + abs(delay / drift.rate))
             place = Place(way.before, start, 0.0)
-            passed, _ = reached_delay(site, drift, place, stop, span)
+            passed, _ = reached_delay(local, drift, place, stop, span)
         if math.isfinite(passed):
             break
-    error, more = bound_of(site, delay, passed, drift)
+    error, more = bound_of(local, delay, passed, drift)
     return words + more, error
 
 
 def _behind(
-    site: Site, drift: Drift, way: Approach, stop: Event, slowest: float
+    local: LocalField, drift: Drift, way: Approach, stop: Event, slowest: float
 ) -> tuple[Place, str, bool]:
     """Where the passage behind an interface ends, why it does not, and whether it is linear."""
     span = 40.0 * slowest
-    if site.affine(way.behind) and not drift.law:
-        place, reason, linear = _linear_legs(site, drift, way, stop)
+    if local.affine(way.behind) and not drift.law:
+        place, reason, linear = _linear_legs(local, drift, way, stop)
         if linear:
             return place, reason, True
         span += 4.0 * (abs(place.time) if not reason else 0.0)
-    start = Place(way.behind, way.z[: site.n + 1], way.time)
-    place, reason = follow(site, drift, start, stop, span=span)
+    start = Place(way.behind, way.z[: local.n + 1], way.time)
+    place, reason = follow(local, drift, start, stop, span=span)
     return place, reason and NOT_REACHED, False
 
 
-def _linear_legs(site: Site, drift: Drift, way: Approach, stop: Event) -> tuple[Place, str, bool]:
+def _linear_legs(
+    local: LocalField, drift: Drift, way: Approach, stop: Event
+) -> tuple[Place, str, bool]:
     """The passage behind an interface in closed form; False where it is not linear."""
-    field, n, count = site.field, site.n, len(site.field.interfaces)
+    field, n, count = local.field, local.n, len(local.field.interfaces)
     region, z, linear = way.behind, way.z, True
     for _ in range(REGIONS):
-        linear &= site.affine(region)
-        flow = _flow(site, drift, region)
+        linear &= local.affine(region)
+        flow = _flow(local, drift, region)
         rows = np.zeros((count + 1, n + 3))
-        _, _, heights, gradients = field.evaluate(region, site.u)
+        _, _, heights, gradients = field.evaluate(region, local.u)
         rows[:count, : n + 1] = field.signs[region, :count, None] * gradients[:count]
         rows[:count, -1] = field.signs[region, :count] * heights[:count]
         if stop.level == TURN:
@@ -277,16 +279,16 @@ def _linear_legs(site: Site, drift: Drift, way: Approach, stop: Event) -> tuple[
     return place, NOT_REACHED, linear
 
 
-def _flow(site: Site, drift: Drift, region: int) -> LinearFlow:
+def _flow(local: LocalField, drift: Drift, region: int) -> LinearFlow:
     """The rates of a region linearised at the point, with a drift."""
-    rates, slopes, _, _ = site.field.evaluate(region, site.u)
-    by_state = np.array([drift.by_state.get(name, 0.0) for name in site.field.model.states])
+    rates, slopes, _, _ = local.field.evaluate(region, local.u)
+    by_state = np.array([drift.by_state.get(name, 0.0) for name in local.field.model.states])
     # at an equilibrium of the region rounding is all there is
-    rounding = 1e-12 * (np.abs(slopes) @ np.abs(site.u))
+    rounding = 1e-12 * (np.abs(slopes) @ np.abs(local.u))
     offset = np.where(np.abs(rates) > rounding, rates, 0.0)
     return LinearFlow(
-        slopes[:, : site.n],
-        slopes[:, site.n],
+        slopes[:, : local.n],
+        slopes[:, local.n],
         drift.rate,
         drift.change,
         drift.by_value,
@@ -295,13 +297,13 @@ def _flow(site: Site, drift: Drift, region: int) -> LinearFlow:
     )
 
 
-def gap_transit(
+def gap_crossing(
     point: SpecialPoint,
     rate: float | Drift,
     *,
     parameter: object = None,
     model: Model | None = None,
-) -> GapTransit:
+) -> GapCrossing:
     """How long a drifting parameter needs to carry the trajectory across a gap.
 
     In a region whose equilibria form a continuum at one value of the parameter
@@ -312,7 +314,7 @@ def gap_transit(
         delay = √(2ℓ |rate/β|) + τ |rate|.
 
     For x'' + c x' = w between x = ±D with s = |rate| that is Δw = 2√(c D s) + s/c, in
-    Δt = √(4 c D/s) + 1/c: the slow limit, `GapTransit.asymptotic`. The prediction itself is
+    Δt = √(4 c D/s) + 1/c: the slow limit, `GapCrossing.asymptotic`. The prediction itself is
     solved for the linear motion in the gap (integrated, where the rates or the drift are not
     linear), from the quasi-static state in which it is entered; the two agree as the drift
     becomes slow.
@@ -331,7 +333,7 @@ def gap_transit(
 
     Returns
     -------
-    GapTransit
+    GapCrossing
 
     Raises
     ------
@@ -345,8 +347,8 @@ def gap_transit(
     >>> fast = fs.systems.harmonic_gear(D=0.25).frozen()
     >>> diagram = fs.continue_equilibria(fast, "w", over=(-1, 1))
     >>> upper = [p for p in diagram.boundary_equilibria if p["x"] > 0][0]
-    >>> law = gap_transit(upper, -0.001)
-    >>> round(law.asymptotic - 2 * (0.25 * 0.001) ** 0.5, 12), round(law.transit_time, 2)
+    >>> law = gap_crossing(upper, -0.001)
+    >>> round(law.asymptotic - 2 * (0.25 * 0.001) ** 0.5, 12), round(law.duration, 2)
     (0.001, 32.58)
     """
     require_code(point, "BE", "the crossing of a gap")
@@ -356,38 +358,38 @@ def gap_transit(
             f"expected a degenerate boundary equilibrium of a continuous field, the end of a "
             f"continuum; received {point.label}, {kind}"
         )
-    site = site_of(point, parameter, model)
-    drift = drift_of(site, rate)
-    way = approach_of(site, drift)
-    jacobian, slope = site.slopes(way.behind)
-    p, q = null_vectors(jacobian, site.unit)
-    p, q = _normalised(site, p, q, way)
+    local = local_field_at(point, parameter, model)
+    drift = drift_of(local, rate)
+    way = approach_of(local, drift)
+    jacobian, slope = local.slopes(way.behind)
+    p, q = null_vectors(jacobian, local.unit)
+    p, q = _normalised(local, p, q, way)
     drifts = float(p @ slope)
-    far, length, outward = _far_side(site, way, q)
+    far, length, outward = _far_side(local, way, q)
     # the inverse of J on its range: the other motions lag behind by it
     bordered = np.block([[jacobian, q[:, None]], [p[None, :], np.zeros((1, 1))]])
     lean = np.linalg.solve(bordered, np.append(slope - drifts * q, 0.0))[:-1]
-    n = site.n
+    n = local.n
     relaxation = float(outward[:n] @ lean / (outward[:n] @ q)) / drifts
     relaxation -= float(outward[n] / (outward[:n] @ q)) / drifts
     stop = Event(interface=far)
     slowest = math.sqrt(2.0 * length / abs(drifts * drift.rate)) + abs(relaxation)
-    place, reason, linear = _behind(site, drift, way, stop, slowest)
+    place, reason, linear = _behind(local, drift, way, stop, slowest)
     delay, time, error = drift.way * float(place.z[-1]), place.time, math.nan
     if reason:
         delay = time = math.nan
         back = "the motion returns to the contact that it left"
         words = f"none: {back if reason == RETURNED else 'the far interface is not reached'}"
     else:
-        linear &= site.affine(way.before)
-        words, error = _judged(site, drift, way, stop, delay, linear=linear)
+        linear &= local.affine(way.before)
+        words, error = _judged(local, drift, way, stop, delay, linear=linear)
         values = np.linalg.eigvals(jacobian)
         others = np.delete(values, np.argmin(np.abs(values))).real
         fastest = float(others.max(initial=-math.inf)) * (time - way.time)
         words += f"; of the slow limit a part {math.exp(min(fastest, 700.0)):.1g} has not died out"
-    return GapTransit(
+    return GapCrossing(
         point=point,
-        parameter=site.field.parameter,
+        parameter=local.field.parameter,
         rate=drift.rate,
         delay=delay,
         validity=words,
@@ -398,31 +400,31 @@ def gap_transit(
         length=length,
         slope=drifts,
         relaxation=relaxation,
-        interfaces=(site.field.interfaces[way.interface], site.field.interfaces[far]),
+        interfaces=(local.field.interfaces[way.interface], local.field.interfaces[far]),
         lag_time=way.time,
     )
 
 
-def approach_of(site: Site, drift: Drift) -> Approach:
-    """Which region's stable sheet the drift runs off, and the quasi-static crossing.
+def approach_of(local: LocalField, drift: Drift) -> Approach:
+    """Which region's stable branch the drift runs off, and the quasi-static crossing.
 
     Raises
     ------
     ArgumentError
-        If the drift goes the other way or is not slow, or the sheet before the interface is
+        If the drift goes the other way or is not slow, or the branch before the interface is
         unstable.
     """
-    field, n = site.field, site.n
-    k = field.interfaces.index(str(site.point.interface))
-    regions = [site.region(name) for name in site.point.regions]
+    field, n = local.field, local.n
+    k = field.interfaces.index(str(local.point.interface))
+    regions = [local.region(name) for name in local.point.regions]
     unstable, moved = -math.inf, False
     for before, behind in (regions, regions[::-1]):
-        jacobian, slope = site.slopes(before)
+        jacobian, slope = local.slopes(before)
         values = np.linalg.eigvals(jacobian).real
         if np.abs(values).min() <= 1e-10 * np.abs(values).max(initial=0.0):
             continue
         first = np.linalg.solve(-jacobian, slope)
-        _, _, _, gradients = field.evaluate(behind, site.u)
+        _, _, _, gradients = field.evaluate(behind, local.u)
         inward = np.zeros(n + 3)
         inward[: n + 1] = field.signs[behind, k] * gradients[k]
         speed = float(inward[:n] @ first + inward[n]) * drift.rate
@@ -434,49 +436,49 @@ def approach_of(site: Site, drift: Drift) -> Approach:
         if values.max() >= 0:
             unstable = max(unstable, float(values.max()))
             continue
-        flow = _flow(site, drift, before)
+        flow = _flow(local, drift, before)
         manifold = flow.slow_manifold()
         time = math.nan if manifold is None else flow.slow_crossing(manifold, inward)
         if manifold is None or math.isnan(time):
             raise ArgumentError(
-                f"the drift of {field.parameter} is not slow beside the sheet before "
-                f"{site.point.label}, whose slowest eigenvalue is {values.max():.3g}"
+                f"the drift of {field.parameter} is not slow beside the branch before "
+                f"{local.point.label}, whose slowest eigenvalue is {values.max():.3g}"
             )
         z = flow.slow_motion(manifold, time)
         return Approach(before, behind, k, inward, float(values.max()), manifold[0], z)
     if unstable >= 0:
         raise ArgumentError(
-            f"no stable sheet ends at {site.point.label}: before the interface an eigenvalue has "
+            f"no stable branch ends at {local.point.label}: before the interface an eigenvalue has "
             f"real part {unstable:.3g}"
         )
     if not moved:
         raise ArgumentError(
-            f"a drift of {field.parameter} leaves the equilibrium at {site.point.label} on the "
+            f"a drift of {field.parameter} leaves the equilibrium at {local.point.label} on the "
             "interface"
         )
-    raise wrong_way(site, drift.rate)
+    raise wrong_way(local, drift.rate)
 
 
-def _normalised(site: Site, p: Array, q: Array, way: Approach) -> tuple[Array, Array]:
+def _normalised(local: LocalField, p: Array, q: Array, way: Approach) -> tuple[Array, Array]:
     """Null vectors with ψ·q = 1, q into the gap."""
-    across, unit = way.inward[: site.n], site.unit
+    across, unit = way.inward[: local.n], local.unit
     overlap, inward, length = float(p @ q), float(across @ q), np.linalg.norm(q / unit)
     if (
         abs(overlap) <= ZERO * np.linalg.norm(p * unit) * length
         or abs(inward) <= ZERO * np.linalg.norm(across * unit) * length
     ):
         raise ArgumentError(
-            f"behind {site.point.label} no continuum of equilibria with damped motion along it "
+            f"behind {local.point.label} no continuum of equilibria with damped motion along it "
             "leads away from the interface"
         )
     q = math.copysign(1.0, inward) * q
     return p / float(p @ q), q
 
 
-def _far_side(site: Site, way: Approach, q: Array) -> tuple[int, float, Array]:
+def _far_side(local: LocalField, way: Approach, q: Array) -> tuple[int, float, Array]:
     """The next interface along the continuum, how far it is, and its function, positive inside."""
-    field, n = site.field, site.n
-    _, _, heights, gradients = field.evaluate(way.behind, site.u)
+    field, n = local.field, local.n
+    _, _, heights, gradients = field.evaluate(way.behind, local.u)
     found: list[tuple[float, int]] = []
     for j in range(len(field.interfaces)):
         along = float(gradients[j, :n] @ q)
@@ -484,7 +486,7 @@ def _far_side(site: Site, way: Approach, q: Array) -> tuple[int, float, Array]:
             found.append((float(-heights[j] / along), j))
     if not found:
         raise ArgumentError(
-            f"the continuum behind {site.point.label} ends at no other interface; a gap lies "
+            f"the continuum behind {local.point.label} ends at no other interface; a gap lies "
             "between two"
         )
     length, j = min(found)

@@ -1,4 +1,4 @@
-"""The buffer point of a slow passage through a Hopf point: a bound in the complex parameter."""
+"""Buffer point of a slow passage through a Hopf bifurcation."""
 
 from __future__ import annotations
 
@@ -23,30 +23,31 @@ Complex = NDArray[np.complex128]
 #: Functions that are not analytic.
 NOT_ANALYTIC = (sp.Piecewise, sp.Abs, sp.sign, sp.Max, sp.Min, sp.Heaviside, sp.floor, sp.ceiling)
 
-#: Error control along a level curve, and how near to the entry it must end, by its length.
+#: Error control along a level curve, and largest distance of its end from the entry, relative to
+#: its length.
 RTOL, ARRIVED = 1e-8, 1e-3
 
-#: Bisections for the level at which the curves break.
+#: Bisections for the first level whose curve is interrupted.
 BISECTIONS = 22
 
-#: A branch moves where a state changes by more than this part of its unit.
+#: Relative change of a state above which a branch depends on the parameter.
 MOVES = 1e-9
 
-#: Steps of the search for where the pair becomes real.
+#: Bisections for the level at which the pair becomes real.
 LEVELS = 12
 
 
 @dataclass(frozen=True)
 class Buffer:
-    """What is known of the buffer point.
+    """Level of the buffer point and its consequence.
 
     Parameters
     ----------
     level : float
-        ∫ Re λ |dp| from the Hopf point to the buffer point; inf where no level curve up to
-        the entry breaks, nan where it is not computed.
+        ∫ Re λ |dp| from the Hopf point to the buffer point; inf if no level curve up to
+        the entry is interrupted, nan if it is not computed.
     words : str
-        What follows from it, or why it is not computed or does not matter.
+        Consequence, or the reason why it is not computed or irrelevant.
     """
 
     level: float
@@ -54,22 +55,21 @@ class Buffer:
 
 
 def buffer_of(mode: CriticalMode, level: float) -> Buffer:
-    """The buffer point of a constant drift, looked for up to a level ∫ Re λ |dp|.
+    """Locate the buffer point of a constant drift up to a level ∫ Re λ |dp|.
 
     The motion about a branch that moves with the parameter is forced by its lag. Along
     the curve Re ψ(s) = c, ψ(s) = ∫ λ ds from the Hopf point, in the complex parameter, the
-    forcing is carried from an entry to the exit at the same level c. These curves begin
-    next to the Hopf point and spread; the buffer point is at the first level c at which
-    one meets a zero or a singularity of λ and no longer leads from exit to entry
-    (Neishtadt 1988). Each curve is traced as ds/dψ = 1/λ with the equilibrium
-    continued along.
+    forcing is transported from an entry to the exit at the same level c. The buffer point is
+    at the first level c whose curve contains a zero or a singularity of λ and no longer
+    connects exit and entry (Neishtadt 1988). Each curve is traced by ds/dψ = 1/λ together
+    with the equilibrium.
 
     Parameters
     ----------
     mode : CriticalMode
-        Of a Hopf point.
+        Critical mode of a Hopf point.
     level : float
-        That of the entry.
+        Level of the entry.
 
     Returns
     -------
@@ -92,27 +92,27 @@ def buffer_of(mode: CriticalMode, level: float) -> Buffer:
         highest = low
     if not highest > 0.0:
         return Buffer(math.nan, "the buffer point is not computed")
-    if curve.leads_back(highest):
+    if curve.connects(highest):
         if highest < level:
             return Buffer(math.nan, "the buffer point is not computed, as the pair becomes real")
-        return Buffer(math.inf, "the buffer point lies beyond")
+        return Buffer(math.inf, "the buffer point is beyond the exit")
     low, high = 0.0, highest
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if curve.leads_back(middle) else (low, middle)
+        low, high = (middle, high) if curve.connects(middle) else (low, middle)
     at = mode.behind.where(low)
     name = mode.before.diagram.parameter
     words = (
-        f"the buffer point decides: entries before it leave together at {name} = {at:.6g}, up to "
-        "terms of the order of rate ln(1/rate); no error is stated"
+        f"limited by the buffer point: earlier entries exit together at {name} = {at:.6g}, up to "
+        "terms of the order of rate ln(1/rate); no error bound"
     )
     return Buffer(low, words)
 
 
 def _not_computed(mode: CriticalMode) -> str:
-    if mode.site is None or mode.before.diagram.corrector is None:
+    if mode.local is None or mode.before.diagram.corrector is None:
         return "there is no model"
-    field = mode.site.field
+    field = mode.local.field
     if len(field.modes) > 1:
         return "the model has interfaces"
     rates = field.rates(0)
@@ -122,13 +122,13 @@ def _not_computed(mode: CriticalMode) -> str:
 
 
 def _functions(mode: CriticalMode) -> Callable[..., Any]:
-    """Jacobian and derivative by the parameter, of complex states and parameter."""
-    assert mode.site is not None
-    field = mode.site.field
+    """Jacobian and parameter derivative as functions of complex states and parameter."""
+    assert mode.local is not None
+    field = mode.local.field
     names = [real(n) for n in (*field.model.states, field.parameter)]
     values = {n: sp.Float(v, 17) for n, v in field.model.values.items() if n not in names}
     rates = [rate.xreplace(values) for rate in field.rates(0)]
-    # real symbols would let SymPy simplify what is complex here
+    # plain symbols, as real ones permit simplifications that fail for complex values
     plain = {n: sp.Dummy(n.name) for n in names}
     matrix = sp.Matrix([rate.xreplace(plain) for rate in rates])
     return numpy_function(list(plain.values()), matrix.jacobian(list(plain.values())))
@@ -149,7 +149,7 @@ class LevelCurve:
     slopes: Callable[..., Any]
 
     def ends(self, level: float) -> tuple[float, float]:
-        """Entry and exit of a level on the real axis; nan where it has none."""
+        """Entry and exit of a level on the real axis; nan if there is none."""
         before, behind = self.mode.before, self.mode.behind
         leave = behind.where(level)
         if -before.integral(before.end) < level:
@@ -166,8 +166,8 @@ class LevelCurve:
         modes = self.mode.modes(np.linspace(enter, leave, 33))
         return all(mode is not None and mode.value.imag > 0.0 for mode in modes)
 
-    def leads_back(self, level: float) -> bool:
-        """Whether the curve of a level leads from its exit to its entry."""
+    def connects(self, level: float) -> bool:
+        """Whether the curve of a level connects its exit with its entry."""
         from scipy.integrate import solve_ivp
 
         enter, leave = self.ends(level)

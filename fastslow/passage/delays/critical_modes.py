@@ -1,4 +1,4 @@
-"""The mode that becomes unstable at a special point: its amplitude, and what is of first order."""
+"""Critical mode of a special point: amplitude and first-order terms."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.model.model import Model
-from fastslow.passage.delays.growth_rates import Sheet
-from fastslow.passage.delays.local_field import Site, site_of
+from fastslow.passage.delays.growth_rates import BranchSide
+from fastslow.passage.delays.local_field import LocalField, local_field_at
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
@@ -18,23 +18,23 @@ from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
 
-#: Step of differences along the branch and along the lag, relative: the error is its square.
+#: Relative step of central differences along the branch and along the lag.
 STEP = 1e-4
 
-#: A state is zero along a branch that stays below this part of its unit.
+#: Largest size of a state, in its unit, that is zero along a branch.
 ZERO = 1e-9
 
-#: Gauss points on each side of the point for the terms of first order.
+#: Gauss points on each side of the point for the first-order terms.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 
-#: The change of amplitude where two eigenvalues meet, as an exponent: Airy's connection formulas
-#: give at most ln 2, and as much for the width that is left out.
+#: Bound of the exponent's change where two eigenvalues coalesce: at most ln 2 by Airy's
+#: connection formulas, and as much for the excluded interval.
 CONNECTION = 2.0 * math.log(2.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """The critical mode at one equilibrium, states in their units.
+    """Critical mode at one equilibrium, states in their units.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Mode:
     value : complex
         The eigenvalue.
     left, right : ndarray of complex, shape (n,)
-        Eigenvectors with left @ right = 1, the right one of length one.
+        Eigenvectors with left @ right = 1 and a right one of unit length.
     lag : ndarray, shape (n,)
         J⁻¹ dX/dp: the slow manifold is at X + lag p' to first order.
     by_parameter : ndarray, shape (n,)
@@ -66,54 +66,54 @@ class Mode:
 
 @dataclass(frozen=True, eq=False)
 class CriticalMode:
-    """The critical mode along both sides of a special point.
+    """Critical mode along both sides of a special point.
 
     Parameters
     ----------
     point : SpecialPoint
-    site : Site or None
-        None for a point of a file, without a model; no mode is then computed.
-    before, behind : Sheet
+    local : LocalField or None
+        None for a point from a file without a model; modes are then not computed.
+    before, behind : BranchSide
     unit : ndarray, shape (n,)
-        Of the states.
+        Units of the states.
     periods : ndarray, shape (n,)
-        In the same units, 0 where a state has none.
+        Periods in the same units, 0 for a state without one.
     """
 
     point: SpecialPoint
-    site: Site | None
-    before: Sheet
-    behind: Sheet
+    local: LocalField | None
+    before: BranchSide
+    behind: BranchSide
     unit: Array
     periods: Array
 
-    def side(self, value: float) -> Sheet:
+    def side(self, value: float) -> BranchSide:
         ahead = self.behind.way * (value - self.behind.here) >= 0.0
         return self.behind if ahead else self.before
 
     def at(self, value: float) -> Mode | None:
-        """The mode at a value of the parameter; None of a sliding motion or where it is not."""
+        """Mode at a value of the parameter; None for sliding or beyond the branch."""
         return self.modes(np.array([value]))[0]
 
     def modes(self, values: Array) -> list[Mode | None]:
-        """The modes at values of the parameter, as `at`."""
+        """Modes at values of the parameter, as `at`."""
         found: list[Mode | None] = [None] * len(values)
         ahead = self.behind.way * (values - self.behind.here) >= 0.0
-        for sheet, on in ((self.behind, ahead), (self.before, ~ahead)):
-            growth = sheet.rate(values)
+        for side, on in ((self.behind, ahead), (self.before, ~ahead)):
+            growth = side.rate(values)
             rows = np.flatnonzero(on & np.isfinite(growth))
-            if self.site is None or not len(rows):
+            if self.local is None or not len(rows):
                 continue
-            regions, states = sheet.places(values[rows])
+            regions, states = side.places(values[rows])
             for row, region, state in zip(rows.tolist(), regions, states, strict=True):
                 found[row] = self._mode(str(region), state, float(values[row]), growth[row])
         return found
 
     def _mode(self, region: str, state: Array, value: float, growth: float) -> Mode | None:
-        """The mode at an equilibrium whose critical eigenvalue has this real part."""
-        assert self.site is not None
-        number = self.site.region(region)
-        if self.site.field.modes[number].sides is not None:
+        """Mode at an equilibrium whose critical eigenvalue has a given real part."""
+        assert self.local is not None
+        number = self.local.region(region)
+        if self.local.field.modes[number].sides is not None:
             return None
         jacobian, by_parameter = self._slopes(number, state, value)
         values, vectors = np.linalg.eig(jacobian)
@@ -128,7 +128,7 @@ class CriticalMode:
         others = np.abs(values - pair)
         others[chosen] = np.inf
         if abs(pair.imag) > 0.0:
-            # a pair that meets on the real axis is its own neighbour
+            # a pair that coalesces on the real axis is its own neighbour
             others = np.where(np.abs(values - pair.conjugate()) == 0.0, 2 * abs(pair.imag), others)
         return Mode(
             region, state / self.unit, jacobian, pair, left, right, lag, by_parameter,
@@ -136,13 +136,13 @@ class CriticalMode:
         )  # fmt: skip
 
     def _slopes(self, region: int, state: Array, value: float) -> tuple[Array, Array]:
-        assert self.site is not None
-        _, slopes, _, _ = self.site.field.evaluate(region, np.append(state, value))
-        n = self.site.n
+        assert self.local is not None
+        _, slopes, _, _ = self.local.field.evaluate(region, np.append(state, value))
+        n = self.local.n
         return slopes[:, :n] * self.unit / self.unit[:, None], slopes[:, n] / self.unit
 
     def amplitude(self, state: Array, value: float, rate: float) -> float:
-        """|left · (x − slow manifold)| of a state at a value of the parameter that drifts."""
+        """|left · (x − slow manifold)| of a state at a value of the drifting parameter."""
         mode = self.at(value)
         if mode is None:
             return math.nan
@@ -150,9 +150,9 @@ class CriticalMode:
         return float(abs(mode.left @ away))
 
     def first_order(self, values: Array, rate: float) -> Array:
-        """d/dp of the exponent's first-order terms: λ on the slow manifold, and the turning vector.
+        """d/dp of the exponent's first-order terms: λ on the slow manifold, rotation of the mode.
 
-        nan within the width about a meeting of eigenvalues in which their mode is not defined.
+        nan in the interval about a coalescence of eigenvalues where the mode is undefined.
         """
         steps = STEP * np.array([self.side(v).length for v in values.tolist()])
         modes = self.modes(np.concatenate([values, values - steps, values + steps]))
@@ -175,17 +175,17 @@ class CriticalMode:
         after: Mode | None,
         rate: float,
     ) -> float:
-        """At one value, with the modes there and a step to both sides."""
-        if self.site is None or mode is None or before is None or after is None:
+        """First-order term at one value, from the modes there and one step to both sides."""
+        if self.local is None or mode is None or before is None or after is None:
             return math.nan
         change = abs(after.separation**2 - before.separation**2) / (2.0 * step)
         if change * abs(rate) > 2.0 * mode.separation**3:
             return math.nan
-        number = self.site.region(mode.region)
+        number = self.local.region(mode.region)
         size = float(np.abs(mode.lag).max())
         bent = 0.0
         if size > 0.0:
-            # as far as the states' own scale, not as far as they lag
+            # a step on the scale of the states, not of the lag
             reach = STEP / size
             up, down = (
                 self._slopes(number, (mode.state + s * reach * mode.lag) * self.unit, value)[0]
@@ -196,10 +196,10 @@ class CriticalMode:
         return bent - (turned[1] - turned[0]) / (2.0 * step)
 
     def exponent_error(self, start: float, stop: float, rate: float) -> float:
-        """How much the exponent from one value to another may be off, to first order.
+        """Error bound of the exponent between two values, to first order.
 
-        Of what adds up to E along the way, a quarter of ∫ |dE| is allowed beside |E|: the
-        terms of second order do not cancel as those of first order may.
+        The bound is |E| plus a quarter of ∫ |dE|, as the second-order terms do not cancel
+        where the first-order terms E may.
         """
         here = self.behind.here
         halves = np.array([0.5 * (here - start), 0.5 * (stop - here)])[:, None]
@@ -219,32 +219,32 @@ def critical_mode(
     *,
     model: Model | None = None,
 ) -> CriticalMode:
-    """The mode of an eigenvalue at a point, on both sides of it.
+    """Critical mode of an eigenvalue at a point, along both sides of the branch.
 
     Parameters
     ----------
     diagram : Diagram
     point : SpecialPoint
     place : (Branch, int)
-        The branch and the row of the point.
+        Branch and row of the point.
     way : int
-        +1 where the parameter rises.
+        +1 for an increasing parameter.
     critical : complex
     model : Model, optional
-        Of a point that carries none.
+        Model of a point that has none.
     """
     branch, row = place
-    before, behind = (Sheet(diagram, branch, row, w, critical) for w in (-way, way))
-    site = None
+    before, behind = (BranchSide(diagram, branch, row, w, critical) for w in (-way, way))
+    local = None
     if point.source is not None or model is not None:
-        site = site_of(point, diagram.parameter, model)
+        local = local_field_at(point, diagram.parameter, model)
     rows = [*before.rows, *behind.rows]
     size = np.abs(branch.state[rows]).max(axis=0)
-    natural = np.ones_like(size) if site is None else site.unit
-    # a state that is zero along the branch but for rounding has no size there
+    natural = np.ones_like(size) if local is None else local.unit
+    # a state that is zero along the branch up to rounding takes its natural unit
     unit = np.where(size > ZERO * natural, size, natural)
     unit = np.where(unit > 0, unit, 1.0)
     periods = np.zeros(len(unit))
-    if site is not None:
-        periods = periods_of(point.states, site.field.model.periodic) / unit
-    return CriticalMode(point, site, before, behind, unit, periods)
+    if local is not None:
+        periods = periods_of(point.states, local.field.model.periodic) / unit
+    return CriticalMode(point, local, before, behind, unit, periods)

@@ -1,4 +1,4 @@
-"""The law of delay that holds at a special point."""
+"""Prediction of delays at special points of every type."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from fastslow.arguments import finite, formula, instance, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
-from fastslow.passage.delays.boundary_delays import boundary_delay, gap_transit
+from fastslow.passage.delays.boundary_delays import boundary_delay, gap_crossing
 from fastslow.passage.delays.branch_exits import branch_exit
 from fastslow.passage.delays.fold_delays import fold_delay
 from fastslow.passage.delays.hopf_delays import hopf_exit
@@ -20,7 +20,7 @@ from fastslow.results.overlay.delays import (
     BoundaryDelay,
     BranchPointExit,
     FoldDelay,
-    GapTransit,
+    GapCrossing,
     HopfExit,
 )
 from fastslow.results.overlay.drifts import Drift
@@ -48,46 +48,49 @@ def predict_delay(
     diagram: Diagram | None = None,
     entry: float | None = None,
     gain: float = 1.0,
-) -> FoldDelay | BoundaryDelay | GapTransit | HopfExit | BranchPointExit:
-    """How far past a special point a drifting parameter is when the trajectory changes sheet.
+) -> FoldDelay | BoundaryDelay | GapCrossing | HopfExit | BranchPointExit:
+    """Predict the delay of a slow passage through a special point.
 
-    At a fold see `fold_delay`, at a boundary equilibrium with persistence or a
-    non-smooth fold `boundary_delay`, at the end of a continuum `gap_transit`. At a
-    Hopf point, and at a branch point where an invariant branch is left, the delay
-    depends on where the trajectory came to the branch: ``diagram`` and ``entry`` are
-    needed, and the integral of the eigenvalue from the entry to the exit is zero
-    (see `hopf_exit`). At other branch points, where the branch moves with the
-    parameter, the passage is algebraic and no such law is offered.
+    The law follows from the type of the point: `fold_delay` at a fold (saddle-node),
+    `boundary_delay` at a boundary equilibrium with persistence or a non-smooth fold,
+    `gap_crossing` at the end of a continuum of equilibria. At a Hopf point, and at a
+    branch point of an invariant branch, the loss of stability is delayed: the integral of the
+    critical eigenvalue from the entry to the exit is zero (`hopf_exit`, `branch_exit`), which
+    requires ``diagram`` and ``entry``. At other branch points the passage is algebraic in the
+    rate, and no delay is predicted.
 
     Parameters
     ----------
     point : SpecialPoint
         Code LP, BE, HB or BP.
     rate : float or Drift
-        Of the parameter, with its sign; as a `Drift` with its change in time and its feedback
-        from the states, as that of a slow state has it.
+        Signed rate of the parameter, or a `Drift` that also contains its change in time and
+        the feedback from the states, as for a slow state.
     level : mapping or "turn", optional
-        One state and its value at which the jump counts as done, or ``"turn"``: that the
-        parameter itself turns round, as in a relaxation oscillation. Not used for a gap.
+        One state and its value that mark the end of the jump, e.g. ``{"x": 1.0}``, or
+        ``"turn"`` for the extremum of the parameter, as in a relaxation oscillation. Not used
+        for a gap.
     parameter : str or Symbol, optional
-        What drifts, by default the parameter of the point's diagram.
+        The drifting parameter, by default that of the point's diagram.
     model : Model, optional
-        For a point that was read from a file: its model.
+        The model of a point that was read from a file.
     diagram : Diagram, optional
-        At HB and BP: with the branch on both sides of the point.
+        At HB and BP: diagram with the branch on both sides of the point.
     entry : float, optional
-        At HB and BP: the parameter where the trajectory comes to the branch.
+        At HB and BP: value of the parameter at which the trajectory enters the vicinity of
+        the branch.
     gain : float
-        At HB and BP: distance from the branch at the exit by that at the entry.
+        At HB and BP: ratio of the distances from the branch at exit and entry.
 
     Returns
     -------
-    FoldDelay, BoundaryDelay, GapTransit, HopfExit or BranchPointExit
+    FoldDelay, BoundaryDelay, GapCrossing, HopfExit or BranchPointExit
 
     Raises
     ------
     ArgumentError
-        For a point without such a law, or where its law raises one.
+        For a point without a law of delay, a degenerate point, a rate of zero or towards the
+        stable branch, or an entry that is not on the branch before the point.
 
     Examples
     --------
@@ -107,14 +110,14 @@ def predict_delay(
     if law == "fold":
         return fold_delay(point, rate, level=level, parameter=parameter, model=model)
     if law == "boundary" and point.subtype == "degenerate":
-        return gap_transit(point, rate, parameter=parameter, model=model)
+        return gap_crossing(point, rate, parameter=parameter, model=model)
     if law == "boundary":
         return boundary_delay(point, rate, level=level, parameter=parameter, model=model)
     if law == "entry-exit":
         if diagram is None or entry is None:
             raise ArgumentError(
-                f"the exit past {point.label}, a {point_name(point.code)}, depends on where the "
-                "trajectory came to the branch; give diagram= and entry="
+                f"the exit past {point.label}, a {point_name(point.code)}, depends on the entry to "
+                "the branch; give diagram= and entry="
             )
         if level is not None:
             raise ArgumentError(
@@ -129,7 +132,7 @@ def predict_delay(
             exits = branch_exit(diagram, point, entry, speed, gain=gain, model=model)
         if not isinstance(rate, Drift) or rate.constant:
             return exits
-        words = "; at the rate at the point, the change of the drift left aside: no error is stated"
+        words = "; with the rate at the point, the change of the drift is neglected: no error bound"
         return replace(exits, error=math.nan, validity=exits.validity + words)
     raise ArgumentError(
         "expected a fold (LP), a boundary equilibrium (BE), a Hopf (HB) or branch point (BP), "

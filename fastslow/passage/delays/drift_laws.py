@@ -1,4 +1,4 @@
-"""The law of a drift in numbers: its values, and what compiled code takes in its place."""
+"""Numerical evaluation of the law of a drift, for NumPy and for compiled code."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from fastslow.model.structure import TIME, read_expression, real
 
 Array = NDArray[np.float64]
 
-#: Nodes on every part of a table, parts of the first one, and most of them.
+#: Nodes per interval of a table, initial and largest number of intervals.
 NODES, PARTS, MOST = 16, 4, 4096
 
-#: The last two coefficients of a part are below this times the largest of the table.
+#: Bound of the last two coefficients of an interval, relative to the largest of the table.
 ACCURATE = 1e-14
 
 _ANGLES = np.pi * (np.arange(NODES) + 0.5) / NODES
 
-#: Places of the nodes, between -1 and 1, and from values there to Chebyshev's coefficients.
+#: Nodes in [-1, 1], and the matrix from values to Chebyshev coefficients.
 _PLACES = np.cos(_ANGLES)
 _TO_COEFFICIENTS = np.cos(np.arange(NODES)[:, None] * _ANGLES) * 2.0 / NODES
 _TO_COEFFICIENTS[0] *= 0.5
@@ -33,13 +33,13 @@ _TO_COEFFICIENTS[0] *= 0.5
 
 @dataclass(frozen=True, eq=False)
 class DriftLaw:
-    """w' as a formula in fast states, the slow quantity and the time, in numbers.
+    """w' as a function of the fast states, the slow quantity and time.
 
     Parameters
     ----------
     text : str
     names : tuple of str
-        Of the states and of the slow quantity.
+        Names of the states and of the slow quantity.
     """
 
     text: str
@@ -51,7 +51,7 @@ class DriftLaw:
 
     @cached_property
     def in_time(self) -> bool:
-        """Whether it depends on the time alone."""
+        """Whether it depends on time only."""
         return bool(self.expression.free_symbols <= {TIME})
 
     @cached_property
@@ -61,16 +61,16 @@ class DriftLaw:
         return function
 
     def at(self, u: Array, time: float) -> float:
-        """Its value at one point u (n + 1,) and a time."""
+        """Value at one point u (n + 1,) and a time."""
         return float(self._function(*u, time))
 
     def along(self, points: Array, times: Array) -> Array:
-        """Its values at points (N, n + 1) and times (N,)."""
+        """Values at points (N, n + 1) and times (N,)."""
         values = np.asarray(self._function(*points.T, times), dtype=float)
         return np.broadcast_to(values, len(times)).copy()
 
     def table(self, start: float, stop: float) -> tuple[Array, Array]:
-        """A law in time as sums of Chebyshev polynomials.
+        """Piecewise Chebyshev approximation of a law that depends on time only.
 
         Parameters
         ----------
@@ -115,11 +115,11 @@ class DriftLaw:
 
     @cached_property
     def compiled(self) -> tuple[int, Array]:
-        """Address of its compiled function of (states, w, t), with slopes, and its parameters."""
+        """Address of the compiled function of (states, w, t) with slopes, and its parameters."""
         return compile_function(self.expression, [*map(real, self.names), TIME])
 
 
 @lru_cache(maxsize=256)
 def drift_law(text: str, names: tuple[str, ...]) -> DriftLaw:
-    """A law by its text; its functions are made once."""
+    """Law with a given formula; its functions are cached."""
     return DriftLaw(text, names)

@@ -1,4 +1,4 @@
-"""How the slow quantity of a run moves where it passes a special point."""
+"""Drift of the slow quantity of a run at the passage of a special point."""
 
 from __future__ import annotations
 
@@ -22,44 +22,42 @@ from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
-#: Half width of the interval over which a path's parameter is differentiated, by the run's length.
+#: Half-width of the stencil for derivatives of a path's parameter, relative to the run's length.
 WINDOW = 1e-4
 
-#: Digits of numbers in the text of a law.
+#: Digits of numbers in the formula of a drift.
 DIGITS = 17
 
 
 def drift_at(
-    slow: SlowQuantity, point: SpecialPoint, time: float, *, told: bool = True
+    slow: SlowQuantity, point: SpecialPoint, time: float, *, with_law: bool = True
 ) -> Drift | None:
-    """The drift of the slow quantity about a special point that a run passes at a time.
+    """Compute the drift of the slow quantity near a special point that a run passes.
 
-    Of a forcing with its derivatives at that time; of a slow state with its rate and
-    the derivatives of its rate at the special point, other slow quantities as they move
-    then; of the parameter g of a path w = u(g) with those of w'/u'(g). Without
-    the model of the run, or dense output, only what the run itself shows, with
-    ``complete=False``.
+    The derivatives are those of a forcing at that time; of the rate of a slow state at the
+    special point, with other slow quantities to first order in time; or of w'/u'(g) for the
+    parameter g of a path w = u(g). Without the model of the run, or dense output, they are
+    finite differences along the run, with ``complete=False``.
 
     Parameters
     ----------
     slow : SlowQuantity
     point : SpecialPoint
     time : float
-        When the slow quantity passes the value of the point.
-    told : bool
-        Whether a rate that is not linear is put into words; without it the law of the drift
-        may be missing.
+        Time at which the slow quantity passes the value of the point.
+    with_law : bool
+        Whether to include the formula of a nonlinear rate, ``Drift.law``.
 
     Returns
     -------
     Drift or None
-        None where the slow quantity is at rest there.
+        None if the slow quantity is at rest.
     """
     run, name = slow.run, slow.name
     model = run.symbolic_model
     try:
         if name in run.forcing and model is not None:
-            return _of_a_forcing(model, slow, time, told)
+            return _of_a_forcing(model, slow, time, with_law)
         if slow.laws and slow.dense and model is not None:
             return _on_a_path(slow, point, time)
         if slow.laws or not slow.dense:
@@ -68,9 +66,9 @@ def drift_at(
             _, rate, double = _derivatives(run, time)[:, run.columns.index(name)]
             change = float(double) if name in run.forcing else 0.0
             return Drift(float(rate), change=change, complete=False)
-        return _of_a_slow_state(slow, point, time, told)
+        return _of_a_slow_state(slow, point, time, with_law)
     except ArgumentError:
-        # the drift is at rest, or not finite
+        # the rate is zero or not finite
         return None
 
 
@@ -88,7 +86,7 @@ def _derivatives(run: Trajectory, time: float) -> Array:
 
 
 def _along_the_run(slow: SlowQuantity, time: float) -> Drift:
-    """Rate and change from three values of the slow quantity."""
+    """Rate and its change by finite differences of the slow quantity."""
     begin, end = float(slow.run.t[0]), float(slow.run.t[-1])
     step = min(WINDOW * (end - begin), time - begin, end - time)
     if not step > 0.0:
@@ -99,19 +97,19 @@ def _along_the_run(slow: SlowQuantity, time: float) -> Drift:
     return Drift((after - before) / (2.0 * step), change=change, complete=False)
 
 
-def _of_a_forcing(model: Any, slow: SlowQuantity, time: float, told: bool) -> Drift:
-    """From the derivatives of a forcing at a time."""
-    return _drift_of(model, _in_time(model.forcing[slow.name]), {}, time, (), told)
+def _of_a_forcing(model: Any, slow: SlowQuantity, time: float, with_law: bool) -> Drift:
+    """Drift of a forcing from its derivatives at a time."""
+    return _drift_of(model, _in_time(model.forcing[slow.name]), {}, time, (), with_law)
 
 
 @lru_cache(maxsize=128)
 def _in_time(forcing: sp.Expr) -> sp.Expr:
-    """The rate of a forcing."""
+    """Time derivative of a forcing."""
     return forcing.diff(TIME)
 
 
-def _of_a_slow_state(slow: SlowQuantity, point: SpecialPoint, time: float, told: bool) -> Drift:
-    """From the rate of a slow state, its gradient at the special point, and what else moves."""
+def _of_a_slow_state(slow: SlowQuantity, point: SpecialPoint, time: float, with_law: bool) -> Drift:
+    """Drift of a slow state from its rate and gradient at the special point."""
     model, names = slow.run.symbolic_model, (*slow.states, slow.name)
     others = [n for n in slow.run.columns if n not in names]
     rate = model.rates[slow.name]
@@ -119,7 +117,7 @@ def _of_a_slow_state(slow: SlowQuantity, point: SpecialPoint, time: float, told:
         law = _rate(model, slow.name, time).xreplace(_moving(slow, time))
         return drift_of_law(law, {n: point[n] for n in names})
     here = {n: float(point[n]) for n in names}
-    return _drift_of(model, rate, here, time, names, told)
+    return _drift_of(model, rate, here, time, names, with_law)
 
 
 def _drift_of(
@@ -128,9 +126,9 @@ def _drift_of(
     here: Mapping[str, float],
     time: float,
     names: tuple[str, ...],
-    told: bool,
+    with_law: bool,
 ) -> Drift:
-    """As `drift_of_law` of a rate in the parameters of a model, by functions that are made once.
+    """Drift of a rate in the parameters of a model, as `drift_of_law`, by cached functions.
 
     Parameters
     ----------
@@ -139,11 +137,11 @@ def _drift_of(
     here : mapping
         Values of the states and the slow quantity at the special point.
     time : float
-        When it is passed.
+        Time of the passage.
     names : tuple of str
-        Of ``here``, in order; the slow quantity is the last.
-    told : bool
-        Whether a rate that is not linear is put into words.
+        Names in ``here``, in order; the slow quantity is the last.
+    with_law : bool
+        Whether to include the formula of a nonlinear rate.
     """
     moving = (*map(real, names), TIME)
     used, values = _values(rate, tuple(model.values), moving)
@@ -153,10 +151,10 @@ def _drift_of(
     except (TypeError, ValueError, NameError, ArithmeticError):
         value, slopes, change = math.nan, [], math.nan
     if not all(map(math.isfinite, (value, *slopes, change))):
-        # what these functions cannot tell, SymPy may
+        # SymPy may evaluate what these functions cannot
         return drift_of_law(rate.xreplace({**_known(model, used), TIME: _later(time)}), here)
     text = ""
-    if told and not _linear(rate, moving):
+    if with_law and not _linear(rate, moving):
         moved = rate.xreplace(_known(model, used))
         if not _linear(moved, moving):
             text = str(moved.xreplace({TIME: _later(time)}))
@@ -172,7 +170,7 @@ def _drift_of(
 
 
 def _known(model: Any, used: tuple[sp.Symbol, ...]) -> dict[sp.Symbol, sp.Float]:
-    """Values of some parameters."""
+    """Values of parameters as SymPy numbers."""
     return {n: sp.Float(model.values[n], DIGITS) for n in used}
 
 
@@ -180,7 +178,7 @@ def _known(model: Any, used: tuple[sp.Symbol, ...]) -> dict[sp.Symbol, sp.Float]
 def _values(
     rate: sp.Expr, parameters: tuple[sp.Symbol, ...], moving: tuple[sp.Symbol, ...]
 ) -> tuple[tuple[sp.Symbol, ...], Callable[..., Any]]:
-    """The parameters in a rate, and it and its slopes as a function of these and what moves."""
+    """Parameters in a rate, and a function of these and the variables for it and its slopes."""
     used = tuple(n for n in parameters if n in rate.free_symbols)
     slopes = [rate.diff(s) if s in rate.free_symbols else sp.Integer(0) for s in moving]
     function: Callable[..., Any] = sp.lambdify((*used, *moving), [rate, *slopes], "math")
@@ -189,7 +187,7 @@ def _values(
 
 @lru_cache(maxsize=256)
 def _linear(law: sp.Expr, moving: tuple[sp.Symbol, ...]) -> bool:
-    """Whether a rate is linear, or at least affine, in what moves."""
+    """Whether a rate is affine in the variables."""
     inside = [s for s in moving if s in law.free_symbols]
     return not law.has(sp.Piecewise) and all(
         sp.expand(law.diff(s).diff(other)) == 0 for s in inside for other in inside
@@ -197,7 +195,7 @@ def _linear(law: sp.Expr, moving: tuple[sp.Symbol, ...]) -> bool:
 
 
 def _on_a_path(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift:
-    """From the rate of the quantity that varies most along the path: g' = w'/u'(g)."""
+    """Drift g' = w'/u'(g) from the quantity that varies most along the path."""
     values = {real(n): sp.Float(v, DIGITS) for n, v in slow.constants.items()}
     parameter = real(slow.name)
     known = (*slow.constants, slow.name)
@@ -214,20 +212,20 @@ def _on_a_path(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift:
 
 
 def _rate(model: Any, name: str, time: float) -> sp.Expr:
-    """The rate of a slow quantity, t from a time on."""
+    """Rate of a slow quantity, with time measured from a given time."""
     law = model.forcing[name].diff(TIME) if name in model.forcing else model.rates[name]
     numbers = {n: sp.Float(v, DIGITS) for n, v in model.values.items()}
     return law.xreplace({**numbers, TIME: _later(time)})
 
 
 def _later(time: float) -> sp.Expr:
-    """The time from a time on."""
-    # one below the normal numbers is the rounding of 0, and has no decimals to be read again
+    """Time measured from a given time."""
+    # a subnormal number is the rounding of 0 and cannot be parsed again
     return TIME + (sp.Float(time, DIGITS) if abs(time) >= sys.float_info.min else 0)
 
 
 def _moving(slow: SlowQuantity, time: float) -> dict[sp.Symbol, sp.Expr]:
-    """Other slow quantities of a run from a time on, to first order."""
+    """Other slow quantities of a run to first order in time."""
     run, found = slow.run, {}
     columns = _derivatives(run, time)
     for k, name in enumerate(run.columns):
@@ -238,19 +236,19 @@ def _moving(slow: SlowQuantity, time: float) -> dict[sp.Symbol, sp.Expr]:
 
 
 def drift_of_law(law: sp.Expr, here: Mapping[str, float]) -> Drift:
-    """The drift of a rate given in the fast states, the slow quantity and the time since it passed.
+    """Drift of a rate in the fast states, the slow quantity and the time since its passage.
 
     Parameters
     ----------
     law : Expr
         In real symbols; t is the time.
     here : mapping
-        Names to their values at the special point, the slow quantity last.
+        Values at the special point by name, the slow quantity last.
 
     Raises
     ------
     ArgumentError
-        For a rate that vanishes there.
+        For a rate that vanishes at the point.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The entry-exit integral of a slow passage, along the branch on both sides of a special point."""
+"""Entry-exit integral of a slow passage along the branch through a special point."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from typing import Any
 
 from fastslow.errors import ArgumentError
 from fastslow.passage.delays.critical_modes import CriticalMode
-from fastslow.passage.delays.growth_rates import Sheet
+from fastslow.passage.delays.growth_rates import BranchSide
 from fastslow.passage.delays.local_field import same_point
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.points import SpecialPoint
 
-#: Beyond this decay, exp(−30) = 1e−13, rounding and noise outlive the memory of the entry.
+#: Decay exponent above which rounding and noise, exp(−30) = 1e−13, determine the exit.
 MEMORY = 30.0
 
 
-#: Error of the integral along a branch, relative.
+#: Relative error of the integral along a branch.
 NUMERICAL = 1e-9
 
-#: An exit is off by no more than this many times what the terms of first order make.
+#: Safety factor of the error bound from the terms of first order.
 SAFETY = 1.25
 
 
@@ -35,18 +35,18 @@ def entry_exit(
     remembered: str,
     lost: str,
 ) -> dict[str, Any]:
-    """The exit at which growth makes up for the decay since the entry, as entries of its law.
+    """Exit at which growth balances the decay since the entry, as fields of its `Delay`.
 
     Parameters
     ----------
     mode : CriticalMode
-        With the two sides of the point.
+        Critical mode with the two sides of the point.
     entry, rate, gain : float
         As in `fastslow.predict_delay`.
     memory : float
-        Decay beyond which the entry is forgotten.
+        Decay exponent above which the exit no longer depends on the entry.
     remembered, lost : str
-        What holds of an exit below that decay and beyond it; ``{decay}`` is its value.
+        Validity below and above that decay; ``{decay}`` is its value.
     """
     before, behind, point = mode.before, mode.behind, mode.point
     require_entry(before, point, entry)
@@ -56,7 +56,7 @@ def entry_exit(
     error = math.nan
     words = remembered
     if math.isnan(exit_at):
-        words = "none: the branch ends or turns before growth has made up for the decay"
+        words = "none: the branch ends or reverses before growth balances the decay"
     elif decay > memory:
         words = lost.format(decay=f"{decay:.0f}")
     elif before.diagram.corrector is None:
@@ -85,28 +85,28 @@ def entry_exit(
 
 
 def bound_in_words(error: float, of: str = "") -> str:
-    """What is said of the error of an exit, and of what else it takes into account."""
+    """Statement of the error bound of an exit."""
     if math.isnan(error):
-        return "; no error is stated"
+        return "; no error bound"
     words = of or " at small amplitude"
-    return f"; within {error:.2g}{words}, by the terms of first order in the rate"
+    return f"; error below {error:.2g}{words}, from the terms of first order in the rate"
 
 
-def require_entry(before: Sheet, point: SpecialPoint, entry: float) -> None:
-    """Raise unless an entry is on the sheet before a point."""
+def require_entry(before: BranchSide, point: SpecialPoint, entry: float) -> None:
+    """Raise unless an entry is on the branch before a point."""
     name = before.diagram.parameter
     here = point[name]
     reached = before.end
     low, high = sorted((reached, here))
     if not low <= entry <= high or entry == here:
         raise ArgumentError(
-            f"entry = {entry:g}; expected a value of {name} on the sheet before {point.label}, "
+            f"entry = {entry:g}; expected a value of {name} on the branch before {point.label}, "
             f"from {reached:g} to {here:g}"
         )
 
 
 def places(diagram: Diagram, point: SpecialPoint) -> Iterator[tuple[Branch, int]]:
-    """The branches of a diagram through a special point, each with its row."""
+    """Branches of a diagram through a special point, each with the row of the point."""
     found = False
     length = diagram.over[1] - diagram.over[0]
     for branch in diagram.branches:

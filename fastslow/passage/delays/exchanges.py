@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.passage.delays.critical_modes import CriticalMode
-from fastslow.passage.delays.local_field import Site
+from fastslow.passage.delays.local_field import LocalField
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class Form:
         return 2.0 * self.a * slope + self.b
 
 
-def passage_in_words(mode: CriticalMode, site: Site, rate: float) -> str:
+def passage_in_words(mode: CriticalMode, local: LocalField, rate: float) -> str:
     """What the drift does to a trajectory at a branch point whose branches both move.
 
     With y = √ε Y and μ = √ε τ the rate drops out of the normal form. The solution of
@@ -63,7 +63,7 @@ def passage_in_words(mode: CriticalMode, site: Site, rate: float) -> str:
     the branch that attracts from there on, or on the other side, from which it goes
     to infinity (Krupa and Szmolyan 2001, Nonlinearity 14, 1473-1491).
     """
-    form = _form(mode, site)
+    form = _form(mode, local)
     if form is None:
         return "the passage is algebraic in the rate; at a pitchfork no law for it is known here"
     tau = blow_up(form, mode.behind.way)
@@ -79,16 +79,16 @@ def passage_in_words(mode: CriticalMode, site: Site, rate: float) -> str:
     )
 
 
-def _form(mode: CriticalMode, site: Site) -> Form | None:
+def _form(mode: CriticalMode, local: LocalField) -> Form | None:
     """The quadratic normal form at the point; None at a pitchfork or in a sliding motion."""
-    region = site.region(str(mode.before.branch.region[mode.before.rows[-1]]))
-    if site.field.modes[region].sides is not None:
+    region = local.region(str(mode.before.branch.region[mode.before.rows[-1]]))
+    if local.field.modes[region].sides is not None:
         return None
-    n, unit, u = site.n, mode.unit, site.u
+    n, unit, u = local.n, mode.unit, local.u
     scale = float(np.ptp(mode.before.diagram.over))
 
     def slopes(y: Array, mu: float) -> tuple[Array, Array]:
-        _, table, _, _ = site.field.evaluate(region, u + np.append(y * unit, mu))
+        _, table, _, _ = local.field.evaluate(region, u + np.append(y * unit, mu))
         return table[:, :n] * unit / unit[:, None], table[:, n] / unit
 
     jacobian, by_parameter = slopes(np.zeros(n), 0.0)

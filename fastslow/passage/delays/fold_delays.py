@@ -16,12 +16,12 @@ from fastslow.model.model import Model
 from fastslow.passage.delays.local_field import (
     TURN,
     Level,
-    Site,
+    LocalField,
     drift_of,
     level_of,
+    local_field_at,
     named_level,
     require_code,
-    site_of,
     wrong_way,
 )
 from fastslow.passage.delays.local_passages import (
@@ -146,9 +146,9 @@ def fold_delay(
     Raises
     ------
     ArgumentError
-        For a point of another code, a rate of zero or towards the stable sheet, a
+        For a point of another code, a rate of zero or towards the stable branch, a
         degenerate fold (a = 0, as at a cusp; b = 0, where the parameter does not
-        unfold it; a double zero eigenvalue), or a fold whose sheets are unstable.
+        unfold it; a double zero eigenvalue), or a fold whose branches are unstable.
 
     References
     ----------
@@ -166,14 +166,14 @@ def fold_delay(
     (1.94690271, -0.11111111, '1.9582e-04')
     """
     require_code(point, "LP", "the delay of a fold")
-    site = site_of(point, parameter, model)
-    drift = drift_of(site, rate)
-    height = level_of(site, level, drift)
-    form = fold_form_of(site)
+    local = local_field_at(point, parameter, model)
+    drift = drift_of(local, rate)
+    height = level_of(local, level, drift)
+    form = fold_form_of(local)
     if form.a * form.b * drift.rate < 0:
-        raise wrong_way(site, drift.rate)
+        raise wrong_way(local, drift.rate)
     speed, product = abs(drift.rate), abs(form.a * form.b)
-    feedback, change = _moved(site, form, drift)
+    feedback, change = _moved(local, form, drift)
     # with μ as the independent variable feedback is a part of the cubic and the mixed term
     kappa = feedback / (form.a * drift.rate)
     d, g = form.c / form.a**2 - kappa, form.g / (form.a * form.b) - kappa
@@ -185,13 +185,13 @@ def fold_delay(
     if height is not None:
         eta = _end(form, height, kappa) / scale
         slow = height != TURN and eta <= SLOW_PART
-        jump = math.nan if slow else jump_time(site, form, drift, kappa, height)
+        jump = math.nan if slow else jump_time(local, form, drift, kappa, height)
         if slow:
             words = "to first order: the level lies within the slow part of the passage"
             terms = (d * scale, g * scale, change / scale)
             delay = slow_part(eta, terms) * speed / scale
         elif math.isnan(jump):
-            goal = "a turn" if isinstance(height, str) else _words(site, height)
+            goal = "a turn" if isinstance(height, str) else _words(local, height)
             words = f"leading order: no jump of the frozen model to {goal} was found"
         else:
             # the inner solution to first order, matched to the jump
@@ -203,11 +203,11 @@ def fold_delay(
             words = "to the order of the rate"
     passed, time = math.nan, math.nan
     if height is not None:
-        passed, time = _passed(site, form, drift, height, scale)
-    error, more = bound_of(site, delay, passed, drift)
+        passed, time = _passed(local, form, drift, height, scale)
+    error, more = bound_of(local, delay, passed, drift)
     return FoldDelay(
         point=point,
-        parameter=site.field.parameter,
+        parameter=local.field.parameter,
         rate=drift.rate,
         delay=delay,
         validity=words + more,
@@ -220,13 +220,13 @@ def fold_delay(
         mixed=form.g,
         feedback=feedback,
         coefficients=(first, d / 3.0, third),
-        level=named_level(site, height),
+        level=named_level(local, height),
     )
 
 
-def _moved(site: Site, form: FoldForm, drift: Drift) -> tuple[float, float]:
+def _moved(local: LocalField, form: FoldForm, drift: Drift) -> tuple[float, float]:
     """Slope k in μ' = rate + k y + …, and the relative change of the rate in time and by μ."""
-    by_state = np.array([drift.by_state.get(n, 0.0) for n in site.field.model.states])
+    by_state = np.array([drift.by_state.get(n, 0.0) for n in local.field.model.states])
     change = drift.change / drift.rate + drift.by_value + float(by_state @ form.lean)
     return float(by_state @ form.along), change
 
@@ -239,10 +239,10 @@ def _end(form: FoldForm, level: Level, kappa: float) -> float:
 
 
 def _passed(
-    site: Site, form: FoldForm, drift: Drift, level: Level, scale: float
+    local: LocalField, form: FoldForm, drift: Drift, level: Level, scale: float
 ) -> tuple[float, float]:
     """The delay and the time of the passage as integrated; nan where that fails."""
-    region, start = site.region(site.point.regions[0]), None
+    region, start = local.region(local.point.regions[0]), None
     for before in BEFORE:
         mu = -before * drift.rate / scale
         if start is None:
@@ -250,15 +250,15 @@ def _passed(
             guess = y * form.along + 0.5 * y**2 * form.bend + mu * form.lean
         else:
             guess = start[:-1]
-        found = quasi_static(site, drift, region, mu, guess)
+        found = quasi_static(local, drift, region, mu, guess)
         if found is None:
             break
         start = found
     place = None if start is None else Place(region, start, 0.0)
-    return reached_delay(site, drift, place, Event(level), 200.0 / scale)
+    return reached_delay(local, drift, place, Event(level), 200.0 / scale)
 
 
-def jump_time(site: Site, form: FoldForm, drift: Drift, kappa: float, level: Level) -> float:
+def jump_time(local: LocalField, form: FoldForm, drift: Drift, kappa: float, level: Level) -> float:
     """Finite part of the time of the jump in the frozen model, from the fold to a level.
 
     Time counts by w'/rate, so that it is the change of the slow quantity along the jump. From
@@ -270,15 +270,15 @@ def jump_time(site: Site, form: FoldForm, drift: Drift, kappa: float, level: Lev
     """
     cubic = form.c / form.a**2
     end = _end(form, level, kappa)
-    bends = _turning(form, site.unit)
+    bends = _turning(form, local.unit)
     usual = max(abs(cubic), abs(kappa), 1.0 / form.slowest, bends, 1.0 / end)
     y = NEAR / usual
-    while not _inside(site, _past(site, form, y)):
+    while not _inside(local, _past(local, form, y)):
         y *= 0.5
     best, change = math.nan, math.inf
     row: list[float] = []
     for _ in range(HALVINGS + 1):
-        gone = _gone(site, drift, _past(site, form, y), 1.0 / y, level)
+        gone = _gone(local, drift, _past(local, form, y), 1.0 / y, level)
         following = [gone - 1.0 / y - (cubic - kappa) * math.log(y / (1.0 + cubic * y))]
         for k, last in enumerate(row):
             following.append(following[k] + (following[k] - last) / (2.0 ** (k + 1) - 1.0))
@@ -292,50 +292,50 @@ def jump_time(site: Site, form: FoldForm, drift: Drift, kappa: float, level: Lev
     return best
 
 
-def _past(site: Site, form: FoldForm, y: float) -> Array:
+def _past(local: LocalField, form: FoldForm, y: float) -> Array:
     """The state on the centre manifold at Y past a fold, to second order."""
     past = y / form.a
-    return np.asarray(site.u[:-1] + past * form.along + 0.5 * past**2 * form.bend)
+    return np.asarray(local.u[:-1] + past * form.along + 0.5 * past**2 * form.bend)
 
 
-def _inside(site: Site, state: Array) -> bool:
+def _inside(local: LocalField, state: Array) -> bool:
     """Whether a state at the fold's parameter is in the region of the fold."""
-    region, count = site.region(site.point.regions[0]), len(site.field.interfaces)
-    _, _, heights, _ = site.field.evaluate(region, np.append(state, site.u[-1]))
-    return bool((site.field.signs[region, :count] * heights[:count] >= 0.0).all())
+    region, count = local.region(local.point.regions[0]), len(local.field.interfaces)
+    _, _, heights, _ = local.field.evaluate(region, np.append(state, local.u[-1]))
+    return bool((local.field.signs[region, :count] * heights[:count] >= 0.0).all())
 
 
-def _gone(site: Site, drift: Drift, state: Array, slow: float, level: Level) -> float:
+def _gone(local: LocalField, drift: Drift, state: Array, slow: float, level: Level) -> float:
     """∫ w' dt/rate along the jump of the frozen model from a state; nan if it is not done.
 
     Parameters
     ----------
-    site : Site
+    local : LocalField
     drift : Drift
     state : ndarray, shape (n,)
     slow : float
         Time that it takes to leading order.
     level : (int, float) or "turn"
     """
-    model = site.field.model.with_ramp(site.field.parameter, 0.0, float(site.u[-1]))
-    speed = LocalDrift(site, drift)
+    model = local.field.model.with_ramp(local.field.parameter, 0.0, float(local.u[-1]))
+    speed = LocalDrift(local, drift)
     for longer in LONGER:
         span = (0.0, (1.0 + longer) * slow)
         try:
             run = simulate(model, state, t=span, integration=Integration(rtol=1e-15))
         except ModelError:
             return math.nan
-        done = _done(run, site, speed, level)
+        done = _done(run, local, speed, level)
         if not (math.isnan(done) and run.outcome):
             break
     return done if drift.constant or math.isnan(done) else _integral(run, speed, done)
 
 
-def _done(run: Trajectory, site: Site, speed: LocalDrift, level: Level) -> float:
+def _done(run: Trajectory, local: LocalField, speed: LocalDrift, level: Level) -> float:
     """When a jump of the frozen model reaches a level; nan if it does not."""
     if isinstance(level, str):
         return _turned(run, speed)
-    name, height = site.field.model.states[level[0]], float(site.u[level[0]])
+    name, height = local.field.model.states[level[0]], float(local.u[level[0]])
     hits = run.section(name, level=height + level[1])
     return float(hits.times[0]) if len(hits) else math.nan
 
@@ -371,24 +371,24 @@ def _turning(form: FoldForm, unit: Array) -> float:
     return float(bend / (abs(form.a) * along))
 
 
-def _words(site: Site, level: tuple[int, float]) -> str:
+def _words(local: LocalField, level: tuple[int, float]) -> str:
     number, height = level
-    return f"{site.field.model.states[number]} = {float(site.u[number]) + height:g}"
+    return f"{local.field.model.states[number]} = {float(local.u[number]) + height:g}"
 
 
-def fold_form_of(site: Site) -> FoldForm:
+def fold_form_of(local: LocalField) -> FoldForm:
     """The normal form on the centre manifold of a fold, by projection (Kuznetsov 2004, 5.4)."""
-    region = site.region(site.point.regions[0])
-    jacobian, slope = site.slopes(region)
-    p, q = null_vectors(jacobian, site.unit)
-    label = site.point.label
+    region = local.region(local.point.regions[0])
+    jacobian, slope = local.slopes(region)
+    p, q = null_vectors(jacobian, local.unit)
+    label = local.point.label
     overlap = float(p @ q)
-    if abs(overlap) <= ZERO * np.linalg.norm(p * site.unit) * np.linalg.norm(q / site.unit):
+    if abs(overlap) <= ZERO * np.linalg.norm(p * local.unit) * np.linalg.norm(q / local.unit):
         raise ArgumentError(
             f"{label} has a double zero eigenvalue (Bogdanov-Takens), where this law does not hold"
         )
     p = p / overlap
-    forms = forms_at(site.field, region, site.u)
+    forms = forms_at(local.field, region, local.u)
     bent = forms.form(q, q).real
     a, b = float(0.5 * (p @ bent)), float(p @ slope)
     if abs(a) <= ZERO * max(float(np.abs(p) @ np.abs(forms.form(abs(q), abs(q)))), 1e-300):
@@ -398,21 +398,21 @@ def fold_form_of(site: Site) -> FoldForm:
         )
     if abs(b) <= ZERO * float(np.abs(p) @ np.abs(slope)) or b == 0.0:
         raise ArgumentError(
-            f"{label} is not unfolded by {site.field.parameter}: the derivative of the rates by it "
-            "has no part along the fold (the branch is vertical or crossed there)"
+            f"{label} is not unfolded by {local.field.parameter}: the parameter derivative of the "
+            "rates has no component along the critical mode (a vertical branch or a branch point)"
         )
     others = np.delete(*_without_zero(jacobian))
     if np.any(others.real >= 0):
         raise ArgumentError(
-            f"no stable sheet ends at {label}: another eigenvalue has real part "
+            f"no stable branch ends at {label}: another eigenvalue has real part "
             f"{others.real.max():.3g}"
         )
     bordered = np.block([[jacobian, q[:, None]], [p[None, :], np.zeros((1, 1))]])
     bend = np.linalg.solve(bordered, np.append(-bent + (p @ bent) * q, 0.0))[:-1]
     lean = np.linalg.solve(bordered, np.append(-slope + b * q, 0.0))[:-1]
-    mixed = float(p @ (site.mixed(region) @ q + forms.form(q, lean).real))
+    mixed = float(p @ (local.mixed(region) @ q + forms.form(q, lean).real))
     slowest = float(np.abs(others.real).min(initial=math.inf))
-    return FoldForm(a, b, cusp_form(forms, jacobian, site.unit), mixed, q, bend, lean, slowest)
+    return FoldForm(a, b, cusp_form(forms, jacobian, local.unit), mixed, q, bend, lean, slowest)
 
 
 def _without_zero(jacobian: Array) -> tuple[NDArray[np.complex128], int]:
@@ -460,7 +460,7 @@ def slow_part(eta: float, terms: tuple[float, float, float]) -> float:
 
 
 def airy_passage(eta: float) -> float:
-    """The s at which η' = η² + s, from the stable sheet, reaches η: −A'(s)/A(s) = η, A(s) = Ai(−s).
+    """Solve −A'(s)/A(s) = η, A(s) = Ai(−s): the s at which η' = η² + s reaches η.
 
     Examples
     --------
@@ -472,7 +472,7 @@ def airy_passage(eta: float) -> float:
     if math.isinf(eta):
         return OMEGA_0
     if eta < -500.0:
-        # the quasi-static sheet, η = −√z − 1/(4 z) with z = −s, where the Airy functions overflow
+        # the quasi-static branch, η = −√z − 1/(4 z) with z = −s, where the Airy functions overflow
         return -((eta + 0.25 / eta**2) ** 2)
 
     def left(s: float) -> float:

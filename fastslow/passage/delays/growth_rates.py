@@ -1,4 +1,4 @@
-"""The growth rate of the mode that becomes unstable at a special point, along its branch."""
+"""Growth rate of the critical mode of a special point along its branch."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from fastslow.results.branch.interpolation import hermite
 
 Array = NDArray[np.float64]
 
-#: Chebyshev points of a piece, in ascending order on (−1, 1).
+#: Chebyshev points on (−1, 1) in ascending order.
 NODES = -np.cos(np.pi * (np.arange(15) + 0.5) / 15)
 
-#: From values at the points to Chebyshev coefficients.
+#: Matrix from values at the points to Chebyshev coefficients.
 TO_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(NODES, len(NODES) - 1))
 
-#: A piece is resolved where its last coefficients, times its length, are below this part of
-#: the eigenvalues times that of the branch: the error that they leave in an integral.
+#: Bound of the last coefficients times the length of a piece, relative to the eigenvalues times
+#: the length of the branch: the error of an integral.
 RESOLVED = 1e-11
 
-#: No piece is shorter than this part of the branch: a pair that splits is a square root there.
+#: Length of the shortest piece relative to the branch: a splitting pair is a square root.
 SHORTEST = 1e-8
 
-#: The first piece takes this part of the branch.
+#: Length of the first piece relative to the branch.
 FIRST = 0.125
 
 
-class Followed(NamedTuple):
-    """An eigenvalue that is followed: its value, where, and its slope along the branch."""
+class Eigenvalue(NamedTuple):
+    """Continued eigenvalue: value, position, and slope along the branch."""
 
     value: complex
     along: float
@@ -45,19 +45,19 @@ class Followed(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
-    """The growth rate on one interval of the parameter, as a polynomial.
+class GrowthPiece:
+    """Polynomial approximation of the growth rate on one parameter interval.
 
     Parameters
     ----------
     start, stop : float
-        In the direction away from the point.
+        Parameter values, in the direction away from the point.
     rate, primitive : ndarray
         Chebyshev coefficients of Re λ and of its integral from the start, over (−1, 1).
     before : float
         ∫ Re λ |dp| from the point to the start.
-    last : Followed
-        The eigenvalue at the last Chebyshev point.
+    last : Eigenvalue
+        Eigenvalue at the last Chebyshev point.
     """
 
     start: float
@@ -65,7 +65,7 @@ class Piece:
     rate: Array
     primitive: Array
     before: float
-    last: Followed
+    last: Eigenvalue
 
     def _local(self, value: Array | float) -> Array | float:
         return (2.0 * value - self.start - self.stop) / (self.stop - self.start)
@@ -78,23 +78,23 @@ class Piece:
 
 
 @dataclass(eq=False)
-class Sheet:
-    """One side of a special point, as far as the parameter goes on in one direction.
+class BranchSide:
+    """Side of a branch at a special point, up to the next reversal of the parameter.
 
-    The eigenvalue that is critical at the point is evaluated at equilibria of the
-    model, on pieces that are halved until a polynomial resolves it: the result does not
-    depend on the rows of the branch. Pieces are added as far as they are needed.
+    The critical eigenvalue is evaluated at equilibria of the model and approximated by
+    polynomials on adaptively halved pieces, so that the result does not depend on the rows
+    of the branch. Pieces are added on demand.
 
     Parameters
     ----------
     diagram : Diagram
     branch : Branch
     row : int
-        Of the special point.
+        Row of the special point.
     way : int
-        +1 where the parameter rises along it.
+        +1 if the parameter increases away from the point.
     critical : complex
-        The eigenvalue at the point that is followed along the branch.
+        Critical eigenvalue at the point, which is continued along the branch.
     """
 
     diagram: Diagram
@@ -103,7 +103,7 @@ class Sheet:
     way: int
     critical: complex
     rows: list[int] = field(default_factory=list)
-    pieces: list[Piece] = field(default_factory=list)
+    pieces: list[GrowthPiece] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         values = self.branch.parameter
@@ -119,7 +119,7 @@ class Sheet:
         regions = self.branch.region[self.rows]
         joints = [k for k in range(1, len(self.rows)) if regions[k] != regions[k - 1]]
         interpolated = self.diagram.corrector is None
-        # within a region, or within a step where eigenvalues are only known at its ends
+        # pieces lie in one region, or in one step if eigenvalues are known at its ends only
         breaks = range(1, len(self.rows)) if interpolated else joints
         self._breaks = sorted({self._along(values[self.rows[k]]) for k in breaks} | {self.length})
         self._steps = np.array([self._along(values[k]) for k in self.rows])
@@ -137,12 +137,12 @@ class Sheet:
 
     @property
     def here(self) -> float:
-        """The parameter at the special point."""
+        """Parameter at the special point."""
         return float(self.branch.parameter[self.row])
 
     @property
     def end(self) -> float:
-        """The parameter where the side ends."""
+        """Parameter at the end of the side."""
         return float(self.branch.parameter[self.rows[-1]])
 
     @property
@@ -150,11 +150,11 @@ class Sheet:
         return self._along(self.end)
 
     def first_growth(self) -> float:
-        """Largest real part next to the point."""
+        """Largest real part of the eigenvalues next to the point."""
         return float(self.branch.eigenvalues[self.rows[:2][-1]].real.max())
 
     def rate(self, values: Array) -> Array:
-        """Re λ at values of the parameter, nan where they are not on this side, shape (N,)."""
+        """Re λ at values of the parameter, nan for values not on this side, shape (N,)."""
         values = np.asarray(values, dtype=float)
         along = self.way * (values - self.here)
         found = np.full(values.shape, np.nan)
@@ -163,7 +163,7 @@ class Sheet:
             return found
         self._extend_to(float(along[inside].max()))
         rows = np.flatnonzero(inside)
-        # at a joint the later piece counts
+        # a joint belongs to the later piece
         starts = [self._along(piece.start) for piece in self.pieces]
         number = np.searchsorted(starts, along[rows], side="right") - 1
         rows = rows[np.argsort(number, kind="stable")]
@@ -174,7 +174,7 @@ class Sheet:
         return found
 
     def integral(self, end: float) -> float:
-        """∫ Re λ |dp| from the point to a value on the sheet."""
+        """∫ Re λ |dp| from the point to a value on the branch."""
         along = min(self._along(end), self.length)
         if not along > 0.0:
             return 0.0
@@ -183,7 +183,7 @@ class Sheet:
         return self.pieces[min(bisect_right(ends, along), len(ends) - 1)].integral(end)
 
     def where(self, target: float) -> float:
-        """The value at which the integral from the point reaches a target, nan if none does."""
+        """Parameter at which the integral from the point reaches a target, else nan."""
         if target <= 0 or not self.length > 0.0:
             return math.nan
         number = 0
@@ -191,7 +191,7 @@ class Sheet:
             if number == len(self.pieces) and not self._extend():
                 return math.nan
             piece = self.pieces[number]
-            # growth may fall again inside of a piece
+            # the integral may decrease within a piece
             for one, other in zip(*self._parts(piece), strict=True):
                 if piece.integral(other) >= target:
                     missing = partial(_missing, piece, target)
@@ -201,8 +201,8 @@ class Sheet:
             number += 1
 
     @staticmethod
-    def _parts(piece: Piece) -> tuple[Array, Array]:
-        """Intervals of a piece on which its integral is nearly monotone."""
+    def _parts(piece: GrowthPiece) -> tuple[Array, Array]:
+        """Intervals of a piece on which its integral is taken as monotone."""
         ends = np.linspace(piece.start, piece.stop, 9)
         return ends[:-1], ends[1:]
 
@@ -212,11 +212,11 @@ class Sheet:
                 return
 
     def _extend(self) -> bool:
-        """Add a piece; False where the side ends."""
+        """Add a piece; return False at the end of the side."""
         start = self._along(self.pieces[-1].stop) if self.pieces else 0.0
         if not start < self.length:
             return False
-        pair = self.pieces[-1].last if self.pieces else Followed(self.critical, 0.0, 0.0)
+        pair = self.pieces[-1].last if self.pieces else Eigenvalue(self.critical, 0.0, 0.0)
         before = self.pieces[-1].integral(self.pieces[-1].stop) if self.pieces else 0.0
         stop = self._breaks[bisect_right(self._breaks, start)]
         width = FIRST * self.length
@@ -241,11 +241,11 @@ class Sheet:
             ends[1] = self.end
         if self.pieces:
             ends[0] = self.pieces[-1].stop
-        self.pieces.append(Piece(ends[0], ends[1], coefficients, primitive, before, last))
+        self.pieces.append(GrowthPiece(ends[0], ends[1], coefficients, primitive, before, last))
         return True
 
-    def _values(self, start: float, stop: float, pair: Followed) -> tuple[Array, Followed]:
-        """Re λ at the Chebyshev points of an interval, followed from one to the next."""
+    def _values(self, start: float, stop: float, pair: Eigenvalue) -> tuple[Array, Eigenvalue]:
+        """Re λ at the Chebyshev points of an interval, continued from one to the next."""
         found = np.empty(len(NODES))
         along = start + 0.5 * (stop - start) * (1.0 + NODES)
         spectra = self.eigenvalues(self.here + self.way * along)
@@ -255,7 +255,7 @@ class Sheet:
         return found, pair
 
     def place(self, value: float) -> tuple[str, Array]:
-        """The region and the equilibrium at a value of the parameter."""
+        """Region and equilibrium at a value of the parameter."""
         regions, states = self.places(np.array([value]))
         return str(regions[0]), states[0]
 
@@ -265,7 +265,7 @@ class Sheet:
         return regions, states
 
     def eigenvalues(self, values: Array) -> NDArray[np.complex128]:
-        """Of the equilibria at values, shape (N, n); interpolated where there is no model."""
+        """Eigenvalues at values of the parameter, shape (N, n); interpolated without a model."""
         return self._solved(values)[2]
 
     def _solved(self, values: Array) -> tuple[NDArray[np.str_], Array, NDArray[np.complex128]]:
@@ -286,7 +286,7 @@ class Sheet:
         return regions, states, spectra
 
     def _rows_below(self, values: Array) -> NDArray[np.intp]:
-        """The lower row of the step in which each value lies."""
+        """Lower row of the step that contains each value."""
         k = np.searchsorted(self._steps, self.way * (values - self.here), side="right")
         k = np.clip(k, 1, len(self.rows) - 1)
         while (level := (k > 1) & (self._steps[k] == self._steps[k - 1])).any():
@@ -294,15 +294,15 @@ class Sheet:
         return np.minimum(self._numbers[k - 1], self._numbers[k])
 
 
-def _missing(piece: Piece, target: float, value: float) -> float:
+def _missing(piece: GrowthPiece, target: float, value: float) -> float:
     return piece.integral(value) - target
 
 
-def following(values: NDArray[np.complex128], pair: Followed, along: float) -> Followed:
-    """The eigenvalue that goes on from one, of two into which a pair splits the larger.
+def following(values: NDArray[np.complex128], pair: Eigenvalue, along: float) -> Eigenvalue:
+    """Continue an eigenvalue; of a pair that splits into two real ones, the larger.
 
-    Real ones pass through one another where one belongs to an invariant plane, so that the
-    nearest to the extrapolated one goes on.
+    Real eigenvalues cross where one belongs to an invariant plane, so that the eigenvalue
+    nearest to the extrapolated one is chosen.
     """
     upper = values[values.imag >= 0]
     step = along - pair.along
@@ -312,4 +312,4 @@ def following(values: NDArray[np.complex128], pair: Followed, along: float) -> F
         near = upper[(upper.imag == 0.0) & (apart <= 1.5 * apart.min())]
         chosen = complex(near[np.argmax(near.real)])
     slope = (chosen - pair.value) / step if step > 0.0 else pair.slope
-    return Followed(chosen, along, slope)
+    return Eigenvalue(chosen, along, slope)

@@ -1,4 +1,4 @@
-"""Delayed loss of stability in a slow passage through a Hopf point."""
+"""Delayed loss of stability in a slow passage through a Hopf bifurcation."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from fastslow.arguments import finite, instance, positive, validated
 from fastslow.passage.delays.buffer_points import buffer_of
 from fastslow.passage.delays.critical_modes import CriticalMode, critical_mode
 from fastslow.passage.delays.entry_exits import MEMORY, entry_exit, places
@@ -17,13 +16,6 @@ from fastslow.results.overlay.delays import HopfExit
 from fastslow.results.points import SpecialPoint
 
 
-@validated(
-    diagram=instance(Diagram),
-    point=instance(SpecialPoint),
-    entry=finite,
-    rate=finite,
-    gain=positive,
-)
 def hopf_exit(
     diagram: Diagram,
     point: SpecialPoint,
@@ -32,43 +24,22 @@ def hopf_exit(
     *,
     gain: float = 1.0,
 ) -> HopfExit:
-    """Where a trajectory that came to a sheet before a Hopf point leaves it behind the point.
+    """Exit point of a slow passage through a Hopf bifurcation (entry-exit function).
 
-    The amplitude falls as exp(∫ Re λ dp/rate) up to the Hopf point and grows as
-    long again: without noise the exit solves
+    The amplitude decreases as exp(∫ Re λ dp/rate) up to the Hopf point and increases after it.
+    Without noise the exit solves
 
         ∫ Re λ(p) dp = rate · ln gain    from the entry to the exit,
 
-    with the pair λ of the frozen equilibria along the branch (Neishtadt 1987; Baer,
-    Erneux and Rinzel 1989). A decay beyond about 30 is forgotten in rounding, and
-    the exit comes earlier than predicted. For analytic rates the buffer point, where
-    curves of constant ∫ Re λ dp in the complex parameter break, bounds the delay of a
-    branch that moves (Neishtadt 1988): it is computed where the pair stays complex.
+    with the critical pair λ of the frozen equilibria along the branch (Neishtadt 1987; Baer,
+    Erneux and Rinzel 1989). A decay exponent above about 30 brings the amplitude below
+    rounding, and the exit is earlier than predicted. For analytic rates on a branch that
+    depends on the parameter the buffer point, where curves of constant ∫ Re λ dp in the complex
+    parameter are interrupted, bounds the delay (Neishtadt 1988); it is computed where the
+    pair remains complex.
 
-    Parameters
-    ----------
-    diagram : Diagram
-        With the branch on both sides of the point.
-    point : SpecialPoint
-        A Hopf point of the diagram, code HB.
-    entry : float
-        The parameter where the trajectory comes to the sheet.
-    rate : float
-        Of the parameter, with its sign.
-    gain : float
-        Amplitude about the sheet at the exit by that at the entry.
-
-    Returns
-    -------
-    HopfExit
-        The delay is nan where the branch ends, turns or loses stability before.
-
-    Raises
-    ------
-    ArgumentError
-        For a point of another code or diagram, a rate of zero or towards the
-        stable side, an entry that is not on the sheet before the point, or a gain
-        that is not positive.
+    Parameters and errors are those of `fastslow.predict_delay`. The delay is nan if the branch
+    ends, reverses or loses stability before the exit.
 
     References
     ----------
@@ -89,7 +60,7 @@ def hopf_exit(
     mode = hopf_mode(diagram, point, 1 if speed > 0 else -1)
     if mode.before.first_growth() > 0:
         raise WrongWay(
-            f"rate = {speed:g}: the sheet before {point.label} is not stable in this direction; "
+            f"rate = {speed:g}: the branch before {point.label} is not stable in this direction; "
             f"expected rate {'<' if speed > 0 else '>'} 0"
         )
     found = entry_exit(
@@ -98,23 +69,23 @@ def hopf_exit(
         rate=speed,
         gain=gain,
         memory=MEMORY,
-        remembered="the exit at the amplitude of the entry",
-        lost="rounding decides: the amplitude falls by exp(−{decay}), below rounding and noise, "
-        "and the exit comes earlier than this",
+        remembered="exit at the amplitude of the entry",
+        lost="limited by rounding: the amplitude decreases by exp(−{decay}), below rounding and "
+        "noise, and the exit is earlier",
     )
     law = HopfExit(**found)
     return law if math.isnan(law.delay) else with_buffer(mode, law)
 
 
 def with_buffer(mode: CriticalMode, law: HopfExit) -> HopfExit:
-    """The law of a constant drift, bounded by the buffer point where that comes first."""
+    """Bound the exit for a constant drift by the buffer point if that comes first."""
     speed = abs(law.rate)
     buffer = buffer_of(mode, law.decay * speed)
     if not math.isfinite(buffer.level):
         return replace(law, validity=f"{law.validity}; {buffer.words}")
     at = mode.behind.where(buffer.level)
     if buffer.level / speed > MEMORY:
-        # rounding comes before it
+        # rounding limits the exit earlier
         return replace(law, buffer=at)
     return replace(
         law,
@@ -128,14 +99,14 @@ def with_buffer(mode: CriticalMode, law: HopfExit) -> HopfExit:
 
 
 def hopf_mode(diagram: Diagram, point: SpecialPoint, way: int) -> CriticalMode:
-    """The pair that crosses the imaginary axis, on both sides of a Hopf point.
+    """Critical pair of a Hopf point along both sides of the branch.
 
     Raises
     ------
     ArgumentError
         For a point of another code or diagram.
     """
-    require_code(point, "HB", "the exit after a Hopf point")
+    require_code(point, "HB", "the exit from a Hopf point")
     branch, row = next(places(diagram, point))
     values = branch.eigenvalues[row]
     turning = values[values.imag > 0]

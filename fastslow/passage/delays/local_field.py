@@ -35,11 +35,11 @@ Level = tuple[int, float] | str
 
 
 class WrongWay(ArgumentError):
-    """The parameter drifts towards the stable sheet and not off its end."""
+    """The parameter drifts towards the stable branch and not off its end."""
 
 
 @dataclass(frozen=True, eq=False)
-class Site:
+class LocalField:
     """A special point on the field of its frozen model.
 
     Parameters
@@ -105,7 +105,7 @@ def _affine(field: FrozenField, region: int) -> bool:
     )
 
 
-def site_of(point: SpecialPoint, parameter: object, model: Model | None) -> Site:
+def local_field_at(point: SpecialPoint, parameter: object, model: Model | None) -> LocalField:
     """Put a special point on the field of its model.
 
     Raises
@@ -140,7 +140,7 @@ def site_of(point: SpecialPoint, parameter: object, model: Model | None) -> Site
         raise unknown_name("parameter of the point", name, point.parameters)
     values = {n: point.parameters[n] for n in known if n in point.parameters}
     field = _field(model, name, tuple(sorted(values.items())))
-    return Site(point, field, np.append(point.state, point.parameters[name]))
+    return LocalField(point, field, np.append(point.state, point.parameters[name]))
 
 
 @lru_cache(maxsize=32)
@@ -174,7 +174,7 @@ def drift(rate: Any) -> float:
     return Drift(rate).rate
 
 
-def drift_of(site: Site, rate: float | Drift) -> Drift:
+def drift_of(local: LocalField, rate: float | Drift) -> Drift:
     """A rate or a drift as a drift, of the states of a site.
 
     Raises
@@ -185,7 +185,7 @@ def drift_of(site: Site, rate: float | Drift) -> Drift:
         For a state that the model has not.
     """
     drift = rate if isinstance(rate, Drift) else Drift(rate)
-    states = site.field.model.states
+    states = local.field.model.states
     for name in drift.by_state:
         if name not in states:
             raise unknown_name("state of the drift", name, states)
@@ -203,7 +203,7 @@ def level_argument(name: str, value: Any) -> Any:
 rate_argument = either(instance(Drift), finite)
 
 
-def level_of(site: Site, level: Any, drift: Drift) -> Level | None:
+def level_of(local: LocalField, level: Any, drift: Drift) -> Level | None:
     """The state of a level, by its number, and how far it is from the special point; or a turn."""
     if level is None:
         return None
@@ -219,28 +219,28 @@ def level_of(site: Site, level: Any, drift: Drift) -> Level | None:
             f"level = {level!r}; expected one state and its value, as in {{'x': 1}}, or 'turn'"
         )
     ((name, value),) = level.items()
-    states = site.field.model.states
+    states = local.field.model.states
     if str(name) not in states:
         raise unknown_name("state of the level", name, states)
     value = finite(f"level of {name}", value)
     number = states.index(str(name))
-    return number, value - float(site.u[number])
+    return number, value - float(local.u[number])
 
 
-def named_level(site: Site, level: Level | None) -> dict[str, float] | str | None:
+def named_level(local: LocalField, level: Level | None) -> dict[str, float] | str | None:
     """A level as it was given."""
     if level is None or isinstance(level, str):
         return level
     number, height = level
-    return {site.field.model.states[number]: float(site.u[number]) + height}
+    return {local.field.model.states[number]: float(local.u[number]) + height}
 
 
-def wrong_way(site: Site, rate: float) -> WrongWay:
-    """The error for a drift towards a stable sheet."""
-    name, way = site.field.parameter, "rising" if rate > 0 else "falling"
+def wrong_way(local: LocalField, rate: float) -> WrongWay:
+    """The error for a drift towards a stable branch."""
+    name, way = local.field.parameter, "rising" if rate > 0 else "falling"
     other = "rate < 0" if rate > 0 else "rate > 0"
     return WrongWay(
-        f"rate = {rate:g}: with {name} {way} no stable sheet ends at {site.point.label}; "
+        f"rate = {rate:g}: with {name} {way} no stable branch ends at {local.point.label}; "
         f"expected {other}"
     )
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.kernels.loops import load_loop
 from fastslow.passage.delays.drift_laws import DriftLaw, drift_law
-from fastslow.passage.delays.local_field import TURN, Site
+from fastslow.passage.delays.local_field import TURN, LocalField
 from fastslow.passage.delays.radau_passages import End, Law, Motion, space_for
 from fastslow.passage.loops import PASS_THROUGH
 from fastslow.results.overlay.drifts import Drift
@@ -37,36 +37,36 @@ class LocalDrift:
 
     Parameters
     ----------
-    site : Site
+    local : LocalField
     drift : Drift
     """
 
-    site: Site
+    local: LocalField
     drift: Drift
 
     @cached_property
     def gradient(self) -> Array:
         """By the states and by w, shape (n + 1,)."""
-        names = self.site.field.model.states
+        names = self.local.field.model.states
         return np.array([*(self.drift.by_state.get(n, 0.0) for n in names), self.drift.by_value])
 
     @cached_property
     def _law(self) -> DriftLaw | None:
-        names = (*self.site.field.model.states, self.site.field.parameter)
+        names = (*self.local.field.model.states, self.local.field.parameter)
         return drift_law(self.drift.law, names) if self.drift.law else None
 
     def __call__(self, z: Array, time: float) -> float:
         """Rate w' at z = (x − x*, w − w*)."""
         if self._law is not None:
-            return self._law.at(self.site.u + z, time)
+            return self._law.at(self.local.u + z, time)
         return float(self.drift.rate + self.drift.change * time + self.gradient @ z)
 
     def on_a_path(self, states: Array) -> Array:
         """Rate w' at states (N, n) with w = w* and t = 0, shape (N,)."""
         if self._law is not None:
-            here = np.full(len(states), float(self.site.u[-1]))
+            here = np.full(len(states), float(self.local.u[-1]))
             return self._law.along(np.column_stack([states, here]), np.zeros(len(states)))
-        rate = self.drift.rate + (states - self.site.u[:-1]) @ self.gradient[:-1]
+        rate = self.drift.rate + (states - self.local.u[:-1]) @ self.gradient[:-1]
         return np.asarray(rate, dtype=float)
 
     def numbers(self, start: float, stop: float) -> Law:
@@ -103,15 +103,17 @@ class Place:
     time: float
 
 
-def quasi_static(site: Site, drift: Drift, region: int, mu: float, guess: Array) -> Array | None:
+def quasi_static(
+    local: LocalField, drift: Drift, region: int, mu: float, guess: Array
+) -> Array | None:
     """(x − x*, μ) near a guess on the slow manifold of a region's stable branch, to first order.
 
     None where Newton's method finds no stable equilibrium.
     """
-    y, n = guess.copy(), site.n
+    y, n = guess.copy(), local.n
     jacobian = np.empty((n, n))
     for _ in range(60):
-        rates, slopes, _, _ = site.field.evaluate(region, site.u + np.append(y, mu))
+        rates, slopes, _, _ = local.field.evaluate(region, local.u + np.append(y, mu))
         jacobian = slopes[:, :n]
         try:
             step = np.linalg.solve(jacobian, -rates)
@@ -120,22 +122,22 @@ def quasi_static(site: Site, drift: Drift, region: int, mu: float, guess: Array)
         y = y + step
         if not np.isfinite(y).all():
             return None
-        if (np.abs(step) <= 1e-14 * (np.abs(y) + site.unit)).all():
+        if (np.abs(step) <= 1e-14 * (np.abs(y) + local.unit)).all():
             break
-    _, slopes, heights, _ = site.field.evaluate(region, site.u + np.append(y, mu))
-    count = len(site.field.interfaces)
-    if (site.field.signs[region, :count] * heights[:count] < 0).any():
+    _, slopes, heights, _ = local.field.evaluate(region, local.u + np.append(y, mu))
+    count = len(local.field.interfaces)
+    if (local.field.signs[region, :count] * heights[:count] < 0).any():
         return None
     jacobian = slopes[:, :n]
     if not np.linalg.eigvals(jacobian).real.max() < 0:
         return None
-    rate = LocalDrift(site, drift)(np.append(y, mu), _time_before(drift, mu))
+    rate = LocalDrift(local, drift)(np.append(y, mu), _time_before(drift, mu))
     lag = np.linalg.solve(jacobian, np.linalg.solve(jacobian, slopes[:, n])) * rate
     return np.append(y - lag, mu)
 
 
 def follow(
-    site: Site, drift: Drift, start: Place, stop: Event, *, span: float
+    local: LocalField, drift: Drift, start: Place, stop: Event, *, span: float
 ) -> tuple[Place, str]:
     """Integrate x' = F(x, w), w' of a drift, from a place to what ends the passage.
 
@@ -144,7 +146,7 @@ def follow(
 
     Parameters
     ----------
-    site : Site
+    local : LocalField
     drift : Drift
     start : Place
     stop : Event
@@ -159,16 +161,16 @@ def follow(
         Empty where the end was reached, else why it was not.
     """
     place, reason = start, ""
-    way, speed = drift.way, LocalDrift(site, drift)
+    way, speed = drift.way, LocalDrift(local, drift)
     if start.z[-1] * way < 0.0:
         begin = start.time if start.time < 0.0 else _time_before(drift, float(start.z[-1]))
         early = Place(start.region, start.z, begin)
-        place, reason = _legs(site, speed, early, None, way, span)
+        place, reason = _legs(local, speed, early, None, way, span)
         if reason:
             return place, reason
         # the drift before the point may take another time than it was given
         place = Place(place.region, place.z, 0.0)
-    return _legs(site, speed, place, stop, way, span)
+    return _legs(local, speed, place, stop, way, span)
 
 
 def _time_before(drift: Drift, mu: float) -> float:
@@ -179,26 +181,26 @@ def _time_before(drift: Drift, mu: float) -> float:
 
 
 def _legs(
-    site: Site, speed: LocalDrift, start: Place, stop: Event | None, way: float, span: float
+    local: LocalField, speed: LocalDrift, start: Place, stop: Event | None, way: float, span: float
 ) -> tuple[Place, str]:
     """Integrate from region to region until an event (or, without one, until w passes w*)."""
     place, final = start, start.time + span
     for _ in range(REGIONS):
-        place, met, reason = _leg(site, speed, place, stop, way, final)
+        place, met, reason = _leg(local, speed, place, stop, way, final)
         if reason or met < 0 or (stop is not None and met == stop.interface):
             return place, reason
-        across = site.field.neighbour(place.region, met)
-        if across is None or site.field.modes[across].sides is not None:
+        across = local.field.neighbour(place.region, met)
+        if across is None or local.field.modes[across].sides is not None:
             return place, "it leaves the regions of the model"
         place = Place(across, place.z, place.time)
     return place, "it goes through too many regions"
 
 
 def _leg(
-    site: Site, speed: LocalDrift, start: Place, stop: Event | None, way: float, final: float
+    local: LocalField, speed: LocalDrift, start: Place, stop: Event | None, way: float, final: float
 ) -> tuple[Place, int, str]:
     """Integrate within one region: where it ends, by which interface (−1: the event), why not."""
-    field, n = site.field, site.n
+    field, n = local.field, local.n
     count = len(field.interfaces)
     reach = abs(float(start.z[n])) or abs(speed.drift.rate * final)
     motion = Motion(
@@ -206,7 +208,7 @@ def _leg(
         start.region,
         field.values,
         field.compiled.size,
-        site.u,
+        local.u,
         np.ascontiguousarray(field.signs[start.region, :count]),
     )
     z, times = np.array(start.z, dtype=float), np.array([start.time, final], dtype=float)
@@ -216,7 +218,7 @@ def _leg(
         _end(stop, way),
         z,
         times,
-        np.append(site.unit, reach),
+        np.append(local.unit, reach),
         space_for(n, count, field.compiled.size),
     )
     return Place(start.region, z, float(times[0])), met, ("", TOO_LONG, FAILED)[status]
@@ -234,23 +236,23 @@ def _end(stop: Event | None, way: float) -> End:
 
 
 def reached_delay(
-    site: Site, drift: Drift, start: Place | None, stop: Event, span: float
+    local: LocalField, drift: Drift, start: Place | None, stop: Event, span: float
 ) -> tuple[float, float]:
     """How far past the point, along the drift, and when a passage ends; (nan, nan) if never."""
     if start is None:
         return math.nan, math.nan
-    place, reason = follow(site, drift, start, stop, span=span)
+    place, reason = follow(local, drift, start, stop, span=span)
     if reason:
         return math.nan, math.nan
     return drift.way * float(place.z[-1]), place.time
 
 
-def rounding(site: Site) -> float:
+def rounding(local: LocalField) -> float:
     """What the parameter is rounded by at a special point: no delay is known better."""
-    return 4.0 * float(np.spacing(abs(site.u[-1])))
+    return 4.0 * float(np.spacing(abs(local.u[-1])))
 
 
-def bound_of(site: Site, delay: float, passed: float, drift: Drift) -> tuple[float, str]:
+def bound_of(local: LocalField, delay: float, passed: float, drift: Drift) -> tuple[float, str]:
     """Bound on the error of a law, from the passage as integrated, and what to say of it."""
     if math.isnan(delay):
         return math.nan, ""
@@ -258,5 +260,5 @@ def bound_of(site: Site, delay: float, passed: float, drift: Drift) -> tuple[flo
         return math.nan, "; no error is stated, as the drift is not known in full"
     if math.isnan(passed):
         return math.nan, "; no error is stated"
-    error = SAFETY * abs(delay - passed) + NUMERICAL * abs(passed) + rounding(site)
+    error = SAFETY * abs(delay - passed) + NUMERICAL * abs(passed) + rounding(local)
     return error, f"; within {error:.2g}, by the passage integrated with this drift"

@@ -1,4 +1,4 @@
-"""Entry and exit along the slow path of a run: the growth integrated over time."""
+"""Entry-exit integral over time along the slow path of a run."""
 
 from __future__ import annotations
 
@@ -23,29 +23,28 @@ Array = NDArray[np.float64]
 #: Gauss points within one interval of time.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
-#: Intervals of time that the path is divided into, beside the steps of the run.
+#: Number of time intervals of the path, besides the steps of the run.
 INTERVALS = 400
 
-#: Intervals over which growth on the slow path of a feedback is compared with that of the branch.
+#: Intervals on which growth rates with and without the feedback of a slow state are compared.
 FEEDBACK = 48
 
 #: Bisections within an interval.
 BISECTIONS = 60
 
-#: Amplitudes are compared with their growth over these exponents next to the entry and the exit.
+#: Exponents next to entry and exit over which amplitudes are compared with their linear growth.
 COMPARED = (1.5, 3.0)
 
-#: An amplitude below this part of the lag behind the branch is not told from the terms of
-#: second order of the slow manifold.
+#: Amplitude, relative to the lag, below which the second-order terms of the slow manifold prevail.
 UNREADABLE = 1e-3
 
-#: The path is continued for so many times its length beyond the run.
+#: Length of the continuation of the path beyond the run, relative to the path.
 BEYOND = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class SlowPath:
-    """The slow quantity of a run from its entry on, and beyond what the run gives.
+    """Slow quantity of a run since the entry, continued beyond the run.
 
     Parameters
     ----------
@@ -53,11 +52,11 @@ class SlowPath:
     start : float
         Time of the entry.
     known : float
-        Time up to which the run itself gives the path.
+        Time up to which the path is that of the run.
     beyond : callable or None
-        Values at later times; None where nothing is known of them.
+        Values at later times; None if they are not known.
     source : str
-        Of the values beyond, in words.
+        Description of the source of the values beyond.
     """
 
     slow: SlowQuantity
@@ -67,7 +66,7 @@ class SlowPath:
     source: str
 
     def at(self, times: Array) -> Array:
-        """Values at times, nan where they are not known."""
+        """Values at times, nan if they are not known."""
         inside = times <= self.known
         found = np.full(len(times), np.nan)
         if inside.any():
@@ -85,22 +84,22 @@ class SlowPath:
         return float((other - one) / (pair[1] - pair[0]))
 
     def edges(self, stop: float) -> Array:
-        """Ends of intervals in each of which the path is smooth, from the entry to a time."""
+        """Ends of intervals on which the path is smooth, from the entry to a time."""
         run = self.slow.run
         even = np.linspace(self.start, stop, INTERVALS + 1)
         steps = np.asarray(run.step_starts) if self.slow.dense else np.empty(0)
         inside = steps[(steps > self.start) & (steps < min(stop, self.known))]
         every = np.unique(np.concatenate([even, inside, [min(self.known, stop)]]))
-        # intervals that are shorter than rounding hold nothing
+        # intervals of the length of rounding are dropped
         apart = np.diff(every) > 1e-13 * np.abs(every[1:])
         return np.asarray(every[np.r_[True, apart]])
 
 
 def path_of(mode: CriticalMode, slow: SlowQuantity, start: float, left: float) -> SlowPath:
-    """The path of a run that comes to a branch at a time and leaves it at another.
+    """Slow path of a run between entry and departure, continued beyond the run.
 
-    A forcing goes on, whatever the state does. The rate of a slow state is that of the
-    branch after the run has left it, if it depends on nothing else that moves.
+    A forcing is continued by its formula, a slow state by its rate on the branch after the
+    departure, if that depends on no other slow quantity.
     """
     run, model, name = slow.run, slow.run.symbolic_model, slow.name
     end = float(run.t[-1])
@@ -132,7 +131,7 @@ def _vectorised(function: Callable[..., Any]) -> Callable[[Array], Array]:
 def _along_the_branch(
     mode: CriticalMode, slow: SlowQuantity, rate: Callable[..., Any], left: float
 ) -> Callable[[Array], Array]:
-    """The solution of w' = g(X(w), w, t) from where the run leaves, nan beyond the branch."""
+    """Solution of w' = g(X(w), w, t) since the departure, nan beyond the branch."""
     from scipy.integrate import solve_ivp
 
     low, high = sorted((mode.before.end, mode.behind.end))
@@ -155,14 +154,14 @@ def _along_the_branch(
 
 @dataclass(frozen=True, eq=False)
 class Growth:
-    """The exponent ∫ Re λ(w(t)) dt from the entry on, at the edges of intervals of time.
+    """Exponent ∫ Re λ(w(t)) dt since the entry, at the edges of time intervals.
 
     Parameters
     ----------
     mode : CriticalMode
     path : SlowPath
     edges, exponent : ndarray
-        The exponent is nan from where the path leaves the branch.
+        The exponent is nan after the path leaves the range of the branch.
     """
 
     mode: CriticalMode
@@ -180,14 +179,14 @@ class Growth:
         return np.where(ahead, behind.rate(w), self.mode.before.rate(w))
 
     def at(self, time: float) -> float:
-        """The exponent at a time."""
+        """Exponent at a time."""
         k = min(max(int(np.searchsorted(self.edges, time)) - 1, 0), len(self.edges) - 2)
         half = 0.5 * (time - self.edges[k])
         inner = self.rate(self.edges[k] + half * (1.0 + NODES)) @ WEIGHTS * half
         return float(self.exponent[k] + inner)
 
     def first(self, level: float, since: float) -> float:
-        """The first time after another at which the exponent is at a level, nan if none."""
+        """First time after ``since`` at which the exponent reaches a level, else nan."""
         late = np.flatnonzero((self.edges > since) & (self.exponent >= level))
         if not len(late):
             return math.nan
@@ -199,7 +198,7 @@ class Growth:
         return sign_change(lambda time: self.at(time) - level, low, high, fine)
 
     def last(self, level: float, until: float) -> float:
-        """The last time of an edge before another at which the exponent is below a level."""
+        """Last edge before ``until`` at which the exponent is below a level, else nan."""
         early = np.flatnonzero((self.edges < until) & (self.exponent <= level))
         return float(self.edges[early[-1]]) if len(early) else math.nan
 
@@ -217,22 +216,22 @@ def growth_along(mode: CriticalMode, path: SlowPath, stop: float) -> Growth:
 
 @dataclass(frozen=True, eq=False)
 class PathExit:
-    """Where growth along a path has made up for the decay.
+    """Exit at which growth along a path balances the decay.
 
     Parameters
     ----------
     entry, exit : float
-        Values of the slow quantity; the exit is nan where there is none.
+        Values of the slow quantity; the exit is nan if there is none.
     passed, time : float
-        Times at which the branch loses stability for the last time, and of the exit.
+        Times of the last loss of stability of the branch, and of the exit.
     decay, gain : float
-        As those of `HopfExit`.
+        As in `HopfExit`.
     amplitude : float
-        At the entry, the states in their units; nan where it cannot be read.
+        Amplitude at the entry, states in their units; nan if it cannot be determined.
     error : float
-        Bound on the exit's error, nan where none is stated.
+        Error bound of the exit, nan without one.
     words : str
-        What the path and the amplitudes are known from.
+        Source of the path and the amplitudes.
     """
 
     entry: float
@@ -249,22 +248,22 @@ class PathExit:
 def path_exit(
     mode: CriticalMode, slow: SlowQuantity, start: float, small: float, left: float
 ) -> PathExit | None:
-    """Where a run should leave a branch that it came to at one time and left at another.
+    """Predict the exit of a run from a branch, given the times of entry and departure.
 
-    The amplitudes of the critical mode at both times are read off the run, about the
-    slow manifold to first order.
+    The amplitudes of the critical mode at both times are those of the run about the
+    first-order slow manifold.
 
     Parameters
     ----------
     mode : CriticalMode
     slow : SlowQuantity
     start, small, left : float
-        Times of the entry, where the run is last near the branch, and where it counts as left.
+        Times of the entry, of the last sample near the branch, and of the departure.
 
     Returns
     -------
     PathExit or None
-        None where the run is on neither side of the point in between.
+        None if the run leaves both sides of the point in between.
     """
     path = path_of(mode, slow, start, left)
     growth = growth_along(mode, path, max(left, path.known))
@@ -274,11 +273,11 @@ def path_exit(
     lowest = int(np.argmin(growth.exponent[inside]))
     passed, decay = _stability_lost(growth, lowest), -float(growth.exponent[lowest])
     first, last = _amplitude(growth, start), _amplitude(growth, left)
-    gain, words = last / first, "the amplitudes at the entry and where the run leaves"
+    gain, words = last / first, "with the amplitudes at entry and departure"
     if not math.isfinite(gain) or gain <= 0.0:
         gain, words = (
             1.0,
-            "the exit at the amplitude of the entry, which cannot be read off the run",
+            "exit at the amplitude of the entry, which cannot be determined from the run",
         )
     level = math.log(gain)
     at = growth.first(level, passed)
@@ -289,23 +288,23 @@ def path_exit(
             words += f"; beyond t = {path.known:.6g} along {path.source}"
     entry = float(path.at(np.array([start]))[0])
     if math.isnan(at):
-        why = "the branch or the path ends before growth has made up for the decay"
+        why = "the branch or the path ends before growth balances the decay"
         if path.beyond is None and not slow.laws and slow.name not in slow.run.forcing:
-            why += "; how the slow quantity would go on after the run leaves is not known"
+            why += "; the slow quantity after the departure is not known"
         nan = math.nan
         return PathExit(entry, nan, passed, nan, decay, gain, first, nan, f"none: {why}")
     value = float(path.at(np.array([at]))[0])
     error = math.nan
     if math.isfinite(first) and math.isfinite(last):
         if path.beyond is not None and growth.edges[-1] <= path.known:
-            # the error reaches farther than the exit
+            # the error bound needs the path beyond the exit
             growth = growth_along(mode, path, path.known + BEYOND * (path.known - start))
         error = _error(growth, entry, value, passed, at, level, (small, left))
     return PathExit(entry, value, passed, at, decay, gain, first, error, words)
 
 
 def _stability_lost(growth: Growth, lowest: int) -> float:
-    """When the path passes the point about the edge at which the exponent is lowest."""
+    """Time at which the path passes the point, near the smallest exponent."""
     behind, edges = growth.mode.behind, growth.edges
     low, high = (float(edges[min(max(lowest + k, 0), len(edges) - 1)]) for k in (-1, 1))
     for _ in range(BISECTIONS):
@@ -316,7 +315,7 @@ def _stability_lost(growth: Growth, lowest: int) -> float:
 
 
 def _amplitude(growth: Growth, time: float) -> float:
-    """Of the critical mode at a time of the run; nan where the lag is not told from it."""
+    """Amplitude of the critical mode at a time of the run; nan if the lag dominates it."""
     value, state = growth.path.slow.at(np.array([time]))
     rate = growth.path.rate(time)
     mode = growth.mode.at(float(value[0]))
@@ -336,7 +335,7 @@ def _error(
     level: float,
     leaving: tuple[float, float],
 ) -> float:
-    """From terms of first order, the feedback of a slow state, and amplitudes not small."""
+    """Error bound from first-order terms, feedback of a slow state, and finite amplitudes."""
     mode, path = growth.mode, growth.path
     speed = path.rate(min(passed, path.known))
     off = mode.exponent_error(entry, value, speed) + abs(_feedback(growth, at))
@@ -353,7 +352,7 @@ def _error(
 
 
 def _nonlinear(growth: Growth, small: float, left: float) -> float:
-    """What amplitudes of the run differ from their growth, next to the entry and to the exit."""
+    """Deviation of amplitudes from linear growth, next to the entry and the exit."""
     start = growth.path.start
     total = 0.0
     reached = growth.at(small)
@@ -371,7 +370,7 @@ def _nonlinear(growth: Growth, small: float, left: float) -> float:
 
 
 def _feedback(growth: Growth, at: float) -> float:
-    """What the feedback of a slow state adds to the exponent, by λ of all states together."""
+    """Contribution of the feedback of a slow state to the exponent, by λ of the full system."""
     slow = growth.path.slow
     model, name = slow.run.symbolic_model, slow.name
     if model is None or slow.laws or name in slow.run.forcing:

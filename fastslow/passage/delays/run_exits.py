@@ -1,4 +1,4 @@
-"""The entry-exit laws of a run: where it should leave a branch past a Hopf or branch point."""
+"""Entry-exit prediction along the path of a run, past a Hopf or branch point."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from fastslow.passage.delays.hopf_delays import hopf_mode, with_buffer
 from fastslow.passage.delays.path_exits import PathExit, path_exit
 from fastslow.passage.overlay.transitions import Passage
 from fastslow.results.overlay.delays import BranchPointExit, Delay, HopfExit
-from fastslow.results.overlay.transitions import StableSheet, Transition
+from fastslow.results.overlay.transitions import StableBranch, Transition
 from fastslow.results.points import SpecialPoint
 
-#: What a run forgets by its own tolerance is told within this factor of an amplitude.
+#: Factor between the tolerance of a run and the smallest amplitude it resolves.
 NOISY = 10.0
 
 
-#: A mode that loses stability, why its branch is invariant, and the decay that is remembered.
+#: Critical mode, reason for the invariance of its branch, largest decay exponent.
 Known = tuple[CriticalMode, str, float]
 
 
@@ -34,16 +34,16 @@ def exit_law(
     point: SpecialPoint,
     known: dict[tuple[str, int], Known | None],
 ) -> Delay | None:
-    """What entry-exit along its own path predicts for a transition; None where it does not hold.
+    """Predict the exit of a transition by the entry-exit integral along the run, else None.
 
-    The growth rate is integrated over time along the slow quantity of the run, from where
-    the motion came to the branch, however the load moved in between; amplitudes at both
-    ends are read off the run. ``known`` keeps the modes of points that are passed again.
+    The growth rate is integrated over time along the slow quantity of the run, from the
+    entry to the vicinity of the branch, for any variation of the forcing in between; the
+    amplitudes at both ends are those of the run. ``known`` caches the modes of points.
     """
     if t.land is t.leave:
-        # it never left
+        # no departure
         return None
-    left = next(sheet for sheet in p.sheets if sheet.label == t.from_sheet)
+    left = next(s for s in p.stable_branches if s.label == t.from_branch)
     way = int(p.outward(left, point))
     key = (point.label, way)
     if key not in known:
@@ -68,7 +68,7 @@ def _mode(p: Passage, point: SpecialPoint, way: int) -> Known:
 
 
 def _others(p: Passage) -> bool:
-    """Whether quantities other than the one of the diagram move in the fast rates."""
+    """Whether the fast rates depend on other slow quantities than the diagram's parameter."""
     run = p.slow.run
     moving = {n for n in run.columns if n != p.slow.name and n not in p.slow.states}
     if run.symbolic_model is None or p.slow.laws:
@@ -80,11 +80,11 @@ def _others(p: Passage) -> bool:
     )
 
 
-def _entry(p: Passage, t: Transition, left: StableSheet) -> float:
-    """When the motion came to the course of the sheet that it leaves."""
-    number = p.sheets.index(left)
-    course = next(c for c in p.m.courses if number in c.sheets)
-    on = np.isin(p.followed, course.sheets)
+def _entry(p: Passage, t: Transition, left: StableBranch) -> float:
+    """Time at which the arc of the stable branch left is first followed."""
+    number = p.stable_branches.index(left)
+    arc = next(c for c in p.m.arcs if number in c.stable_branches)
+    on = np.isin(p.followed, arc.stable_branches)
     away = np.flatnonzero(~on[: np.searchsorted(p.m.time, t.leave.time)])
     if not len(away):
         return float(p.m.time[0])
@@ -100,12 +100,12 @@ def _law(
     floor = _floor(p, found, memory)
     forgotten = bool(floor)
     if math.isfinite(found.exit):
-        words = f"along the path of the run, by {words}{remembered}"
+        words = f"along the path of the run, {words}{remembered}"
         if forgotten:
             error = math.nan
             words = (
-                f"{floor} decides: the amplitude falls by exp(−{found.decay:.0f}), below it, and "
-                "the exit comes at another place than this"
+                f"limited by {floor}: the amplitude decreases by exp(−{found.decay:.0f}), below "
+                "this limit, which changes the exit"
             )
         else:
             words += bound_in_words(error, " at these amplitudes")
@@ -131,7 +131,7 @@ def _law(
 
 
 def _constant(p: Passage) -> bool:
-    """Whether the slow quantity is a forcing of constant rate."""
+    """Whether the slow quantity is a forcing with constant rate."""
     model, name = p.slow.run.symbolic_model, p.slow.name
     if model is None or p.slow.laws or name not in p.slow.run.forcing:
         return False
@@ -147,9 +147,9 @@ def _rate(p: Passage, time: float) -> float:
 
 
 def _floor(p: Passage, found: PathExit, memory: float) -> str:
-    """What the entry is forgotten in, empty where it is remembered."""
+    """The limit below which the amplitude decays, empty if it remains above all of them."""
     if memory == UNDERFLOW:
-        return "the smallest number, 1e-300," if found.decay > memory else ""
+        return "the smallest number, 1e-300" if found.decay > memory else ""
     rtol = float(p.slow.run.settings.get("rtol", 0.0))
     known = math.isfinite(found.amplitude) and found.amplitude > 0.0
     start = math.log(found.amplitude) if known else 0.0

@@ -1,4 +1,4 @@
-"""Exponents and constants out of measured delays."""
+"""Fits of exponents and coefficients to measured delays."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.passage.delays.local_field import Site
+from fastslow.passage.delays.local_field import LocalField
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.overlay.delay_scaling import DelayScaling
-from fastslow.results.overlay.delays import BoundaryDelay, Delay, FoldDelay, GapTransit
+from fastslow.results.overlay.delays import BoundaryDelay, Delay, FoldDelay, GapCrossing
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ Terms = dict[str, tuple[Array, float]]
 
 
 def fitted(
-    site: Site,
+    local: LocalField,
     direction: int,
     event: str,
     eps: Array,
@@ -27,21 +27,21 @@ def fitted(
     laws: Sequence[Delay],
     outcomes: Sequence[Outcome],
 ) -> DelayScaling:
-    """Fit the terms of the law and the power of measured delays."""
+    """Fit the terms of the law and a power to measured delays."""
     terms, power, offset = _terms(laws[-1], eps)
     good = np.isfinite(delay) & (delay > 0)
     coefficients = np.full(len(terms), math.nan)
     if good.sum() >= len(terms):
         table = np.column_stack([values for values, _ in terms.values()])[good]
-        # equal relative weights: the smallest delays say most about the leading term
+        # equal relative weights: the smallest delays determine the leading term
         weighted = table / delay[good, None]
         coefficients = np.linalg.lstsq(weighted, np.ones(int(good.sum())))[0]
-    exponent, uncertainty, local = _power(eps, delay - offset * eps)
+    exponent, uncertainty, exponents = _power(eps, delay - offset * eps)
     if math.isnan(power):
         exponent = uncertainty = math.nan
     return DelayScaling(
-        site.point,
-        site.field.parameter,
+        local.point,
+        local.field.parameter,
         direction,
         event,
         eps,
@@ -53,14 +53,14 @@ def fitted(
         np.array([known for _, known in terms.values()]),
         exponent,
         uncertainty,
-        local,
+        exponents,
         power,
         tuple(outcomes),
     )
 
 
 def _terms(law: Delay, eps: Array) -> tuple[Terms, float, float]:
-    """Terms of a law with their predicted coefficients, its exponent, and its linear part."""
+    """Terms of a law with their predicted coefficients, its exponent and its linear part."""
     log = np.log(eps)
     if isinstance(law, FoldDelay):
         first, second, third = law.coefficients
@@ -70,7 +70,7 @@ def _terms(law: Delay, eps: Array) -> tuple[Terms, float, float]:
             "eps": (eps, third),
         }
         return terms, 2.0 / 3.0, 0.0
-    if isinstance(law, GapTransit):
+    if isinstance(law, GapCrossing):
         first = math.sqrt(2.0 * law.length / abs(law.slope))
         terms = {"eps^(1/2)": (np.sqrt(eps), first), "eps": (eps, law.relaxation)}
         return terms, 0.5, law.relaxation
@@ -82,16 +82,16 @@ def _terms(law: Delay, eps: Array) -> tuple[Terms, float, float]:
 
 
 def _power(eps: Array, size: Array) -> tuple[float, float, Array]:
-    """Exponent with uncertainty over all positive sizes, and between neighbours."""
+    """Fitted exponent with its uncertainty, and exponents between neighbours."""
     log = np.log(np.where(size > 0, size, math.nan))
-    local = np.diff(log) / np.diff(np.log(eps))
+    exponents = np.diff(log) / np.diff(np.log(eps))
     good = np.isfinite(log)
     if good.sum() < 2:
-        return math.nan, math.nan, local
+        return math.nan, math.nan, exponents
     x, y = np.log(eps[good]), log[good]
     x, y = x - x.mean(), y - y.mean()
     exponent = float(x @ y / (x @ x))
     left = y - exponent * x
     error = math.sqrt(float(left @ left) / max(len(x) - 2, 1) / float(x @ x))
-    farthest = float(np.abs(local[np.isfinite(local)] - exponent).max(initial=0.0))
-    return exponent, max(error, farthest), local
+    farthest = float(np.abs(exponents[np.isfinite(exponents)] - exponent).max(initial=0.0))
+    return exponent, max(error, farthest), exponents

@@ -24,13 +24,13 @@ from fastslow.errors import ArgumentError, FastSlowError
 from fastslow.model.model import Model
 from fastslow.passage.delays.boundary_delays import approach_of
 from fastslow.passage.delays.delay_laws import predict_delay
-from fastslow.passage.delays.local_field import Site, WrongWay, same_point, site_of
+from fastslow.passage.delays.local_field import LocalField, WrongWay, local_field_at, same_point
 from fastslow.passage.delays.scaling_fits import fitted
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.delay_scaling import DelayScaling
-from fastslow.results.overlay.delays import BoundaryDelay, FoldDelay, GapTransit
+from fastslow.results.overlay.delays import BoundaryDelay, FoldDelay, GapCrossing
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.point_types import POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint
@@ -40,18 +40,18 @@ from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration, integration_settings
 
 Array = NDArray[np.float64]
-Law = FoldDelay | BoundaryDelay | GapTransit
+Law = FoldDelay | BoundaryDelay | GapCrossing
 
-#: Error control of the runs, by default.
+#: Default error control of the runs.
 PRECISE = Integration(rtol=1e-13)
 
-#: A run starts where this many relaxation times of its sheet, integrated, lie before the point.
+#: Integrated number of relaxation times between the start of a run and the point.
 FORGOTTEN = 40.0
 
-#: A point found again over a shorter range differs by less than this part of its size.
+#: Relative difference of a point located again over a shorter range.
 AGAIN = 1e-7
 
-#: A run ends at this multiple of the predicted delay.
+#: End of a run as a multiple of the predicted delay.
 REACH = 4.0
 
 
@@ -75,33 +75,33 @@ def delay_scaling(
     integration: Integration = PRECISE,
     progress: bool = False,
 ) -> DelayScaling:
-    """Measure the delay past a special point at a range of rates, beside its law.
+    """Measure and predict the delay past a special point over a range of rates.
 
-    At each rate the frozen model's parameter drifts through the point, from the
-    quasi-static state on the stable sheet far enough before that the start is
-    forgotten; the delay is read where the trajectory reaches a level or an
-    interface, found on its series to rounding.
+    At each rate the parameter of the frozen model drifts through the point, from a
+    quasi-static state on the stable branch, far enough before the point for initial
+    transients to decay. The delay is measured where the trajectory reaches a level or an
+    interface, located to rounding on its Taylor series.
 
     Parameters
     ----------
     model : Model
-        The frozen model, or the full one to be frozen.
+        The frozen model, or the full model, which is then frozen.
     point : SpecialPoint
         A fold (LP) or a boundary equilibrium (BE).
     rates : array_like, shape (m,)
-        Speeds of the drift, positive; its direction is the one in which the stable
-        sheet ends (rising, where it goes on either way).
+        Positive speeds of the drift; its direction is the one in which the stable
+        branch ends (increasing if it ends in neither).
     level : mapping
-        One state and its value at which a jump counts as done, e.g. ``{"x": 1}``; at a
-        fold or a non-smooth fold. Persistence is measured at its interface, a gap
-        at the far one.
+        One state and its value that marks the end of a jump, e.g. ``{"x": 1}``, at a fold
+        or a non-smooth fold. Persistence is measured at the interface, a gap crossing at
+        the far interface.
     start : float, optional
         Value of the parameter at which every run starts.
     parameter : str or Symbol, optional
-        What drifts, by default the parameter of the point's diagram.
+        The drifting parameter, by default that of the point's diagram.
     integration : Integration
-        Error control of the runs, and where one of them stops; by default with
-        ``rtol=1e-13``, so that small delays keep their digits.
+        Error control and limits of the runs; by default ``rtol=1e-13``, as small delays
+        require.
     progress : bool
         Whether to show a progress bar.
 
@@ -112,8 +112,8 @@ def delay_scaling(
     Raises
     ------
     ArgumentError
-        For a point without a law of delay (see `predict_delay`), rates that are not
-        positive or equal, a missing level, or a start off the stable sheet.
+        For a point without a law of delay (see `predict_delay`), rates that are not positive
+        and distinct, a missing level, or a start that is not on the stable branch.
 
     Examples
     --------
@@ -125,25 +125,25 @@ def delay_scaling(
     array([0.668, 0.668])
     """
     eps = _speeds(rates)
-    site = site_of(point, parameter, model)
-    name = site.field.parameter
-    direction, first = _direction(site, eps[0], level)
+    local = local_field_at(point, parameter, model)
+    name = local.field.parameter
+    direction, first = _direction(local, eps[0], level)
     if isinstance(first, FoldDelay) and level is None:
         raise ArgumentError(
-            "the delay of a jump is that of reaching a level; give level={state: value}"
+            "the delay of a jump depends on the level that ends it; give level={state: value}"
         )
     laws = [first]
-    laws += [_law(site, direction * e, level) for e in eps[1:]]
-    ramp = site.field.model.with_ramp(name, direction * eps[0])
-    before = _starts(site, laws, start)
+    laws += [_law(local, direction * e, level) for e in eps[1:]]
+    ramp = local.field.model.with_ramp(name, direction * eps[0])
+    before = _starts(local, laws, start)
     delays, outcomes = [], []
     for law, (value, state) in zip(
         tqdm(laws, unit="rate", disable=not progress), before, strict=True
     ):
-        delay, outcome = _measured(ramp, site, law, value, state, integration)
+        delay, outcome = _measured(ramp, local, law, value, state, integration)
         delays.append(delay)
         outcomes.append(outcome)
-    return fitted(site, direction, _event(first), eps, np.array(delays), laws, outcomes)
+    return fitted(local, direction, _event(first), eps, np.array(delays), laws, outcomes)
 
 
 def _speeds(rates: ArrayLike) -> Array:
@@ -156,30 +156,30 @@ def _speeds(rates: ArrayLike) -> Array:
     return np.ascontiguousarray(eps)
 
 
-def _law(site: Site, rate: float, level: Mapping[Any, float] | None) -> Law:
-    if POINT_TYPES[site.point.code].law == "entry-exit":
+def _law(local: LocalField, rate: float, level: Mapping[Any, float] | None) -> Law:
+    if POINT_TYPES[local.point.code].law == "entry-exit":
         raise ArgumentError(
-            f"expected a fold (LP) or a boundary equilibrium (BE), received {site.point.label}, a "
-            f"{point_name(site.point.code)}, whose exit depends on the entry: see predict_delay"
+            f"expected a fold (LP) or a boundary equilibrium (BE), received {local.point.label}, a "
+            f"{point_name(local.point.code)}, whose exit depends on the entry: see predict_delay"
         )
     law = predict_delay(
-        site.point, rate, level=level, parameter=site.field.parameter, model=site.field.model
+        local.point, rate, level=level, parameter=local.field.parameter, model=local.field.model
     )
-    assert isinstance(law, FoldDelay | BoundaryDelay | GapTransit)
+    assert isinstance(law, FoldDelay | BoundaryDelay | GapCrossing)
     return law
 
 
-def _direction(site: Site, eps: float, level: Mapping[Any, float] | None) -> tuple[int, Law]:
-    """The direction in which the stable sheet ends, and the law for it."""
+def _direction(local: LocalField, eps: float, level: Mapping[Any, float] | None) -> tuple[int, Law]:
+    """Direction in which the stable branch ends, and the law for it."""
     try:
-        return 1, _law(site, eps, level)
+        return 1, _law(local, eps, level)
     except WrongWay:
-        return -1, _law(site, -eps, level)
+        return -1, _law(local, -eps, level)
 
 
 def _event(law: Law) -> str:
-    """What ends the delay, in words."""
-    if isinstance(law, GapTransit):
+    """Description of the event that ends the delay."""
+    if isinstance(law, GapCrossing):
         return f"{law.interfaces[1]} = 0"
     if law.level is None or (isinstance(law, BoundaryDelay) and law.subtype == "persistence"):
         return f"{law.point.interface} = 0"
@@ -188,20 +188,20 @@ def _event(law: Law) -> str:
     return f"{state} = {value:g}"
 
 
-def _starts(site: Site, laws: list[Law], start: float | None) -> list[tuple[float, Array]]:
-    """Value of the parameter and quasi-static state from which each run starts."""
-    name, here = site.field.parameter, float(site.u[-1])
+def _starts(local: LocalField, laws: list[Law], start: float | None) -> list[tuple[float, Array]]:
+    """Parameter value and quasi-static state at the start of each run."""
+    name, here = local.field.parameter, float(local.u[-1])
     way = 1.0 if laws[0].rate > 0 else -1.0
-    far = [_distance(site, law) for law in laws]
+    far = [_distance(local, law) for law in laws]
     if start is not None:
         if not (way * (here - start) > 0):
             side = "below" if way > 0 else "above"
             raise ArgumentError(f"start = {start:g}; expected a value {side} {name} = {here:g}")
         far = [abs(here - start)] * len(laws)
     ends = sorted((here - 1.02 * way * max(far), here + 0.05 * way * max(far)))
-    model = site.field.model
+    model = local.field.model
     diagram = continue_equilibria(model, name, (ends[0], ends[1]))
-    branch, rows = _stable_rows(site, diagram.branches, way, ends[1] - ends[0])
+    branch, rows = _stable_rows(local, diagram.branches, way, ends[1] - ends[0])
     found = []
     for law, distance in zip(laws, far, strict=True):
         value = here - way * distance
@@ -209,53 +209,55 @@ def _starts(site: Site, laws: list[Law], start: float | None) -> list[tuple[floa
         if not low <= value <= high:
             raise ArgumentError(
                 f"at rate {abs(law.rate):.3g} a run would start at {name} = {value:.6g}, but the "
-                f"stable sheet before {site.point.label} goes from {low:.6g} to {high:.6g}; give "
-                "smaller rates, or start="
+                f"stable branch before {local.point.label} extends from {low:.6g} to {high:.6g}; "
+                "give smaller rates, or start="
             )
         region = str(branch.region[rows[len(rows) // 2]])
         order = np.argsort(branch.parameter[rows])
-        across, sheet = branch.parameter[rows][order], branch.state[rows][order]
-        guess = np.array([np.interp(value, across, sheet[:, k]) for k in range(site.n)])
-        corrected = _corrected(site, diagram, region, guess, value)
-        _, slopes, _, _ = site.field.evaluate(site.region(region), np.append(corrected, value))
-        jacobian, slope = slopes[:, : site.n], slopes[:, site.n]
+        across, states = branch.parameter[rows][order], branch.state[rows][order]
+        guess = np.array([np.interp(value, across, states[:, k]) for k in range(local.n)])
+        corrected = _corrected(local, diagram, region, guess, value)
+        _, slopes, _, _ = local.field.evaluate(local.region(region), np.append(corrected, value))
+        jacobian, slope = slopes[:, : local.n], slopes[:, local.n]
         lag = np.linalg.solve(jacobian, np.linalg.solve(jacobian, slope)) * law.rate
         found.append((value, corrected - lag))
     return found
 
 
-def _corrected(site: Site, diagram: Diagram, region: str, guess: Array, value: float) -> Array:
-    """The equilibrium near a state, to rounding."""
+def _corrected(
+    local: LocalField, diagram: Diagram, region: str, guess: Array, value: float
+) -> Array:
+    """Equilibrium near a state, up to rounding."""
     solved = diagram.corrector(region, guess, value) if diagram.corrector is not None else None
     if solved is None:
         raise ArgumentError(
-            f"no equilibrium was found at {site.field.parameter} = {value:.6g} on the sheet before "
-            f"{site.point.label}"
+            f"no equilibrium found at {local.field.parameter} = {value:.6g} on the branch before "
+            f"{local.point.label}"
         )
     return solved.state
 
 
-def _distance(site: Site, law: Law) -> float:
-    """How far before the point the start is forgotten when the point is reached."""
+def _distance(local: LocalField, law: Law) -> float:
+    """Distance from the point over which initial transients decay."""
     speed = abs(law.rate)
     if isinstance(law, FoldDelay):
         # |λ| = 2 √(|ab| |μ|) next to the fold
         pull = math.sqrt(abs(law.quadratic * law.slope))
         return float((0.75 * FORGOTTEN * speed / pull) ** (2.0 / 3.0))
-    return FORGOTTEN * speed / abs(approach_of(site, Drift(law.rate)).stable)
+    return FORGOTTEN * speed / abs(approach_of(local, Drift(law.rate)).stable)
 
 
 def _stable_rows(
-    site: Site, branches: tuple[Branch, ...], way: float, length: float
+    local: LocalField, branches: tuple[Branch, ...], way: float, length: float
 ) -> tuple[Branch, NDArray[np.intp]]:
-    """The branch through the point, and its rows along the stable sheet before it.
+    """Branch through the point, and its rows on the stable branch before the point.
 
-    ``length`` is that of the range over which the branches were traced.
+    ``length`` is the length of the parameter range of the branches.
     """
-    name = site.field.parameter
+    name = local.field.parameter
     for branch in branches:
         for other, row in zip(branch.special, branch.special_rows, strict=True):
-            if not same_point(site.point, other, name, length, AGAIN):
+            if not same_point(local.point, other, name, length, AGAIN):
                 continue
             second = row + POINT_TYPES[other.code].two_rows
             for begin, step in ((row, -1), (second, 1)):
@@ -263,12 +265,12 @@ def _stable_rows(
                 if len(rows) > 1:
                     return branch, rows
     raise ArgumentError(
-        f"the stable sheet before {site.point.label} was not found; expected a point of this model"
+        f"no stable branch found before {local.point.label}; expected a point of this model"
     )
 
 
 def _monotone(branch: Branch, row: int, step: int, way: float) -> NDArray[np.intp]:
-    """Rows of one region from one on, as long as they are stable and lead back before the point."""
+    """Successive stable rows of one region, in the direction away from the point."""
     rows, stable, values = [row], branch.stable, branch.parameter
     following = row + step
     while 0 <= following < len(values):
@@ -281,11 +283,11 @@ def _monotone(branch: Branch, row: int, step: int, way: float) -> NDArray[np.int
 
 
 def _measured(
-    ramp: Model, site: Site, law: Law, value: float, state: Array, integration: Integration
+    ramp: Model, local: LocalField, law: Law, value: float, state: Array, integration: Integration
 ) -> tuple[float, Outcome]:
-    """The delay of one run, nan with the reason where there is none."""
-    name, speed = site.field.parameter, abs(law.rate)
-    ahead = abs(float(site.u[-1]) - value)
+    """Delay of one run; nan with the reason if the event is not reached."""
+    name, speed = local.field.parameter, abs(law.rate)
+    ahead = abs(float(local.u[-1]) - value)
     span = abs(law.delay) if math.isfinite(law.delay) else ahead
     model = ramp.with_parameters({f"{name}_rate": law.rate, f"{name}_start": value})
     end = (ahead + REACH * span) / speed
@@ -304,8 +306,8 @@ def _measured(
 
 
 def _hits(run: Trajectory, law: Law, passed: float) -> Section:
-    """Where the run reaches what ends the delay."""
-    if isinstance(law, GapTransit):
+    """Section of a run at the event that ends the delay."""
+    if isinstance(law, GapCrossing):
         found = run.section(interface=law.interfaces[1])
     elif law.level is None or (isinstance(law, BoundaryDelay) and law.subtype == "persistence"):
         found = run.section(interface=law.point.interface)

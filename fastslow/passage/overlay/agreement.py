@@ -1,4 +1,4 @@
-"""Whether a diagram and a run are of one model."""
+"""Check that a diagram and a run belong to the same model."""
 
 from __future__ import annotations
 
@@ -17,28 +17,27 @@ from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
-#: Rows of each branch at which rates that are written differently are compared.
+#: Rows of each branch at which differently written rates are compared.
 ROWS = 5
 
-#: A rate vanishes where what is left is this part of its change over the states of the branch;
-#: files of AUTO have few digits.
+#: Residual of an equilibrium relative to the change of the rates over the states of the branch;
+#: AUTO files have few digits.
 SAME = 1e-4
 
-#: Eigenvalues that differ by this part of the largest are different: of a double one only half the
-#: digits are known.
+#: Relative tolerance of eigenvalues; a double eigenvalue has half the digits.
 NEAR = 1e-2
 
 
 def require_one_model(diagram: Diagram, run: Trajectory) -> bool:
     """Raise if the rates of a diagram's states are not those of the run.
 
-    They are the same when they are written alike. Otherwise equilibria of the diagram, with
-    their eigenvalues, must be those of the run's model.
+    Rates that are written identically agree. Otherwise the equilibria of the diagram and
+    their eigenvalues must be those of the run's model.
 
     Returns
     -------
     bool
-        False where nothing could be compared: along a path, for a run that was read from a file.
+        False if a comparison was not possible: along a path, or for a run read from a file.
 
     Raises
     ------
@@ -70,15 +69,15 @@ def require_one_model(diagram: Diagram, run: Trajectory) -> bool:
 
 
 def _rates(equations: str) -> dict[str, str]:
-    """The right-hand sides of a model's text."""
+    """Right-hand sides in the text of a model."""
     lines = (line.strip().partition("' = ") for line in equations.splitlines())
     return {name: rate for name, equals, rate in lines if equals}
 
 
 def _agrees(model: Model, branch: Branch, diagram: Diagram) -> bool | None:
-    """Whether equilibria of a branch, with their eigenvalues, are those of a model.
+    """Whether equilibria of a branch and their eigenvalues are those of a model.
 
-    None for a branch of virtual or pseudo-equilibria, which are zeros of no rate as written.
+    None for a branch of virtual or pseudo-equilibria, which are not zeros of the rates.
     """
     regular = [k for k, name in enumerate(branch.region) if name in diagram.regions]
     if not branch.admissible or not regular:

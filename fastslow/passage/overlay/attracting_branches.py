@@ -1,4 +1,4 @@
-"""Stable sheets of a diagram, and the courses that they lie on, over the slow quantity."""
+"""Stable branches of a diagram, and the monotone arcs that contain them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.results.branch.branch import Branch, Sheet
+from fastslow.results.branch.branch import Branch, MonotonePiece
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.interpolation import Cubics, cubics
-from fastslow.results.overlay.transitions import StableSheet
+from fastslow.results.overlay.transitions import StableBranch
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
 
@@ -19,28 +19,28 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
-    """A run of a branch over which the parameter is monotone, across interfaces too.
+class Arc:
+    """Arc of a branch along which the parameter is monotone, possibly across interfaces.
 
     Parameters
     ----------
     branch : Branch
-    pieces : tuple of Sheet
-        One for each region, in order along the branch, the joints at boundary equilibria.
-    sheets : tuple of int
-        The stable sheets on it, as indices into those of the diagram.
-    ranges : ndarray, shape (len(sheets), 2)
-        The parameter's range on each of them.
+    pieces : tuple of MonotonePiece
+        One for each region, in order along the branch, joined at boundary equilibria.
+    stable_branches : tuple of int
+        Stable branches on the arc, as indices into those of the diagram.
+    ranges : ndarray, shape (len(stable_branches), 2)
+        Parameter range of each of them.
     """
 
     branch: Branch
-    pieces: tuple[Sheet, ...]
-    sheets: tuple[int, ...]
+    pieces: tuple[MonotonePiece, ...]
+    stable_branches: tuple[int, ...]
     ranges: Array
 
     @cached_property
     def _rows(self) -> NDArray[np.intp]:
-        """Rows in ascending order of the parameter; a joint stands twice."""
+        """Rows in ascending order of the parameter; a joint has two rows."""
         rows = np.concatenate([np.arange(p.start, p.stop) for p in self.pieces])
         values = self.branch.parameter
         return rows if values[rows[-1]] >= values[rows[0]] else rows[::-1]
@@ -65,29 +65,31 @@ class Course:
         return float(self._ordered[0]), float(self._ordered[-1])
 
     def present(self, slow: Array) -> NDArray[np.bool_]:
-        """Whether a stable sheet of the course exists at values of the parameter."""
+        """Whether the arc contains a stable equilibrium at values of the parameter."""
         found = np.zeros(len(slow), dtype=bool)
         for low, high in self.ranges.tolist():
             found |= (slow >= low) & (slow <= high)
         return found
 
-    def sheet(self, slow: Array) -> NDArray[np.intp]:
-        """Number of the stable sheet at (or nearest to) values of the parameter."""
+    def stable_branch(self, slow: Array) -> NDArray[np.intp]:
+        """Index of the stable branch at (or nearest to) values of the parameter."""
         low, high = self.ranges.T
         away = np.maximum(low - slow[:, None], slow[:, None] - high)
-        return np.asarray(self.sheets, dtype=np.intp)[np.argmin(np.maximum(away, 0.0), axis=1)]
+        return np.asarray(self.stable_branches, dtype=np.intp)[
+            np.argmin(np.maximum(away, 0.0), axis=1)
+        ]
 
     def fastest(self) -> float:
-        """Typical modulus of its largest finite eigenvalue."""
+        """Median modulus of the largest finite eigenvalue."""
         size = np.abs(self.branch.eigenvalues[self._rows])
         return float(np.median(np.where(np.isfinite(size), size, 0.0).max(axis=1)))
 
     def curve(self) -> Array:
-        """States and parameter of all its rows, shape (rows, n + 1)."""
+        """States and parameter of all rows, shape (rows, n + 1)."""
         return np.column_stack([self.branch.state[self._rows], self._ordered])
 
     def state(self, slow: Array) -> Array:
-        """Equilibria at values of the parameter, shape (N, n); at its end beyond the range."""
+        """Equilibria at values of the parameter, shape (N, n); constant beyond the range."""
         low, high = self.range
         slow = np.minimum(np.maximum(slow, low), high)
         return self._cubics.at(self._step(slow), slow)
@@ -110,9 +112,9 @@ class Course:
 
     @cached_property
     def _tangents(self) -> tuple[Array, Array, Array, Array]:
-        """Where each step begins, its width, and tangents at its lower and its upper row.
+        """Start and width of each step, and tangents at its lower and upper row.
 
-        Those of one step, in columns, point the same way.
+        The two tangents of a step, in columns, have the same orientation.
         """
         values, tangent = self._ordered, self.branch.tangent[self._rows]
         one, other = tangent[:-1], tangent[1:]
@@ -125,25 +127,25 @@ class Course:
         return np.interp(slow, self._ordered, self._leading)
 
     def stiffness(self, slow: Array) -> Array:
-        """Least modulus of the eigenvalues at values of the parameter, shape (N,)."""
+        """Smallest modulus of the eigenvalues at values of the parameter, shape (N,)."""
         return np.interp(slow, self._ordered, self._softest)
 
     def _step(self, slow: Array) -> NDArray[np.intp]:
-        """The step in which each of some values inside the range is."""
+        """Index of the step that contains each value inside the range."""
         return self._step_after[np.searchsorted(self._ordered, slow, side="right")]
 
     @cached_property
     def _step_after(self) -> NDArray[np.intp]:
-        """The step of a value that is not below so many rows."""
+        """Index of the step of a value, by the number of rows not above it."""
         place = np.clip(np.arange(len(self._ordered) + 1) - 1, 0, len(self._ordered) - 2)
-        # not between the two rows of a joint
+        # the two rows of a joint bound no step
         return np.where(self._ordered[place] == self._ordered[place + 1], place - 1, place)
 
 
-def courses_of(diagram: Diagram) -> tuple[tuple[StableSheet, ...], tuple[Course, ...]]:
-    """Stable sheets of every admissible branch, and the courses that they lie on."""
+def arcs_of(diagram: Diagram) -> tuple[tuple[StableBranch, ...], tuple[Arc, ...]]:
+    """Collect the stable branches of all admissible branches and their arcs."""
     found: list[tuple[int, int, int, str]] = []
-    members: list[tuple[Branch, list[Sheet], list[int]]] = []
+    members: list[tuple[Branch, list[MonotonePiece], list[int]]] = []
     for number, branch in enumerate(diagram.branches):
         if not branch.admissible:
             continue
@@ -162,50 +164,53 @@ def courses_of(diagram: Diagram) -> tuple[tuple[StableSheet, ...], tuple[Course,
                 members.append((branch, pieces, inside))
     counts = {f[3]: sum(g[3] == f[3] for g in found) for f in found}
     seen: dict[str, int] = {}
-    sheets = []
+    stable_branches = []
     for number, start, stop, region in found:
         seen[region] = seen.get(region, 0) + 1
         label = region if counts[region] == 1 else f"{region}.{seen[region]}"
-        sheets.append(StableSheet(label, number, start, stop, region))
-    courses = []
+        stable_branches.append(StableBranch(label, number, start, stop, region))
+    arcs = []
     for branch, pieces, inside in members:
-        ends = [sorted(branch.parameter[[sheets[k].start, sheets[k].stop - 1]]) for k in inside]
-        courses.append(Course(branch, tuple(pieces), tuple(inside), np.array(ends)))
-    return tuple(sheets), tuple(courses)
+        ends = [
+            sorted(branch.parameter[[stable_branches[k].start, stable_branches[k].stop - 1]])
+            for k in inside
+        ]
+        arcs.append(Arc(branch, tuple(pieces), tuple(inside), np.array(ends)))
+    return tuple(stable_branches), tuple(arcs)
 
 
-def _monotone(branch: Branch) -> list[list[Sheet]]:
-    """Sheets of a branch, those joined that follow each other with the parameter in one sense."""
-    joined: list[list[Sheet]] = []
+def _monotone(branch: Branch) -> list[list[MonotonePiece]]:
+    """Monotone pieces of a branch, joined where the parameter continues in one direction."""
+    joined: list[list[MonotonePiece]] = []
     sense = 0.0
-    for sheet in branch.sheets():
-        values = branch.parameter[[sheet.start, sheet.stop - 1]]
+    for piece in branch.monotone_pieces():
+        values = branch.parameter[[piece.start, piece.stop - 1]]
         now = float(np.sign(values[1] - values[0]))
-        touching = joined and joined[-1][-1].stop == sheet.start
-        if touching and now == sense and branch.parameter[sheet.start - 1] == values[0]:
-            joined[-1].append(sheet)
+        touching = joined and joined[-1][-1].stop == piece.start
+        if touching and now == sense and branch.parameter[piece.start - 1] == values[0]:
+            joined[-1].append(piece)
         else:
-            joined.append([sheet])
+            joined.append([piece])
         sense = now
     return joined
 
 
-def ends_of(diagram: Diagram, sheet: StableSheet) -> list[SpecialPoint]:
-    """The special points at which a sheet ends."""
-    branch = diagram.branches[sheet.branch]
-    low, high = sorted(branch.parameter[[sheet.start, sheet.stop - 1]])
+def ends_of(diagram: Diagram, stable_branch: StableBranch) -> list[SpecialPoint]:
+    """Special points at which a stable branch ends."""
+    branch = diagram.branches[stable_branch.branch]
+    low, high = sorted(branch.parameter[[stable_branch.start, stable_branch.stop - 1]])
     near = 1e-9 * max(abs(low), abs(high), high - low)
     return [
         point
         for point, row in zip(branch.special, branch.special_rows, strict=True)
         if POINT_TYPES[point.code].changes_stability
-        and sheet.start - 1 <= row <= sheet.stop
+        and stable_branch.start - 1 <= row <= stable_branch.stop
         and min(abs(point[diagram.parameter] - low), abs(point[diagram.parameter] - high)) <= near
     ]
 
 
-def over_a_gap(diagram: Diagram, one: StableSheet, other: StableSheet) -> bool:
-    """Whether two sheets are joined by a continuum: rows of one branch at one parameter value."""
+def over_a_gap(diagram: Diagram, one: StableBranch, other: StableBranch) -> bool:
+    """Whether a continuum joins two stable branches: rows at one parameter value."""
     if one.branch != other.branch:
         return False
     first, second = sorted((one, other), key=lambda s: s.start)

@@ -1,4 +1,4 @@
-"""What the rhythm of a run is called."""
+"""Classification of bursting and relaxation oscillations."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from fastslow.passage.overlay.cycle_ends import CycleEnd
 from fastslow.results.overlay.transitions import Bursting, Phase, Transition
 from fastslow.results.points import SpecialPoint
 
-#: Kinds of transition that a relaxation oscillation consists of.
-LEAVING = ("jump", "gap crossing", "grazing", "Hopf")
+#: Kinds of transition in a relaxation oscillation.
+DEPARTURES = ("jump", "gap crossing", "grazing", "Hopf")
 
-#: A rhythm repeats at least once.
+#: Smallest number of bursts to classify.
 TWICE = 2
 
-#: Of a start or end that nothing explains.
+#: Onset or end without an identified bifurcation.
 UNKNOWN = "unclassified"
 
 
 @dataclass(frozen=True, eq=False)
 class Burst:
-    """A complete oscillating phase, with what starts and what ends it."""
+    """Complete oscillating phase with its onset and end."""
 
     phase: Phase
     start: Transition
@@ -31,36 +31,35 @@ class Burst:
 
 
 def bursting_of(bursts: Sequence[Burst], transitions: Sequence[Transition]) -> Bursting | None:
-    """Name a rhythm after the bifurcations that start and end its oscillating phases.
+    """Classify bursting by the bifurcations at the onset and the end of oscillating phases.
 
-    The start is the special point at which the branch is left, the end is that of the cycle;
-    where one of them is not known the burst is unclassified.
+    The onset is the special point at which the stable branch is left, the end that of the
+    cycle; a burst without one of them is unclassified.
 
     Bursts on a cycle are named as by E. M. Izhikevich, International Journal of
-    Bifurcation and Chaos 10(6), 1171-1266, 2000: start/end. Where it is
-    the oscillation in which a trajectory settles on the next sheet (point-point
-    bursting there), the names of the two leavings take their place, and without
-    oscillations the rhythm is a relaxation oscillation.
+    Bifurcation and Chaos 10(6), 1171-1266, 2000: onset/end. If the oscillation decays onto
+    the next stable branch (point-point bursting), the two departures give the name, and
+    without oscillations the run is a relaxation oscillation.
 
     Parameters
     ----------
     bursts : sequence of Burst
         In order of time.
     transitions : sequence of Transition
-        All of the run.
+        All transitions of the run.
 
     Returns
     -------
     Bursting or None
-        None where there is no rhythm: no two oscillating phases on a cycle, each from a stable
-        branch to one, and no two branches that are left in turn.
+        None without a recurrent pattern: fewer than two oscillating phases on a cycle between
+        stable branches, and no two branches that are left in turn.
     """
     cycles = [b for b in bursts if b.end is not None]
     if cycles:
         return _on_cycles(cycles) if len(cycles) >= TWICE else None
-    between = [t for t in transitions if t.kind in LEAVING]
-    between = [t for t in between if t.from_sheet != t.to_sheet and t.to_sheet]
-    if len({t.from_sheet for t in between}) < 2:
+    between = [t for t in transitions if t.kind in DEPARTURES]
+    between = [t for t in between if t.from_branch != t.to_branch and t.to_branch]
+    if len({t.from_branch for t in between}) < 2:
         return None
     leavings = list(dict.fromkeys(_start(t) for t in between[-2:]))
     pair = "/".join(leavings * 2 if len(leavings) == 1 else leavings)
@@ -68,7 +67,7 @@ def bursting_of(bursts: Sequence[Burst], transitions: Sequence[Transition]) -> B
     specials = [t.special for t in between[-2:]]
     mirrored = _mirrored(specials[0], specials[1])
     symmetric = "symmetric " if mirrored else ""
-    evidence = [f"{_at(t)}, from {t.from_sheet} to {t.to_sheet}" for t in between[-2:]]
+    evidence = [f"{_at(t)}, from {t.from_branch} to {t.to_branch}" for t in between[-2:]]
     gaps = all(t.kind == "gap crossing" for t in between)
     if mirrored and not gaps:
         evidence.append("both points have the same eigenvalues and normal form: a symmetric pair")
@@ -81,17 +80,18 @@ def bursting_of(bursts: Sequence[Burst], transitions: Sequence[Transition]) -> B
     if counts:
         evidence.append(_settling(counts))
         return Bursting(f"{symmetric}{pair} bursting (point-point)", tuple(evidence))
-    evidence.append("no oscillation of the fast states between the sheets")
+    evidence.append("no oscillation of the fast states between the stable branches")
     return Bursting(f"relaxation oscillation ({symmetric}{pair})", tuple(evidence))
 
 
 def _settling(counts: Sequence[int]) -> str:
     low, high = min(counts), max(counts)
-    return f"{low if low == high else f'{low} to {high}'} oscillations while settling on a sheet"
+    count = low if low == high else f"{low} to {high}"
+    return f"{count} oscillations decaying onto a stable branch"
 
 
 def _on_cycles(bursts: Sequence[Burst]) -> Bursting:
-    # the first may still bear the marks of the start
+    # the first burst may still depend on the initial state
     steady = bursts[1:] if len(bursts) > 1 else bursts
     names: list[str] = []
     evidence: list[str] = []
@@ -100,9 +100,9 @@ def _on_cycles(bursts: Sequence[Burst]) -> Bursting:
         name = _named(_start(b.start), b.end.name)
         if name not in names:
             names.append(name)
-            evidence.append(f"starts: {_at(b.start)}")
+            evidence.append(f"onset: {_at(b.start)}")
             end = "" if b.end.special is None else f"at {b.end.special.label}, "
-            evidence.append(f"ends: {end}{b.end.evidence}")
+            evidence.append(f"end: {end}{b.end.evidence}")
     counts = [b.phase.oscillations for b in steady]
     low, high = min(counts), max(counts)
     evidence.append(f"{low if low == high else f'{low} to {high}'} oscillations in a burst")
@@ -113,15 +113,15 @@ def _on_cycles(bursts: Sequence[Burst]) -> Bursting:
 
 
 def _named(start: str, end: str) -> str:
-    """The class of a burst; none where one of the two bifurcations is not known."""
+    """Class of a burst; unclassified if one of the two bifurcations is not known."""
     if UNKNOWN not in (start, end):
         return f"{start}/{end} bursting"
-    known = [f"starts: {start}"] * (start != UNKNOWN) + [f"ends: {end}"] * (end != UNKNOWN)
-    return f"unclassified bursting ({', '.join(known) or 'start and end not known'})"
+    known = [f"onset: {start}"] * (start != UNKNOWN) + [f"end: {end}"] * (end != UNKNOWN)
+    return f"unclassified bursting ({', '.join(known) or 'onset and end not known'})"
 
 
 def _start(t: Transition) -> str:
-    """What a leaving is called in a name."""
+    """Name of a departure in a class of bursting."""
     point = t.special
     if t.kind == "gap crossing":
         return "gap crossing"
@@ -139,7 +139,7 @@ def _start(t: Transition) -> str:
 def _at(t: Transition) -> str:
     if t.special is None:
         return f"{t.kind} at {t.value:.4g}"
-    words = f"leaves at {t.special.label}"
+    words = f"departure at {t.special.label}"
     return words + (f" with delay {t.delay:.3g}" if np.isfinite(t.delay) else "")
 
 

@@ -1,4 +1,4 @@
-"""How an oscillating phase ends: what the fast cycle does before it, and what lies there."""
+"""Classification of the ends of oscillating phases."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from fastslow.passage.overlay.attracting_branches import ends_of
 from fastslow.passage.overlay.excursions import Excursion
 from fastslow.passage.overlay.frozen_cycles import FrozenEnd, frozen_end
-from fastslow.passage.overlay.spikes import turns_of
+from fastslow.passage.overlay.spikes import extrema_of
 from fastslow.passage.overlay.transitions import Passage
 from fastslow.results.angles import apart
 from fastslow.results.overlay.transitions import OSCILLATING, Transition
@@ -18,25 +18,25 @@ from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.crossings import Crossing
 
-#: Amplitudes that sink below this part of their largest say that the cycle shrinks to a point.
+#: Relative amplitude below which the cycle is taken to shrink to a point.
 SHRUNK = 0.5
 
-#: Intervals that grow to this many times their median say that the cycle's period grows.
+#: Ratio of the last interval to the median above which the period is taken to increase.
 SLOWED = 1.5
 
-#: A forcing turns round by more than this fraction of its range.
+#: Relative prominence of an extremum of a forcing.
 WIGGLE = 0.02
 
-#: A slow forcing turns round no more often than once in so many oscillations.
+#: Smallest number of oscillations per extremum of a slow forcing.
 OSCILLATIONS = 2
 
-#: A saddle is met when the last oscillation passes it within this many radii.
-MET = 1.0
+#: Largest distance of the last oscillation from a saddle of a homoclinic candidate, in radii.
+SADDLE_DISTANCE = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class CycleEnd:
-    """The end of an oscillating phase on a cycle.
+    """End of an oscillating phase on a cycle.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class CycleEnd:
         ``"Hopf"``, ``"homoclinic"``, ``"circle"``, ``"grazing (candidate)"``,
         ``"fold cycle (candidate)"``, ``"homoclinic (candidate)"`` or ``"unclassified"``.
     special : SpecialPoint or None
-        The Hopf point, where there is one.
+        The Hopf point, if any.
     evidence : str
     """
 
@@ -54,27 +54,28 @@ class CycleEnd:
 
 
 def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], FrozenEnd | None]) -> CycleEnd:
-    """What ends the fast cycle of an excursion that lands on a sheet.
+    """Classify the end of the fast cycle of an excursion that lands on a stable branch.
 
-    A supercritical Hopf point ends it where the sheet landed on begins there and the amplitude
-    shrinks; else it is a bifurcation of the cycle itself, which equilibria do not
-    show. It is named by the cycle of the frozen fast subsystem, followed towards its end
-    (`frozen_end`), once for each pair of sheets. Where the frozen model is not known, it is
-    named by the run alone, and is a candidate: its period grows towards a saddle
-    (homoclinic), it reaches an interface (grazing), or neither (fold of cycles).
+    The cycle ends at a supercritical Hopf point if the stable branch of the landing begins
+    there and the amplitude decreases; otherwise at a bifurcation of the cycle itself, which the
+    equilibria do not show. It is identified by continuation of the cycle of the frozen fast
+    subsystem towards its end (`frozen_end`), once for each pair of stable branches. Without
+    the frozen model it is a candidate identified from the run alone: the period increases
+    towards a saddle (homoclinic), the cycle reaches an interface (grazing), or neither (fold of
+    cycles).
 
     Parameters
     ----------
     p : Passage
     e : Excursion
     known : dict
-        Ends of the frozen cycle by the sheets left and landed on; what is found is added.
+        Cache of ends of the frozen cycle by the labels of the old and the new stable branch.
     """
     assert e.new is not None
     name = p.diagram.parameter
-    entered = p.sheets[p.followed[e.new.start]]
+    entered = p.stable_branches[p.followed[e.new.start]]
     sizes, intervals = np.array(e.sizes), np.diff(e.turns)
-    last = p.moment(e.turns[-1])
+    last = p.state_at(e.turns[-1])
     size = float(sizes[-1] / sizes.max())
     words = [f"the last oscillation has {size:.0%} of the largest amplitude"]
     growth = float(intervals[-1] / np.median(intervals)) if len(intervals) > 2 else float("nan")
@@ -97,23 +98,28 @@ def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], FrozenEnd |
         words.append(f"nearest special point {closest.label}, {away:.3g} away")
     distance = _saddle(p, e, last.value)
     if distance is not None:
-        words.append(f"the last oscillation passes a saddle at {distance:.2g} of the extent")
+        words.append(f"the last oscillation passes a saddle within {distance:.2g} of the extent")
     reached = _first_reached(p, e)
     if reached is not None:
         words.append(f"{reached.interface} is reached for the first time at t = {reached.time:.6g}")
     frozen = None
     if e.old is not None and slowly(p, e):
-        sheets = p.sheets[p.followed[e.old.stop - 1]].label, entered.label
-        if sheets not in known:
-            known[sheets] = frozen_end(p, e.turns)
-        frozen = known[sheets]
+        stable_branches = p.stable_branches[p.followed[e.old.stop - 1]].label, entered.label
+        if stable_branches not in known:
+            known[stable_branches] = frozen_end(p, e.turns)
+        frozen = known[stable_branches]
     if frozen is not None:
         words.append(frozen.evidence)
         ended = "grazing" if reached is not None else "fold cycle"
         cause = f"{ended} (candidate)" if frozen.name == "fold cycle (candidate)" else frozen.name
         return CycleEnd(cause, None, "; ".join(words))
     steady = not growth > SLOWED and size >= SHRUNK and np.isfinite(growth)
-    if growth > SLOWED and size >= SHRUNK and distance is not None and distance < MET * p.m.radius:
+    if (
+        growth > SLOWED
+        and size >= SHRUNK
+        and distance is not None
+        and distance < SADDLE_DISTANCE * p.m.radius
+    ):
         return CycleEnd("homoclinic (candidate)", None, "; ".join(words))
     if steady:
         cause = "fold cycle" if reached is None else "grazing"
@@ -122,27 +128,27 @@ def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], FrozenEnd |
 
 
 def slowly(p: Passage, e: Excursion) -> bool:
-    """Whether the slow quantity is slow beside an oscillation: it turns round more rarely."""
+    """Whether the slow quantity has fewer extrema than the oscillation."""
     if not p.slow.laws and p.slow.name not in p.slow.run.forcing:
         return True
     start, stop = e.rows(p.m)
-    turns = turns_of(p.m.slow[start:stop], WIGGLE * p.m.span)
+    turns = extrema_of(p.m.slow[start:stop], WIGGLE * p.m.span)
     return OSCILLATIONS * len(turns.rows) <= len(e.turns)
 
 
 def _first_reached(p: Passage, e: Excursion) -> Crossing | None:
-    """A crossing at the end of the last oscillations of an interface that no earlier one met."""
+    """Crossing in the last oscillation of an interface that no earlier oscillation reaches."""
     start, _ = e.rows(p.m)
     crossings = [c for c in p.slow.run.crossings if p.m.time[start] <= c.time]
     before = {c.interface for c in crossings if c.time < e.turns[-2]}
-    # the one after the last maximum is where the cycle is left
+    # crossings after the last maximum belong to the last oscillation
     end = 2.0 * e.turns[-1] - e.turns[-2]
     last = (c for c in crossings if e.turns[-2] <= c.time <= end)
     return next((c for c in last if c.interface not in before), None)
 
 
 def _saddle(p: Passage, e: Excursion, value: float) -> float | None:
-    """Scaled distance at which the last oscillation passes a saddle."""
+    """Scaled distance of the last oscillation from the nearest saddle."""
     low, high = p.diagram.over
     if not low <= value <= high:
         return None
@@ -160,13 +166,13 @@ def _saddle(p: Passage, e: Excursion, value: float) -> float | None:
 
 
 def ending(p: Passage, e: Excursion, end: CycleEnd) -> Transition:
-    """The transition from an oscillating phase to the sheet that is followed after it."""
+    """Transition from an oscillating phase to the stable branch followed afterwards."""
     assert e.new is not None
-    last = p.moment(e.turns[-1])
-    entered = p.sheets[p.followed[e.new.start]]
+    last = p.state_at(e.turns[-1])
+    entered = p.stable_branches[p.followed[e.new.start]]
     delay = float("nan")
     if end.special is not None:
-        # past the Hopf point in the sense of the drift, into the sheet
+        # past the Hopf point in the direction of the drift, onto the stable branch
         delay = -p.delay(entered, end.special, last.value)
     return Transition(
         last.time,

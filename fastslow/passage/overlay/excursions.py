@@ -1,4 +1,4 @@
-"""What a trajectory does between two stays on sheets: jump, oscillate, or settle by oscillating."""
+"""Intervals between two episodes of following: jumps, oscillations, decaying oscillations."""
 
 from __future__ import annotations
 
@@ -7,37 +7,37 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.passage.overlay.following import Measured, Stay
-from fastslow.passage.overlay.spikes import PROMINENT, refined, turns_of
+from fastslow.passage.overlay.following import Episode, Measured
+from fastslow.passage.overlay.spikes import PROMINENT, extrema_of, refined
 from fastslow.results.overlay.transitions import Phase
 
 Array = NDArray[np.float64]
 
-#: So many oscillations make an oscillating phase.
+#: Smallest number of oscillations in an oscillating phase.
 LEAST = 2
 
-#: An oscillation decays when its last rise is below this part of its largest.
+#: An oscillation decays if its last rise is below this fraction of the largest.
 DECAYED = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Excursion:
-    """The samples between two stays.
+    """Samples between two episodes.
 
     Parameters
     ----------
-    old, new : Stay or None
-        The stays before and after; None at the start and at the end of the run.
+    old, new : Episode or None
+        Episodes before and after; None at the start and at the end of the run.
     turns : tuple of float
         Times of the maxima in between.
     sizes : tuple of float
-        The rise to each of them, in units of the state.
+        Rise to each of them, in units of the state.
     cycle : bool
-        Whether it is an oscillating phase that settles on no sheet.
+        Whether it is an oscillating phase that does not decay onto a stable branch.
     """
 
-    old: Stay | None
-    new: Stay | None
+    old: Episode | None
+    new: Episode | None
     turns: tuple[float, ...]
     sizes: tuple[float, ...]
     cycle: bool
@@ -47,7 +47,7 @@ class Excursion:
         return len(self.turns) >= LEAST
 
     def rows(self, m: Measured) -> tuple[int, int]:
-        """First sample of it, and the first after it."""
+        """First sample of the excursion, and the first after it."""
         return (
             0 if self.old is None else self.old.stop,
             len(m.time) if self.new is None else self.new.start,
@@ -56,14 +56,14 @@ class Excursion:
 
 @dataclass(frozen=True, eq=False)
 class Oscillation:
-    """Every maximum of the observed state that is prominent, and every minimum.
+    """Prominent maxima and minima of the observed state.
 
     Parameters
     ----------
     times, sizes : ndarray, shape (K,)
-        Times of the turns, and how far the state moved to each from the turn before.
+        Times of the extrema, and the change of the state since the previous extremum.
     upper : ndarray of bool, shape (K,)
-        Whether each is a maximum.
+        Whether it is a maximum.
     """
 
     times: Array
@@ -72,14 +72,14 @@ class Oscillation:
 
 
 def oscillation_of(m: Measured, observed: int) -> Oscillation:
-    """Turns of the observed state over the whole run; of an angle those of its sine."""
+    """Extrema of the observed state over the whole run; of an angle those of its sine."""
     values = m.scaled[:, observed] * m.extent[observed]
     if m.periods[observed] > 0:
         values = np.sin(2.0 * np.pi * m.scaled[:, observed] / m.periods[observed])
     reach = float(np.ptp(values))
-    # what moves by rounding only has no turns
+    # variations by rounding have no extrema
     least = PROMINENT * reach if reach > 1e-9 * float(np.abs(values).max(initial=0.0)) else 0.0
-    turns = turns_of(values, least)
+    turns = extrema_of(values, least)
     if not len(turns.rows):
         return Oscillation(np.empty(0), np.empty(0), turns.upper)
     first = values[: turns.rows[0] + 1]
@@ -88,20 +88,22 @@ def oscillation_of(m: Measured, observed: int) -> Oscillation:
     return Oscillation(refined(m.time, values, turns.rows), sizes, turns.upper)
 
 
-def excursions_of(m: Measured, stays: list[Stay], swing: Oscillation) -> list[Excursion]:
-    """What lies between the stays, before the first and after the last."""
-    pairs = zip([None, *stays], [*stays, None], strict=True)
+def excursions_of(m: Measured, episodes: list[Episode], swing: Oscillation) -> list[Excursion]:
+    """Excursions between the episodes, before the first and after the last."""
+    pairs = zip([None, *episodes], [*episodes, None], strict=True)
     found = [_excursion(m, old, new, swing) for old, new in pairs]
-    return [e for e in found if _matters(m, e)]
+    return [e for e in found if _not_empty(m, e)]
 
 
-def _matters(m: Measured, e: Excursion) -> bool:
-    """Whether there is anything between the stays, at the start or the end of the run."""
+def _not_empty(m: Measured, e: Excursion) -> bool:
+    """Whether the excursion has samples or separates two episodes."""
     start, stop = e.rows(m)
     return stop > start or (e.old is not None and e.new is not None)
 
 
-def _excursion(m: Measured, old: Stay | None, new: Stay | None, swing: Oscillation) -> Excursion:
+def _excursion(
+    m: Measured, old: Episode | None, new: Episode | None, swing: Oscillation
+) -> Excursion:
     start = 0 if old is None else old.stop
     stop = len(m.time) if new is None else new.start
     since, until = m.time[min(start, len(m.time) - 1)], m.time[min(stop, len(m.time) - 1)]
@@ -110,12 +112,12 @@ def _excursion(m: Measured, old: Stay | None, new: Stay | None, swing: Oscillati
     if new is not None and upper.sum() + lower.sum() >= 2:
         rows = slice(start, stop)
         weight = np.diff(m.time[start : stop + 1])
-        there = float(weight @ m.present[rows, new.course]) > 0.5 * float(weight.sum())
+        there = float(weight @ m.present[rows, new.arc]) > 0.5 * float(weight.sum())
         sizes = swing.sizes[inside]
         settling = there and sizes[-1] < DECAYED * sizes.max()
     else:
         settling = False
-    # a cycle is counted by its maxima; an oscillation that dies out may begin downwards
+    # maxima are counted, or minima where a decaying oscillation begins downwards
     counted = lower if settling and lower.sum() > upper.sum() else upper
     oscillating = counted.sum() >= LEAST
     return Excursion(
@@ -127,19 +129,21 @@ def _excursion(m: Measured, old: Stay | None, new: Stay | None, swing: Oscillati
     )
 
 
-def phase_of(m: Measured, e: Excursion, start: float, end: float, sheet: str, away: str) -> Phase:
-    """The phase between leaving and landing.
+def phase_of(
+    m: Measured, e: Excursion, start: float, end: float, stable_branch: str, away: str
+) -> Phase:
+    """Phase between departure and landing.
 
     Parameters
     ----------
     m : Measured
     e : Excursion
     start, end : float
-        Its times.
-    sheet : str
-        Where it lands, "" for nowhere.
+        Times of departure and landing.
+    stable_branch : str
+        Stable branch of the landing, "" for none.
     away : str
-        The kind where it does not oscillate.
+        Kind of phase if it does not oscillate.
     """
     first, _ = e.rows(m)
     if first < len(m.time) and not m.within[first]:
@@ -149,7 +153,7 @@ def phase_of(m: Measured, e: Excursion, start: float, end: float, sheet: str, aw
             start,
             end,
             "oscillating",
-            () if e.cycle else (sheet,),
+            () if e.cycle else (stable_branch,),
             len(e.turns),
             "cycle" if e.cycle else "equilibrium",
             tuple(np.diff(e.turns).tolist()),
@@ -157,4 +161,4 @@ def phase_of(m: Measured, e: Excursion, start: float, end: float, sheet: str, aw
         )
     if e.old is None or e.new is None:
         return Phase(start, end, "transient", oscillations=len(e.turns))
-    return Phase(start, end, away, (sheet,), len(e.turns))
+    return Phase(start, end, away, (stable_branch,), len(e.turns))

@@ -1,4 +1,4 @@
-"""The unit of each fast state in which distances of a run from a diagram are measured."""
+"""Units of the fast states for distances between a run and a diagram."""
 
 from __future__ import annotations
 
@@ -8,51 +8,51 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.passage.delays.local_field import frozen_field
-from fastslow.passage.overlay.attracting_branches import Course
+from fastslow.passage.overlay.attracting_branches import Arc
 from fastslow.passage.overlay.slow_quantities import SlowQuantity
 from fastslow.results.angles import periods_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-#: A state's extent is between these parts of what the branches span.
+#: Bounds of a state's extent, relative to its range over the branches.
 LEAST, MOST = 1e-3, 20.0
 
-#: A range below this part of a state's size is rounding.
+#: Relative range of a state below which it is constant up to rounding.
 FLAT = 1e-9
 
-#: Rounding of a rate that is a constant times a state: implicit steps correct derivatives.
+#: Relative tolerance for a rate proportional to a state; implicit steps correct derivatives.
 SAME = 1e-10
 
-#: Times at which a run is looked at for its usual size.
+#: Number of equidistant times at which the typical size of a run is sampled.
 TIMES = 257
 
-#: Rows of each course at which the fast motion is linearised.
+#: Rows of each arc at which the fast motion is linearised.
 ROWS = 5
 
-#: A part of an eigenvector below this part of its length is rounding.
+#: Relative component of an eigenvector below which it is zero up to rounding.
 PART = 1e-9
 
 
 def extents_of(
-    slow: SlowQuantity, courses: Sequence[Course], state: Array, places: Sequence[Array]
+    slow: SlowQuantity, arcs: Sequence[Arc], state: Array, places: Sequence[Array]
 ) -> tuple[Array, Mask]:
-    """The extent of each state, and which states are velocities.
+    """Compute the extent of each state, and detect velocities.
 
-    The range of a state over the run and over the stable branches that the run meets,
-    within reason of what all branches span. Where a state is constant along the
-    branches, its range in a run that follows them is a lag only; it is then at least
-    as large as the fast motion makes it, with the other states at their extents. A
-    velocity is measured against the velocities of the fast motion.
+    The extent is the range of a state over the run and over the stable branches present
+    during the run, bounded by multiples of its range over all branches. The range of a state
+    that is constant along the branches is a mere lag in a run that follows them; its extent is
+    then at least its amplitude in the fast modes whose other states have their extents.
+    The extent of a velocity is the velocity of the fast motion.
 
     Parameters
     ----------
     slow : SlowQuantity
-    courses : sequence of Course
+    arcs : sequence of Arc
     state : ndarray, shape (N, n)
-        Of the run.
+        States of the run.
     places : sequence of ndarray, shape (M, n)
-        States of each course where it is stable, at values that the run takes.
+        States of each arc where it is stable, at the slow values of the run.
 
     Returns
     -------
@@ -61,19 +61,19 @@ def extents_of(
     """
     run = slow.run
     extent = np.ptp(state, axis=0)
-    for met in places:
-        if len(met):
-            extent = np.maximum(extent, np.ptp(met, axis=0))
-    fastest = float(np.median([c.fastest() for c in courses] or [0.0]))
+    for present in places:
+        if len(present):
+            extent = np.maximum(extent, np.ptp(present, axis=0))
+    fastest = float(np.median([c.fastest() for c in arcs] or [0.0]))
     size = np.abs(state).max(axis=0)
-    # what moves by rounding only has no extent
+    # variations by rounding give no extent
     extent = np.where(extent > FLAT * size, extent, np.where(size > 0, size, 1.0))
-    # by time: where a state grows without bound most samples are at the end
+    # equidistant in time: for unbounded growth most samples are at the end
     even = np.searchsorted(run.t, np.linspace(run.t[0], run.t[-1], TIMES))
     usual = state[np.minimum(even, len(state) - 1)]
     typical = np.median(np.abs(usual - np.median(usual, axis=0)), axis=0)
-    extent = _bounded(extent, typical, courses)
-    extent = _from_modes(slow, courses, extent)
+    extent = _bounded(extent, typical, arcs)
+    extent = _from_modes(slow, arcs, extent)
     periods = periods_of(slow.states, run.periods)
     extent = np.where(periods > 0, np.minimum(extent, periods), extent)
     velocities = np.zeros(len(extent), dtype=bool)
@@ -83,17 +83,17 @@ def extents_of(
     return extent, velocities
 
 
-def _bounded(extent: Array, typical: Array, courses: Sequence[Course]) -> Array:
-    """Extents within reach of what the branches span, where they span anything.
+def _bounded(extent: Array, typical: Array, arcs: Sequence[Arc]) -> Array:
+    """Bound the extents by multiples of the range of the branches, where that is not zero.
 
-    A run that hardly moves, or that grows without bound, is no measure for its own distances.
+    A run that hardly moves, or grows without bound, gives no meaningful unit.
     """
-    if not courses:
+    if not arcs:
         return extent
-    rows = np.concatenate([c.curve()[:, :-1] for c in courses])
+    rows = np.concatenate([c.curve()[:, :-1] for c in arcs])
     span = np.ptp(rows, axis=0)
     low, high = LEAST * span, MOST * span
-    # a state that is constant along the branches but for rounding bounds nothing
+    # a state that is constant along the branches up to rounding gives no bound
     spans = (span > FLAT * np.abs(rows).max(axis=0)) & (span > FLAT * typical)
     return np.where(spans, np.clip(extent, low, high), extent)
 
@@ -101,8 +101,8 @@ def _bounded(extent: Array, typical: Array, courses: Sequence[Course]) -> Array:
 def _velocities(slow: SlowQuantity) -> list[tuple[int, int, float]]:
     """Triples (i, j, |c|) where c times fast state i is the time derivative of fast state j.
 
-    A sheet that drifts carries a velocity with it, which is no distance from the sheet:
-    it is small beside the velocities of the fast motion.
+    The velocity of a drifting equilibrium is no deviation from it, and small compared with
+    the velocities of the fast motion.
     """
     if not slow.dense:
         return []
@@ -123,18 +123,18 @@ def _velocities(slow: SlowQuantity) -> list[tuple[int, int, float]]:
     return found
 
 
-def _from_modes(slow: SlowQuantity, courses: Sequence[Course], extent: Array) -> Array:
-    """Extents; of states that are constant along the branches, from the fast modes.
+def _from_modes(slow: SlowQuantity, arcs: Sequence[Arc], extent: Array) -> Array:
+    """Replace the extents of states that are constant along the branches by modal amplitudes.
 
     In each mode of the linearised fast motion, the other states have their extents.
     """
-    if not courses or slow.run.symbolic_model is None or slow.laws:
+    if not arcs or slow.run.symbolic_model is None or slow.laws:
         return extent
-    rows = np.concatenate([c.curve()[:, :-1] for c in courses])
+    rows = np.concatenate([c.curve()[:, :-1] for c in arcs])
     fixed = np.ptp(rows, axis=0) <= FLAT * np.maximum(np.abs(rows).max(axis=0), extent)
     if fixed.all() or not fixed.any():
         return extent
-    modes = np.concatenate([_modes(slow, course) for course in courses])
+    modes = np.concatenate([_modes(slow, arc) for arc in arcs])
     moved = np.abs(modes / np.linalg.norm(modes / extent[:, None], axis=1, keepdims=True))
     reach = (moved[:, ~fixed] / extent[~fixed, None]).max(axis=1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -147,11 +147,11 @@ def _from_modes(slow: SlowQuantity, courses: Sequence[Course], extent: Array) ->
     return np.where(fixed & np.isfinite(usual), np.maximum(extent, usual), extent)
 
 
-def _modes(slow: SlowQuantity, course: Course) -> NDArray[np.complex128]:
-    """Eigenvectors of the Jacobian at rows of a course, in columns, shape (rows, n, n)."""
-    branch = course.branch
+def _modes(slow: SlowQuantity, arc: Arc) -> NDArray[np.complex128]:
+    """Eigenvectors of the Jacobian at rows of an arc, in columns, shape (rows, n, n)."""
+    branch = arc.branch
     field = frozen_field(slow.run.symbolic_model, slow.name, branch.parameters)
-    every = np.concatenate([np.arange(piece.start, piece.stop) for piece in course.pieces])
+    every = np.concatenate([np.arange(piece.start, piece.stop) for piece in arc.pieces])
     rows = every[np.linspace(0, len(every) - 1, ROWS).astype(int)]
     found = [np.empty((0, field.n, field.n), dtype=complex)]
     for name in dict.fromkeys(branch.region[rows].tolist()):

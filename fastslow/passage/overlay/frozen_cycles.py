@@ -1,4 +1,4 @@
-"""The cycle of the frozen fast subsystem, measured towards the end of an oscillation."""
+"""Continuation of the cycle of the frozen fast subsystem to its end, by simulation."""
 
 from __future__ import annotations
 
@@ -17,40 +17,40 @@ from fastslow.simulation.one import simulate
 
 Array = NDArray[np.float64]
 
-#: A frozen run lasts for so many periods of the cycle before it, or of the last oscillation.
+#: Length of a frozen run, in periods of the previous cycle or of the last oscillation.
 PERIODS = 25.0
 
-#: It is extended by this factor where it has not settled, so many times.
+#: Factor by which an unsettled run is extended, and the number of extensions.
 LONGER, EXTENSIONS = 4.0, 2
 
-#: The end of the cycle is located to this fraction of the interval that is searched.
+#: Relative accuracy of the end of the cycle in the interval searched.
 LOCATED = 1e-7
 
-#: Steps beyond the last value at which the cycle was found, each twice the one before.
+#: Number of steps beyond the last cycle found, each twice the previous one.
 STEPS = 12
 
-#: Periods are compared at distances from the end that fall by this factor.
+#: Ratio of successive distances from the end at which periods are compared.
 FACTOR = 4.0
 
-#: So many of them, the nearest, decide.
+#: Number of cycles nearest to the end that are used for the classification.
 NEAREST = 6
 
-#: The distance from the end is known where it is so many times the error of the end.
+#: Smallest distance from the end, in units of the error of the end.
 KNOWN = 30.0
 
-#: Rounds of the cycle at which its distance from a saddle is read.
+#: Points per cycle at which its distance from a saddle is computed.
 ROUND = 2000
 
-#: Points of a cycle from which its neighbour is looked for.
+#: Points of a cycle from which a neighbouring cycle is searched.
 STARTS = 6
 
-#: A slope agrees with the one predicted within this fraction.
+#: Relative tolerance between measured and predicted slope.
 AGREES = 0.2
 
-#: Increments of a period that stays finite shrink by this factor or less.
+#: Largest ratio of successive increments of a period that remains finite.
 SHRINKING = 0.8
 
-#: A size falls with the square root of the distance when its factor is within this of 1/2.
+#: Tolerance of the exponent or factor of a square-root law.
 ROOT = 0.1
 
 
@@ -61,16 +61,16 @@ class FrozenCycle:
     Parameters
     ----------
     value : float
-        The slow quantity.
+        Value of the slow quantity.
     period : float
     size : float
-        Its extent, in units of those of the run.
+        Extent of the cycle, in units of the extents of the run.
     states : ndarray, shape (STARTS, n)
-        Points on it, the first that which is farthest from equilibria.
+        Points on it; the first is the farthest from all equilibria.
     saddle : float
-        Its distance from the nearest saddle, in the same units; nan without one.
+        Distance from the nearest saddle, in the same units; nan without one.
     rate : float
-        The unstable eigenvalue of that saddle; nan where it is not one and real.
+        Unstable eigenvalue of that saddle; nan unless it is single and real.
     """
 
     value: float
@@ -83,7 +83,7 @@ class FrozenCycle:
 
 @dataclass(frozen=True, eq=False)
 class FrozenEnd:
-    """Where the cycle of the frozen fast subsystem ceases to exist, and how.
+    """End of the cycle of the frozen fast subsystem and its bifurcation.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class FrozenEnd:
         ``"homoclinic"``, ``"circle"``, ``"Hopf"``, ``"fold cycle (candidate)"``, or
         ``"unclassified"``.
     value : float
-        The slow quantity there.
+        Value of the slow quantity.
     evidence : str
     """
 
@@ -101,12 +101,13 @@ class FrozenEnd:
 
 
 def frozen_end(p: Passage, times: Sequence[float]) -> FrozenEnd | None:
-    """Follow the cycle of the frozen fast subsystem to where it ends.
+    """Continue the cycle of the frozen fast subsystem to its end.
 
     Towards a homoclinic orbit of a saddle with the unstable eigenvalue λ the period grows as
-    −ln|w − w*|/λ, and the cycle passes ever nearer to the saddle; on an invariant circle with a
+    −ln|w − w*|/λ, and the distance from the saddle tends to zero; on an invariant circle with a
     saddle-node it grows as |w − w*|^(−1/2) (Kuznetsov 2004, sections 6.2 and 7.1). At a fold of
-    cycles the period and the size stay finite, at a Hopf point the size falls as |w − w*|^(1/2).
+    cycles the period and the size remain finite, at a Hopf point the size decreases as
+    |w − w*|^(1/2).
 
     Parameters
     ----------
@@ -117,7 +118,7 @@ def frozen_end(p: Passage, times: Sequence[float]) -> FrozenEnd | None:
     Returns
     -------
     FrozenEnd or None
-        None where the frozen model is not known.
+        None without a frozen model.
     """
     model = _frozen(p)
     if model is None or len(times) < 2:
@@ -135,7 +136,7 @@ def frozen_end(p: Passage, times: Sequence[float]) -> FrozenEnd | None:
 
 
 def _frozen(p: Passage) -> Model | None:
-    """The frozen fast subsystem, with one parameter free; None where it is not known."""
+    """The frozen fast subsystem with one free parameter; None if it is not known."""
     run, diagram = p.slow.run, p.diagram
     if run.symbolic_model is None or diagram.path:
         return None
@@ -147,10 +148,9 @@ def _frozen(p: Passage) -> Model | None:
 
 
 def _continued(p: Passage, model: Model, value: float, last: FrozenCycle) -> FrozenCycle | None:
-    """The stable cycle at another value, from points of a cycle near it.
+    """The stable cycle at another value, from points of a neighbouring cycle.
 
-    Near its end a cycle passes near the boundary of its basin, so that points of its neighbour
-    may lie outside.
+    Several points are tried, as some may be outside the basin of attraction.
     """
     for state in last.states:
         cycle = _cycle(p, model, value, state, last.period)
@@ -162,7 +162,7 @@ def _continued(p: Passage, model: Model, value: float, last: FrozenCycle) -> Fro
 def _cycle(
     p: Passage, model: Model, value: float, state: Array, period: float
 ) -> FrozenCycle | None:
-    """The stable cycle that the frozen model settles on from a state, if it does."""
+    """The stable cycle that the frozen model converges to from a state, if any."""
     at: dict[str, Any] = {p.diagram.parameter: value}
     frozen, length = model.with_parameters(at), PERIODS * period
     for _ in range(EXTENSIONS + 1):
@@ -186,7 +186,7 @@ def _cycle(
 
 
 def _equilibria(p: Passage, value: float, points: Array) -> tuple[Array, float, float]:
-    """Scaled distances of points from equilibria, the least from a saddle, its eigenvalue."""
+    """Scaled distances of points from equilibria and from the nearest saddle, its eigenvalue."""
     low, high = p.diagram.over
     at: dict[str, Any] = {p.diagram.parameter: float(np.clip(value, low, high))}
     away = np.full(len(points), np.inf)
@@ -204,12 +204,12 @@ def _equilibria(p: Passage, value: float, points: Array) -> tuple[Array, float, 
 
 
 def _first_cycle(p: Passage, model: Model, times: Sequence[float]) -> FrozenCycle | None:
-    """The cycle on which the frozen model is at the last maximum where it has one."""
+    """The cycle of the frozen model at the last maximum at which it has one."""
     intervals = np.diff(times)
     for k in range(len(times) - 1, -1, -1):
-        moment = p.moment(times[k])
+        last = p.state_at(times[k])
         period = float(intervals[min(k, len(intervals) - 1)])
-        cycle = _cycle(p, model, moment.value, moment.state, period)
+        cycle = _cycle(p, model, last.value, last.state, period)
         if cycle is not None:
             return cycle
     return None
@@ -218,9 +218,9 @@ def _first_cycle(p: Passage, model: Model, times: Sequence[float]) -> FrozenCycl
 def _towards(
     p: Passage, model: Model, here: FrozenCycle, times: Sequence[float]
 ) -> tuple[list[FrozenCycle], float | None]:
-    """Cycles in the direction of the drift, and the first value without one."""
-    values = [p.moment(t).value for t in (times[0], times[-2], times[-1])]
-    # a slow state may go to and fro with each oscillation
+    """Cycles in the direction of the drift, and the first value without a cycle."""
+    values = [p.state_at(t).value for t in (times[0], times[-2], times[-1])]
+    # a slow state may oscillate with the fast states
     drift = values[2] - values[1] or values[2] - values[0]
     step = np.sign(drift) * max(abs(drift), 1e-3 * p.m.span)
     found = [here]
@@ -240,7 +240,7 @@ def _towards(
 def _located(
     p: Passage, model: Model, found: list[FrozenCycle], bad: float
 ) -> tuple[list[FrozenCycle], float]:
-    """More cycles, nearer and nearer to the end, and a value behind it."""
+    """Locate the end by bisection: cycles on the way, and a value beyond the end."""
     good = found[-1]
     reach = abs(bad - good.value)
     found = [good]
@@ -258,14 +258,14 @@ def _located(
 
 
 def _sequence(p: Passage, model: Model, found: list[FrozenCycle], bad: float) -> list[FrozenCycle]:
-    """Cycles at distances from the end that fall by one factor."""
+    """Cycles at distances from the end that decrease geometrically."""
     end = 0.5 * (found[-1].value + bad)
     error = max(abs(bad - found[-1].value), 1e-14 * abs(end))
     away, sequence = found[0].value - end, [found[0]]
     while abs(away) / FACTOR > KNOWN * error:
         away /= FACTOR
         value = end + away
-        # one that is not nearer to the end
+        # a cycle that is not nearer to the end
         behind = [c for c in found if abs(c.value - end) >= abs(away)]
         last = min([*behind, sequence[-1]], key=lambda c: abs(c.value - value))
         cycle = _continued(p, model, value, last)
@@ -276,7 +276,7 @@ def _sequence(p: Passage, model: Model, found: list[FrozenCycle], bad: float) ->
 
 
 def _classified(p: Passage, model: Model, found: list[FrozenCycle], bad: float) -> FrozenEnd:
-    """Name the end by what the period, the size and the distance from a saddle do before it."""
+    """Classify the end by the trends of period, size and distance from a saddle."""
     end = 0.5 * (found[-1].value + bad)
     name = p.diagram.parameter
     cycles = _sequence(p, model, found, bad)[-NEAREST:]
@@ -296,33 +296,34 @@ def _classified(p: Passage, model: Model, found: list[FrozenCycle], bad: float) 
     predicted = 1.0 / cycles[-1].rate
     if (growth > 0).all() and (np.diff(saddle) < 0).all() and abs(slope / predicted - 1) < AGREES:
         words += (
-            f": it grows by {slope:.3g} for each factor e (1/λ of the saddle: {predicted:.3g}), "
-            f"and the cycle passes the saddle at {saddle[0]:.2g} to {saddle[-1]:.2g} of the extent"
+            f": it grows as −{slope:.3g} ln|{name} − {end:.6g}| (1/λ of the saddle: "
+            f"{predicted:.3g}), and the cycle passes the saddle within {saddle[0]:.2g} to "
+            f"{saddle[-1]:.2g} of the extent"
         )
         return FrozenEnd("homoclinic", end, f"{where}; {words}")
     power = float(np.polyfit(np.log(away), np.log(period), 1)[0])
     near = [q for q in p.diagram.folds if abs(q[name] - end) < away[0]]
     if (growth > 0).all() and abs(power + 0.5) < ROOT and near:
-        words += f": it grows as the power {power:.3g} towards {near[0].label}"
+        words += f": it grows with the power {power:.3g} of the distance from {near[0].label}"
         return FrozenEnd("circle", end, f"{where}; {words}")
     shrinks = size[1:] / size[:-1]
     hopf = [q for q in p.diagram.special("HB") if abs(q[name] - end) < away[0]]
     if hopf and (abs(shrinks - 1.0 / np.sqrt(FACTOR)) < ROOT).all():
-        words = f"its size falls as the square root of the distance from {hopf[0].label}"
+        words = f"its size decreases as the square root of the distance from {hopf[0].label}"
         return FrozenEnd("Hopf", end, f"{where}; {words}")
-    if _goes_on(p, model, found[0], end):
-        return FrozenEnd("unclassified", end, f"{where}; {words}; it oscillates beyond as well")
+    if _oscillates_beyond(p, model, found[0], end):
+        return FrozenEnd("unclassified", end, f"{where}; {words}; the oscillation persists beyond")
     finite = (np.abs(growth[1:]) <= SHRINKING * np.abs(growth[:-1])).all()
     alone = not (saddle[-1] < 0.5 * saddle[0])
     if (finite or alone) and size[-1] > 0.5 * size[0]:
-        words += f": it does not diverge, and the size is {size[-1] / size[0]:.0%} of that before"
+        words += f": it remains finite, the size changes to {size[-1] / size[0]:.0%}"
         words += "" if finite else ", and no saddle is approached"
         return FrozenEnd("fold cycle (candidate)", end, f"{where}; {words}")
     return FrozenEnd("unclassified", end, f"{where}; {words}")
 
 
-def _goes_on(p: Passage, model: Model, cycle: FrozenCycle, end: float) -> bool:
-    """Whether the frozen model oscillates beyond the end as well, as on a torus or in chaos."""
+def _oscillates_beyond(p: Passage, model: Model, cycle: FrozenCycle, end: float) -> bool:
+    """Whether the frozen model still oscillates beyond the end, as on a torus or in chaos."""
     at: dict[str, Any] = {p.diagram.parameter: 2.0 * end - cycle.value}
     frozen = model.with_parameters(at)
     run = simulate(frozen, cycle.states[0], t=(0.0, 2.0 * PERIODS * cycle.period))

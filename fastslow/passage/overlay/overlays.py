@@ -1,4 +1,4 @@
-"""Which stable sheet of a diagram a trajectory follows, and where it changes."""
+"""Overlay of a trajectory and a diagram: stable branches followed, and transitions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import finite, formula, instance, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.passage.overlay.agreement import require_one_model
-from fastslow.passage.overlay.attracting_branches import courses_of
+from fastslow.passage.overlay.attracting_branches import arcs_of
 from fastslow.passage.overlay.bursting import Burst, bursting_of
 from fastslow.passage.overlay.cycle_ends import cycle_end, ending, slowly
 from fastslow.passage.overlay.excursions import (
@@ -19,40 +19,47 @@ from fastslow.passage.overlay.excursions import (
     oscillation_of,
     phase_of,
 )
-from fastslow.passage.overlay.following import Measured, Stay, measured, products, rows_of, stays_of
+from fastslow.passage.overlay.following import (
+    Episode,
+    Measured,
+    episodes_of,
+    measured,
+    products,
+    rows_of,
+)
 from fastslow.passage.overlay.frozen_cycles import FrozenEnd
 from fastslow.passage.overlay.predictions import with_laws
 from fastslow.passage.overlay.slow_quantities import SlowQuantity, slow_quantity
-from fastslow.passage.overlay.spikes import refined, turns_of
+from fastslow.passage.overlay.spikes import extrema_of, refined
 from fastslow.passage.overlay.sticking import along_edges, bands_at, with_sticking
 from fastslow.passage.overlay.transitions import Passage, leaving, passages_within, steep_parts
 from fastslow.results.angles import apart as apart_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import MEASURED, Overlay
-from fastslow.results.overlay.transitions import Phase, Transition
+from fastslow.results.overlay.transitions import Phase, Transition, Transitions
 from fastslow.results.trajectory.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
-#: A quantity that varies by less than this part of its size is held.
+#: Relative variation below which a quantity is constant.
 HELD = 1e-9
 
-#: A turn of the slow quantity by less than this part of its range is none.
+#: Relative prominence below which an extremum of the slow quantity is ignored.
 WIGGLE = 0.02
 
-#: A sheet stands still that changes by less than this part of the extent over the slow range.
+#: Relative change over the slow range, in units of the extent, below which a branch is flat.
 FLAT = 1e-9
 
-#: A lag accounts for a deviation, and a constant drift for the change in that time, of which
-#: no more than this part is left.
+#: Largest unexplained fraction of a deviation that is attributed to a lag, and of the change
+#: during the lag that is attributed to a constant drift.
 REST = 0.5
 
-#: A drift leaves a state behind by its relaxation time; by so many it has not settled yet.
+#: Lag, in relaxation times, above which the state has not yet relaxed.
 LONG = 2.0
 
-#: The slow quantity stands still where it drifts slower than this part of its mean speed.
+#: Fraction of the mean speed below which the slow quantity is at rest.
 STILL = 1e-3
 
 
@@ -60,30 +67,30 @@ STILL = 1e-3
 def overlay(
     diagram: Diagram, run: Trajectory, *, radius: float = 0.1, observed: object = None
 ) -> Overlay:
-    """Lay a trajectory over the equilibrium diagram of its frozen model.
+    """Compare a trajectory with the equilibrium diagram of its frozen model.
 
-    A stable sheet is followed from where the motion comes near it and stays for
-    half its relaxation time or more, to where it is no longer near, or has done two
-    thirds of the way to another stable sheet. Near means near the sheet as a curve
-    over the slow quantity, as the eye sees it in the figure, so that to lag behind a
-    steep sheet is not to leave it. Sheets that join at a boundary
-    equilibrium count as one here, so that a persistent equilibrium is followed
-    across; past a Hopf point the branch is still followed while the state stays
-    near it (the delay), past a fold the fold. What happens between two such stays
-    is a jump, or with two oscillations or more an oscillating phase.
+    A stable branch is followed from the time at which the state is near it for at least half a
+    relaxation time, up to the time at which the state is no longer near, or has covered two
+    thirds of the distance to another stable branch. Nearness refers to the distance from the
+    branch as a curve over the slow quantity, so that a lag along a steep branch does not
+    count as a departure. Stable branches that join at a boundary equilibrium are treated as
+    one, so that a persistent equilibrium is followed across the interface; past a Hopf point
+    the unstable branch is followed while the state remains near it (delayed loss of
+    stability), past a fold the fold point. The interval between two such episodes is a jump
+    or, with at least two oscillations, an oscillating phase.
 
     Parameters
     ----------
     diagram : Diagram
-        Over the slow quantity of the run, or over the parameter of a path along
-        which the model was frozen.
+        Diagram over the slow quantity of the run, or over the parameter of a path
+        along which the model was frozen.
     run : Trajectory
-        Of the full model.
+        Trajectory of the full model.
     radius : float
-        What counts as near, with each state in units of its extent.
+        Distance that counts as near, with each state in units of its extent.
     observed : str or Symbol, optional
-        The state whose maxima are counted, by default the first that is not
-        periodic; of a periodic one those of its sine.
+        State whose maxima are counted, by default the first that is not periodic;
+        for a periodic one the maxima of its sine.
 
     Returns
     -------
@@ -94,52 +101,52 @@ def overlay(
     UnknownNameError
         If the diagram's parameter is no slow quantity of the run, or a state is missing.
     ArgumentError
-        If the two are of different models, their other parameters differ, the run
-        leaves the path along which the model was frozen, the run has no samples, or
-        the radius is not between 0 and 1.
+        If diagram and run belong to different models or parameter values, the run leaves
+        the path along which the model was frozen or has no samples, or the radius is not
+        between 0 and 1.
 
     Examples
     --------
     >>> import fastslow as fs
     >>> model = fs.systems.cusp(omega=0.002)
     >>> diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
-    >>> lay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=2))
-    >>> [(t.kind, t.from_sheet, t.to_sheet) for t in lay.transitions[:2]]
+    >>> overlay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=2))
+    >>> [(t.kind, t.from_branch, t.to_branch) for t in overlay.transitions[:2]]
     [('jump', 'S1.1', 'S1.2'), ('jump', 'S1.2', 'S1.1')]
-    >>> print(lay.bursting)
+    >>> print(overlay.bursting)
     relaxation oscillation (symmetric fold/fold)
     """
     state_number = _checked(diagram, run, radius, observed)
     compared = require_one_model(diagram, run)
     slow = slow_quantity(diagram, run)
-    sheets, courses = courses_of(diagram)
-    m = measured(slow, courses, diagram.over, radius)
-    stays = stays_of(m)
-    p = Passage(diagram, slow, m, sheets, _followed(m, stays), _drift(m))
+    stable_branches, arcs = arcs_of(diagram)
+    m = measured(slow, arcs, diagram.over, radius)
+    episodes = episodes_of(m)
+    p = Passage(diagram, slow, m, stable_branches, _followed(m, episodes), _drift(m))
     swing = oscillation_of(m, state_number)
     phases: list[Phase] = []
     transitions: list[Transition] = []
     bursts: list[Burst] = []
     ends: dict[tuple[str, str], FrozenEnd | None] = {}
-    excursions = {id(e.old): e for e in excursions_of(m, stays, swing)}
+    excursions = {id(e.old): e for e in excursions_of(m, episodes, swing)}
     if id(None) in excursions:
         phases.append(_between(p, excursions[id(None)], transitions, bursts, ends))
     followed = p.followed.copy()
-    for stay in stays:
+    for episode in episodes:
         transitions += sorted(
-            [*passages_within(p, stay), *steep_parts(p, stay)], key=lambda t: t.time
+            [*passages_within(p, episode), *steep_parts(p, episode)], key=lambda t: t.time
         )
         start = phases[-1].end if phases else float(m.time[0])
-        after = excursions.get(id(stay))
+        after = excursions.get(id(episode))
         before = len(transitions)
         nxt = None if after is None else _between(p, after, transitions, bursts, ends)
-        numbers, rows = np.unique(p.followed[stay.start : stay.stop], return_index=True)
-        labels = [sheets[k].label for k in numbers[np.argsort(rows)]]
+        numbers, rows = np.unique(p.followed[episode.start : episode.stop], return_index=True)
+        labels = [stable_branches[k].label for k in numbers[np.argsort(rows)]]
         end = float(m.time[-1]) if nxt is None else nxt.start
         phases.append(Phase(start, end, "quasi-static", tuple(dict.fromkeys(labels))))
         if nxt is not None:
             phases.append(nxt)
-            _hand_over(p, after, transitions[before:], followed)
+            _divide_jump(p, after, transitions[before:], followed)
     held = _held(diagram, run)
     distance, lag, relaxation = _distances(p, followed, _jumping(p, phases))
     rests = bands_at(diagram, run, m.slow, m.extent)
@@ -155,13 +162,13 @@ def overlay(
         np.column_stack([run[name] for name in diagram.states]),
         m.extent,
         radius,
-        sheets,
+        stable_branches,
         followed,
         distance,
         lag,
         relaxation,
         with_sticking([q for q in phases if q.end > q.start], diagram, run, rests, band),
-        tuple(with_laws(p, transitions) if held is None else map(_elsewhere, transitions)),
+        Transitions(with_laws(p, transitions) if held is None else map(_elsewhere, transitions)),
         bursting_of(bursts, transitions),
         _turning(p),
         _outcome(diagram, run, slow, compared),
@@ -170,7 +177,7 @@ def overlay(
 
 
 def _checked(diagram: Diagram, run: Trajectory, radius: float, observed: object) -> int:
-    """Refuse what does not fit together; the number of the observed state."""
+    """Check the arguments against each other; return the index of the observed state."""
     for name in diagram.states:
         if name not in run.states:
             raise unknown_name("state of the trajectory", name, run.states)
@@ -192,7 +199,7 @@ def _checked(diagram: Diagram, run: Trajectory, radius: float, observed: object)
 
 
 def _drift(m: Measured) -> Array:
-    """Rate of the slow quantity, zero where it moves by rounding only."""
+    """Rate of the slow quantity, zero if it varies by rounding only."""
     # where a state grows without bound, samples may share their time
     apart = np.r_[True, np.diff(m.time) > 0]
     time, slow = m.time[apart], m.slow[apart]
@@ -201,14 +208,14 @@ def _drift(m: Measured) -> Array:
     return np.interp(m.time, time, np.gradient(slow, time))
 
 
-def _followed(m: Measured, stays: list[Stay]) -> NDArray[np.intp]:
-    """The sheet at every sample of a stay, past its end still that sheet; −1 elsewhere."""
+def _followed(m: Measured, episodes: list[Episode]) -> NDArray[np.intp]:
+    """Stable branch followed at every sample, the last one past its end; −1 for none."""
     followed = np.full(len(m.time), -1, dtype=np.intp)
-    for stay in stays:
-        rows = slice(stay.start, stay.stop)
-        course, inside = m.courses[stay.course], m.present[rows, stay.course]
+    for episode in episodes:
+        rows = slice(episode.start, episode.stop)
+        arc, inside = m.arcs[episode.arc], m.present[rows, episode.arc]
         last = np.maximum.accumulate(np.where(inside, np.arange(len(inside)), 0))
-        followed[rows] = course.sheet(m.slow[rows])[last]
+        followed[rows] = arc.stable_branch(m.slow[rows])[last]
     return followed
 
 
@@ -219,9 +226,9 @@ def _between(
     bursts: list[Burst],
     ends: dict[tuple[str, str], FrozenEnd | None],
 ) -> Phase:
-    """The phase of an excursion; its transitions and bursts are added to the lists."""
+    """Return the phase of an excursion; append its transitions and bursts to the lists."""
     time = p.m.time
-    sheet = "" if e.new is None else p.sheets[p.followed[e.new.start]].label
+    stable_branch = "" if e.new is None else p.stable_branches[p.followed[e.new.start]].label
     start, _ = e.rows(p.m)
     outside = start < len(time) and not p.m.within[start]
     begin, end = float(time[0]), float(time[-1])
@@ -237,9 +244,9 @@ def _between(
     away = "jump"
     if first is not None and first.kind == "gap crossing":
         away = "gap crossing"
-    elif first is not None and first.from_sheet == first.to_sheet:
+    elif first is not None and first.from_branch == first.to_branch:
         away = "excursion"
-    phase = phase_of(p.m, e, begin, end, sheet, away)
+    phase = phase_of(p.m, e, begin, end, stable_branch, away)
     closing = None
     if e.cycle and e.new is not None and not outside:
         closing = cycle_end(p, e, ends)
@@ -251,10 +258,10 @@ def _between(
     return phase
 
 
-def _hand_over(
+def _divide_jump(
     p: Passage, e: Excursion | None, found: list[Transition], followed: NDArray[np.intp]
 ) -> None:
-    """In a jump the old sheet is followed up to the transition, then the new one."""
+    """Assign the samples of a jump to the old branch before the transition, else to the new."""
     if e is None or e.old is None or e.new is None or e.cycle or not found:
         return
     start, stop = e.rows(p.m)
@@ -264,12 +271,12 @@ def _hand_over(
 
 
 def _elsewhere(t: Transition) -> Transition:
-    """A transition without its delay, where another slow quantity has moved the special point."""
+    """Remove the delay where another slow quantity has moved the special point."""
     return replace(t, delay=float("nan"))
 
 
 def _jumping(p: Passage, phases: list[Phase]) -> NDArray[np.bool_]:
-    """Which samples are on the way from one sheet to another, shape (N,)."""
+    """Samples outside all quasi-static phases, shape (N,)."""
     away = np.zeros(len(p.m.time), dtype=bool)
     for phase in phases:
         if phase.kind != "quasi-static":
@@ -280,28 +287,30 @@ def _jumping(p: Passage, phases: list[Phase]) -> NDArray[np.bool_]:
 def _distances(
     p: Passage, followed: NDArray[np.intp], away: NDArray[np.bool_]
 ) -> tuple[Array, Array, Array]:
-    """Distance from the followed (else the nearest stable) sheet, lag, and relaxation time.
+    """Distance from the followed (else the nearest) stable branch, lag, and relaxation time.
 
-    The lag solves X(w(t − lag)) ≈ x(t) to first order. There is none in a jump, where the sheet
-    at the earlier time is not much nearer (the state oscillates about it, the slow quantity
-    turns), or where the drift cannot have caused it: after a jump, before the state has relaxed.
+    The lag solves X(w(t − lag)) ≈ x(t) to first order. It is nan in a jump, where the branch at
+    the earlier time is not much nearer (the state oscillates about it, the slow quantity has an
+    extremum), and after a jump until the state has relaxed, where the drift is not the cause.
     """
     m = p.m
-    apart = np.array([m.apart(k) for k in range(len(m.courses))]).reshape(-1, len(m.time))
+    apart = np.array([m.apart(k) for k in range(len(m.arcs))]).reshape(-1, len(m.time))
     nearest = np.where(m.present.T, apart, np.inf)
     distance = nearest.min(axis=0, initial=np.inf)
     lag, relaxation = np.full((2, len(m.time)), np.nan)
     mean = float(np.abs(np.diff(m.slow)).sum()) / (float(m.time[-1] - m.time[0]) or 1.0)
-    for number, course in enumerate(m.courses):
-        on = np.flatnonzero(np.isin(np.arange(-1, len(p.sheets)), course.sheets)[followed + 1])
+    for number, arc in enumerate(m.arcs):
+        on = np.flatnonzero(
+            np.isin(np.arange(-1, len(p.stable_branches)), arc.stable_branches)[followed + 1]
+        )
         distance[on] = apart[number, on]
         slow = m.slow[on]
-        # a velocity is that of the drifting sheet itself, at whatever lag
+        # a velocity state is not displaced along the branch by a lag
         moves = np.where(m.velocities, 0.0, 1.0)
-        slope = moves * course.slope(slow) / m.extent
+        slope = moves * arc.slope(slow) / m.extent
         deviation = moves * rows_of(m.deviation(number), on)
         steep = products(slope, slope)
-        rate = -course.relaxation(slow)
+        rate = -arc.relaxation(slow)
         with np.errstate(divide="ignore", invalid="ignore"):
             ahead = products(deviation, slope) / steep
             behind = -ahead / p.drift[on]
@@ -313,7 +322,7 @@ def _distances(
         inside = (earlier >= m.time[0]) & (earlier <= m.time[-1])
         before = np.where(inside, np.interp(earlier, m.time, m.slow), slow - step)
         exists &= np.abs(before - slow + step) <= REST * np.abs(step)
-        rest = moves * apart_of(rows_of(m.scaled, on), course.state(before) / m.extent, m.periods)
+        rest = moves * apart_of(rows_of(m.scaled, on), arc.state(before) / m.extent, m.periods)
         left, whole = (np.sqrt(products(v, v)) for v in (rest, deviation))
         exists &= left <= REST * whole
         lag[on] = np.where(exists, behind, np.nan)
@@ -325,12 +334,12 @@ def _turning(p: Passage) -> tuple[StatePoint, ...]:
     reach = float(np.ptp(slow))
     if len(slow) < 3 or reach <= 1e-9 * float(np.abs(slow).max()):
         return ()
-    turns = turns_of(slow, WIGGLE * reach)
-    return tuple(p.moment(float(t)) for t in refined(time, slow, turns.rows))
+    turns = extrema_of(slow, WIGGLE * reach)
+    return tuple(p.state_at(float(t)) for t in refined(time, slow, turns.rows))
 
 
 def _held(diagram: Diagram, run: Trajectory) -> str | None:
-    """A slow quantity of the run that the diagram holds at one value."""
+    """Name of a slow quantity of the run that is constant in the diagram, if any."""
     for name, value in diagram.parameters.items():
         if name in run.columns and np.abs(run[name] - value).max() > HELD * np.abs(run[name]).max():
             return name
@@ -338,16 +347,16 @@ def _held(diagram: Diagram, run: Trajectory) -> str | None:
 
 
 def _outcome(diagram: Diagram, run: Trajectory, slow: SlowQuantity, compared: bool) -> Outcome:
-    """What the diagram does not cover of a run, and what else the overlay cannot tell."""
+    """Outcome: the interval of the run that the diagram does not cover, or other limitations."""
     name, (low, high) = diagram.parameter, diagram.over
     values = slow.table
     held = _held(diagram, run)
     if held is not None:
         return Outcome(
             "another slow quantity",
-            f"the diagram holds {held} = {diagram.parameters[held]:.6g}, in the run it goes from "
-            f"{run[held].min():.6g} to {run[held].max():.6g}: its special points are not where the "
-            "run meets them, and no delays are given.",
+            f"{held} = {diagram.parameters[held]:.6g} in the diagram, but varies from "
+            f"{run[held].min():.6g} to {run[held].max():.6g} in the run, which moves the special "
+            "points; delays are not computed.",
             False,
         )
     outside = (values < low) | (values > high)
@@ -357,26 +366,24 @@ def _outcome(diagram: Diagram, run: Trajectory, slow: SlowQuantity, compared: bo
         share = float(weight[outside[:-1]].sum()) / total
         return Outcome(
             "outside the diagram",
-            f"{name} runs from {values.min():.6g} to {values.max():.6g}, the diagram from "
-            f"{low:.6g} to {high:.6g}: what lies outside, {share:.1%} of the time, is not "
-            "measured; continue it over the whole range.",
+            f"{name} varies from {values.min():.6g} to {values.max():.6g}, the diagram covers "
+            f"{low:.6g} to {high:.6g}: {share:.1%} of the time is not measured; "
+            "continue the equilibria over the whole range.",
             False,
         )
     if not run.outcome:
-        return Outcome(
-            "cut short", f"the run ended early, what follows is not known: {run.outcome}", False
-        )
+        return Outcome("cut short", f"the run ended early: {run.outcome}", False)
     if not np.ptp(values) > HELD * np.abs(values).max():
         return Outcome(
             "at rest",
-            f"{name} stays at {values[0]:.6g} all along: nothing is passed, and there are no lags.",
+            f"{name} = {values[0]:.6g} is constant in the run: there are no passages and no lags.",
             False,
         )
     if not compared:
         return Outcome(
             "not compared",
-            "that the diagram and the run are of one model could not be checked: their equations "
-            "are not both known, or written in different ways.",
+            "the models of diagram and run could not be compared: their equations are not both "
+            "known, or are written differently.",
             False,
         )
     return MEASURED

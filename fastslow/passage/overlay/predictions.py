@@ -1,4 +1,4 @@
-"""The law of delay beside every transition that has one."""
+"""Predicted delays of transitions."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from fastslow.results.overlay.drifts import Drift
 from fastslow.results.overlay.transitions import OSCILLATING, Transition
 from fastslow.results.points import SpecialPoint
 
-#: Kinds of transition that a law is known for.
-LAWFUL = ("jump", "gap crossing", "crossing", "Hopf")
+#: Kinds of transition with a known law of delay.
+PREDICTABLE = ("jump", "gap crossing", "crossing", "Hopf")
 
 
 def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
-    """The same transitions, each with what its law predicts for its own rate of drift."""
-    # a periodic run passes the same points at the same rates over and over
+    """Add the predicted delay for its own rate of drift to every transition."""
+    # a periodic run passes the same points at the same rates repeatedly
     known: dict[tuple[object, ...], Delay | None] = {}
     modes: dict[tuple[str, int], Known | None] = {}
     found = []
     for t in transitions:
         point = t.special
-        exits = point is not None and point.code in ("HB", "BP") and t.from_sheet != OSCILLATING
-        if not (t.kind in LAWFUL or exits) or point is None or not t.slope > 0:
+        exits = point is not None and point.code in ("HB", "BP") and t.from_branch != OSCILLATING
+        if not (t.kind in PREDICTABLE or exits) or point is None or not t.slope > 0:
             found.append(t)
             continue
         if exits:
             found.append(replace(t, law=exit_law(p, t, point, modes)))
             continue
         passed = p.passing(point, t.time)
-        drift = None if passed is None else drift_at(p.slow, point, passed, told=False)
+        drift = None if passed is None else drift_at(p.slow, point, passed, with_law=False)
         where: str | dict[str, float] | None = None
         if t.kind == "jump":
             where = TURN if t.turned else _level(p, t)
@@ -62,19 +62,19 @@ def _law(
     try:
         return predict_delay(point, drift, level=where)
     except ArgumentError:
-        # a law that does not hold there, or a diagram without its model
+        # no prediction for this point, or a diagram without its model
         return None
 
 
 def _rounded(what: str | Mapping[str, float] | Drift | None) -> str:
     if isinstance(what, Mapping):
         return " ".join(f"{name} {value:.6g}" for name, value in what.items())
-    # a law in time differs by the period, its first terms do not
+    # the full law in time differs by the period, its linear terms do not
     return str(replace(what, law="") if isinstance(what, Drift) else what)
 
 
 def _level(p: Passage, t: Transition) -> dict[str, float]:
-    """Where the measured delay is taken, in the state that moves most."""
+    """Level of the measured delay in the state that changes most."""
     way = (t.state - t.leave.state) / p.m.extent
     number = int(np.argmax(np.abs(way)))
     return {p.diagram.states[number]: float(t.state[number])}

@@ -1,4 +1,4 @@
-"""The slow quantity of a diagram along a run: a column, or the parameter of a path."""
+"""Slow quantity of a diagram along a run: a column, or the parameter of a path."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
-#: Values of a path's parameter that are tried for each sample.
+#: Number of values of a path's parameter that are tried for each sample.
 TRIED = 2001
 
-#: A run lies on a path when it is no farther from it than this part of each quantity's range.
+#: Largest distance of a run from a path, relative to the range of each quantity.
 ON_PATH = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class SlowQuantity:
-    """How the parameter of a diagram is read off a run.
+    """Evaluation of the parameter of a diagram along a run.
 
     Parameters
     ----------
@@ -36,17 +36,17 @@ class SlowQuantity:
     states : tuple of str
         The fast states, in the diagram's order.
     name : str
-        The parameter.
+        Name of the parameter.
     laws : mapping
-        Slow quantity to its text in the parameter; empty where the parameter is a column.
+        Slow quantity to its formula in the parameter; empty if the parameter is a column.
     constants : mapping
-        Values of what else stands in the laws.
+        Values of the other symbols in the formulas.
     table : ndarray, shape (N,)
         The parameter at the samples of the run.
     spacing : float
-        How finely the path was tried.
+        Spacing of the values tried along the path.
     bounds : tuple of float
-        The range of the diagram.
+        Range of the diagram.
     """
 
     run: Trajectory
@@ -64,13 +64,13 @@ class SlowQuantity:
 
     @property
     def responds(self) -> bool:
-        """Whether it is a slow state, which the fast states drive back."""
+        """Whether it is a slow state, with feedback from the fast states."""
         return any(name in self.run.states for name in (self.laws or [self.name]))
 
     def at(self, times: Array) -> tuple[Array, Array]:
         """The parameter (N,) and the fast states (N, n) at times inside the run.
 
-        Without dense output the samples are joined by straight lines.
+        Without dense output the samples are interpolated linearly.
         """
         if not self.dense:
             rows = [np.interp(times, self.run.t, self.run[n]) for n in self.states]
@@ -78,7 +78,7 @@ class SlowQuantity:
         run, names = self.run, self.run.columns
         columns = np.empty((len(names), len(times)))
         if load_loop(STEP_VALUES)(run.series, run.step_starts, *run.span, times, columns):
-            # says which of the times is outside the run
+            # raises for the times outside the run
             columns = columns_at(run, times)
         state = columns[self._rows].T
         if not self.laws:
@@ -89,20 +89,20 @@ class SlowQuantity:
 
     @cached_property
     def _rows(self) -> list[int]:
-        """Of the fast states among the columns of the run."""
+        """Indices of the fast states among the columns of the run."""
         return [self.run.columns.index(n) for n in self.states]
 
     def _values(self, value: Array) -> Array:
-        """The slow quantities on the path, shape (quantities, N)."""
+        """Slow quantities on the path, shape (quantities, N)."""
         known = {**self.constants, self.name: value}
         laws = [evaluated(text, known) for text in self.laws.values()]
         return np.array([np.broadcast_to(law, value.shape) for law in laws])
 
     def _solved(self, start: Array, wanted: Array) -> Array:
-        """The point of the path nearest to the wanted quantities, beside a start.
+        """Point of the path nearest to the given quantities, close to an initial value.
 
-        In the range of the diagram where there is one: a path that turns at an end of it
-        goes through the same places beyond.
+        A point in the range of the diagram is preferred: a path that reverses at the end of
+        the range passes the same values beyond.
         """
         inside = self._searched(start, wanted, self.bounds)
         reach = np.maximum(np.ptp(wanted, axis=1), 1e-3 * np.abs(wanted).max(axis=1))[:, None]
@@ -110,10 +110,10 @@ class SlowQuantity:
         return np.where(off.any(axis=0), self._searched(start, wanted, None), inside)
 
     def _searched(self, start: Array, wanted: Array, bounds: tuple[float, float] | None) -> Array:
-        """The nearest point of the path beside a start, within bounds.
+        """Nearest point of the path close to an initial value, within bounds.
 
-        A search in ever shorter steps, since Newton's leaps away where the path
-        turns, and then Newton to rounding.
+        A pattern search with decreasing steps, as Newton's method diverges where the path
+        reverses, followed by Newton's method up to rounding.
         """
         unit = np.maximum(np.ptp(wanted, axis=1), 1e-12 * np.abs(wanted).max(axis=1))
         unit = np.where(unit > 0, unit, 1.0)[:, None]
@@ -138,22 +138,22 @@ class SlowQuantity:
     def _better(
         self, value: Array, rest: Array, tried: Array, wanted: Array, unit: Array
     ) -> tuple[Array, Array]:
-        """Values and what is left there, or others where less is left."""
+        """Values and residuals, replaced where the tried ones have smaller residuals."""
         left = (wanted - self._values(tried)) / unit
         better = (left**2).sum(axis=0) < (rest**2).sum(axis=0)
         return np.where(better, tried, value), np.where(better, left, rest)
 
 
 def slow_quantity(diagram: Diagram, run: Trajectory) -> SlowQuantity:
-    """Find the parameter of a diagram among the columns of a run, or from the path.
+    """Evaluate the parameter of a diagram along a run, from a column or from the path.
 
     Raises
     ------
     UnknownNameError
         If the parameter is no slow quantity of the run.
     ArgumentError
-        If nothing varies slowly in the run, it leaves the path along which the model was
-        frozen, or the path passes the same place twice along its whole length.
+        If the run has no slow quantity or leaves the path along which the model was frozen,
+        or the path takes every value twice.
     """
     name = diagram.parameter
     quantities = (*run.forcing, *(s for s in run.states if s not in diagram.states))
@@ -164,7 +164,7 @@ def slow_quantity(diagram: Diagram, run: Trajectory) -> SlowQuantity:
     laws = {q: t for q, t in diagram.path.items() if name in names_in(t, known)}
     if not laws and not quantities:
         raise ArgumentError(
-            f"nothing varies slowly in this run, and the diagram is over {name}; run a model "
+            f"this run has no slow quantity, and the diagram is over {name}; simulate a model "
             f"with forcing={{{name}: ...}} or slow={{{name}: ...}}"
         )
     if not laws:
@@ -190,9 +190,9 @@ def slow_quantity(diagram: Diagram, run: Trajectory) -> SlowQuantity:
 
 
 def _nearest(grid: Array, curve: Array, wanted: Array, diagram: Diagram) -> Array:
-    """The value whose place on the path is nearest at each sample, followed in time.
+    """Value of the nearest point on the path at each sample, continuous in time.
 
-    Values in the range of the diagram come first: beyond it a path may come back to itself.
+    Values in the range of the diagram are preferred, as a path may reverse beyond it.
     """
     unit = np.maximum(np.ptp(curve, axis=1), 1e-300)[:, None]
     curve, wanted = curve / unit, wanted / unit
@@ -215,7 +215,7 @@ def _nearest(grid: Array, curve: Array, wanted: Array, diagram: Diagram) -> Arra
         found[k] = grid[last]
     if twofold > 0.5 * len(found):
         raise ArgumentError(
-            f"the path passes every place twice, so that the trajectory does not give "
-            f"{diagram.parameter}; freeze along a path on which one slow quantity grows with it"
+            f"the path takes every value twice, so that {diagram.parameter} is ambiguous along the "
+            "trajectory; freeze along a path on which one slow quantity is monotone in it"
         )
     return found

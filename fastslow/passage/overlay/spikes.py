@@ -1,4 +1,4 @@
-"""Where a quantity turns: spikes of a fast state, turning points of a forcing."""
+"""Extrema of sampled quantities: spikes of a fast state, extrema of a forcing."""
 
 from __future__ import annotations
 
@@ -9,40 +9,39 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: A maximum counts as a spike when the state rises to it and falls from it by this part of its
-#: extent.
+#: Prominence of a spike on both sides, relative to the extent of the state.
 PROMINENT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Turns:
+class Extrema:
     """Alternating maxima and minima.
 
     Parameters
     ----------
     rows : ndarray of int, shape (K,)
-        Samples at which they are.
+        Sample indices.
     upper : ndarray of bool, shape (K,)
-        Whether each is a maximum.
+        Whether it is a maximum.
     """
 
     rows: NDArray[np.intp]
     upper: NDArray[np.bool_]
 
 
-def turns_of(values: Array, least: float) -> Turns:
+def extrema_of(values: Array, least: float) -> Extrema:
     """Maxima and minima between which the values change by at least ``least`` on both sides.
 
-    The ends of the values are no turns.
+    The first and the last value are no extrema.
 
     Examples
     --------
-    >>> turns = turns_of(np.array([0.0, 3.0, 2.9, 4.0, 0.0, 1.0]), 0.5)
-    >>> turns.rows.tolist(), turns.upper.tolist()
+    >>> extrema = extrema_of(np.array([0.0, 3.0, 2.9, 4.0, 0.0, 1.0]), 0.5)
+    >>> extrema.rows.tolist(), extrema.upper.tolist()
     ([3, 4], [True, False])
     """
     if len(values) < 3 or not least > 0:
-        return Turns(np.empty(0, dtype=np.intp), np.empty(0, dtype=bool))
+        return Extrema(np.empty(0, dtype=np.intp), np.empty(0, dtype=bool))
     change = np.sign(np.diff(values))
     moving = np.flatnonzero(change)
     steps = change[moving]
@@ -67,11 +66,11 @@ def turns_of(values: Array, least: float) -> Turns:
                 rows.append(low)
                 upper.append(False)
             sense, high = 1, row
-    return Turns(np.array(rows, dtype=np.intp), np.array(upper, dtype=bool))
+    return Extrema(np.array(rows, dtype=np.intp), np.array(upper, dtype=bool))
 
 
 def _rose(values: Array, row: int, least: float) -> bool:
-    """Whether the first maximum has a rise before it."""
+    """Whether a sufficient rise precedes the first maximum."""
     return bool(row > 0 and values[row] - values[: row + 1].min() >= least)
 
 
@@ -80,7 +79,7 @@ def _fell(values: Array, row: int, least: float) -> bool:
 
 
 def refined(time: Array, values: Array, rows: NDArray[np.intp]) -> Array:
-    """Times of turns by the parabola through each sample and its neighbours.
+    """Times of extrema by the parabola through each sample and its neighbours.
 
     Examples
     --------

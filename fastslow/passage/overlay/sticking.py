@@ -1,4 +1,4 @@
-"""When a run rests in a band of equilibria, as a block that sticks, or slips along its edge."""
+"""Phases at rest in a band of equilibria (sticking) and slip along its edge."""
 
 from __future__ import annotations
 
@@ -16,16 +16,15 @@ from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
-#: How far a state may be outside a band that is interpolated between its rows, relative to
-#: the state or its extent: where it slides along the same interfaces it is in the set or has
-#: just left it.
+#: Tolerance of a band interpolated between its rows, relative to the state or its extent; a
+#: state that slides along the same interfaces is in the band or has just left it.
 NEAR = 1e-6
 
 
 def bands_at(diagram: Diagram, run: Trajectory, slow: Array, extent: Array) -> NDArray[np.intp]:
-    """The band of the diagram in which a run rests at each of its samples, −1 for none.
+    """Index of the band in which the run is at rest at each sample, −1 for none.
 
-    The run slides along the band's interfaces, and its states are within the band's ranges.
+    The run slides along the band's interfaces, with states within the band's ranges.
 
     Parameters
     ----------
@@ -34,7 +33,7 @@ def bands_at(diagram: Diagram, run: Trajectory, slow: Array, extent: Array) -> N
     slow : ndarray, shape (N,)
         The diagram's parameter at the samples.
     extent : ndarray, shape (n,)
-        Of every state.
+        Extent of every state.
     """
     found = np.full(len(slow), -1, dtype=np.intp)
     if not diagram.bands:
@@ -58,14 +57,14 @@ def along_edges(
     extent: Array,
     radius: float,
 ) -> tuple[NDArray[np.intp], Array]:
-    """Add the samples at which a run that has left a band slips along its edge.
+    """Add the samples at which the run slips along the edge of a band it has left.
 
     Returns
     -------
     band : ndarray, shape (N,)
-        The band at these samples too.
+        Index of the band, including these samples.
     distance : ndarray, shape (N,)
-        From the band, in units of ``extent``; NaN elsewhere.
+        Distance from the band, in units of ``extent``; NaN elsewhere.
     """
     found, distance = band.copy(), np.full(len(slow), np.nan)
     distance[band >= 0] = 0.0
@@ -90,7 +89,7 @@ def with_sticking(
     rests: NDArray[np.intp],
     band: NDArray[np.intp],
 ) -> tuple[Phase, ...]:
-    """The phases of an overlay with those at rest in a band, and along its edge, in their place."""
+    """Replace parts of the phases by sticking and by slip along the edge of a band."""
     found: list[Phase] = []
     for number, one in enumerate(diagram.bands):
         resting, slipping = rests == number, (band == number) & (rests < 0)

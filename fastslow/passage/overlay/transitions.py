@@ -1,4 +1,4 @@
-"""Leavings and landings of a trajectory: where, when, and what is responsible."""
+"""Transitions of a trajectory between stable branches: departures, landings, causes."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.passage.overlay.attracting_branches import Course, ends_of, over_a_gap
+from fastslow.passage.overlay.attracting_branches import Arc, ends_of, over_a_gap
 from fastslow.passage.overlay.excursions import Excursion
-from fastslow.passage.overlay.following import WAY, Measured, Stay, way_done
+from fastslow.passage.overlay.following import WAY, Episode, Measured, way_done
 from fastslow.passage.overlay.slow_quantities import SlowQuantity
 from fastslow.passage.overlay.spikes import refined
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.overlay.transitions import OSCILLATING, StableSheet, Transition
+from fastslow.results.overlay.transitions import OSCILLATING, StableBranch, Transition
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.crossings import Crossing, regions_at
 from fastslow.results.trajectory.state_at import StatePoint
 
 Array = NDArray[np.float64]
 
-#: A sheet left at no more than this part of the slow range before its end was left because of it.
+#: Largest distance before the end of a branch, relative to the slow range, of a departure due to
+#: that end.
 BEFORE = 0.05
 
-#: A state goes away from a sheet that comes back between samples by less than this part of the
-#: radius.
+#: Decrease of the distance between samples, relative to the radius, that counts as a return.
 RETURN = 1e-3
 
-#: A turn between samples is bracketed 16 times closer so often before a parabola is put through it.
+#: Number of 16-fold refinements of the bracket of an extremum before parabolic interpolation.
 CLOSER = 4
 
 #: Rounding of a number of size one.
 EPSILON = float(np.finfo(float).eps)
 
-#: Places between two times, and about where a condition is expected to begin to hold.
+#: Relative abscissae in an interval, and about the estimated onset of a condition.
 EVEN = np.linspace(0.0, 1.0, 17)
 NEARBY = np.concatenate([-(10.0 ** -np.arange(1, 13)), [0.0], 10.0 ** -np.arange(1, 13)])
 PLACES = np.concatenate([EVEN, NEARBY])
@@ -44,16 +44,16 @@ PLACES = np.concatenate([EVEN, NEARBY])
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """All that transitions are read off.
+    """Data from which transitions are determined.
 
     Parameters
     ----------
     diagram : Diagram
     slow : SlowQuantity
     m : Measured
-    sheets : tuple of StableSheet
+    stable_branches : tuple of StableBranch
     followed : ndarray of int, shape (N,)
-        The sheet of each sample of a stay (past its end still that sheet), −1 elsewhere.
+        Stable branch at each sample of an episode, the last one past its end; −1 elsewhere.
     drift : ndarray, shape (N,)
         dw/dt.
     """
@@ -61,12 +61,12 @@ class Passage:
     diagram: Diagram
     slow: SlowQuantity
     m: Measured
-    sheets: tuple[StableSheet, ...]
+    stable_branches: tuple[StableBranch, ...]
     followed: NDArray[np.intp]
     drift: Array
 
-    def moment(self, time: float) -> StatePoint:
-        """The slow quantity and the state at a time."""
+    def state_at(self, time: float) -> StatePoint:
+        """State and slow quantity at a time."""
         value, state = self.slow.at(np.array([time]))
         run, name = self.slow.run, self.slow.name
         return StatePoint(
@@ -81,19 +81,19 @@ class Passage:
 
     @cached_property
     def crossed(self) -> tuple[Array, NDArray[np.str_], NDArray[np.str_]]:
-        """Times of the run's crossings, and the regions that are left and entered."""
+        """Times of the run's crossings, and the regions before and after them."""
         table, modes = self.slow.run.crossing_table, np.array(self.slow.run.modes, dtype=str)
         return table[:, 0], modes[table[:, 3].astype(int)], modes[table[:, 4].astype(int)]
 
     def first(self, start: float, stop: float, over: Callable[[Array, Array], Array]) -> float:
-        """First time of an interval, to rounding, from which on a condition holds.
+        """Locate the onset of a condition in an interval, up to rounding.
 
         Parameters
         ----------
         start, stop : float
-            Times; at the second the condition holds.
+            Times; the condition is fulfilled at the second.
         over : callable
-            (slow (N,), state (N, n)) -> (N,), not negative where it holds.
+            (slow (N,), state (N, n)) -> (N,), nonnegative where it is fulfilled.
         """
         guess = 0.5 * (start + stop)
         while stop - start > 4.0 * EPSILON * max(abs(start), abs(stop)):
@@ -112,47 +112,49 @@ class Passage:
             guess = zero_between(times[rows], value[rows], start, stop)
         return stop
 
-    def left(self, stay: Stay, rival: int | None) -> StatePoint:
-        """Where a stay ends."""
-        time, course = self.m.time, self.m.courses[stay.course]
-        if stay.stop >= len(time):
-            return self.moment(float(time[-1]))
-        other = None if rival is None else self.m.courses[rival]
+    def left(self, episode: Episode, rival: int | None) -> StatePoint:
+        """State at the end of an episode."""
+        time, arc = self.m.time, self.m.arcs[episode.arc]
+        if episode.stop >= len(time):
+            return self.state_at(float(time[-1]))
+        other = None if rival is None else self.m.arcs[rival]
 
         def away(slow: Array, state: Array) -> Array:
             scaled = state / self.m.extent
-            far = -self.m.nearness(stay.course, slow, scaled)
+            far = -self.m.nearness(episode.arc, slow, scaled)
             there = None if other is None else other.present(slow)
             if other is not None and there is not None and there.any():
-                old, new = (c.state(slow) / self.m.extent for c in (course, other))
+                old, new = (c.state(slow) / self.m.extent for c in (arc, other))
                 way = way_done(scaled, old, new, self.m.periods)
                 far = np.where(there, np.maximum(far, way - WAY), far)
             return far
 
-        return self.moment(self.first(float(time[stay.stop - 1]), float(time[stay.stop]), away))
+        return self.state_at(
+            self.first(float(time[episode.stop - 1]), float(time[episode.stop]), away)
+        )
 
-    def landed(self, stay: Stay, not_before: float) -> StatePoint:
-        """Where a stay begins."""
-        time, course = self.m.time, self.m.courses[stay.course]
+    def landed(self, episode: Episode, not_before: float) -> StatePoint:
+        """State at the beginning of an episode."""
+        time, arc = self.m.time, self.m.arcs[episode.arc]
 
         def near(slow: Array, state: Array) -> Array:
-            beside = self.m.nearness(stay.course, slow, state / self.m.extent)
-            return np.where(course.present(slow), beside, -1.0)
+            beside = self.m.nearness(episode.arc, slow, state / self.m.extent)
+            return np.where(arc.present(slow), beside, -1.0)
 
-        since = max(float(time[max(stay.start - 1, 0)]), not_before)
-        if since >= time[stay.start]:
-            return self.moment(since)
-        if (stay, since) not in self._landings:
-            found = self.moment(self.first(since, float(time[stay.start]), near))
-            self._landings[stay, since] = found
-        return self._landings[stay, since]
+        since = max(float(time[max(episode.start - 1, 0)]), not_before)
+        if since >= time[episode.start]:
+            return self.state_at(since)
+        if (episode, since) not in self._landings:
+            found = self.state_at(self.first(since, float(time[episode.start]), near))
+            self._landings[episode, since] = found
+        return self._landings[episode, since]
 
     @cached_property
-    def _landings(self) -> dict[tuple[Stay, float], StatePoint]:
+    def _landings(self) -> dict[tuple[Episode, float], StatePoint]:
         return {}
 
     def passing(self, point: SpecialPoint, until: float) -> float | None:
-        """When the slow quantity last passed a special point before the sample after a time."""
+        """Time of the last passage of a special point before the sample after a time."""
         value, time = point[self.diagram.parameter], self.m.time
         stop = int(np.searchsorted(time, until, side="right"))
         passed = np.flatnonzero(np.diff(self.m.slow[:stop] > value))
@@ -170,15 +172,15 @@ class Passage:
     def _passings(self) -> dict[tuple[float, int], float]:
         return {}
 
-    def two_thirds(self, old: Stay, new: Stay) -> StatePoint | None:
-        """Where two thirds of the way from one course to another are done."""
-        # near sheets are come to before
+    def two_thirds(self, old: Episode, new: Episode) -> StatePoint | None:
+        """State at which two thirds of the distance between two arcs are covered."""
+        # branches close to each other are reached earlier
         rows = slice(old.stop, new.stop)
-        over = self.m.present[rows, new.course] & (self.m.way(old.course, new.course)[rows] > WAY)
+        over = self.m.present[rows, new.arc] & (self.m.way(old.arc, new.arc)[rows] > WAY)
         if not over.any():
             return None
         row = old.stop + int(np.argmax(over))
-        one, other = self.m.courses[old.course], self.m.courses[new.course]
+        one, other = self.m.arcs[old.arc], self.m.arcs[new.arc]
 
         def done(slow: Array, state: Array) -> Array:
             unit = self.m.extent
@@ -186,33 +188,33 @@ class Passage:
             way = way_done(state / unit, *places, self.m.periods)
             return np.where(other.present(slow), way - WAY, -1.0)
 
-        return self.moment(self.first(float(self.m.time[row - 1]), float(self.m.time[row]), done))
+        return self.state_at(self.first(float(self.m.time[row - 1]), float(self.m.time[row]), done))
 
-    def outward(self, sheet: StableSheet, point: SpecialPoint) -> float:
-        """+1 where a special point is at the upper end of a sheet, −1 at the lower."""
-        branch = self.diagram.branches[sheet.branch]
-        ends = branch.parameter[[sheet.start, sheet.stop - 1]]
+    def outward(self, stable_branch: StableBranch, point: SpecialPoint) -> float:
+        """+1 for a special point at the upper end of a stable branch, −1 at the lower."""
+        branch = self.diagram.branches[stable_branch.branch]
+        ends = branch.parameter[[stable_branch.start, stable_branch.stop - 1]]
         return 1.0 if point[self.diagram.parameter] >= ends.mean() else -1.0
 
-    def passed(self, sheet: StableSheet, rows: slice) -> SpecialPoint | None:
-        """The end of a sheet that the slow quantity goes past first in some samples."""
+    def passed(self, stable_branch: StableBranch, rows: slice) -> SpecialPoint | None:
+        """End of a stable branch that the slow quantity passes first in some samples."""
         found: list[tuple[int, SpecialPoint]] = []
-        for point in ends_of(self.diagram, sheet):
+        for point in ends_of(self.diagram, stable_branch):
             past = self.m.slow[rows] - point[self.diagram.parameter]
-            beyond = self.outward(sheet, point) * past
+            beyond = self.outward(stable_branch, point) * past
             if (beyond > 0).any():
                 found.append((int(np.argmax(beyond > 0)), point))
         return min(found, key=lambda f: f[0])[1] if found else None
 
     def extreme_past(
-        self, sheet: StableSheet, point: SpecialPoint, until: float
+        self, stable_branch: StableBranch, point: SpecialPoint, until: float
     ) -> StatePoint | None:
-        """Where the slow quantity turns round past the end of a sheet, if before a time."""
-        where, outward = point[self.diagram.parameter], self.outward(sheet, point)
+        """Extremum of the slow quantity past the end of a stable branch, if before a time."""
+        where, outward = point[self.diagram.parameter], self.outward(stable_branch, point)
         stop = int(np.searchsorted(self.m.time, until, side="right"))
         past = outward * (self.m.slow[:stop] - where)
         within = np.flatnonzero(past <= 0.0)
-        # the last passage of the end, or one that is undone before landing
+        # after the last passage of the end, or after one that is reversed before landing
         rows = np.arange(within[-1] + 1 if len(within) else 0, stop)
         if not len(rows) and len(within):
             gone = np.flatnonzero(past > 0.0)
@@ -226,10 +228,10 @@ class Passage:
         if row in (0, stop - 1):
             return None
         time = self._turn(row, outward)
-        return self.moment(time) if time < until else None
+        return self.state_at(time) if time < until else None
 
     def _turn(self, row: int, outward: float) -> float:
-        """When the slow quantity is farthest out, near a sample at which it is among samples."""
+        """Time of the extremum of the slow quantity near the extreme sample."""
         times = self.m.time[[row - 1, row, row + 1]]
         value = self.slow.at(times)[0]
         for _ in range(CLOSER if self.slow.dense else 0):
@@ -239,14 +241,14 @@ class Passage:
             times, value = times[best - 1 : best + 2], value[best - 1 : best + 2]
         return float(refined(times, value, np.array([1]))[0])
 
-    def delay(self, sheet: StableSheet, point: SpecialPoint | None, value: float) -> float:
+    def delay(self, stable_branch: StableBranch, point: SpecialPoint | None, value: float) -> float:
         if point is None:
             return float("nan")
-        delay = self.outward(sheet, point) * (value - point[self.diagram.parameter])
+        delay = self.outward(stable_branch, point) * (value - point[self.diagram.parameter])
         return delay if abs(delay) > 1e-13 * self.m.span else 0.0
 
     def slope(self, point: SpecialPoint | None, until: float) -> float:
-        """|dw/dt| where the slow quantity last passed a special point before a time, or then."""
+        """|dw/dt| at the last passage of a special point before a time, else at that time."""
         time = self.m.time
         passed = None if point is None else self.passing(point, until)
         until = until if passed is None else passed
@@ -257,9 +259,9 @@ class Passage:
 
 
 def zero_between(times: Array, values: Array, start: float, stop: float) -> float:
-    """Where values at up to four times vanish, between two of these, by inverse interpolation.
+    """Zero of values at up to four times, between two of these, by inverse interpolation.
 
-    The middle where the values do not rise.
+    The midpoint if the values do not increase.
 
     Examples
     --------
@@ -281,27 +283,29 @@ def zero_between(times: Array, values: Array, start: float, stop: float) -> floa
     return 0.5 * (start + stop)
 
 
-def passages_within(p: Passage, stay: Stay) -> list[Transition]:
-    """Changes of sheet along one course: passages of boundary equilibria and unstable stretches."""
+def passages_within(p: Passage, episode: Episode) -> list[Transition]:
+    """Transitions along one arc: boundary equilibria passed, unstable intervals."""
     found = []
-    rows = np.arange(stay.start, stay.stop)
+    rows = np.arange(episode.start, episode.stop)
     for row in rows[1:][np.diff(p.followed[rows]) != 0]:
-        left, entered = p.sheets[p.followed[row - 1]], p.sheets[p.followed[row]]
-        course = p.m.courses[stay.course]
-        last = stay.start + int(np.flatnonzero(p.m.present[stay.start : row, stay.course])[-1])
+        left, entered = p.stable_branches[p.followed[row - 1]], p.stable_branches[p.followed[row]]
+        arc = p.m.arcs[episode.arc]
+        last = episode.start + int(
+            np.flatnonzero(p.m.present[episode.start : row, episode.arc])[-1]
+        )
         special = p.passed(left, slice(last, row + 1))
-        low, high = course.ranges[course.sheets.index(int(p.followed[row]))]
+        low, high = arc.ranges[arc.stable_branches.index(int(p.followed[row]))]
 
         def entering(slow: Array, state: Array, low: float = low, high: float = high) -> Array:
             return np.minimum(slow - low, high - slow)
 
-        here = p.moment(p.first(float(p.m.time[row - 1]), float(p.m.time[row]), entering))
+        here = p.state_at(p.first(float(p.m.time[row - 1]), float(p.m.time[row]), entering))
         kind, note = "crossing", ""
         if special is not None and special.code == "BE":
             crossing = _crossing(p, special, left, entered, here.time)
-            here = p.moment(crossing) if crossing is not None else here
+            here = p.state_at(crossing) if crossing is not None else here
         elif special is not None and special.code == "HB":
-            kind, note = "Hopf", "stays near the branch all along its unstable stretch"
+            kind, note = "Hopf", "follows the branch along its entire unstable part"
         found.append(
             Transition(
                 here.time, here.value, here.state, left.label, entered.label, special,
@@ -312,34 +316,34 @@ def passages_within(p: Passage, stay: Stay) -> list[Transition]:
     return found
 
 
-def steep_parts(p: Passage, stay: Stay) -> list[Transition]:
-    """Where a sheet goes on, but so steeply that its state at the same value is out of reach.
+def steep_parts(p: Passage, episode: Episode) -> list[Transition]:
+    """Detect intervals with a large lag along a steep part of a stable branch.
 
-    Such a part begins and ends where the distance at the same value of the slow quantity
-    passes the radius; one that reaches to the end of the stay belongs to the leaving.
+    Such an interval begins and ends where the distance at the same value of the slow quantity
+    passes the radius; one that lasts to the end of the episode belongs to the departure.
     """
-    course = p.m.courses[stay.course]
-    rows = slice(stay.start, stay.stop)
-    behind = (p.m.apart(stay.course)[rows] >= p.m.radius) & p.m.present[rows, stay.course]
+    arc = p.m.arcs[episode.arc]
+    rows = slice(episode.start, episode.stop)
+    behind = (p.m.apart(episode.arc)[rows] >= p.m.radius) & p.m.present[rows, episode.arc]
     edges = np.flatnonzero(np.diff(behind.astype(int)))
     if behind[0]:
         edges = edges[1:]
     found = []
     for start, stop in zip(edges[::2], edges[1::2], strict=False):
-        inside = slice(stay.start + int(start), stay.start + int(stop) + 2)
-        steepness = _steepness(p, course, stay, inside)
-        sheets = p.followed[inside]
+        inside = slice(episode.start + int(start), episode.start + int(stop) + 2)
+        steepness = _steepness(p, arc, episode, inside)
+        stable_branches = p.followed[inside]
         time = p.m.time[inside]
-        worst = inside.start + int(np.argmax(p.m.apart(stay.course)[inside]))
-        lags = steepness >= 0.5 * p.m.radius and _behind(p, stay.course, worst)
-        if not lags or np.ptp(sheets):
+        worst = inside.start + int(np.argmax(p.m.apart(episode.arc)[inside]))
+        lags = steepness >= 0.5 * p.m.radius and _behind(p, episode.arc, worst)
+        if not lags or np.ptp(stable_branches):
             continue
-        here = p.moment(float(p.m.time[worst]))
-        label = p.sheets[sheets[0]].label
+        here = p.state_at(float(p.m.time[worst]))
+        label = p.stable_branches[stable_branches[0]].label
         found.append(
             Transition(
                 here.time, here.value, here.state, label, label, None, float("nan"), "steep",
-                p.moment(float(time[0])), p.moment(float(time[-1])), p.slope(None, here.time),
+                p.state_at(float(time[0])), p.state_at(float(time[-1])), p.slope(None, here.time),
                 steepness,
             )
         )  # fmt: skip
@@ -347,8 +351,8 @@ def steep_parts(p: Passage, stay: Stay) -> list[Transition]:
 
 
 def _behind(p: Passage, number: int, row: int) -> bool:
-    """Whether the deviation of a sample points back along the course that drifts away."""
-    slope = p.m.courses[number].slope(p.m.slow[row : row + 1])[0] / p.m.extent
+    """Whether the deviation of a sample is opposite to the drift of the arc."""
+    slope = p.m.arcs[number].slope(p.m.slow[row : row + 1])[0] / p.m.extent
     back = -slope * p.drift[row]
     deviation = p.m.deviation(number, row)
     sizes = np.linalg.norm(back) * np.linalg.norm(deviation)
@@ -356,54 +360,54 @@ def _behind(p: Passage, number: int, row: int) -> bool:
 
 
 def _crossing(
-    p: Passage, point: SpecialPoint, left: StableSheet, entered: StableSheet, time: float
+    p: Passage, point: SpecialPoint, left: StableBranch, entered: StableBranch, time: float
 ) -> float | None:
-    """The time of the crossing of a boundary equilibrium's interface that is nearest to another."""
+    """Crossing time of the interface of a boundary equilibrium nearest to a given time."""
     run, (times, outside, inside) = p.slow.run, p.crossed
     through = run.crossing_table[:, 1].astype(int)
-    met = (outside == left.region) & (inside == entered.region)
-    met &= np.array(run.interfaces, dtype=str)[through] == point.interface
-    if not met.any():
+    matching = (outside == left.region) & (inside == entered.region)
+    matching &= np.array(run.interfaces, dtype=str)[through] == point.interface
+    if not matching.any():
         return None
-    nearest = float(times[met][np.argmin(np.abs(times[met] - time))])
+    nearest = float(times[matching][np.argmin(np.abs(times[matching] - time))])
     if not p.m.time[0] <= nearest <= p.m.time[-1]:
         return None
-    # one that belongs to this passage lies before the slow quantity turns back
+    # a crossing of this passage precedes the reversal of the slow quantity
     slow = p.m.slow[slice(*np.searchsorted(p.m.time, sorted((time, nearest))))]
     turned = len(slow) > 2 and len(np.unique(np.sign(np.diff(slow)))) > 1
     return None if turned else nearest
 
 
 def leaving(p: Passage, excursion: Excursion) -> Transition:
-    """The transition that begins with leaving a sheet."""
+    """Transition that begins with the departure from a stable branch."""
     old, new = excursion.old, excursion.new
     assert old is not None
-    course = p.m.courses[old.course]
+    arc = p.m.arcs[old.arc]
     rows = slice(old.start, old.stop)
-    last = old.start + int(np.flatnonzero(p.m.present[rows, old.course])[-1])
-    left = p.sheets[p.followed[old.stop - 1]]
-    leave = p.left(old, None if new is None else new.course)
+    last = old.start + int(np.flatnonzero(p.m.present[rows, old.arc])[-1])
+    left = p.stable_branches[p.followed[old.stop - 1]]
+    leave = p.left(old, None if new is None else new.arc)
     stop = len(p.m.time) if new is None else new.start + 1
     special = p.passed(left, slice(last, stop)) or _passed_before(p, left, old)
     land = None if new is None else p.landed(new, leave.time)
-    entered = None if new is None else p.sheets[p.followed[new.start]]
+    entered = None if new is None else p.stable_branches[p.followed[new.start]]
     here = leave
-    if new is not None and not excursion.cycle and new.course != old.course:
+    if new is not None and not excursion.cycle and new.arc != old.arc:
         here = p.two_thirds(old, new) or leave
         if land is not None and land.time < here.time:
             land = here
-    to_sheet = OSCILLATING if excursion.cycle else "" if entered is None else entered.label
+    to_branch = OSCILLATING if excursion.cycle else "" if entered is None else entered.label
     passed = special is not None
-    if special is None and to_sheet != left.label:
+    if special is None and to_branch != left.label:
         special = _just_before(p, left, leave.value)
-    steepness = _steepness(p, course, old, slice(max(old.stop - 2, 0), stop))
+    steepness = _steepness(p, arc, old, slice(max(old.stop - 2, 0), stop))
     kind, note = _kind(p, excursion, left, entered, special, steepness)
     if kind == "gap crossing":
         leave, land = _across(p, left, entered, here.time) or (leave, land)
     extreme = None
     if kind == "jump" and special is not None and passed:
         extreme = p.extreme_past(left, special, here.time if land is None else land.time)
-        # a load that turned before the jump did not turn because of it
+        # a forcing that reversed before the jump did not do so because of it
         if extreme is not None and not p.slow.responds and extreme.time < leave.time:
             extreme = None
         here = extreme or here
@@ -413,39 +417,39 @@ def leaving(p: Passage, excursion: Excursion) -> Transition:
         notes.append(f"{count} oscillation{'s' if count > 1 else ''} on landing")
     delay = p.delay(left, special, here.value)
     if special is not None and delay < 0.0:
-        candidate = "" if passed else ", which is not passed: a candidate"
-        notes.insert(0, f"left {-delay:.3g} before {special.label}{candidate}")
+        candidate = "" if passed else ", which is not passed (candidate)"
+        notes.insert(0, f"departure {-delay:.3g} before {special.label}{candidate}")
         delay = float("nan")
     note = "; ".join(filter(None, notes))
     return Transition(
-        here.time, here.value, here.state, left.label, to_sheet, special,
+        here.time, here.value, here.state, left.label, to_branch, special,
         delay, kind, leave, None if excursion.cycle else land,
         p.slope(special, here.time),
         steepness, note, turned=extreme is not None,
     )  # fmt: skip
 
 
-def _passed_before(p: Passage, left: StableSheet, stay: Stay) -> SpecialPoint | None:
-    """The end of a sheet that was passed during a stay, after which the state only went away.
+def _passed_before(p: Passage, left: StableBranch, episode: Episode) -> SpecialPoint | None:
+    """End of a stable branch that was passed in an episode, without a later approach.
 
-    The slow quantity has turned round and is back over the sheet where that is left.
+    The slow quantity has reversed and is back in the range of the branch at the departure.
     """
-    rows = np.arange(stay.start, stay.stop)
+    rows = np.arange(episode.start, episode.stop)
     past = np.zeros(len(rows), dtype=bool)
     for point in ends_of(p.diagram, left):
         beyond = p.outward(left, point) * (p.m.slow[rows] - point[p.diagram.parameter])
         past |= beyond > 0.0
     if not past.any():
         return None
-    since = stay.start + int(np.flatnonzero(past)[-1])
-    away = np.diff(p.m.apart(stay.course)[since : stay.stop])
+    since = episode.start + int(np.flatnonzero(past)[-1])
+    away = np.diff(p.m.apart(episode.arc)[since : episode.stop])
     if (away < -RETURN * p.m.radius).any():
         return None
     return p.passed(left, slice(since, since + 1))
 
 
-def _just_before(p: Passage, left: StableSheet, value: float) -> SpecialPoint | None:
-    """The end of a sheet that was left a little before it."""
+def _just_before(p: Passage, left: StableBranch, value: float) -> SpecialPoint | None:
+    """End of a stable branch shortly after a departure."""
     reach = BEFORE * float(np.ptp(p.m.slow))
     near = [
         point
@@ -455,15 +459,15 @@ def _just_before(p: Passage, left: StableSheet, value: float) -> SpecialPoint | 
     return min(near, key=lambda e: abs(e[p.diagram.parameter] - value), default=None)
 
 
-def _steepness(p: Passage, course: Course, stay: Stay, rows: slice) -> float:
-    """Largest predicted lag behind a course where it is stable, in units of the extent."""
+def _steepness(p: Passage, arc: Arc, episode: Episode, rows: slice) -> float:
+    """Largest predicted lag behind the stable part of an arc, in units of the extent."""
     slow = p.m.slow[rows]
-    # the lag solves J y = dX/dw dw/dt: before a Hopf point Re λ vanishes, and λ does not
-    rate = course.stiffness(slow)
-    usable = p.m.present[rows, stay.course] & (rate > 0)
+    # the lag solves J y = dX/dw dw/dt; at a Hopf point Re λ vanishes, λ does not
+    rate = arc.stiffness(slow)
+    usable = p.m.present[rows, episode.arc] & (rate > 0)
     if not usable.any():
         return float("nan")
-    slope = np.linalg.norm(course.slope(slow[usable]) / p.m.extent, axis=1)
+    slope = np.linalg.norm(arc.slope(slow[usable]) / p.m.extent, axis=1)
     lag = slope * np.abs(p.drift[rows][usable]) / rate[usable]
     lag = lag[np.isfinite(lag)]
     return float(lag.max()) if len(lag) else float("nan")
@@ -472,12 +476,12 @@ def _steepness(p: Passage, course: Course, stay: Stay, rows: slice) -> float:
 def _kind(
     p: Passage,
     excursion: Excursion,
-    left: StableSheet,
-    entered: StableSheet | None,
+    left: StableBranch,
+    entered: StableBranch | None,
     special: SpecialPoint | None,
     steepness: float,
 ) -> tuple[str, str]:
-    """Kind of a leaving, and what else is to be said."""
+    """Kind of a departure, and a note."""
     back = entered is not None and entered.label == left.label and not excursion.cycle
     if special is not None:
         if special.code == "LP" or special.subtype == "non-smooth fold":
@@ -485,7 +489,7 @@ def _kind(
         if special.code in ("HB", "BP"):
             return ("Hopf" if special.code == "HB" else "branch point"), ""
         if special.code == "BE" and back:
-            return "excursion", "past the end of the sheet and back"
+            return "excursion", "past the end of the branch and back"
         if special.code == "BE" and entered is not None:
             if over_a_gap(p.diagram, left, entered):
                 return "gap crossing", ""
@@ -494,26 +498,26 @@ def _kind(
         return "unclassified", ""
     touch = _touch(p, excursion)
     if touch is not None:
-        return "grazing", f"touches {touch.interface} at t = {touch.time:.6g}"
+        return "grazing", f"tangency with {touch.interface} at t = {touch.time:.6g}"
     if back:
         return ("steep" if steepness >= 0.5 * p.m.radius else "excursion"), ""
-    if _lost(p, excursion):
+    if _rate_induced(p, excursion):
         return "rate-induced", _still_stable(p, excursion)
     return "loss of tracking", ""
 
 
-def _lost(p: Passage, excursion: Excursion) -> bool:
-    """Whether a stable sheet was lost because it drifted away too fast.
+def _rate_induced(p: Passage, excursion: Excursion) -> bool:
+    """Whether the departure is rate-induced tipping.
 
-    It exists and is stable all the time, the state falls behind it and not ahead, and comes to
-    another sheet or grows without bound.
+    The branch remains stable throughout, the state lags behind it, and reaches another
+    stable branch or grows without bound.
     """
     old, (_, stop) = excursion.old, excursion.rows(p.m)
     assert old is not None
     if excursion.cycle or (excursion.new is None and p.slow.run.outcome):
         return False
     rows = slice(old.stop - 1, min(stop + 1, len(p.m.time)))
-    return bool(p.m.present[rows, old.course].all()) and _behind(p, old.course, old.stop - 1)
+    return bool(p.m.present[rows, old.arc].all()) and _behind(p, old.arc, old.stop - 1)
 
 
 def _still_stable(p: Passage, excursion: Excursion) -> str:
@@ -521,13 +525,13 @@ def _still_stable(p: Passage, excursion: Excursion) -> str:
     rows = slice(max(start - 1, 0), min(stop + 1, len(p.m.time)))
     low, high = float(p.m.slow[rows].min()), float(p.m.slow[rows].max())
     return (
-        f"the equilibrium stays stable from {p.diagram.parameter} = {low:.6g} to {high:.6g}, and "
-        "the state falls behind it"
+        f"the equilibrium remains stable from {p.diagram.parameter} = {low:.6g} to {high:.6g}, "
+        "and the state lags behind it"
     )
 
 
 def _touch(p: Passage, excursion: Excursion) -> Crossing | None:
-    """The first touch of an interface around a leaving: from one fast oscillation before it on."""
+    """First tangency with an interface, from one fast oscillation before a departure on."""
     start, stop = excursion.rows(p.m)
     since = p.m.time[max(start - (stop - start), 0)]
     until = p.m.time[min(stop, len(p.m.time) - 1)]
@@ -537,9 +541,9 @@ def _touch(p: Passage, excursion: Excursion) -> Crossing | None:
 
 
 def _across(
-    p: Passage, left: StableSheet, entered: StableSheet | None, time: float
+    p: Passage, left: StableBranch, entered: StableBranch | None, time: float
 ) -> tuple[StatePoint, StatePoint] | None:
-    """Where a trajectory leaves the one side of a gap and reaches the other."""
+    """States at which a trajectory leaves one side of a gap and reaches the other."""
     if entered is None:
         return None
     times, outside, inside = p.crossed
@@ -547,4 +551,4 @@ def _across(
     if not len(out):
         return None
     reach = times[(inside == entered.region) & (times > out[-1])]
-    return (p.moment(float(out[-1])), p.moment(float(reach[0]))) if len(reach) else None
+    return (p.state_at(float(out[-1])), p.state_at(float(reach[0]))) if len(reach) else None

@@ -34,7 +34,7 @@ from fastslow.results.points import Corrector, Equilibrium, SpecialPoints, stabi
 
 
 @dataclass(frozen=True)
-class Sheet:
+class MonotonePiece:
     """A range of rows of a branch with strictly monotone parameter in a single region.
 
     Parameters
@@ -355,7 +355,7 @@ class Branch(Table, Result):
             "label": labels_at(self.special, self.special_rows, len(self)),
         }
 
-    def sheets(self) -> Iterator[Sheet]:
+    def monotone_pieces(self) -> Iterator[MonotonePiece]:
         """Yield the ranges of rows in one region with strictly monotone parameter.
 
         Vertical segments, where the parameter is constant, are omitted.
@@ -368,7 +368,7 @@ class Branch(Table, Result):
         edges = np.flatnonzero(step[1:] != step[:-1]) + 1
         for start, stop in zip([0, *edges.tolist()], [*edges.tolist(), len(step)], strict=True):
             if stop > start and step[start] != 0:
-                yield Sheet(start, stop + 1, str(self.region[start]))
+                yield MonotonePiece(start, stop + 1, str(self.region[start]))
 
     def _repr_html_(self) -> str:
         return branch_html(self)

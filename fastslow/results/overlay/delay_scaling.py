@@ -1,4 +1,4 @@
-"""Delays measured over a range of rates, beside the law."""
+"""Measured and predicted delays over a range of rates."""
 
 from __future__ import annotations
 
@@ -17,40 +17,41 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DelayScaling(Result):
-    """Delays past one special point at m rates, as simulated and as predicted.
+    """Simulated and predicted delays past one special point at m rates.
 
     Parameters
     ----------
     point : SpecialPoint
     parameter : str
-        The parameter that drifts.
+        Name of the drifting parameter.
     direction : int
-        +1 where it rises.
+        +1 if it increases, −1 if it decreases.
     event : str
-        What ends the delay, e.g. ``"x = 1"``.
+        Event that ends the delay, e.g. ``"x = 1"``.
     eps : ndarray, shape (m,)
-        Rates without their sign, falling.
+        Absolute rates in descending order.
     delay : ndarray, shape (m,)
-        Measured, in units of the parameter; nan where a run did not get there.
+        Measured delays, in units of the parameter; nan if a run did not reach the event.
     laws : tuple of Delay
-        The prediction at every rate.
+        Predicted delay at every rate.
     offset : float
-        The fitted power is that of delay − offset·eps; zero but for a gap.
+        The power is fitted to delay − offset·eps; zero except for a gap crossing.
     terms : tuple of str
-        Of the fit of the delay, e.g. ``("eps^(2/3)", "eps ln eps", "eps")``.
+        Basis functions of the fit, e.g. ``("eps^(2/3)", "eps ln eps", "eps")``.
     coefficients, predicted_coefficients : ndarray
-        Of those terms, fitted with equal relative weights, and by the law where it
-        gives them (nan otherwise). The fit is nan with fewer good runs than terms.
+        Coefficients of those terms, fitted with equal relative weights, and as predicted
+        (nan if the law does not give them). The fit is nan with fewer successful runs than
+        terms.
     exponent, uncertainty : float
-        Of the power fitted over these rates, and the larger of its standard error and
-        the distance of the farthest local exponent: how far it is from being one
-        power, not from its limit as eps goes to zero. Nan where the law is no power.
+        Exponent of the power fitted over these rates, and the larger of its standard error
+        and the largest deviation of a local exponent: a measure of the departure from a
+        single power, not from the limit eps → 0. nan if the law is not a power.
     local_exponents : ndarray, shape (m − 1,)
-        d ln(delay − offset·eps) / d ln eps between neighbours.
+        d ln(delay − offset·eps) / d ln eps between neighbouring rates.
     law_exponent : float
-        The exponent as eps goes to zero; nan where the law is no power.
+        Exponent in the limit eps → 0; nan if the law is not a power.
     outcomes : tuple of Outcome
-        How every run ended.
+        Outcome of every run.
     """
 
     point: SpecialPoint
@@ -72,17 +73,17 @@ class DelayScaling(Result):
 
     @property
     def predicted(self) -> Array:
-        """Delays by the law, shape (m,)."""
+        """Predicted delays, shape (m,)."""
         return np.array([law.delay for law in self.laws])
 
     @property
     def error(self) -> Array:
-        """Measured by predicted, minus one, shape (m,)."""
+        """Relative error of the prediction, measured/predicted − 1, shape (m,)."""
         return self.delay / self.predicted - 1.0
 
     @property
     def success(self) -> NDArray[np.bool_]:
-        """Whether every run got there, shape (m,)."""
+        """Whether each run reached the event, shape (m,)."""
         return np.array([outcome.success for outcome in self.outcomes])
 
     def __repr__(self) -> str:
@@ -94,11 +95,11 @@ class DelayScaling(Result):
         if np.isfinite(self.exponent):
             of = f"delay − {self.offset:.6g} eps" if self.offset else "delay"
             lines.append(
-                f"  {of} goes as eps^({self.exponent:.4f} ± {self.uncertainty:.4f}); "
-                f"the law has {self.law_exponent:.4f}"
+                f"  {of} scales as eps^({self.exponent:.4f} ± {self.uncertainty:.4f}), "
+                f"predicted exponent {self.law_exponent:.4f}"
             )
         else:
-            lines.append(f"  no power of eps: {self.laws[0].law}")
+            lines.append(f"  not a power of eps: {self.laws[0].law}")
         for term, value, law in zip(
             self.terms, self.coefficients, self.predicted_coefficients, strict=True
         ):
@@ -107,7 +108,7 @@ class DelayScaling(Result):
         good = np.isfinite(self.error)
         if good.any():
             worst = float(np.abs(self.error[good]).max())
-            lines.append(f"  measured and predicted differ by at most {worst:.2g} of the delay")
+            lines.append(f"  measured and predicted delays agree within a relative {worst:.2g}")
         failed = [str(outcome) for outcome in self.outcomes if not outcome]
         lines += [f"  {len(failed)} runs failed: {failed[0]}"] if failed else []
         return "\n".join(lines)

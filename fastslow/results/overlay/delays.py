@@ -1,4 +1,4 @@
-"""What the laws of slow passage predict at special points."""
+"""Predicted delays of slow passages through special points."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from fastslow.results.points import SpecialPoint
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Delay(Result, ABC):
-    """How far past a special point a drifting parameter is when something happens.
+    """Delay of a slow passage: distance of the drifting parameter past a special point.
 
     Parameters
     ----------
     point : SpecialPoint
     parameter : str
-        The parameter that drifts.
+        Name of the drifting parameter.
     rate : float
-        Its rate where it passes the point, in its unit by time.
+        Its rate of change at the point, in its unit per time.
     delay : float
-        How far past the point, along the drift, in units of the parameter; nan
-        where the law has no answer, and ``validity`` says why.
+        Distance past the point in the direction of the drift, in units of the parameter;
+        nan without a prediction, with the reason in ``validity``.
     validity : str
-        How good the prediction is, and what it leaves out.
+        Accuracy of the prediction and neglected effects.
     error : float
-        Bound on the difference between ``delay`` and what the model does under this
-        drift, in units of the parameter; nan where none can be stated.
+        Bound on the difference between ``delay`` and the delay of the model under this
+        drift, in units of the parameter; nan if no bound is available.
     drift : Drift, optional
-        How the parameter drifts, where that is more than its rate.
+        Drift of the parameter, unless it is constant.
     time : float
-        Time from the special point to there; by default at the rate alone.
+        Time since the passage of the special point; by default ``delay`` / |``rate``|.
     """
 
     point: SpecialPoint
@@ -53,18 +53,18 @@ class Delay(Result, ABC):
 
     @property
     def value(self) -> float:
-        """The parameter there."""
+        """Value of the parameter after the delay."""
         return self.point[self.parameter] + (self.delay if self.rate > 0 else -self.delay)
 
     @property
     def bound(self) -> str:
-        """The error as it is written after the delay; "" where none is stated."""
+        """The error bound as printed after the delay; "" without one."""
         return f" ± {self.error:.2g}" if math.isfinite(self.error) else ""
 
     @property
     @abstractmethod
     def law(self) -> str:
-        """The law in words."""
+        """Short description of the law."""
 
     def __repr__(self) -> str:
         name = self.parameter
@@ -77,22 +77,22 @@ class Delay(Result, ABC):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class FoldDelay(Delay):
-    """Delay of the jump at a smooth fold, from y' = a y² + b μ + c y³ + g μ y, μ the parameter.
+    """Delay of the jump at a saddle-node, from y' = a y² + b μ + c y³ + g μ y, μ the parameter.
 
     delay = α |rate|^(2/3) + β |rate| ln |rate| + γ |rate| with (α, β, γ) = ``coefficients``.
 
     Parameters
     ----------
     quadratic, slope, cubic, mixed : float
-        a, b, c and g of the motion along the null vector of length one.
+        a, b, c and g on the center manifold, with a null vector of unit length.
     feedback : float
-        k in μ' = rate + k y + …, from the drift.
+        k in μ' = rate + k y + … of the drift.
     coefficients : tuple of float
         α = Ω₀ |ab|^(−1/3), β = (c/a² − κ)/3 with κ = k/(a rate), and γ, which depends on the
-        level (nan without one).
+        level (nan without a level).
     level : mapping or "turn", optional
-        The state and its value at which the jump counts as done, or that the slow quantity
-        turns round; without it a jump to infinity of the quadratic normal form.
+        State and value that mark the end of the jump, or the extremum of the slow quantity;
+        by default the blow-up of the quadratic normal form.
     """
 
     quadratic: float
@@ -105,7 +105,7 @@ class FoldDelay(Delay):
 
     @property
     def leading(self) -> float:
-        """The first term alone, α |rate|^(2/3)."""
+        """Leading term, α |rate|^(2/3)."""
         return float(self.coefficients[0] * abs(self.rate) ** (2.0 / 3.0))
 
     @property
@@ -115,19 +115,18 @@ class FoldDelay(Delay):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class BoundaryDelay(Delay):
-    """Passage of a boundary equilibrium: the lag of persistence, the delay of a non-smooth fold.
+    """Passage of a boundary equilibrium: lag at persistence, delay at a non-smooth fold.
 
     Parameters
     ----------
     lag : float
-        How far past the point the interface is crossed, in units of the parameter.
+        Distance past the point at which the interface is crossed, in units of the parameter.
     stable : float
-        Largest real part of the eigenvalues before the interface.
+        Largest real part of the eigenvalues on the side before the interface.
     unstable : float
-        Largest real part of the eigenvalues behind it.
+        Largest real part of the eigenvalues on the side behind it.
     level : mapping or "turn", optional
-        The state and its value at which the jump counts as done, or that the slow quantity
-        turns round.
+        State and value that mark the end of the jump, or the extremum of the slow quantity.
     """
 
     lag: float
@@ -143,31 +142,32 @@ class BoundaryDelay(Delay):
     @property
     def law(self) -> str:
         if self.subtype == "persistence":
-            return "persistence, a lag of the order of the rate and no delay"
+            return "persistence, a lag of the order of the rate, no delay"
         return "non-smooth fold, of the order of rate ln(1/rate)"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class GapTransit(Delay):
-    """Crossing of a region whose equilibria form a continuum, such as the gap of a backlash.
+class GapCrossing(Delay):
+    """Crossing of a region with a continuum of equilibria, such as a backlash gap.
 
-    ``delay`` is that at the far interface, solved for the motion in the region at this
-    drift; `asymptotic` is its limit for slow drift, in closed form.
+    ``delay`` is measured at the far interface and computed from the motion in the region
+    under this drift; `asymptotic` is its closed-form limit for slow drift.
 
     Parameters
     ----------
     lag : float
-        How far past the point the near interface is crossed, in units of the parameter.
+        Distance past the point at which the near interface is crossed, in units of the
+        parameter.
     length : float
-        Of the continuum, between the interfaces, in the norm of the states.
+        Length of the continuum between the interfaces, in the norm of the states.
     slope : float
-        b in ξ' = b μ, the drift along the continuum.
+        b in ξ' = b μ, the slow motion along the continuum.
     relaxation : float
-        τ, the time by which the other motions in the region hold the crossing up.
+        τ, the additional time due to the other modes in the region.
     interfaces : tuple of str
-        The near one and the far one.
+        Near and far interface.
     lag_time : float
-        Time from the special point to the near interface; by default at the rate alone.
+        Time from the special point to the near interface; by default ``lag`` / |``rate``|.
     """
 
     lag: float
@@ -183,18 +183,18 @@ class GapTransit(Delay):
             object.__setattr__(self, "lag_time", self.lag / abs(self.rate))
 
     @property
-    def transit(self) -> float:
-        """By how much the parameter changes between the two interfaces."""
+    def width(self) -> float:
+        """Change of the parameter between the two interfaces."""
         return self.delay - self.lag
 
     @property
-    def transit_time(self) -> float:
-        """Time between the two interfaces."""
+    def duration(self) -> float:
+        """Time from the near to the far interface."""
         return self.time - self.lag_time
 
     @property
     def asymptotic(self) -> float:
-        """The slow limit of the delay, √(2 length |rate/b|) + τ |rate|."""
+        """Limit of the delay for slow drift, √(2 length |rate/b|) + τ |rate|."""
         speed = abs(self.rate)
         return float((2.0 * self.length * speed / abs(self.slope)) ** 0.5 + self.relaxation * speed)
 
@@ -205,23 +205,23 @@ class GapTransit(Delay):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class HopfExit(Delay):
-    """Delayed loss of stability at a Hopf point: where growth has made up for the decay before.
+    """Exit point of a slow passage through a Hopf bifurcation (entry-exit function).
 
     Parameters
     ----------
     entry : float
-        The parameter where the trajectory comes to its sheet.
+        Value of the parameter at which the trajectory enters the vicinity of the branch.
     decay : float
         ∫ |Re λ| dp / |rate| from the entry to the Hopf point: the amplitude
-        falls to exp(−decay).
+        decreases by the factor exp(−decay).
     gain : float
-        Amplitude at the exit by amplitude at the entry.
+        Ratio of the amplitudes at exit and entry.
     forgotten : bool
-        Whether the decay is below what is remembered, so that rounding, noise or the
-        tolerance decides the exit.
+        Whether the amplitude falls below rounding, noise or the tolerance of the
+        integration, which then determine the exit.
     buffer : float
-        The parameter beyond which the buffer point lets no trajectory stay, where it is
-        below the exit that the entry alone would give; else nan.
+        Value of the parameter at the buffer point if it precedes the exit by the
+        entry-exit function alone; else nan.
     """
 
     entry: float
@@ -232,25 +232,25 @@ class HopfExit(Delay):
 
     @property
     def law(self) -> str:
-        return f"entry at {self.entry:.6g} and exit of a Hopf point, ∫ Re λ = 0"
+        return f"Hopf, entry at {self.entry:.6g} and exit by ∫ Re λ = 0"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class BranchPointExit(Delay):
-    """Delayed loss of stability of an invariant branch: where growth has made up for the decay.
+    """Exit point of a slow passage along an invariant branch (entry-exit function).
 
     Parameters
     ----------
     entry : float
-        The parameter where the trajectory comes to the branch.
+        Value of the parameter at which the trajectory enters the vicinity of the branch.
     decay : float
         ∫ |λ| dp / |rate| from the entry to the branch point: the distance from the
-        branch falls to exp(−decay).
+        branch decreases by the factor exp(−decay).
     gain : float
-        Distance at the exit by distance at the entry.
+        Ratio of the distances from the branch at exit and entry.
     forgotten : bool
-        Whether the decay is below what is remembered, so that rounding, noise or the
-        tolerance decides the exit.
+        Whether the amplitude falls below rounding, noise or the tolerance of the
+        integration, which then determine the exit.
     """
 
     entry: float
@@ -260,4 +260,4 @@ class BranchPointExit(Delay):
 
     @property
     def law(self) -> str:
-        return f"entry at {self.entry:.6g} and exit of an invariant branch, ∫ λ = 0"
+        return f"invariant branch, entry at {self.entry:.6g} and exit by ∫ λ = 0"

@@ -1,4 +1,4 @@
-"""How the slow quantity moves while it passes a special point."""
+"""Drift of the slow quantity through a special point."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fastslow.results.base.immutable import Immutable
 
 @dataclass(frozen=True, eq=False)
 class Drift(Immutable):
-    """The rate of the slow quantity w near a special point (x*, w*), which it passes at t = 0.
+    """Rate of change of the slow quantity w near a special point (x*, w*), passed at t = 0.
 
     w' = rate + change·t + by_value·(w − w*) + Σ by_state[x]·(x − x*).
 
@@ -29,16 +29,16 @@ class Drift(Immutable):
     by_state : mapping
         Fast state (symbol or name) to ∂w'/∂x: the feedback of a slow state.
     law : str
-        w' as a formula in the fast states, w and t, where the linear terms are its
-        linearisation and not all of it; it takes their place away from the point.
+        w' as a formula in the fast states, w and t, if it is nonlinear; the other
+        arguments are then its linearisation.
     complete : bool
-        False where only the rate is known, as of a run read from a file; laws then state
-        no error.
+        False if only the rate is known, as for a run read from a file; predictions then
+        have no error bound.
 
     Raises
     ------
     ArgumentError
-        For a rate that is zero, or a number that is not finite.
+        For a rate of zero, or a number that is not finite.
 
     Examples
     --------
@@ -79,12 +79,12 @@ class Drift(Immutable):
 
     @property
     def constant(self) -> bool:
-        """Whether w' is the same everywhere."""
+        """Whether w' is constant."""
         return not (self.change or self.by_value or self.by_state or self.law)
 
     @property
     def way(self) -> float:
-        """Direction of the drift, +1 where w rises."""
+        """Direction of the drift, +1 for increasing w."""
         return math.copysign(1.0, self.rate)
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""A trajectory measured against an equilibrium diagram."""
+"""A trajectory compared with the equilibrium diagram of its frozen model."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ from fastslow.results.overlay.delays import BranchPointExit, HopfExit
 from fastslow.results.overlay.transitions import (
     Bursting,
     Phase,
-    StableSheet,
-    Transition,
+    StableBranch,
     Transitions,
 )
 from fastslow.results.trajectory.crossings import regions_at
@@ -42,54 +41,56 @@ SHOWN = 12
 
 @dataclass(frozen=True, eq=False)
 class Overlay(Table, Result):
-    """A trajectory laid over the equilibrium diagram of its frozen model.
+    """A trajectory compared with the equilibrium diagram of its frozen model.
 
-    ``lay["distance"]`` is a column and ``lay["x - w"]`` an expression, sample by sample;
-    ``lay[3]`` and iteration give the moments of samples, with the sheet followed then, and
-    ``lay[10:50]`` is the overlay of those samples.
+    ``overlay["distance"]`` is a column and ``overlay["x - w"]`` an expression, one value per
+    sample; ``overlay[3]`` and iteration return the state at single samples with the stable
+    branch followed there, and ``overlay[10:50]`` the overlay of those samples.
 
     Parameters
     ----------
     diagram : Diagram
     run : Trajectory
     time, slow : ndarray, shape (N,)
-        Times, and the diagram's parameter there: a slow quantity of the run, or the
+        Sample times and the diagram's parameter there: a slow quantity of the run, or the
         parameter of the path along which the model was frozen.
     state : ndarray, shape (N, n)
-        The fast states at those times.
+        Fast states at those times.
     extent : ndarray, shape (n,)
-        Unit of each state in distances: its extent in the run or on the sheets that the run
-        can follow, whichever is larger, if that is within reason of what the branches span;
-        of a velocity at least that of its state times |λ|.
+        Unit of each state in distances: its range in the run or on the stable branches that
+        the run can follow, whichever is larger, bounded by multiples of the range of all
+        branches; for a velocity at least the extent of its state times |λ|.
     radius : float
-        What counts as near, in those units.
-    sheets : tuple of StableSheet
-        All stable sheets of the diagram.
+        Distance, in those units, below which the state counts as near a stable branch.
+    stable_branches : tuple of StableBranch
+        All stable branches of the diagram.
     followed : ndarray of int, shape (N,)
-        Index into ``sheets``; −1 where none is followed: before the first and after the last
-        sheet, while oscillating on a cycle, and outside the diagram's range.
+        Index into ``stable_branches``; −1 where none is followed: before the first and after
+        the last one, during oscillations on a cycle, and outside the diagram's range.
     distance : ndarray, shape (N,)
-        From the followed sheet (past a Hopf point its unstable continuation, past a fold the
-        fold); where none is followed from the nearest stable one, infinite without any.
+        Distance from the followed stable branch (past a Hopf point from its unstable
+        continuation, past a fold from the fold); where none is followed, from the nearest
+        stable equilibrium, infinite if there is none.
     lag : ndarray, shape (N,)
-        How much time the motion is behind the sheet that it follows, X(w(t − lag)) ≈ x(t):
-        the deviation along the sheet over the speed at which the sheet drifts. nan where no
-        sheet is followed, or where the sheet or the slow quantity stands still.
+        Time lag behind the followed stable branch X, X(w(t − lag)) ≈ x(t): the deviation
+        along the branch divided by the speed at which the equilibrium drifts. nan where no
+        branch is followed, or where the equilibrium or the slow quantity does not move.
     relaxation : ndarray, shape (N,)
-        Relaxation time 1/|Re λ| of the followed sheet; nan where it is not stable.
+        Relaxation time 1/|Re λ| of the followed branch; nan where it is not stable.
     phases : tuple of Phase
-        All of the run, in time.
-    transitions : tuple of Transition
-        Every leaving of a sheet and end of an oscillation, in time.
+        All phases of the run, in order of time.
+    transitions : Transitions
+        Departures from a stable branch and ends of oscillations, in order of time;
+        ``overlay.transitions("jump")`` are those of one kind.
     bursting : Bursting or None
-        What the rhythm is called; None without one.
+        Classification of the recurrent pattern; None if there is none.
     turning : tuple of StatePoint
-        Where the slow quantity turns back.
+        Extrema of the slow quantity.
     outcome : Outcome
         Whether the diagram covers the run.
     band : ndarray of int, shape (N,), optional
-        Index into the diagram's ``bands`` where the run rests in one, as a block that
-        sticks by dry friction does, or slips along its edge; else −1.
+        Index into the diagram's ``bands`` where the state is at rest in a band of
+        equilibria, as a block held by dry friction, or slips along its edge; else −1.
     """
 
     diagram: Diagram
@@ -99,13 +100,13 @@ class Overlay(Table, Result):
     state: NDArray[np.float64]
     extent: NDArray[np.float64]
     radius: float
-    sheets: tuple[StableSheet, ...]
+    stable_branches: tuple[StableBranch, ...]
     followed: NDArray[np.intp]
     distance: NDArray[np.float64]
     lag: NDArray[np.float64]
     relaxation: NDArray[np.float64]
     phases: tuple[Phase, ...]
-    transitions: tuple[Transition, ...]
+    transitions: Transitions
     bursting: Bursting | None
     turning: tuple[StatePoint, ...]
     outcome: Outcome = MEASURED
@@ -121,29 +122,29 @@ class Overlay(Table, Result):
         return chain.from_iterable(queries.measured(self, block) for block in in_blocks(self.run))
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Time t, the slow quantity, states, distance, lag, and what is followed."""
+        """Columns: time t, slow quantity, states, distance, lag and stable branch followed."""
         return {
             "t": self.time,
             self.parameter: self.slow,
             **{name: self.state[:, k] for k, name in enumerate(self.diagram.states)},
             "distance": self.distance,
             "lag": self.lag,
-            "sheet": self.labels,
+            "stable_branch": self.labels,
         }
 
     @property
     def parameter(self) -> str:
-        """The slow quantity, the parameter of the diagram."""
+        """Name of the slow quantity, which is the parameter of the diagram."""
         return self.diagram.parameter
 
     @property
     def labels(self) -> NDArray[np.str_]:
-        """What is followed at each sample, "" for nothing.
+        """Label of the stable branch followed at each sample, "" where there is none.
 
-        The label of a sheet; ``"S1|S2 (sticking)"`` where the run rests in a band of
-        equilibria, and ``"edge of S1|S2"`` where it slips along the edge of the band.
+        ``"S1|S2 (sticking)"`` where the state is at rest in a band of equilibria, and
+        ``"edge of S1|S2"`` where it slips along the edge of the band.
         """
-        labels = np.array([*(sheet.label for sheet in self.sheets), ""])[self.followed]
+        labels = np.array([*(s.label for s in self.stable_branches), ""])[self.followed]
         if self.band is None or not self.diagram.bands:
             return labels
         names = np.array([band.name for band in self.diagram.bands])
@@ -155,13 +156,8 @@ class Overlay(Table, Result):
 
     @property
     def delays(self) -> NDArray[np.float64]:
-        """Delay of every transition, in the slow quantity's units."""
+        """Delay of every transition, in units of the slow quantity."""
         return np.array([t.delay for t in self.transitions])
-
-    @property
-    def special(self) -> Transitions:
-        """The transitions; ``lay.special("jump")`` those of one kind."""
-        return Transitions(self.transitions)
 
     @overload
     def __getitem__(self, key: slice) -> Overlay: ...
@@ -170,19 +166,19 @@ class Overlay(Table, Result):
     @overload
     def __getitem__(self, key: str) -> NDArray[np.float64]: ...
     def __getitem__(self, key: object) -> Overlay | StatePoint | NDArray[np.float64]:
-        """A column or expression, shape (N,); the moment of a sample; the overlay of some samples.
+        """Return a column or expression, shape (N,), the state at a sample, or a slice.
 
-        Columns are states, slow quantities, t, distance and lag. Parameters may
-        stand in an expression too.
+        Columns are states, slow quantities, t, distance and lag; expressions may
+        also contain parameters.
 
         Raises
         ------
         UnknownNameError
-            For a name that is none of these.
+            For an unknown name.
         ArgumentError
-            For what is no expression, or a slice that holds no sample or leaves some out.
+            For an invalid expression, or a slice that is empty or has a step.
         OutOfRangeError
-            For a sample that there is not.
+            For the index of a sample that does not exist.
         """
         if isinstance(key, slice):
             return queries.rows_of(self, key)
@@ -200,29 +196,29 @@ class Overlay(Table, Result):
         }
         return np.broadcast_to(evaluated(key, known, by_value("t", key)), self.time.shape)
 
-    @validated(region=text, sheet=text, direction=among(-1, 0, 1, None))
+    @validated(region=text, stable_branch=text, direction=among(-1, 0, 1, None))
     def at(
         self,
         *,
         region: str | None = None,
-        sheet: str | None = None,
+        stable_branch: str | None = None,
         direction: int | None = None,
         **value: float,
     ) -> list[StatePoint]:
-        """The moments at one value of a column, with the sheet followed then.
+        """Return the states at which a column takes a value, with the stable branch followed.
 
-        As `Trajectory.at`; the parameter of a path is read between samples.
+        As `Trajectory.at`; the parameter of a path is interpolated between samples.
 
         Parameters
         ----------
         region : str, optional
             Keep only those in one region.
-        sheet : str, optional
-            Keep only those on the sheet of this label; ``""`` those on none.
+        stable_branch : str, optional
+            Keep only those on the stable branch with this label; ``""`` for none.
         direction : int, optional
-            Keep only passages upwards (+1), downwards (−1), or touches (0).
+            Keep only upward crossings (+1), downward crossings (−1), or tangencies (0).
         **value : float
-            A state, slow quantity or ``t`` by name, e.g. ``w=0.1``.
+            Name of a state, a slow quantity or ``t``, e.g. ``w=0.1``.
 
         Returns
         -------
@@ -232,40 +228,40 @@ class Overlay(Table, Result):
         Raises
         ------
         UnknownNameError
-            For a name that is no column, no region or no sheet.
+            For an unknown column, region or stable branch.
         ArgumentError
-            If the run does not reach the value.
+            If the column does not take the value.
 
         Examples
         --------
         >>> import fastslow as fs
         >>> model = fs.systems.cusp(omega=0.002)
         >>> diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
-        >>> lay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=1))
-        >>> [(moment.sheet, round(moment["x"], 3)) for moment in lay.at(p=0)]
+        >>> overlay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=1))
+        >>> [(point.stable_branch, round(point["x"], 3)) for point in overlay.at(p=0)]
         [('S1.1', -1.0), ('S1.2', 1.0), ('S1.1', -1.0)]
-        >>> [part.special("jump")[0].to_sheet for part in lay.select(kind="jump")]
+        >>> [part.transitions("jump")[0].to_branch for part in overlay.select(kind="jump")]
         ['S1.2', 'S1.1']
         """
-        return queries.moments_of(self, value, direction, sheet, region)
+        return queries.states_at(self, value, direction, stable_branch, region)
 
-    @validated(region=text, sheet=text, kind=text)
+    @validated(region=text, stable_branch=text, kind=text)
     def select(
         self,
         *,
         region: str | None = None,
-        sheet: str | None = None,
+        stable_branch: str | None = None,
         kind: str | None = None,
         between: tuple[float, float] | None = None,
     ) -> tuple[Overlay, ...]:
-        """The parts of the overlay whose samples all fulfil the conditions, in order.
+        """Return the intervals of the overlay on which all conditions hold, in order.
 
         Parameters
         ----------
         region : str, optional
             Samples in one region.
-        sheet : str, optional
-            Samples on the sheet of this label; ``""`` those on none.
+        stable_branch : str, optional
+            Samples on the stable branch with this label; ``""`` for none.
         kind : str, optional
             Samples in a phase of this kind; see `fastslow.results.overlay.transitions.Phase`.
         between : (float, float), optional
@@ -274,26 +270,26 @@ class Overlay(Table, Result):
         Returns
         -------
         tuple of Overlay
-            Each with its part of the run, phases and transitions, and without ``bursting``.
+            Each with its interval of the run, phases and transitions; ``bursting`` is None.
 
         Raises
         ------
         UnknownNameError
-            For a region, sheet or kind that there is not.
+            For an unknown region, stable branch or kind of phase.
         ArgumentError
-            For a range that is none.
+            For an invalid range.
         """
-        return queries.parts_of(self, sheet, region, kind, between)
+        return queries.intervals_of(self, stable_branch, region, kind, between)
 
     def nearest(self, **values: float) -> StatePoint:
-        """The moment nearest to some values of columns, with the sheet followed then.
+        """Return the state nearest to given values of columns, with the stable branch followed.
 
-        As `Trajectory.nearest`; the parameter of a path is read between samples.
+        As `Trajectory.nearest`; the parameter of a path is interpolated between samples.
 
         Parameters
         ----------
         **values : float
-            At least one of the states, slow quantities and ``t``, e.g. ``w=0.1, x=0.3``.
+            Values of at least one state, slow quantity or ``t``, e.g. ``w=0.1, x=0.3``.
 
         Returns
         -------
@@ -302,24 +298,24 @@ class Overlay(Table, Result):
         Raises
         ------
         UnknownNameError
-            For a name that is no column.
+            For an unknown column.
         ArgumentError
-            For a number that is not finite, or none at all.
+            For a number that is not finite, or without values.
         """
         return queries.nearest_on(self, values)
 
     def shares(self) -> dict[str, float]:
-        """Part of the time on each sheet or in each band, and in ``""`` on none."""
+        """Return the fraction of time on each stable branch and in each band; ``""`` for none."""
         weight = np.diff(self.time)
         total = float(weight.sum()) or 1.0
         labels = self.labels[:-1]
-        known = [s.label for s in self.sheets]
+        known = [s.label for s in self.stable_branches]
         known += [name for band in self.diagram.bands for name in (band.name, band.edge)]
         times = {k: weight[labels == k].sum() / total for k in dict.fromkeys(["", *known])}
         return {k: float(v) for k, v in times.items() if v > 0}
 
     def summary(self) -> str:
-        """The story in words and numbers: sheets, phases, rhythm, and every transition."""
+        """Summarize the run: time fractions, phases, bursting and transitions."""
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
@@ -333,12 +329,12 @@ class Overlay(Table, Result):
             yield f"  {self.outcome}"
         if not self.run.outcome and self.outcome.code != "cut short":
             yield f"  the run ended early: {self.run.outcome}"
-        if not self.sheets and not self.diagram.bands:
-            yield "  the diagram has no stable sheet"
+        if not self.stable_branches and not self.diagram.bands:
+            yield "  the diagram has no stable branch"
         elif not self.diagram.folds:
             yield "  the diagram has no fold"
         for label, share in self.shares().items():
-            yield f"  on {label or 'no sheet'}: {share:.1%} of the time{self._behind(label)}"
+            yield f"  on {label or 'no stable branch'}: {share:.1%} of the time{self._lag(label)}"
         yield from self._sticking()
         yield from self._oscillating()
         if self.bursting is not None:
@@ -354,36 +350,37 @@ class Overlay(Table, Result):
         }
         yield from lost
 
-    def _behind(self, label: str) -> str:
-        """The median lag behind a sheet, where most samples on it have one."""
-        numbers = [k for k, sheet in enumerate(self.sheets) if sheet.label == label]
+    def _lag(self, label: str) -> str:
+        """Return the median lag behind a stable branch if most samples on it have one."""
+        numbers = [k for k, s in enumerate(self.stable_branches) if s.label == label]
         lags = self.lag[np.isin(self.followed, numbers)]
         known = lags[np.isfinite(lags)]
         if not len(known) or len(known) < LAGGING * len(lags):
             return ""
-        # the places of the samples, and so the third digit, depend on the processor's rounding
+        # sample times, and so the third digit, depend on the processor's rounding
         return f", median lag {float(np.median(known)):.2g}"
 
     def _sticking(self) -> Iterator[str]:
-        """How often the run rests in each band."""
+        """Number and durations of the sticking phases in each band."""
         met = [phase for phase in self.phases if phase.kind == "sticking"]
-        for name in dict.fromkeys(phase.sheets[0] for phase in met):
-            lengths = [phase.duration for phase in met if phase.sheets[0] == name]
+        for name in dict.fromkeys(phase.stable_branches[0] for phase in met):
+            lengths = [phase.duration for phase in met if phase.stable_branches[0] == name]
             count = len(lengths)
-            yield f"  in {name}: {count} time{'' if count == 1 else 's'}, {_range(lengths)} long"
+            times = "time" if count == 1 else "times"
+            yield f"  in {name}: {count} {times}, duration {_range(lengths)}"
 
     def _oscillating(self) -> Iterator[str]:
-        """Oscillating phases that are alike, in one line each."""
+        """Oscillating phases, one line for each attractor."""
         groups: dict[tuple[str, tuple[str, ...]], list[Phase]] = {}
         for phase in self.phases:
             if phase.kind == "oscillating":
-                groups.setdefault((phase.attractor, phase.sheets), []).append(phase)
-        for (attractor, sheets), met in groups.items():
+                groups.setdefault((phase.attractor, phase.stable_branches), []).append(phase)
+        for (attractor, stable_branches), met in groups.items():
             counts, lengths = [p.oscillations for p in met], [p.duration for p in met]
-            what = "on a cycle" if attractor == "cycle" else f"settling on {sheets[0]}"
+            what = "on a cycle" if attractor == "cycle" else f"settling on {stable_branches[0]}"
             yield (
                 f"  {len(met)} oscillating phase{'' if len(met) == 1 else 's'} {what}: "
-                f"{_range(counts)} oscillations, {_range(lengths)} long"
+                f"{_range(counts)} oscillations, duration {_range(lengths)}"
             )
 
     def __repr__(self) -> str:
@@ -391,6 +388,6 @@ class Overlay(Table, Result):
 
 
 def _range(values: Sequence[float]) -> str:
-    """The values from least to largest, to three digits."""
+    """Format the range of some values with three digits."""
     low, high = (f"{v:.3g}" if v < 1000 else f"{v:.0f}" for v in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"

@@ -48,7 +48,7 @@ class StatePoint(_Point):
         True for an end of a time interval in which the quantity is constant at the level.
     parameter : str
         For an overlay, the slow quantity that is the parameter of its diagram.
-    sheet : str
+    stable_branch : str
         For an overlay, the label of the stable branch followed, empty if there is none.
     branch : int or None
         The index of that branch in the diagram.
@@ -65,7 +65,7 @@ class StatePoint(_Point):
     interpolated: bool = False
     resting: bool = False
     parameter: str = ""
-    sheet: str = ""
+    stable_branch: str = ""
     branch: int | None = None
     distance: float = float("nan")
 
@@ -85,7 +85,7 @@ class StatePoint(_Point):
 
     def __repr__(self) -> str:
         slow = "".join(f", {name} = {value:.6g}" for name, value in self.slow.items())
-        more = f", on {self.sheet}" if self.sheet else ""
+        more = f", on {self.stable_branch}" if self.stable_branch else ""
         more += "; interpolated" if self.interpolated else ""
         return f"StatePoint(t = {self.time:.9g}: {self._values()}{slow}; in {self.region}{more})"
 
