@@ -1,24 +1,23 @@
-"""Where a function of one number changes its sign."""
+"""Sign changes of scalar functions."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-#: Evaluations at most; some ten are usual.
+#: Largest number of evaluations; about ten are typical.
 TRIALS = 100
 
 
 def sign_change(function: Callable[[float], float], low: float, high: float, fine: float) -> float:
-    """The upper end of an interval, no longer than ``fine``, within which a function changes sign.
-
-    By regula falsi, the value at the end that stays halved (Illinois).
+    """Locate a sign change by regula falsi (Illinois); return the upper end of its bracket.
 
     Parameters
     ----------
     function : callable
-        Of opposite signs at both ends.
+        Function with opposite signs at both ends.
     low, high : float
     fine : float
+        Largest length of the final bracket.
 
     Examples
     --------
@@ -36,7 +35,7 @@ def sign_change(function: Callable[[float], float], low: float, high: float, fin
         if right == 0.0 or not high - low > fine or not low < middle < high:
             break
         if left != right:
-            # one that rounds to an end is put beside it, so that the other end comes there
+            # an estimate at an end is moved inside, so that the other end moves
             estimate = (low * right - high * left) / (right - left)
             inside = min(max(estimate, low + 0.5 * fine), high - 0.5 * fine)
             middle = inside if low < inside < high else middle

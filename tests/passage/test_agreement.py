@@ -102,7 +102,7 @@ def test_the_fraction_of_time_outside_the_diagram_is_given(linear):
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(-0.5, 0.5))
     lay = fs.overlay(diagram, run)
     # |sin| > 1/2 on two thirds of a period; the samples are coarse
-    share = re.search(r"what lies outside, ([0-9.]+)% of the time", lay.summary())
+    share = re.search(r"([0-9.]+)% of the time is not measured", lay.summary())
     assert float(share.group(1)) == pytest.approx(66.7, abs=2)
 
 

@@ -86,14 +86,14 @@ def test_a_drift_that_is_not_known_in_full_states_no_error():
 
 def test_levels_and_drifts_that_do_not_fit():
     point, _ = special(slow_models.cusp())
-    with pytest.raises(fs.ArgumentError, match="a constant drift does not turn"):
+    with pytest.raises(fs.ArgumentError, match="a constant drift has no extremum"):
         fs.predict_delay(point, 1e-3, level="turn")
     with pytest.raises(fs.ArgumentError, match="expected a mapping of one state"):
         fs.predict_delay(point, 1e-3, level="turns")
     with pytest.raises(fs.UnknownNameError, match="unknown state of the drift 'y'"):
         fs.predict_delay(point, fs.Drift(1e-3, by_state={"y": 1e-3}))
     corner, _ = special(slow_models.van_der_pol_linear())
-    with pytest.raises(fs.ArgumentError, match="is not slow beside the branch"):
+    with pytest.raises(fs.ArgumentError, match="is not slow compared with the branch"):
         fs.predict_delay(corner, fs.Drift(-1.0, by_state={"x": -9.0}), level="turn")
 
 

@@ -149,7 +149,9 @@ def test_wrong_arguments(cusp_fold, corner):
     with pytest.raises(fs.UnknownNameError, match="unknown parameter 'r'"):
         fold_delay(cusp_fold, 1e-3, parameter="r")
     point = fs.continue_equilibria(corner, "p", over=(-1, 1)).boundary_equilibria[0]
-    with pytest.raises(fs.ArgumentError, match=r"at a point LP \(fold\); received BE1, a boundary"):
+    with pytest.raises(
+        fs.ArgumentError, match=r"requires a point LP \(fold\); received BE1, a boundary"
+    ):
         fold_delay(point, 1e-3)
 
 

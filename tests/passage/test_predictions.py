@@ -74,9 +74,9 @@ def test_a_drift_is_put_into_words_once_for_every_law(monkeypatch):
     """The gap is crossed twice in every period, both ways at the same rates."""
     calls = []
 
-    def counted(slow, point, time, *, told=True):
-        calls.append(told)
-        return drift_at(slow, point, time, told=told)
+    def counted(slow, point, time, *, with_law=True):
+        calls.append(with_law)
+        return drift_at(slow, point, time, with_law=with_law)
 
     monkeypatch.setattr(predictions, "drift_at", counted)
     lay = laid(fs.systems.harmonic_gear(), "w", (-20, 20), [0.0, 0.0], periods=3)

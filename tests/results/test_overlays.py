@@ -50,7 +50,7 @@ def test_sentences():
     )
     assert "no bifurcation nearby" in transition(None, "loss of tracking").describe("w")
     steep = transition(None, "steep", steepness=0.234).describe("w")
-    assert "no bifurcation: the predicted lag |dX/dw| |dw/dt| / |λ| grows to 0.23" in steep
+    assert "no bifurcation: the predicted lag |dX/dw| |dw/dt| / |λ| reaches 0.23" in steep
 
 
 def test_shares_and_summary(lay):

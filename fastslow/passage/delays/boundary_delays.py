@@ -1,4 +1,4 @@
-"""The lag of persistence, the delay of a non-smooth fold, and the crossing of a gap."""
+"""Lag at persistence, delay of a non-smooth fold, and gap crossing."""
 
 from __future__ import annotations
 
@@ -40,37 +40,37 @@ from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
 
-#: A product of null vectors, or of one with a gradient, below this part of their lengths is zero.
+#: Relative size of a vanishing product of null vectors, or of one with a gradient.
 ZERO = 1e-9
 
-#: Relative error of a passage in closed form, after root finding.
+#: Relative error of a closed-form passage after root finding.
 EXACT = 1e-9
 
-#: Why a passage behind an interface does not end.
+#: Reasons for which a passage behind an interface does not end.
 NOT_REACHED = "the motion behind the interface does not reach the level"
 RETURNED = "the motion returns across the interface before it reaches the level"
 
-#: Relaxation times before the point at which a passage is integrated from, where it may be.
+#: Relaxation times before the point at which the integrated passage may start, tried in order.
 FORGOTTEN = (36.0, 24.0, 12.0, 6.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Approach:
-    """The stable branch followed up to an interface.
+    """Quasi-static motion up to an interface.
 
     Parameters
     ----------
     before, behind : int
-        The regions.
+        Regions.
     interface : int
     inward : ndarray, shape (n + 3,)
-        Positive, applied to z = (y, μ, t, 1), behind the interface.
+        Row whose product with z = (y, μ, t, 1) is positive behind the interface.
     stable : float
-        Largest real part of the eigenvalues before it.
+        Largest real part of the eigenvalues before the interface.
     first : ndarray, shape (n,)
         dX/dμ of its slow manifold.
     z : ndarray, shape (n + 3,)
-        Where the quasi-static motion crosses, t = 0 when the parameter is at the point.
+        Crossing of the quasi-static motion, with t = 0 at the passage of the point.
     """
 
     before: int
@@ -98,19 +98,19 @@ def boundary_delay(
     parameter: object = None,
     model: Model | None = None,
 ) -> BoundaryDelay:
-    """How late a drifting parameter finds the trajectory at a boundary equilibrium.
+    """Lag or delay of a slow passage through a boundary equilibrium.
 
     Before the interface the rates are linearised, y' = J₁ y + b₁ μ with μ' linear as well: the
     motion on the slow manifold, y = −J₁⁻¹ b₁ μ − J₁⁻² b₁ rate at a constant drift, crosses
-    with a lag of the order of the rate. With persistence that is all. At a non-smooth
+    with a lag of the order of the rate, which is the result for persistence. At a non-smooth
     fold the motion behind the interface, y' = J₂ y + b₂ μ + …, grows along the unstable
     direction of J₂ until the level is reached, at
 
         delay = (rate/λ₂) ln(1/rate) + O(rate)
 
-    with a part of order rate that depends on the level: no power of the rate. It is
-    solved in closed form where the rates and the drift are linear, region by region, and
-    else integrated from the crossing. For x' = p + |x|, p = εt, it gives
+    with a term of order rate that depends on the level; this is not a power of the rate. The
+    passage is solved in closed form, region by region, if the rates and the drift are linear,
+    and integrated from the crossing otherwise. For x' = p + |x|, p = εt, it gives
     p = ε (1 + ln((x + p + ε)/(2ε))).
 
     Parameters
@@ -119,20 +119,20 @@ def boundary_delay(
         A boundary equilibrium of a continuous field, code BE, of subtype
         ``"persistence"`` or ``"non-smooth fold"``.
     rate : float or Drift
-        Of the parameter, with its sign.
+        Signed rate of the parameter.
     level : mapping or "turn"
-        One state and its value, e.g. ``{"x": 1.0}``, or that the parameter turns round; a
-        non-smooth fold needs it.
+        One state and its value, e.g. ``{"x": 1.0}``, or the extremum of the parameter;
+        required at a non-smooth fold.
     parameter : str or Symbol, optional
-        What drifts, by default the parameter of the point's diagram.
+        The drifting parameter, by default that of the point's diagram.
     model : Model, optional
-        For a point that was read from a file: its model.
+        The model of a point that was read from a file.
 
     Returns
     -------
     BoundaryDelay
-        Exact where the rates and the drift are linear. ``delay`` is the lag
-        for persistence, and nan where the level is never reached.
+        Exact if the rates and the drift are linear. ``delay`` is the lag
+        for persistence, and nan if the level is never reached.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def boundary_delay(
     >>> round(law.delay, 10)
     0.0497000894
     """
-    require_code(point, "BE", "the delay of a boundary equilibrium")
+    require_code(point, "BE", "the delay at a boundary equilibrium")
     if point.clarke is None or point.subtype not in ("persistence", "non-smooth fold"):
         kind = "a degenerate one" if point.subtype == "degenerate" else "one of a Filippov field"
         hint = "; see gap_crossing" if point.subtype == "degenerate" else ""
@@ -173,7 +173,8 @@ def boundary_delay(
             words += "; the branch behind the interface is not stable"
     elif height is None:
         raise ArgumentError(
-            "the delay of a non-smooth fold is that of reaching a level; give level={state: value}"
+            "the delay of a non-smooth fold depends on the level that ends it; "
+            "give level={state: value}"
         )
     else:
         stop = Event(height)
@@ -204,10 +205,10 @@ def boundary_delay(
 def _judged(
     local: LocalField, drift: Drift, way: Approach, stop: Event, delay: float, *, linear: bool
 ) -> tuple[str, float]:
-    """How good a passage is, in words and by its error."""
+    """Validity and error of a passage."""
     if linear and not drift.law:
         if not drift.complete:
-            return "exact at a drift of this form, whose other terms are not known", math.nan
+            return "exact for a drift of this form, whose other terms are not known", math.nan
         return "exact: the rates and the drift are linear", EXACT * abs(delay) + rounding(local)
     words = "from the rates linearised before the interface"
     words += "" if stop.level is None else ", integrated behind it"
@@ -228,7 +229,7 @@ def _judged(
 def _behind(
     local: LocalField, drift: Drift, way: Approach, stop: Event, slowest: float
 ) -> tuple[Place, str, bool]:
-    """Where the passage behind an interface ends, why it does not, and whether it is linear."""
+    """End of the passage behind an interface, reason of failure, and whether it is linear."""
     span = 40.0 * slowest
     if local.affine(way.behind) and not drift.law:
         place, reason, linear = _linear_legs(local, drift, way, stop)
@@ -243,7 +244,7 @@ def _behind(
 def _linear_legs(
     local: LocalField, drift: Drift, way: Approach, stop: Event
 ) -> tuple[Place, str, bool]:
-    """The passage behind an interface in closed form; False where it is not linear."""
+    """Closed-form passage behind an interface; False if it is not linear."""
     field, n, count = local.field, local.n, len(local.field.interfaces)
     region, z, linear = way.behind, way.z, True
     for _ in range(REGIONS):
@@ -280,10 +281,10 @@ def _linear_legs(
 
 
 def _flow(local: LocalField, drift: Drift, region: int) -> LinearFlow:
-    """The rates of a region linearised at the point, with a drift."""
+    """Linearised rates of a region at the point, with a drift."""
     rates, slopes, _, _ = local.field.evaluate(region, local.u)
     by_state = np.array([drift.by_state.get(name, 0.0) for name in local.field.model.states])
-    # at an equilibrium of the region rounding is all there is
+    # the rates at an equilibrium of the region are rounding
     rounding = 1e-12 * (np.abs(slopes) @ np.abs(local.u))
     offset = np.where(np.abs(rates) > rounding, rates, 0.0)
     return LinearFlow(
@@ -304,32 +305,31 @@ def gap_crossing(
     parameter: object = None,
     model: Model | None = None,
 ) -> GapCrossing:
-    """How long a drifting parameter needs to carry the trajectory across a gap.
+    """Delay of the gap crossing that a drifting parameter causes.
 
     In a region whose equilibria form a continuum at one value of the parameter
     (no stiffness between two contacts) the motion y' = J y + b μ with J q = 0,
-    ψ J = 0, ψ·q = 1 is pushed along q by ξ' = β μ, β = ψ·b; the other motions
-    follow with the time τ. From contact to contact over the length ℓ, for slow drift,
+    ψ J = 0, ψ·q = 1 drifts along q by ξ' = β μ, β = ψ·b; the other modes add the time τ.
+    From contact to contact over the length ℓ, for slow drift,
 
         delay = √(2ℓ |rate/β|) + τ |rate|.
 
     For x'' + c x' = w between x = ±D with s = |rate| that is Δw = 2√(c D s) + s/c, in
     Δt = √(4 c D/s) + 1/c: the slow limit, `GapCrossing.asymptotic`. The prediction itself is
-    solved for the linear motion in the gap (integrated, where the rates or the drift are not
-    linear), from the quasi-static state in which it is entered; the two agree as the drift
-    becomes slow.
+    computed from the linear motion in the gap (by integration if the rates or the drift are
+    nonlinear), from the quasi-static state at the near interface; the two agree in the limit
+    of slow drift.
 
     Parameters
     ----------
     point : SpecialPoint
-        The end of the continuum at which it is entered: a degenerate boundary
-        equilibrium, code BE.
+        The near end of the continuum: a degenerate boundary equilibrium, code BE.
     rate : float or Drift
-        Of the parameter, with its sign.
+        Signed rate of the parameter.
     parameter : str or Symbol, optional
-        What drifts, by default the parameter of the point's diagram.
+        The drifting parameter, by default that of the point's diagram.
     model : Model, optional
-        For a point that was read from a file: its model.
+        The model of a point that was read from a file.
 
     Returns
     -------
@@ -338,8 +338,8 @@ def gap_crossing(
     Raises
     ------
     ArgumentError
-        For a point of another code or subtype, or without a continuum behind it
-        that ends at another interface; for a rate of zero or towards the contact.
+        For a point of another code or subtype, without a continuum that ends at another
+        interface, or for a rate of zero or towards the contact.
 
     Examples
     --------
@@ -351,7 +351,7 @@ def gap_crossing(
     >>> round(law.asymptotic - 2 * (0.25 * 0.001) ** 0.5, 12), round(law.duration, 2)
     (0.001, 32.58)
     """
-    require_code(point, "BE", "the crossing of a gap")
+    require_code(point, "BE", "a gap crossing")
     if point.clarke is None or point.subtype != "degenerate":
         kind = point.subtype or "one of a Filippov field"
         raise ArgumentError(
@@ -366,7 +366,7 @@ def gap_crossing(
     p, q = _normalised(local, p, q, way)
     drifts = float(p @ slope)
     far, length, outward = _far_side(local, way, q)
-    # the inverse of J on its range: the other motions lag behind by it
+    # the inverse of J on its range gives the lag of the other modes
     bordered = np.block([[jacobian, q[:, None]], [p[None, :], np.zeros((1, 1))]])
     lean = np.linalg.solve(bordered, np.append(slope - drifts * q, 0.0))[:-1]
     n = local.n
@@ -386,7 +386,9 @@ def gap_crossing(
         values = np.linalg.eigvals(jacobian)
         others = np.delete(values, np.argmin(np.abs(values))).real
         fastest = float(others.max(initial=-math.inf)) * (time - way.time)
-        words += f"; of the slow limit a part {math.exp(min(fastest, 700.0)):.1g} has not died out"
+        words += (
+            f"; remaining transient relative to the slow limit {math.exp(min(fastest, 700.0)):.1g}"
+        )
     return GapCrossing(
         point=point,
         parameter=local.field.parameter,
@@ -406,13 +408,13 @@ def gap_crossing(
 
 
 def approach_of(local: LocalField, drift: Drift) -> Approach:
-    """Which region's stable branch the drift runs off, and the quasi-static crossing.
+    """Region whose stable branch ends under the drift, and the quasi-static crossing.
 
     Raises
     ------
     ArgumentError
-        If the drift goes the other way or is not slow, or the branch before the interface is
-        unstable.
+        If the drift has the other direction or is not slow, or the branch before the
+        interface is unstable.
     """
     field, n = local.field, local.n
     k = field.interfaces.index(str(local.point.interface))
@@ -441,7 +443,7 @@ def approach_of(local: LocalField, drift: Drift) -> Approach:
         time = math.nan if manifold is None else flow.slow_crossing(manifold, inward)
         if manifold is None or math.isnan(time):
             raise ArgumentError(
-                f"the drift of {field.parameter} is not slow beside the branch before "
+                f"the drift of {field.parameter} is not slow compared with the branch before "
                 f"{local.point.label}, whose slowest eigenvalue is {values.max():.3g}"
             )
         z = flow.slow_motion(manifold, time)
@@ -453,14 +455,14 @@ def approach_of(local: LocalField, drift: Drift) -> Approach:
         )
     if not moved:
         raise ArgumentError(
-            f"a drift of {field.parameter} leaves the equilibrium at {local.point.label} on the "
+            f"a drift of {field.parameter} keeps the equilibrium at {local.point.label} on the "
             "interface"
         )
     raise wrong_way(local, drift.rate)
 
 
 def _normalised(local: LocalField, p: Array, q: Array, way: Approach) -> tuple[Array, Array]:
-    """Null vectors with ψ·q = 1, q into the gap."""
+    """Null vectors with ψ·q = 1 and q pointing into the gap."""
     across, unit = way.inward[: local.n], local.unit
     overlap, inward, length = float(p @ q), float(across @ q), np.linalg.norm(q / unit)
     if (
@@ -468,15 +470,15 @@ def _normalised(local: LocalField, p: Array, q: Array, way: Approach) -> tuple[A
         or abs(inward) <= ZERO * np.linalg.norm(across * unit) * length
     ):
         raise ArgumentError(
-            f"behind {local.point.label} no continuum of equilibria with damped motion along it "
-            "leads away from the interface"
+            f"no continuum of equilibria with damped motion along it starts behind "
+            f"{local.point.label}"
         )
     q = math.copysign(1.0, inward) * q
     return p / float(p @ q), q
 
 
 def _far_side(local: LocalField, way: Approach, q: Array) -> tuple[int, float, Array]:
-    """The next interface along the continuum, how far it is, and its function, positive inside."""
+    """Far interface of the continuum, its distance, and its function, positive inside."""
     field, n = local.field, local.n
     _, _, heights, gradients = field.evaluate(way.behind, local.u)
     found: list[tuple[float, int]] = []
@@ -486,8 +488,8 @@ def _far_side(local: LocalField, way: Approach, q: Array) -> tuple[int, float, A
             found.append((float(-heights[j] / along), j))
     if not found:
         raise ArgumentError(
-            f"the continuum behind {local.point.label} ends at no other interface; a gap lies "
-            "between two"
+            f"the continuum behind {local.point.label} ends at no other interface; expected a gap "
+            "between two interfaces"
         )
     length, j = min(found)
     sign = field.signs[way.behind, j]

@@ -1,4 +1,4 @@
-"""The algebraic passage of a transcritical point, where the drift pushes off the branch left."""
+"""Algebraic passage through a transcritical point of a branch that is not invariant."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from fastslow.passage.delays.local_field import LocalField
 
 Array = NDArray[np.float64]
 
-#: Step of differences, in units of the states and by the parameter's range.
+#: Step of differences, relative to the units of the states and the parameter range.
 STEP = 1e-4
 
-#: The passage begins so many widths √(rate/β) before the point: e^(−72) of its start is left.
+#: Start of the passage before the point, in widths √(rate/β): transients decay by e^(−72).
 BEGIN = 12.0
 
-#: It ends so many widths behind it: a jump comes before.
+#: End of the passage behind the point, in the same widths.
 END = 12.0
 
-#: A quadratic term below this part of the others vanishes, as at a pitchfork.
+#: Relative size of a vanishing quadratic term, as at a pitchfork.
 VANISHES = 1e-6
 
 #: Error control.
 RTOL, ATOL = 1e-11, 1e-13
 
-#: A solution of the scaled normal form beyond this many times its own size runs to infinity.
+#: Size of a solution of the scaled normal form that counts as blow-up.
 INFINITE = 1e6
 
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """y' = a y² + b y μ + c μ² on the centre manifold, with y along the critical vector.
+    """Normal form y' = a y² + b y μ + c μ² on the center manifold, y along the critical vector.
 
     Parameters
     ----------
@@ -46,41 +46,41 @@ class Form:
     c: float
 
     def slopes(self) -> tuple[float, float]:
-        """Of the two branches y = m μ."""
+        """Slopes m of the two branches y = m μ."""
         root = math.sqrt(self.b**2 - 4.0 * self.a * self.c)
         return (-self.b - root) / (2.0 * self.a), (-self.b + root) / (2.0 * self.a)
 
     def growth(self, slope: float) -> float:
-        """d/dμ of the eigenvalue along a branch."""
+        """Derivative by μ of the eigenvalue along a branch."""
         return 2.0 * self.a * slope + self.b
 
 
 def passage_in_words(mode: CriticalMode, local: LocalField, rate: float) -> str:
-    """What the drift does to a trajectory at a branch point whose branches both move.
+    """Describe the passage of a branch point whose branches both depend on the parameter.
 
-    With y = √ε Y and μ = √ε τ the rate drops out of the normal form. The solution of
-    Y' = a Y² + b Y τ + c τ² that comes along the attracting branch is at τ = 0 on the side of
-    the branch that attracts from there on, or on the other side, from which it goes
-    to infinity (Krupa and Szmolyan 2001, Nonlinearity 14, 1473-1491).
+    The scaling y = √ε Y, μ = √ε τ removes the rate from the normal form. The solution of
+    Y' = a Y² + b Y τ + c τ² that follows the attracting branch tends to the other branch if it
+    is on its attracting side at τ = 0, and to infinity otherwise (Krupa and Szmolyan 2001,
+    Nonlinearity 14, 1473-1491).
     """
     form = _form(mode, local)
     if form is None:
-        return "the passage is algebraic in the rate; at a pitchfork no law for it is known here"
+        return "the passage is algebraic in the rate; no law is implemented at a pitchfork"
     tau = blow_up(form, mode.behind.way)
     if math.isnan(tau):
         return (
-            "it is carried over to the other branch without a delay, at a distance of the order "
-            "of the square root of the rate"
+            "it passes to the other branch without a delay, at a distance of the order of the "
+            "square root of the rate"
         )
     delay = math.sqrt(abs(rate)) * tau
     return (
         "it leaves both branches by a jump, with a delay of the order of the square root of the "
-        f"rate ({delay:.3g} in the normal form, without an error)"
+        f"rate ({delay:.3g} in the normal form, without an error bound)"
     )
 
 
 def _form(mode: CriticalMode, local: LocalField) -> Form | None:
-    """The quadratic normal form at the point; None at a pitchfork or in a sliding motion."""
+    """Quadratic normal form at the point; None at a pitchfork or for sliding motion."""
     region = local.region(str(mode.before.branch.region[mode.before.rows[-1]]))
     if local.field.modes[region].sides is not None:
         return None
@@ -98,7 +98,7 @@ def _form(mode: CriticalMode, local: LocalField) -> Form | None:
     values, vectors = np.linalg.eig(jacobian.T)
     left = vectors[:, int(np.argmin(np.abs(values)))].real
     left = left / (left @ right)
-    # the part of the motion with the parameter that is not along the critical vector
+    # displacement with the parameter transverse to the critical vector
     bordered = np.block([[jacobian, right[:, None]], [left[None, :], np.zeros((1, 1))]])
     along = np.linalg.solve(bordered, np.append(-by_parameter, 0.0))[:n]
 
@@ -118,10 +118,10 @@ def _form(mode: CriticalMode, local: LocalField) -> Form | None:
 
 
 def blow_up(form: Form, way: int) -> float:
-    """τ at which the scaled motion goes to infinity; nan where it comes to the other branch."""
+    """τ of the blow-up of the scaled solution; nan if it tends to the other branch."""
     from scipy.integrate import solve_ivp
 
-    # with μ = way |μ| the drift is upwards
+    # with μ = way |μ| the parameter increases
     form = Form(form.a, form.b * way, form.c)
     old, new = sorted(form.slopes(), key=form.growth, reverse=True)
     width = 1.0 / math.sqrt(abs(form.growth(old)))
@@ -129,13 +129,13 @@ def blow_up(form: Form, way: int) -> float:
     def flow(tau: float, y: Array) -> list[float]:
         return [form.a * y[0] ** 2 + form.b * y[0] * tau + form.c * tau**2]
 
-    def runs_away(tau: float, y: Array) -> float:
+    def blows_up(tau: float, y: Array) -> float:
         return float(INFINITE * (1.0 + abs(old) + abs(new)) * width - abs(y[0]))
 
-    runs_away.terminal = True  # type: ignore[attr-defined]
+    blows_up.terminal = True  # type: ignore[attr-defined]
     begin = -BEGIN * width
     start = [old * begin + old / (form.growth(old) * begin)]
     found = solve_ivp(
-        flow, (begin, END * width), start, method="LSODA", rtol=RTOL, atol=ATOL, events=runs_away
+        flow, (begin, END * width), start, method="LSODA", rtol=RTOL, atol=ATOL, events=blows_up
     )
     return float(found.t_events[0][0]) if len(found.t_events[0]) else math.nan

@@ -1,4 +1,4 @@
-"""The delay of the jump at a smooth fold."""
+"""Delay of the jump at a smooth fold (saddle-node)."""
 
 from __future__ import annotations
 
@@ -49,38 +49,37 @@ OMEGA_0 = 2.338107410459767
 #: is −½ ln A'(Ω₀)² − ½ + ∫₋∞^Ω₀ A² ln A ds / A'(Ω₀)².
 MATCHING = -1.0085182549893932
 
-#: Jumps are timed from this part of the way on which the normal form holds, and from half of the
-#: last one as often as this: rounding grows as 1/Y³.
+#: Initial distance of a jump relative to the validity of the normal form, and the number of
+#: halvings; rounding grows as 1/Y³.
 NEAR, HALVINGS = 0.4, 6
 
-#: Extrapolations that differ by no more than this, in units of the time of a jump, are the limit.
+#: Tolerance of the extrapolated limit, in units of the time of a jump.
 SETTLED = 1e-8
 
-#: A level nearer than this (in units of δ) is reached while the drift still carries the passage.
+#: Level, in units of δ, below which the jump ends within the slow part of the passage.
 SLOW_PART = 2.0
 
-#: Places before the fold, in units of δ, up to which its branch is followed for the passage to be
-#: integrated from there: the quasi-static state is forgotten as exp(−4/3 s^(3/2)), from the
-#: last by exp(−40).
+#: Distances before the fold, in units of δ, at which the integrated passage may start: initial
+#: transients decay as exp(−4/3 s^(3/2)), from the last one by exp(−40).
 BEFORE = (1.0, 1.5, 2.0, 3.0, 4.0, 5.5, 7.5, 9.65)
 
-#: A jump is simulated for 1/Y and this part of it more, and then for longer where it is not done:
-#: what the frozen model does behind it, as to oscillate, is not asked for.
+#: Durations of the simulation of a jump beyond 1/Y, relative to it, tried in order, so that the
+#: motion after the jump is not simulated unnecessarily.
 LONGER = (0.25, 1.0, 9.0)
 
-#: A turn of the drift is looked for at so many places in every step of a run.
+#: Points per step of a run at which the sign of the drift is checked.
 PARTS = 4
 
-#: Nodes on a step of a run, whose series has order 16.
+#: Gauss nodes per step of a run, whose series has order 16.
 NODES = 10
 
-#: A coefficient below this times its terms counts as zero.
+#: Size of a zero coefficient relative to its terms.
 ZERO = 1e-9
 
 
 @dataclass(frozen=True)
 class FoldForm:
-    """y' = a y² + b μ + c y³ + g μ y on the centre manifold, and how it lies in the states.
+    """Normal form y' = a y² + b μ + c y³ + g μ y on the center manifold, with its embedding.
 
     Parameters
     ----------
@@ -109,9 +108,9 @@ def fold_delay(
     parameter: object = None,
     model: Model | None = None,
 ) -> FoldDelay:
-    """How far past a fold a drifting parameter is when the trajectory jumps.
+    """Delay of the jump in a slow passage through a fold (saddle-node).
 
-    On the centre manifold of the fold y' = a y² + b μ + c y³ + g μ y with μ' = rate + k y + ….
+    On the center manifold of the fold y' = a y² + b μ + c y³ + g μ y with μ' = rate + k y + ….
     In units of δ = (|ab rate|)^(1/3), with μ as the independent variable, its leading part is
     a Riccati equation whose solution −A'/A, A(s) = Ai(−s), ends at the first zero
     Ω₀ = 2.33810741 of the Airy function; the feedback κ = k/(a rate) acts like a part of the
@@ -119,25 +118,24 @@ def fold_delay(
 
         delay = Ω₀ |ab|^(−1/3) |rate|^(2/3) + ((c/a² − κ)/3) |rate| ln |rate| + O(rate).
 
-    With a level, of a state whose value tells when the jump is done, or the turn of
-    the slow quantity, the term of order rate is known too, by matching to the jump of the frozen
-    model, which is simulated, the drift integrated along it. A rate that changes
-    by the time (c₁) or by the parameter (c₂) adds (2/5) Ω₀² (c₁/rate + c₂) |rate|/δ². The
-    terms left out are O(rate^(4/3)); ``error`` bounds them, from the same passage integrated
-    numerically.
+    With a level that ends the jump, the value of a state or the extremum of the slow
+    quantity, the term of order rate follows by matching to the simulated jump of the frozen
+    model, with the drift integrated along it. A rate that varies with time (c₁) or with the
+    parameter (c₂) adds (2/5) Ω₀² (c₁/rate + c₂) |rate|/δ². The neglected terms are
+    O(rate^(4/3)); ``error`` bounds them by numerical integration of the same passage.
 
     Parameters
     ----------
     point : SpecialPoint
         A fold, code LP.
     rate : float or Drift
-        Of the parameter, with its sign.
+        Signed rate of the parameter.
     level : mapping or "turn", optional
-        One state and its value, e.g. ``{"x": 1.0}``, or that the parameter turns round.
+        One state and its value, e.g. ``{"x": 1.0}``, or the extremum of the parameter.
     parameter : str or Symbol, optional
-        What drifts, by default the parameter of the point's diagram.
+        The drifting parameter, by default that of the point's diagram.
     model : Model, optional
-        For a point that was read from a file: its model.
+        The model of a point that was read from a file.
 
     Returns
     -------
@@ -165,7 +163,7 @@ def fold_delay(
     >>> round(law.coefficients[0], 8), round(law.coefficients[1], 8), f"{law.delay:.4e}"
     (1.94690271, -0.11111111, '1.9582e-04')
     """
-    require_code(point, "LP", "the delay of a fold")
+    require_code(point, "LP", "the delay at a fold")
     local = local_field_at(point, parameter, model)
     drift = drift_of(local, rate)
     height = level_of(local, level, drift)
@@ -174,31 +172,31 @@ def fold_delay(
         raise wrong_way(local, drift.rate)
     speed, product = abs(drift.rate), abs(form.a * form.b)
     feedback, change = _moved(local, form, drift)
-    # with μ as the independent variable feedback is a part of the cubic and the mixed term
+    # with μ as the independent variable, feedback contributes to the cubic and the mixed term
     kappa = feedback / (form.a * drift.rate)
     d, g = form.c / form.a**2 - kappa, form.g / (form.a * form.b) - kappa
     scale = (product * speed) ** (1.0 / 3.0)
     first = OMEGA_0 * product ** (-1.0 / 3.0)
     changed = 0.4 * OMEGA_0**2 * change * speed / scale**2
     delay, third = first * speed ** (2.0 / 3.0) + changed, math.nan
-    words = "leading order, the order of the rate depends on the level of the jump"
+    words = "leading order; the term of order rate depends on the level that ends the jump"
     if height is not None:
         eta = _end(form, height, kappa) / scale
         slow = height != TURN and eta <= SLOW_PART
         jump = math.nan if slow else jump_time(local, form, drift, kappa, height)
         if slow:
-            words = "to first order: the level lies within the slow part of the passage"
+            words = "to first order: the level is within the slow part of the passage"
             terms = (d * scale, g * scale, change / scale)
             delay = slow_part(eta, terms) * speed / scale
         elif math.isnan(jump):
-            goal = "a turn" if isinstance(height, str) else _words(local, height)
+            goal = "an extremum" if isinstance(height, str) else _words(local, height)
             words = f"leading order: no jump of the frozen model to {goal} was found"
         else:
             # the inner solution to first order, matched to the jump
             third = d * (math.log(product) / 3.0 - MATCHING) + jump - g / 2.0
             delay += speed * (d / 3.0 * math.log(speed) + third)
             if height != TURN:
-                # what the level sees of the end of the inner solution
+                # effect of the level on the end of the inner solution
                 delay += (airy_passage(eta) + 1.0 / eta - OMEGA_0) * speed / scale
             words = "to the order of the rate"
     passed, time = math.nan, math.nan
@@ -225,14 +223,14 @@ def fold_delay(
 
 
 def _moved(local: LocalField, form: FoldForm, drift: Drift) -> tuple[float, float]:
-    """Slope k in μ' = rate + k y + …, and the relative change of the rate in time and by μ."""
+    """Feedback k in μ' = rate + k y + …, and the relative change of the rate with time and μ."""
     by_state = np.array([drift.by_state.get(n, 0.0) for n in local.field.model.states])
     change = drift.change / drift.rate + drift.by_value + float(by_state @ form.lean)
     return float(by_state @ form.along), change
 
 
 def _end(form: FoldForm, level: Level, kappa: float) -> float:
-    """a·y where the jump is done, on the centre manifold."""
+    """a·y at the end of the jump, on the center manifold."""
     if isinstance(level, str):
         return -1.0 / kappa if kappa < 0.0 else math.inf
     return _along(form, *level)
@@ -241,7 +239,7 @@ def _end(form: FoldForm, level: Level, kappa: float) -> float:
 def _passed(
     local: LocalField, form: FoldForm, drift: Drift, level: Level, scale: float
 ) -> tuple[float, float]:
-    """The delay and the time of the passage as integrated; nan where that fails."""
+    """Delay and time of the integrated passage; nan if the integration fails."""
     region, start = local.region(local.point.regions[0]), None
     for before in BEFORE:
         mu = -before * drift.rate / scale
@@ -261,12 +259,11 @@ def _passed(
 def jump_time(local: LocalField, form: FoldForm, drift: Drift, kappa: float, level: Level) -> float:
     """Finite part of the time of the jump in the frozen model, from the fold to a level.
 
-    Time counts by w'/rate, so that it is the change of the slow quantity along the jump. From
+    Time is weighted by w'/rate, which gives the change of the slow quantity along the jump. From
     Y = a y on the unstable side the frozen model needs a time T(Y) that grows as
-    1/Y + d ln Y towards the fold, d = c/a² − κ; with those terms taken off, and with the
-    exact time of the cubic normal form in their place, what is left is a series in Y. It is
-    simulated from ever smaller Y and extrapolated to 0 by Romberg's scheme. nan where the level
-    is not reached.
+    1/Y + d ln Y towards the fold, d = c/a² − κ; after subtraction of these terms and with the
+    exact time of the cubic normal form, the remainder is a series in Y. It is simulated from
+    decreasing Y and extrapolated to 0 by Romberg's scheme. nan if the level is not reached.
     """
     cubic = form.c / form.a**2
     end = _end(form, level, kappa)
@@ -293,7 +290,7 @@ def jump_time(local: LocalField, form: FoldForm, drift: Drift, kappa: float, lev
 
 
 def _past(local: LocalField, form: FoldForm, y: float) -> Array:
-    """The state on the centre manifold at Y past a fold, to second order."""
+    """State on the center manifold at Y past a fold, to second order."""
     past = y / form.a
     return np.asarray(local.u[:-1] + past * form.along + 0.5 * past**2 * form.bend)
 
@@ -306,7 +303,7 @@ def _inside(local: LocalField, state: Array) -> bool:
 
 
 def _gone(local: LocalField, drift: Drift, state: Array, slow: float, level: Level) -> float:
-    """∫ w' dt/rate along the jump of the frozen model from a state; nan if it is not done.
+    """∫ w' dt/rate along the jump of the frozen model from a state; nan if it does not end.
 
     Parameters
     ----------
@@ -314,7 +311,7 @@ def _gone(local: LocalField, drift: Drift, state: Array, slow: float, level: Lev
     drift : Drift
     state : ndarray, shape (n,)
     slow : float
-        Time that it takes to leading order.
+        Its duration to leading order.
     level : (int, float) or "turn"
     """
     model = local.field.model.with_ramp(local.field.parameter, 0.0, float(local.u[-1]))
@@ -332,7 +329,7 @@ def _gone(local: LocalField, drift: Drift, state: Array, slow: float, level: Lev
 
 
 def _done(run: Trajectory, local: LocalField, speed: LocalDrift, level: Level) -> float:
-    """When a jump of the frozen model reaches a level; nan if it does not."""
+    """Time at which a jump of the frozen model reaches a level, else nan."""
     if isinstance(level, str):
         return _turned(run, speed)
     name, height = local.field.model.states[level[0]], float(local.u[level[0]])
@@ -341,7 +338,7 @@ def _done(run: Trajectory, local: LocalField, speed: LocalDrift, level: Level) -
 
 
 def _turned(run: Trajectory, speed: LocalDrift) -> float:
-    """When w' of a drift first vanishes along a jump of the frozen model; nan if never."""
+    """First zero of w' along a jump of the frozen model, else nan."""
 
     def relative(time: float) -> float:
         return float(speed.on_a_path(run(np.array([time])).T)[0] / speed.drift.rate)
@@ -356,7 +353,7 @@ def _turned(run: Trajectory, speed: LocalDrift) -> float:
 
 
 def _integral(run: Trajectory, speed: LocalDrift, until: float) -> float:
-    """∫ w' dt/rate along a jump of the frozen model, by Gauss' rule on every step."""
+    """∫ w' dt/rate along a jump of the frozen model, by Gauss quadrature on every step."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     edges = np.append(run.step_starts[run.step_starts < until], until)
     half = 0.5 * np.diff(edges)
@@ -366,7 +363,7 @@ def _integral(run: Trajectory, speed: LocalDrift, until: float) -> float:
 
 
 def _turning(form: FoldForm, unit: Array) -> float:
-    """How soon the centre manifold bends, by Y, with each state in its unit."""
+    """Relative curvature of the center manifold by Y, with each state in its unit."""
     bend, along = (np.abs(v / unit).max() for v in (form.bend, form.along))
     return float(bend / (abs(form.a) * along))
 
@@ -377,7 +374,7 @@ def _words(local: LocalField, level: tuple[int, float]) -> str:
 
 
 def fold_form_of(local: LocalField) -> FoldForm:
-    """The normal form on the centre manifold of a fold, by projection (Kuznetsov 2004, 5.4)."""
+    """Normal form on the center manifold of a fold, by projection (Kuznetsov 2004, 5.4)."""
     region = local.region(local.point.regions[0])
     jacobian, slope = local.slopes(region)
     p, q = null_vectors(jacobian, local.unit)
@@ -385,7 +382,7 @@ def fold_form_of(local: LocalField) -> FoldForm:
     overlap = float(p @ q)
     if abs(overlap) <= ZERO * np.linalg.norm(p * local.unit) * np.linalg.norm(q / local.unit):
         raise ArgumentError(
-            f"{label} has a double zero eigenvalue (Bogdanov-Takens), where this law does not hold"
+            f"{label} has a double zero eigenvalue (Bogdanov-Takens), where this law is not valid"
         )
     p = p / overlap
     forms = forms_at(local.field, region, local.u)
@@ -394,7 +391,7 @@ def fold_form_of(local: LocalField) -> FoldForm:
     if abs(a) <= ZERO * max(float(np.abs(p) @ np.abs(forms.form(abs(q), abs(q)))), 1e-300):
         raise ArgumentError(
             f"{label} is degenerate: its quadratic coefficient vanishes (a cusp); "
-            "the delay there is not of the order rate^(2/3)"
+            "the delay is not of the order rate^(2/3)"
         )
     if abs(b) <= ZERO * float(np.abs(p) @ np.abs(slope)) or b == 0.0:
         raise ArgumentError(
@@ -421,7 +418,7 @@ def _without_zero(jacobian: Array) -> tuple[NDArray[np.complex128], int]:
 
 
 def _along(form: FoldForm, state: int, height: float) -> float:
-    """a·y where the centre manifold reaches a level, the nearest way past the fold."""
+    """a·y of the nearest intersection of the center manifold with a level past the fold."""
     roots = np.roots([0.5 * form.bend[state], form.along[state], -height])
     found = form.a * roots[np.abs(roots.imag) <= 1e-12 * np.abs(roots)].real
     past = found[found > 0]
@@ -431,10 +428,10 @@ def _along(form: FoldForm, state: int, height: float) -> float:
 
 
 def slow_part(eta: float, terms: tuple[float, float, float]) -> float:
-    """The m at which η' = η² + m + c₁ η³ + c₂ m η − c₃ (m η² + m²) reaches η, to first order in c.
+    """Solve η' = η² + m + c₁ η³ + c₂ m η − c₃ (m η² + m²) for the m at η, to first order in c.
 
     With η₀ = −A'/A and the integrating factor A², A(s) = Ai(−s), the solution is
-    η₀ + A⁻² ∫ A² f dm, so that a value is reached earlier by what this adds, over η₀'.
+    η₀ + A⁻² ∫ A² f dm, so that a value is reached earlier by the added term over η₀'.
 
     Examples
     --------
@@ -476,7 +473,7 @@ def airy_passage(eta: float) -> float:
         return -((eta + 0.25 / eta**2) ** 2)
 
     def left(s: float) -> float:
-        # scaled alike, their ratio counts
+        # scaled equally, only the ratio matters
         value, slope, _, _ = airye(-s) if s < 0.0 else airy(-s)
         return float(slope - eta * value)
 

@@ -1,4 +1,4 @@
-"""Passages of a drifting parameter through piecewise-linear rates, in closed form."""
+"""Closed-form passages of a drifting parameter through piecewise-linear rates."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from fastslow.passage.roots import sign_change
 
 Array = NDArray[np.float64]
 
-#: A step resolves the fastest motion; after this many it doubles at every further tenth of them.
+#: Number of steps that resolve the fastest mode; then the step doubles every tenth of them.
 FINE = 2000
 COARSER = FINE // 10
 
-#: Steps in all: the last ones are 2^90 times the first.
+#: Largest number of steps; the last ones are 2^90 times the first.
 STEPS = 20_000
 
-#: Steps that are taken at once.
+#: Number of steps in one block.
 BLOCK = 64
 
-#: A matrix is brought below this by halving before its exponential is summed, in so many terms.
+#: Norm of the halved matrix whose exponential is summed, and the number of terms.
 HALVED, TERMS = 0.5, 16
 
-#: Fixed-point and Newton steps for the slow manifold: it converges by the ratio of time scales.
+#: Fixed-point and Newton steps for the slow manifold, which converge by the time-scale ratio.
 ITERATIONS = 60
 
 
 @dataclass(frozen=True, eq=False)
 class LinearFlow:
-    """A linear flow of z = (y, μ, t, 1).
+    """Linear flow of z = (y, μ, t, 1).
 
     y' = J y + b μ + f, μ' = rate + change·t + by_value·μ + by_state·y.
 
@@ -79,11 +79,11 @@ class LinearFlow:
         return whole
 
     def slow_manifold(self) -> Array | None:
-        """The rows (X, Y₁, Y₀) of y = X μ + Y₁ t + Y₀, invariant and slow, shape (3, n).
+        """Rows (X, Y₁, Y₀) of the slow manifold y = X μ + Y₁ t + Y₀, shape (3, n).
 
         Invariance gives X λ = J X + b with λ = by_value + by_state·X, and two linear
         equations for the rest; without feedback X = −J⁻¹b and Y₀ = −J⁻²b·rate. None
-        where the drift is not slow beside the other motions.
+        if the drift is not slow compared with the other modes.
         """
         pace = math.nan
         along = np.linalg.solve(-self.jacobian, self.slope)
@@ -100,7 +100,7 @@ class LinearFlow:
         return np.array([along, in_time, offset])
 
     def slow_motion(self, manifold: Array, time: float) -> Array:
-        """Give z on the slow manifold at a time, with μ = 0 at t = 0."""
+        """Return z on the slow manifold at a time, with μ = 0 at t = 0."""
         along, in_time, offset = manifold
         whole = np.zeros((3, 3))
         whole[0] = [
@@ -113,7 +113,7 @@ class LinearFlow:
         return np.concatenate([along * mu + in_time * time + offset, [mu, time, 1.0]])
 
     def slow_crossing(self, manifold: Array, row: Array) -> float:
-        """When row·z vanishes on the slow manifold, near where μ = 0; nan if Newton's fails."""
+        """Time of row·z = 0 on the slow manifold near μ = 0; nan if Newton's method fails."""
         time = 0.0
         for _ in range(ITERATIONS):
             z = self.slow_motion(manifold, time)
@@ -127,20 +127,20 @@ class LinearFlow:
         return math.nan
 
     def at(self, start: Array, time: float) -> Array:
-        """Give z at a time after it was ``start``."""
+        """Return z at a time, with z = ``start`` at t = 0."""
         return np.asarray(exponential(self.matrix * time) @ start)
 
     def _height(self, row: Array, start: Array, time: float) -> float:
         return float(row @ self.at(start, time))
 
     def reaches(self, start: Array, rows: Array) -> tuple[float, int]:
-        """When the first of some rows·z turns negative, and which.
+        """First time at which one of the products rows·z becomes negative, and its row.
 
         Parameters
         ----------
         start : ndarray, shape (n + 3,)
         rows : ndarray, shape (m, n + 3)
-            Of products that are not negative at the start, but for rounding.
+            Rows whose products are nonnegative at the start, up to rounding.
 
         Returns
         -------
@@ -176,14 +176,14 @@ class LinearFlow:
         return math.nan, -1
 
     def _root(self, row: Array, start: Array, step: float) -> float:
-        """When row·z turns negative within a step."""
+        """Time within a step at which row·z becomes negative."""
         if float(row @ start) <= 0.0:
             return 0.0
         return sign_change(partial(self._height, row, start), 0.0, step, 1e-15 * step)
 
 
 def exponential(matrix: Array) -> Array:
-    """The exponential of a small matrix, by its series and by squaring.
+    """Exponential of a small matrix, by scaling and squaring of its series.
 
     Examples
     --------
@@ -204,7 +204,7 @@ def exponential(matrix: Array) -> Array:
 
 
 def _powers(matrix: Array) -> Array:
-    """A matrix to the powers 1, 2, …, `BLOCK`."""
+    """Powers 1, 2, …, `BLOCK` of a matrix."""
     found = matrix[None]
     while len(found) < BLOCK:
         found = np.concatenate([found, found[-1] @ found])

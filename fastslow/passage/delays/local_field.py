@@ -1,4 +1,4 @@
-"""A special point with the rates around it, as the laws of slow passage need them."""
+"""Special point with the vector field around it, for the laws of slow passage."""
 
 from __future__ import annotations
 
@@ -23,30 +23,30 @@ from fastslow.results.points import SpecialPoint
 Array = NDArray[np.float64]
 
 
-#: Special points of one diagram that differ by this part of their size are the same.
+#: Relative difference below which special points of a diagram are the same.
 SAME = 1e-9
 
 
-#: A level that is no state's: where the slow quantity itself turns round.
+#: Level at the extremum of the slow quantity.
 TURN = "turn"
 
-#: Where a jump counts as done: one state by its number and its height above the point, or a turn.
+#: End of a jump: index of a state and its height above the point, or an extremum.
 Level = tuple[int, float] | str
 
 
 class WrongWay(ArgumentError):
-    """The parameter drifts towards the stable branch and not off its end."""
+    """Error for a parameter that drifts towards the stable branch and not past its end."""
 
 
 @dataclass(frozen=True, eq=False)
 class LocalField:
-    """A special point on the field of its frozen model.
+    """Special point with the vector field of its frozen model.
 
     Parameters
     ----------
     point : SpecialPoint
     field : FrozenField
-        Over the parameter that drifts.
+        Field over the drifting parameter.
     u : ndarray, shape (n + 1,)
         State and parameter.
     """
@@ -70,7 +70,7 @@ class LocalField:
         return self.field.regions.index(name)
 
     def slopes(self, region: int) -> tuple[Array, Array]:
-        """Jacobian (n, n) and derivative by the parameter (n,) of a region's rates."""
+        """Jacobian (n, n) and parameter derivative (n,) of a region's rates."""
         _, slopes, _, _ = self.field.evaluate(region, self.u)
         return slopes[:, : self.n], slopes[:, self.n]
 
@@ -106,14 +106,14 @@ def _affine(field: FrozenField, region: int) -> bool:
 
 
 def local_field_at(point: SpecialPoint, parameter: object, model: Model | None) -> LocalField:
-    """Put a special point on the field of its model.
+    """Combine a special point with the vector field of its model.
 
     Raises
     ------
     ArgumentError
-        If there is no model, or it is not clear which parameter drifts.
+        If there is no model, or the drifting parameter is ambiguous.
     UnknownNameError
-        For a name that is no parameter.
+        For an unknown parameter.
     """
     if model is None:
         if point.source is None:
@@ -129,7 +129,8 @@ def local_field_at(point: SpecialPoint, parameter: object, model: Model | None) 
         left = [n for n in model.free if n not in model.parameters]
         if len(left) != 1:
             raise ArgumentError(
-                "which parameter drifts? give parameter=, one of " + ", ".join(sorted(set(known)))
+                "the drifting parameter is ambiguous; give parameter=, one of "
+                + ", ".join(sorted(set(known)))
             )
         name = left[0]
     else:
@@ -154,35 +155,35 @@ def _field(model: Model, name: str, values: tuple[tuple[str, float], ...]) -> Fr
 
 
 def frozen_field(model: Model, parameter: str, values: Mapping[str, float]) -> FrozenField:
-    """The fast subsystem of a model over one of its slow quantities, at values of the others."""
+    """Fast subsystem of a model over one slow quantity, at given values of the others."""
     fast = _frozen(model) if model.forcing or model.slow_states else model
     known = {n: values[n] for n in (*fast.parameters, *fast.free) if n in values}
     return _field(fast, parameter, tuple(sorted(known.items())))
 
 
 def require_code(point: SpecialPoint, code: str, law: str) -> None:
-    """Raise unless a special point is of a code."""
+    """Raise unless a special point has a code."""
     if point.code != code:
         received = f"{point.label}, a {point_name(point.code)}"
         raise ArgumentError(
-            f"{law} holds at a point {code} ({point_name(code)}); received {received}"
+            f"{law} requires a point {code} ({point_name(code)}); received {received}"
         )
 
 
 def drift(rate: Any) -> float:
-    """A rate of drift that is finite and not zero."""
+    """Return a finite, nonzero rate of drift."""
     return Drift(rate).rate
 
 
 def drift_of(local: LocalField, rate: float | Drift) -> Drift:
-    """A rate or a drift as a drift, of the states of a site.
+    """Convert a rate to a `Drift`, and check its states.
 
     Raises
     ------
     ArgumentError
         For a rate that is zero or not finite.
     UnknownNameError
-        For a state that the model has not.
+        For an unknown state.
     """
     drift = rate if isinstance(rate, Drift) else Drift(rate)
     states = local.field.model.states
@@ -193,25 +194,25 @@ def drift_of(local: LocalField, rate: float | Drift) -> Drift:
 
 
 def level_argument(name: str, value: Any) -> Any:
-    """A level as an argument: a mapping of one state, or ``"turn"``."""
+    """Check a level: a mapping of one state, or ``"turn"``."""
     if not (isinstance(value, Mapping) or (isinstance(value, str) and value == TURN)):
         raise refusal(name, value, "a mapping of one state to its value, or 'turn'")
     return value
 
 
-#: A rate of drift as an argument.
+#: Check of a rate of drift.
 rate_argument = either(instance(Drift), finite)
 
 
 def level_of(local: LocalField, level: Any, drift: Drift) -> Level | None:
-    """The state of a level, by its number, and how far it is from the special point; or a turn."""
+    """Index of a level's state and its height above the special point, or an extremum."""
     if level is None:
         return None
     if level == TURN:
         if drift.constant:
             raise ArgumentError(
-                "level = 'turn': a constant drift does not turn; give rate=fs.Drift(...), with its "
-                "feedback from the states or its change in time"
+                "level = 'turn': a constant drift has no extremum; give rate=fs.Drift(...) with "
+                "its feedback from the states or its change in time"
             )
         return TURN
     if not isinstance(level, Mapping) or len(level) != 1:
@@ -228,7 +229,7 @@ def level_of(local: LocalField, level: Any, drift: Drift) -> Level | None:
 
 
 def named_level(local: LocalField, level: Level | None) -> dict[str, float] | str | None:
-    """A level as it was given."""
+    """Level in the form of the argument."""
     if level is None or isinstance(level, str):
         return level
     number, height = level
@@ -236,7 +237,7 @@ def named_level(local: LocalField, level: Level | None) -> dict[str, float] | st
 
 
 def wrong_way(local: LocalField, rate: float) -> WrongWay:
-    """The error for a drift towards a stable branch."""
+    """Error for a drift towards a stable branch."""
     name, way = local.field.parameter, "rising" if rate > 0 else "falling"
     other = "rate < 0" if rate > 0 else "rate > 0"
     return WrongWay(
@@ -248,17 +249,17 @@ def wrong_way(local: LocalField, rate: float) -> WrongWay:
 def same_point(
     one: SpecialPoint, other: SpecialPoint, parameter: str, length: float, within: float = SAME
 ) -> bool:
-    """Whether two special points are one, up to rounding, in any units.
+    """Whether two special points coincide up to rounding, in any units.
 
     Parameters
     ----------
     one, other : SpecialPoint
     parameter : str
-        The one that varies.
+        The parameter that varies.
     length : float
-        Of the range over which it does.
+        Length of its range.
     within : float
-        How much they may differ, relative to the size of a state and to the length.
+        Tolerance relative to the size of a state and to the length.
     """
     if (one.code, one.states) != (other.code, other.states):
         return False

@@ -1,4 +1,4 @@
-"""The passage of a special point integrated numerically, with the rates of its model."""
+"""Numerical integration of the passage of a special point."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from fastslow.results.overlay.drifts import Drift
 
 Array = NDArray[np.float64]
 
-#: Error of the integrated passage, relative: ten thousand times what it is found to be.
+#: Relative error of the integrated passage, ten thousand times the observed one.
 NUMERICAL = 1e-7
 
-#: A law is off by no more than this many times what separates it from the integrated passage.
+#: Error bound of a law relative to its difference from the integrated passage.
 SAFETY = 1.25
 
-#: Regions that are gone through at most on the way to a level.
+#: Largest number of regions on the way to a level.
 REGIONS = 12
 
-#: Why a passage does not end, as its integration tells.
+#: Reasons for which the integration of a passage does not end.
 TOO_LONG, FAILED = "it takes longer than expected", "the integration failed"
 
 
@@ -46,7 +46,7 @@ class LocalDrift:
 
     @cached_property
     def gradient(self) -> Array:
-        """By the states and by w, shape (n + 1,)."""
+        """Derivatives of w' by the states and by w, shape (n + 1,)."""
         names = self.local.field.model.states
         return np.array([*(self.drift.by_state.get(n, 0.0) for n in names), self.drift.by_value])
 
@@ -70,7 +70,7 @@ class LocalDrift:
         return np.asarray(rate, dtype=float)
 
     def numbers(self, start: float, stop: float) -> Law:
-        """For compiled code, from one time to another."""
+        """Representation for compiled code between two times."""
         law, none = self._law, np.zeros(len(self.gradient))
         if law is None:
             return Law(self.drift.rate, self.drift.change, self.gradient)
@@ -82,7 +82,7 @@ class LocalDrift:
 
 @dataclass(frozen=True, eq=False)
 class Event:
-    """What ends a passage: a state at a height above the point, an interface, or a turn of w.
+    """Event that ends a passage: a level of a state, an interface, or an extremum of w.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class Event:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where a passage is: the region, (x − x*, w − w*), and the time since w passed the point."""
+    """Region, (x − x*, w − w*), and the time since w passed the point."""
 
     region: int
     z: Array
@@ -106,9 +106,9 @@ class Place:
 def quasi_static(
     local: LocalField, drift: Drift, region: int, mu: float, guess: Array
 ) -> Array | None:
-    """(x − x*, μ) near a guess on the slow manifold of a region's stable branch, to first order.
+    """(x − x*, μ) on the first-order slow manifold of a region's stable branch, near a guess.
 
-    None where Newton's method finds no stable equilibrium.
+    None if Newton's method finds no stable equilibrium.
     """
     y, n = guess.copy(), local.n
     jacobian = np.empty((n, n))
@@ -139,10 +139,10 @@ def quasi_static(
 def follow(
     local: LocalField, drift: Drift, start: Place, stop: Event, *, span: float
 ) -> tuple[Place, str]:
-    """Integrate x' = F(x, w), w' of a drift, from a place to what ends the passage.
+    """Integrate x' = F(x, w) and w' of a drift up to the event that ends the passage.
 
-    A run that starts before the point is first integrated to where w passes it, from
-    where time counts; what ends the passage counts only from there.
+    A passage that starts before the point is first integrated up to w = w*, where t = 0; the
+    event is detected only afterwards.
 
     Parameters
     ----------
@@ -151,14 +151,14 @@ def follow(
     start : Place
     stop : Event
     span : float
-        Time that it may take.
+        Largest duration.
 
     Returns
     -------
     place : Place
-        The last one.
+        Final place.
     reason : str
-        Empty where the end was reached, else why it was not.
+        Empty if the event was reached, else the reason why not.
     """
     place, reason = start, ""
     way, speed = drift.way, LocalDrift(local, drift)
@@ -168,13 +168,13 @@ def follow(
         place, reason = _legs(local, speed, early, None, way, span)
         if reason:
             return place, reason
-        # the drift before the point may take another time than it was given
+        # the time of the drift before the point was an estimate
         place = Place(place.region, place.z, 0.0)
     return _legs(local, speed, place, stop, way, span)
 
 
 def _time_before(drift: Drift, mu: float) -> float:
-    """When w was at w* + μ, from the rate of the drift and its change."""
+    """Time at which w = w* + μ, from the rate of the drift and its change."""
     time = mu / drift.rate
     square = 1.0 + 2.0 * drift.change * mu / drift.rate**2
     return 2.0 * time / (1.0 + math.sqrt(square)) if square > 0.0 else time
@@ -183,7 +183,7 @@ def _time_before(drift: Drift, mu: float) -> float:
 def _legs(
     local: LocalField, speed: LocalDrift, start: Place, stop: Event | None, way: float, span: float
 ) -> tuple[Place, str]:
-    """Integrate from region to region until an event (or, without one, until w passes w*)."""
+    """Integrate across regions up to an event (without one, up to w = w*)."""
     place, final = start, start.time + span
     for _ in range(REGIONS):
         place, met, reason = _leg(local, speed, place, stop, way, final)
@@ -193,13 +193,13 @@ def _legs(
         if across is None or local.field.modes[across].sides is not None:
             return place, "it leaves the regions of the model"
         place = Place(across, place.z, place.time)
-    return place, "it goes through too many regions"
+    return place, "it passes through too many regions"
 
 
 def _leg(
     local: LocalField, speed: LocalDrift, start: Place, stop: Event | None, way: float, final: float
 ) -> tuple[Place, int, str]:
-    """Integrate within one region: where it ends, by which interface (−1: the event), why not."""
+    """Integrate within one region: final place, interface (−1: the event), reason of failure."""
     field, n = local.field, local.n
     count = len(field.interfaces)
     reach = abs(float(start.z[n])) or abs(speed.drift.rate * final)
@@ -225,7 +225,7 @@ def _leg(
 
 
 def _end(stop: Event | None, way: float) -> End:
-    """What ends a passage, in numbers."""
+    """Numerical representation of an event."""
     if stop is None:
         return End(1, 0, 0.0, way)
     if stop.level == TURN:
@@ -238,7 +238,7 @@ def _end(stop: Event | None, way: float) -> End:
 def reached_delay(
     local: LocalField, drift: Drift, start: Place | None, stop: Event, span: float
 ) -> tuple[float, float]:
-    """How far past the point, along the drift, and when a passage ends; (nan, nan) if never."""
+    """Delay and time at which a passage ends; (nan, nan) if it does not."""
     if start is None:
         return math.nan, math.nan
     place, reason = follow(local, drift, start, stop, span=span)
@@ -248,17 +248,17 @@ def reached_delay(
 
 
 def rounding(local: LocalField) -> float:
-    """What the parameter is rounded by at a special point: no delay is known better."""
+    """Rounding of the parameter at a special point, the smallest error of a delay."""
     return 4.0 * float(np.spacing(abs(local.u[-1])))
 
 
 def bound_of(local: LocalField, delay: float, passed: float, drift: Drift) -> tuple[float, str]:
-    """Bound on the error of a law, from the passage as integrated, and what to say of it."""
+    """Error bound of a law from the integrated passage, and its statement."""
     if math.isnan(delay):
         return math.nan, ""
     if not drift.complete:
-        return math.nan, "; no error is stated, as the drift is not known in full"
+        return math.nan, "; no error bound, as the drift is not fully known"
     if math.isnan(passed):
-        return math.nan, "; no error is stated"
+        return math.nan, "; no error bound"
     error = SAFETY * abs(delay - passed) + NUMERICAL * abs(passed) + rounding(local)
-    return error, f"; within {error:.2g}, by the passage integrated with this drift"
+    return error, f"; error below {error:.2g}, by integration of the passage with this drift"

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from fastslow.errors import ArgumentError, raised_by_handler
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.branch.tangencies import Tangencies
+from fastslow.results.overlay.transitions import Transitions
 from fastslow.results.points import Equilibria, SpecialPoints
 from fastslow.results.stored.model import StoredModel
 
@@ -41,6 +42,7 @@ _SEQUENCES: dict[str, Callable[..., Any]] = {
     "list": list,
     "tuple": tuple,
     "SpecialPoints": SpecialPoints,
+    "Transitions": Transitions,
     "Equilibria": Equilibria,
     "Tangencies": Tangencies,
 }
