@@ -1,4 +1,4 @@
-"""Regimes of a gap: of the motions that runs settle on, and over two parameters."""
+"""Regimes of a gap for asymptotic motions, and their maps over two parameters."""
 
 from __future__ import annotations
 
@@ -47,15 +47,15 @@ Floats = NDArray[np.float64]
 Parameters = Mapping[Any, Any] | Callable[[Floats, Floats], Mapping[Any, Any]]
 
 
-#: Periods after which the motion is looked at again where it has not settled; the exponent
-#: is measured from the first of them on.
+#: Lengths in periods to which unsettled runs are extended; exponents are computed from the
+#: first of them on.
 LONGER = (64, 256, 1024)
 
-#: Intervals in a period of a measurement of exponents, at most: where separations shrink by
-#: more than rounding within one, the sign is the same whatever the number.
+#: Largest number of intervals per period for exponents: where separations shrink below rounding
+#: within one, their sign does not depend on the number.
 FINEST = 32
 
-#: Part of a measurement of exponents that is left out at its beginning.
+#: Initial fraction of a computation of exponents that is discarded.
 DISCARDED = 0.25
 
 
@@ -78,26 +78,26 @@ def classify_regime(
     integration: Integration = DEFAULT,
     threads: int | None = None,
 ) -> RegimeSet:
-    """Find the regimes of the motions that runs from several states settle on.
+    """Classify the regimes of the asymptotic motions from several initial states.
 
-    Each run is continued until its states repeat at the ends of periods, or its largest
-    Lyapunov exponent, as decided by `fastslow.lyapunov_exponent`, is positive, or is negative
-    while all periods of the second half are of one kind, or the longest run is reached: it is
-    then named by the kind of all periods, or ``"not settled"`` where they differ. Motions
-    that repeat are told apart by their states; all chaotic ones count as one, and so do
-    those that have not settled.
+    Each run is continued until its states repeat stroboscopically, or its largest Lyapunov
+    exponent, as decided by `fastslow.lyapunov_exponent`, is positive, or is negative while all
+    periods of the second half have the same regime, or the longest run is reached; the label is
+    then the regime of all periods, or ``"not settled"`` if they differ. Periodic motions are
+    distinguished by their states; all chaotic motions count as one, as do those that have not
+    settled.
 
     Parameters
     ----------
     model : Model
-        With a gap and a period.
+        Model with a gap and a period.
     states : array_like, shape (m, n) or (n,), or mapping
-        Initial states; by name, each a number or of shape (m,).
+        Initial states; by name, numbers or arrays of shape (m,).
     periods : float
-        Length of the runs at first, in periods of the forcing. Its second half is looked
-        at period by period.
+        Initial length of the runs, in periods of the forcing. The periods of the second half
+        are classified one by one.
     longest : float
-        Length beyond which no run is continued.
+        Largest length of a run.
     period, gap, integration, threads
         As in `simulate_many`.
 
@@ -125,8 +125,8 @@ def classify_regime(
         raise ArgumentError(f"the run from state {row} ended early: {outcome}")
     if NO_GAP in found.labels:
         raise ArgumentError(
-            "this model has no gap: no three regions between two parallel interfaces; name the "
-            "region inside as gap="
+            "this model has no gap: no three regions between two parallel interfaces; give the "
+            "region of the gap as gap="
         )
     motions: list[Regimes] = []
     places: list[Floats] = []
@@ -136,7 +136,7 @@ def classify_regime(
         same = [
             k
             for k, (known, other) in enumerate(zip(motions, places, strict=True))
-            if known.label == motion.label and _meet(place, other, found.scale(row))
+            if known.label == motion.label and _same_motion(place, other, found.scale(row))
         ]
         if not same:
             motions.append(motion)
@@ -145,30 +145,30 @@ def classify_regime(
     return RegimeSet(tuple(motions), starts, index, dict(model.parameters), model.equations)
 
 
-def _meet(one: Floats, other: Floats, scale: Floats) -> bool:
-    """Whether two motions that repeat go through a common state, or neither repeats."""
+def _same_motion(one: Floats, other: Floats, scale: Floats) -> bool:
+    """Whether two periodic motions share a state, or neither is periodic."""
     if not len(one) or not len(other):
         return len(one) == len(other)
     apart = np.abs(one[:, None] - other[None]) / scale
-    return bool((apart.max(axis=2) < MEETING).any())
+    return bool((apart.max(axis=2) < SAME).any())
 
 
-#: States of motions that differ by less, in units of their range, are of the same one.
-MEETING = 1e-4
+#: Distance of states, in units of their ranges, below which motions are the same.
+SAME = 1e-4
 
 
 class _Settled:
-    """What each of many runs settles on.
+    """Asymptotic motions of many runs.
 
     Parameters
     ----------
     labels : list of str
     runs : dict
-        For each run the ensemble that settled it, its row there, and how many periods long.
+        For each run the last ensemble, its row there, and its length in periods.
     exponents : dict
-        For some runs the exponents that were measured last, and the row there.
+        For some runs the exponents computed last, and the row there.
     failures : dict
-        Runs that ended early, and why.
+        Runs that ended early, with the reason.
     """
 
     def __init__(self, model: Model, count: int) -> None:
@@ -179,13 +179,13 @@ class _Settled:
         self.failures: dict[int, Outcome] = {}
 
     def scale(self, row: int) -> Floats:
-        """The range of each state of a run."""
+        """Range of each state of a run."""
         many, i, _ = self.runs[row]
         ranges = many.maximum[i] - many.minimum[i]
         return np.where(ranges > 0, ranges, 1.0)
 
     def places(self, row: int, integration: Integration) -> Floats:
-        """The states at the ends of periods of a motion that repeats, shape (multiple, n)."""
+        """Stroboscopic states of a periodic motion, shape (multiple, n)."""
         many, i, _ = self.runs[row]
         multiple = int(many.multiples[i])
         if not multiple:
@@ -216,7 +216,7 @@ class _Settled:
         return measured.of(k, here, self._period(row), integration, unsettled)
 
     def motion(self, row: int) -> Regimes:
-        """What a run settles on, as a result."""
+        """Asymptotic motion of a run as a result."""
         many, i, _ = self.runs[row]
         touched = many.touched[i][many.touched[i] > 0]
         kinds = tuple(REGIMES[bits] for bits in touched)
@@ -230,10 +230,8 @@ class _Settled:
             if exponent.chaotic:
                 outcome = Outcome("chaotic", text, True)
             elif self.labels[row] != NOT_SETTLED and exponent.value < 0:
-                told = (
-                    f"The motion is approached, by {many.changes[i]:.2g} of its ranges in a period."
-                )
-                outcome = Outcome("settled", f"{told} {text}", True)
+                change = f"The states change by {many.changes[i]:.2g} of their ranges in a period."
+                outcome = Outcome("settled", f"{change} {text}", True)
             else:
                 outcome = replace(outcome, message=f"{outcome.message} {text}")
         return Regimes(
@@ -260,7 +258,7 @@ def regimes_at(
     integration: Integration = DEFAULT,
     threads: int | None = None,
 ) -> list[str | Outcome]:
-    """The regimes that runs at many parameter sets settle on, as `classify_regime` finds them.
+    """Regimes of the asymptotic motions at many parameter sets, as by `classify_regime`.
 
     Parameters
     ----------
@@ -274,7 +272,7 @@ def regimes_at(
     Returns
     -------
     list of str or Outcome
-        Labels; where a run ended early, why.
+        Labels; for a run that ended early, its outcome.
     """
     starts, swept = starts_and_parameters(model, states, parameters)
     found = _settled(model, starts, swept, periods, longest, period, gap, integration, threads)
@@ -292,7 +290,7 @@ def _settled(
     integration: Integration,
     threads: int | None,
 ) -> _Settled:
-    """Continue runs until they repeat or are found to be chaotic."""
+    """Continue runs until they are periodic or classified as chaotic."""
     found = _Settled(model, len(starts))
     waiting = np.arange(len(starts))
     lengths = [periods, *(float(n) for n in LONGER if periods < n <= longest)]
@@ -339,9 +337,9 @@ def _measured(
     threads: int | None,
     last: bool,
 ) -> NDArray[np.bool_]:
-    """Measure the exponents of runs that do not repeat, on from their ends.
+    """Compute the exponents of runs that are not periodic, from their ends on.
 
-    Returns whether each of them has a label now, shape (m,).
+    Returns whether each of them has a label, shape (m,).
     """
     periods = (many.span[rows, 1] - many.span[rows, 0]) / length
     count = max(10, int(length))
@@ -365,7 +363,7 @@ def _measured(
         if sign > 0:
             found.labels[row] = CHAOTIC
         elif sign < 0 or last:
-            # still approached, or too slow to tell: named where all periods are of one kind
+            # slow convergence: labelled if all periods have the same regime
             found.labels[row] = regime
         decided[k] = found.labels[row] != NOT_SETTLED
     return decided
@@ -401,33 +399,31 @@ def regime_map(
     threads: int | None = None,
     progress: bool = False,
 ) -> RefinedMap:
-    """How the sides of a gap are touched, over two parameters, with refined boundaries.
+    """Map the regimes of a gap over two parameters, with refined boundaries.
 
-    The label of each point is the regime that a run settles on, as `classify_regime`
-    finds it: runs whose states do not repeat over the second half of ``periods`` are made
-    longer, and their largest Lyapunov exponent is measured. ``"chaotic"`` is where it is
-    positive, ``"not settled"`` where the periods of the longest run differ and it does not
-    repeat, ``"coexisting: a + b"`` where runs from several states settle on regimes a and b,
-    ``"no gap"`` where there is no gap, and ``"failed"`` where a run could not go on.
+    The label of each point is the regime of the asymptotic motion, as by `classify_regime`:
+    runs that are not periodic over the second half of ``periods`` are extended, and their
+    largest Lyapunov exponent is computed. ``"chaotic"`` means that it is positive,
+    ``"not settled"`` that the periods of the longest run differ and it is not periodic,
+    ``"coexisting: a + b"`` that several initial states lead to regimes a and b, ``"no gap"`` that
+    there is no gap, and ``"failed"`` that a run could not be continued.
 
     Parameters
     ----------
     model : Model
-        With a gap and a period.
+        Model with a gap and a period.
     over : mapping
-        Two names, each with its range: parameters of the model, or names that
-        ``parameters`` turns into them.
+        Two names with their ranges: parameters of the model, or names from which
+        ``parameters`` computes them.
     state : sequence of float, shape (n,) or (k, n), or mapping
-        Initial states of every run, or those of k runs at every point.
+        Initial state of every run, or of k runs at every point.
     parameters : mapping or callable, optional
-        What the axes mean: parameter to an expression in the names of the axes
-        and the other parameters, ``{"C": "B*ratio"}``; or a function of two
-        arrays that returns the values of parameters.
+        Parameter to an expression in the names of the axes and the other parameters,
+        ``{"C": "B*ratio"}``; or a function of two arrays that returns parameter values.
     cells, levels, guard, resolution
         As in `refined_map`; all new points of a level are simulated together.
     periods, longest : float
-        Length of every run in periods of the forcing: at first, and beyond which no run is
-        continued.
+        Initial and largest length of a run, in periods of the forcing.
     period, gap, integration, threads
         As in `simulate_many`.
     progress : bool
@@ -440,10 +436,10 @@ def regime_map(
     Raises
     ------
     UnknownNameError
-        For a name that is no parameter and is turned into none.
+        For a name that is no parameter and from which none is computed.
     ArgumentError
-        For a model without a gap or period at any point, or what `refined_map`
-        and `simulate_many` refuse.
+        For a model without a gap or period at any point, or an invalid argument of
+        `refined_map` or `simulate_many`.
 
     Examples
     --------
@@ -496,7 +492,7 @@ def regime_map(
     if found.labels == (NO_GAP,):
         raise ArgumentError(
             "this model has no gap anywhere in the map: no three regions between two parallel "
-            "interfaces; name the region inside as gap="
+            "interfaces; give the region of the gap as gap="
         )
     return found
 
@@ -504,7 +500,7 @@ def regime_map(
 def _values(
     model: Model, axes: list[str], parameters: Parameters | None
 ) -> Callable[[Floats, Floats], dict[str, Any]]:
-    """A function from values along the axes to values of the model's parameters."""
+    """Function from values along the axes to values of the model's parameters."""
     if callable(parameters):
 
         def given(*arrays: Floats) -> dict[str, Any]:

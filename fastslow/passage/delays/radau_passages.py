@@ -1,10 +1,10 @@
-"""A passage of a special point by Radau IIA steps, compiled.
+"""Compiled integration of the passage of a special point by Radau IIA steps.
 
-The motion is that of one region, z = (x - x*, w - w*) with x' = F(x, w) by the
-compiled function of a frozen model, and w' by a drift. The steps are those of
-`fastslow.simulation.stepper.radau` (Hairer and Wanner 1996, section IV.8), which hold on to a
-slow manifold however stiff the motion towards it is. What ends a passage is where a step
-of another length ends, so that it is as accurate as the steps are.
+The variables in one region are z = (x - x*, w - w*), with x' = F(x, w) by the compiled
+function of a frozen model and w' by a drift. The steps are those of
+`fastslow.simulation.stepper.radau` (Hairer and Wanner 1996, section IV.8), which follow a slow
+manifold for any stiffness. Events are located by varying the length of the last step, and are
+thus as accurate as the steps.
 """
 
 from __future__ import annotations
@@ -37,46 +37,46 @@ from fastslow.simulation.stepper.radau import (
     C,
 )
 
-#: Error allowed within a step, where it is of order STAGES + 1. At its end it is of order
-#: 2 STAGES: over a whole passage some 1e-11 (Hairer and Wanner 1996, section IV.8).
+#: Error tolerance within a step, where the order is STAGES + 1. At its end the order is
+#: 2 STAGES, with about 1e-11 over a passage (Hairer and Wanner 1996, section IV.8).
 TOLERANCE = 5e-10
 
-#: A deviation below this part of a state's unit need not be known as well.
+#: Deviation, in a state's unit, below which the tolerance is absolute.
 SMALL = 1e-3
 
-#: Newton's method goes on until a state changes by less than this part of its scale.
+#: Largest last change of Newton's method, relative to the scale of a state.
 SOLVED = 1e-13
 
-#: What is left when it stands still is rounding, below this part of the scale.
+#: Stagnating change of Newton's method, relative to the scale, that counts as rounding.
 ROUNDING = 1e-8
 
-#: Iterations of Newton's method, and steps in all.
+#: Largest numbers of Newton iterations and of steps.
 ITERATIONS, STEPS = 16, 200_000
 
-#: Between two steps the length grows by no more than this factor.
+#: Largest ratio of successive step lengths.
 GROWTH = 4.0
 
-#: What ends a passage, beside an interface: nothing, that w passes w*, its turn, a level.
+#: Events that end a passage besides interfaces: none, w = w*, an extremum of w, a level.
 INTERFACES, PASSING, TURNING, LEVEL = range(4)
 
-#: How it went.
+#: Status of a passage.
 ENDED, TOO_LONG, FAILED = range(3)
 
 
 class Motion(NamedTuple):
-    """The motion within a region, for compiled code.
+    """Vector field of a region, for compiled code.
 
     Parameters
     ----------
     address, region : int
-        Of the frozen model's compiled function.
+        Address of the frozen model's compiled function, and the region.
     parameters : ndarray
     width : int
-        Of the function's output.
+        Length of the function's output.
     point : ndarray, shape (n + 1,)
         The special point (x*, w*).
     signs : ndarray
-        Of the interface functions within the region.
+        Signs of the interface functions within the region.
     """
 
     address: int
@@ -88,16 +88,16 @@ class Motion(NamedTuple):
 
 
 class Law(NamedTuple):
-    """w' of a drift, for compiled code: the sum of what is given.
+    """Law of a drift, for compiled code; w' is the sum of the terms given.
 
     Parameters
     ----------
     rate, change : float
     gradient : ndarray, shape (n + 1,)
     breaks, coefficients : ndarray
-        A table over time, empty for none.
+        Piecewise Chebyshev table over time, empty for none.
     address : int
-        Of a compiled function, 0 for none.
+        Address of a compiled function, 0 for none.
     numbers : ndarray
         Its parameters.
     """
@@ -112,20 +112,20 @@ class Law(NamedTuple):
 
 
 class Space(NamedTuple):
-    """Work space of compiled code.
+    """Workspace of compiled code.
 
     Parameters
     ----------
     out, inputs, slopes
-        Of the compiled functions.
+        Output and input of the compiled functions.
     jacobian, factors, given, moved
-        Of the equations of a step.
+        Linear systems of a step.
     stages, increments, kept : ndarray, shape (STAGES, n + 1)
         Rates and increments at the stages of a step, and increments of the last one.
     start, place, rates, scale, speeds : ndarray, shape (n + 1,)
     heights : ndarray, shape (STAGES, count + 1)
     here, floor, beyond : ndarray, shape (count + 1,)
-        Of the interfaces and of what ends the passage.
+        Values for the interfaces and the event.
     """
 
     out: Vector
@@ -150,16 +150,16 @@ class Space(NamedTuple):
 
 
 class End(NamedTuple):
-    """What ends a passage, for compiled code.
+    """Event that ends a passage, for compiled code.
 
     Parameters
     ----------
     kind : int
-        0 an interface only, 1 that w passes w*, 2 a turn of w, 3 a level.
+        0 an interface only, 1 w = w*, 2 an extremum of w, 3 a level.
     number : int
-        Of the state that reaches a level.
+        Index of the state that reaches a level.
     height : float
-        Of the level above the point.
+        Height of the level above the point.
     way : float
         Direction of the drift.
     """
@@ -171,7 +171,7 @@ class End(NamedTuple):
 
 
 def space_for(n: int, count: int, width: int) -> Space:
-    """Work space for n states and so many interfaces."""
+    """Allocate the workspace for n states and a number of interfaces."""
     size, pairs = n + 1, len(VALUES)
     shapes = (width, size + 1, size + 2, (size, size), (pairs, size, size + 1), size, (pairs, size))
     stages, ends = [(STAGES, size)] * 3, [count + 1] * 3
@@ -180,7 +180,7 @@ def space_for(n: int, count: int, width: int) -> Space:
 
 @part
 def pass_through(motion, law, end, z, times, unit, space):
-    """Integrate within one region until something ends the passage.
+    """Integrate within one region up to an event or an interface.
 
     Parameters
     ----------
@@ -188,17 +188,17 @@ def pass_through(motion, law, end, z, times, unit, space):
     law : Law
     end : End
     z : ndarray, shape (n + 1,)
-        (x - x*, w - w*) at the start; the last one is put in its place.
+        (x - x*, w - w*) at the start, overwritten by the final value.
     times : ndarray, shape (2,)
-        At the start, in whose place the last one is put, and the latest one.
+        Start, overwritten by the final time, and latest time.
     unit : ndarray, shape (n + 1,)
-        Of z.
+        Units of z.
     space : Space
 
     Returns
     -------
     met : int
-        Number of the interface that ended it, -1 where it was not an interface.
+        Index of the interface that ended it, -1 for none.
     status : int
         ENDED, TOO_LONG or FAILED.
     """
@@ -217,7 +217,7 @@ def pass_through(motion, law, end, z, times, unit, space):
         noise = 0.0
         for i in range(size):
             noise += abs(out[first + k * size + i] * (motion.point[i] + z[i]))
-        # the interface that was just crossed is met to rounding
+        # the interface just crossed is reached up to rounding
         floor[k] = min(here[k], 0.0) - 4.0 * EPSILON * noise
     floor[count] = 0.0
     sense = math.copysign(1.0, here[count])
@@ -227,8 +227,8 @@ def pass_through(motion, law, end, z, times, unit, space):
         if rates[i] != 0.0:
             h = min(h, 0.01 * (abs(z[i]) + SMALL * unit[i]) / abs(rates[i]))
     last, beyond = 0.0, space.beyond
-    # between low and high, lengths of steps that end before and behind what ends the passage, by
-    # the values left and right of the height that is met
+    # bracket (low, high) of the length of the last step, with the values left and right of the
+    # height that becomes negative
     low = high = left = right = 0.0
     met, side = -1, 0
     for _ in range(STEPS):
@@ -254,7 +254,7 @@ def pass_through(motion, law, end, z, times, unit, space):
                 met, side, low = other, 0, 0.0
                 left, right = here[met] - floor[met], beyond[met] - floor[met]
                 continue
-            # one that rounds to an end is put beside it, so that the other end comes there
+            # an estimate at an end is moved inside, so that the other end moves
             h = min(max(between(low, high, left, right), low + fine), high - fine)
             for j in range(STAGES):
                 for i in range(size):
@@ -263,7 +263,7 @@ def pass_through(motion, law, end, z, times, unit, space):
         if met >= 0:
             if not error < np.inf:
                 return -1, FAILED
-            # regula falsi, the value at the end that stays halved (Illinois)
+            # regula falsi with the value at the retained end halved (Illinois)
             value = heights[STAGES - 1, met] - floor[met]
             if value <= 0.0:
                 left = 0.5 * left if side > 0 else left
@@ -283,7 +283,7 @@ def pass_through(motion, law, end, z, times, unit, space):
             continue
         stage = first_below(heights, floor)
         if stage < STAGES - 1:
-            # a step that ends there comes first
+            # shorten the step to that stage first
             h *= C[stage]
             continue
         copied(Z, kept)
@@ -317,7 +317,7 @@ def copied(values, into):
 
 @part
 def first_below(heights, floor):
-    """The first stage at which any is, STAGES if none."""
+    """First stage at which a height is below its floor, STAGES if none."""
     for j in range(STAGES):
         if another(heights[j], floor, -1) >= 0:
             return j
@@ -326,7 +326,7 @@ def first_below(heights, floor):
 
 @part
 def another(heights, floor, met):
-    """A height below its floor beside one of them, -1 if none."""
+    """Index of a height below its floor, other than ``met``; -1 if none."""
     found = -1
     for k in range(floor.shape[0]):
         if k != met and heights[k] < floor[k]:
@@ -336,15 +336,15 @@ def another(heights, floor, met):
 
 @part
 def between(low, high, left, right):
-    """Where the straight line through two values vanishes, or the middle."""
+    """Zero of the straight line through two values, or the midpoint."""
     found = (low * right - high * left) / (right - left) if right < left else low
     return found if low < found < high else 0.5 * (low + high)
 
 
 @part
 def continued(kept, last, h, Z):
-    """The increments of the last step, continued, as a first guess of those of the next."""
-    # far beyond the last step its polynomial is no guide
+    """Extrapolate the increments of the last step as initial guess of the next."""
+    # the polynomial of the last step is not extrapolated far
     known = last > 0.0 and h <= 2.5 * last
     for i in range(Z.shape[1]):
         for j in range(STAGES):
@@ -362,7 +362,7 @@ def continued(kept, last, h, Z):
 
 @part
 def rates_at(motion, law, t, z, space, rates):
-    """The rates at a place, and all that the compiled function gives there."""
+    """Evaluate the rates and all outputs of the compiled function at a point."""
     out, inputs, slopes = space.out, space.inputs, space.slopes
     size = z.shape[0]
     for i in range(size):
@@ -384,7 +384,7 @@ def rates_at(motion, law, t, z, space, rates):
 
 @part
 def by_table(breaks, coefficients, t):
-    """A sum of Chebyshev polynomials, other ones between every two breaks (Clenshaw)."""
+    """Evaluate a piecewise Chebyshev sum by Clenshaw's algorithm."""
     low, high = 0, breaks.shape[0] - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -401,7 +401,7 @@ def by_table(breaks, coefficients, t):
 
 @part
 def heights_of(motion, end, z, rates, space, sense, heights):
-    """Interface functions, not negative within the region, and what the event is told by."""
+    """Interface functions, nonnegative within the region, and the event function."""
     out, size, count = space.out, z.shape[0], motion.signs.shape[0]
     first = (size - 1) * (size + 1)
     for k in range(count):
@@ -418,12 +418,12 @@ def heights_of(motion, end, z, rates, space, sense, heights):
 
 @part
 def step(motion, law, end, t, z, h, scale, sense, space, Z, heights):
-    """One step: increments at its stages from a guess of them, and the heights there.
+    """Compute one step: increments and heights at its stages, from an initial guess.
 
     Returns
     -------
     float
-        Its error in units of what is allowed, infinite where the equations are not solved.
+        Error relative to the tolerance, infinite if the equations are not solved.
     """
     out, slopes, jacobian, factors = space.out, space.slopes, space.jacobian, space.factors
     given, moved, F = space.given, space.moved, space.stages
@@ -466,7 +466,7 @@ def step(motion, law, end, t, z, h, scale, sense, space, Z, heights):
                 change = 0.0
                 for m in range(half):
                     change += (OUT_OF[j, m] * moved[m, i]).real
-                # the rates may not be defined there
+                # the rates may be undefined
                 if not abs(change) < np.inf:
                     return np.inf
                 Z[j, i] += change
@@ -477,7 +477,7 @@ def step(motion, law, end, t, z, h, scale, sense, space, Z, heights):
         before = largest
     if not done:
         return np.inf
-    # the defects of the rates where they are largest, filtered by the method
+    # largest defects of the rates, filtered by the method
     error = 0.0
     for which in range(2):
         s = BETWEEN if which == 1 else 0.0

@@ -1,4 +1,4 @@
-"""Distances of points from a polygonal curve, compiled."""
+"""Compiled distances of points from a polygonal curve."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fastslow.kernels.decorators import unfused_part
 
 @unfused_part
 def count_below(chain, value, included):
-    """How many vertices have a last coordinate below a value, or at it where that is included."""
+    """Count the vertices whose last coordinate is below a value, or equal if included."""
     last = chain.shape[1] - 1
     low, high = 0, chain.shape[0]
     while low < high:
@@ -25,7 +25,7 @@ def count_below(chain, value, included):
 
 @unfused_part
 def square_to_vertex(points, i, chain, k):
-    """Square of the distance of a point from a vertex."""
+    """Squared distance of a point from a vertex."""
     square = 0.0
     for j in range(chain.shape[1]):
         square += (points[j, i] - chain[k, j]) ** 2
@@ -34,11 +34,11 @@ def square_to_vertex(points, i, chain, k):
 
 @unfused_part
 def nearest_vertex(points, i, chain, first, stop):
-    """Square of the distance of a point from the nearest of some vertices, and which it is."""
+    """Squared distance of a point from the nearest of some vertices, and its index."""
     last = chain.shape[1] - 1
     value = points[last, i]
     least, nearest = np.inf, -1
-    # from the middle outwards, as far as the last coordinate alone leaves a vertex nearer
+    # from the middle outwards, until the last coordinate alone exceeds the distance
     middle = min(max(count_below(chain, value, False), first), stop)
     for k in range(middle, stop):
         ahead = value - chain[k, last]
@@ -52,7 +52,7 @@ def nearest_vertex(points, i, chain, first, stop):
         if ahead * ahead > least:
             break
         square = square_to_vertex(points, i, chain, k)
-        # of vertices at the same distance the first
+        # ties go to the first vertex
         if square <= least:
             least, nearest = square, k
     return least, nearest
@@ -60,11 +60,11 @@ def nearest_vertex(points, i, chain, first, stop):
 
 @unfused_part
 def nearness_of(points, i, chain, radius):
-    """How much nearer than a radius one point is to a curve."""
+    """Radius minus the distance of one point from a curve."""
     count, size = chain.shape
     last = size - 1
     value = points[last, i]
-    # a chord may reach farther than its ends: one vertex more on both sides
+    # a chord may be nearer than its ends: one vertex more on both sides
     first = max(count_below(chain, value - radius, False) - 1, 0)
     stop = min(count_below(chain, value + radius, True) + 1, count)
     if chain[first, last] >= value + radius or chain[stop - 1, last] <= value - radius:
@@ -89,7 +89,7 @@ def nearness_of(points, i, chain, radius):
 
 @unfused_part
 def nearness_to_chain(points, chain, radius, near):
-    """How much nearer than a radius points are to a curve whose last coordinate does not fall.
+    """Radius minus the distances of points from a curve with nondecreasing last coordinate.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def nearness_to_chain(points, chain, radius, near):
         Vertices, evenly spaced.
     radius : float
     near : ndarray, shape (N,)
-        Filled: the radius less the distance near the nearest vertex; −radius for a point
+        Output: the radius minus the distance near the nearest vertex; −radius for a point
         that differs by the radius or more from every vertex in the last coordinate.
     """
     for i in range(points.shape[1]):
@@ -107,10 +107,10 @@ def nearness_to_chain(points, chain, radius, near):
 
 @unfused_part
 def beside_chain(points, chain, radius, beside):
-    """Which points are nearer than a radius to a curve, as `nearness_to_chain` has it.
+    """Points of a path nearer than a radius to a curve, consistent with `nearness_to_chain`.
 
-    Most points of a path need not be looked at, as its distance from the nearest vertex
-    changes by no more than it moves.
+    Most points are skipped, as the distance from the nearest vertex changes by no more than
+    the displacement along the path.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def beside_chain(points, chain, radius, beside):
     chain : ndarray, shape (M, d)
     radius : float
     beside : ndarray of bool, shape (N,)
-        Filled.
+        Output.
     """
     count, size = chain.shape
     longest = 0.0
@@ -128,7 +128,7 @@ def beside_chain(points, chain, radius, beside):
         for j in range(size):
             square += (chain[k + 1, j] - chain[k, j]) ** 2
         longest = max(longest, square)
-    # the curve is nearer than its vertices by no more than a chord; rounding decides nothing
+    # the curve is nearer than its vertices by at most a chord; with a margin for rounding
     far, close = (radius + math.sqrt(longest)) * (1.0 + 1e-9), radius * (1.0 - 1e-9)
     seen, distance = 0, math.nan
     for i in range(points.shape[1]):

@@ -1,4 +1,4 @@
-"""Columns of a run at any times, from the Taylor coefficients of its steps, compiled."""
+"""Compiled evaluation of the columns of a run from the Taylor series of its steps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from fastslow.kernels.decorators import unfused_part
 
 @unfused_part
 def step_of(starts, time):
-    """The last step that begins at a time or before it, 0 where none does."""
+    """Index of the last step that begins at or before a time, else 0."""
     low, high = 0, starts.shape[0]
     while low < high:
         middle = (low + high) // 2
@@ -20,22 +20,22 @@ def step_of(starts, time):
 
 @unfused_part
 def values_in_steps(series, starts, begin, end, times, values):
-    """Sum the series of steps at times, to the bit as `fastslow.results.trajectory.dense`.
+    """Evaluate the series of steps at times, identical to `fastslow.results.trajectory.dense`.
 
     Parameters
     ----------
     series : ndarray, shape (n_steps, columns, order + 1)
     starts : ndarray, shape (n_steps,)
     begin, end : float
-        Of the run.
+        Time span of the run.
     times : ndarray, shape (N,)
     values : ndarray, shape (columns, N)
-        Filled.
+        Output.
 
     Returns
     -------
     int
-        How many of the times are outside the run.
+        Number of times outside the run.
     """
     count, columns, width = series.shape
     row = outside = 0
@@ -43,7 +43,7 @@ def values_in_steps(series, starts, begin, end, times, values):
         time = times[i]
         if not begin <= time <= end:
             outside += 1
-        # most often that of the time before
+        # usually the step of the previous time
         after = row + 1
         if time < starts[row] or (after < count and starts[after] <= time):
             row = step_of(starts, time)

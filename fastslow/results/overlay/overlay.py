@@ -362,9 +362,9 @@ class Overlay(Table, Result):
 
     def _sticking(self) -> Iterator[str]:
         """Number and durations of the sticking phases in each band."""
-        met = [phase for phase in self.phases if phase.kind == "sticking"]
-        for name in dict.fromkeys(phase.stable_branches[0] for phase in met):
-            lengths = [phase.duration for phase in met if phase.stable_branches[0] == name]
+        sticking = [phase for phase in self.phases if phase.kind == "sticking"]
+        for name in dict.fromkeys(phase.stable_branches[0] for phase in sticking):
+            lengths = [phase.duration for phase in sticking if phase.stable_branches[0] == name]
             count = len(lengths)
             times = "time" if count == 1 else "times"
             yield f"  in {name}: {count} {times}, duration {_range(lengths)}"
