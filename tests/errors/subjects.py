@@ -107,6 +107,7 @@ def results():
         "gap": gap,
         "corner": backlash.boundary_equilibria[0],
         "turning": turning,
+        "hopf": turning.special("HB")[0],
         "many": many,
         "swept": fs.bifurcation_sweep(gear, "C", [2.0, 2.5], [0, 0], settle=1, keep=1),
         "map": fs.refined_map(
