@@ -20,20 +20,20 @@ from fastslow.errors import FileError, quoted
 
 Array = NDArray[np.float64]
 
-#: Branch, point, type and label take so many characters, every number as many again.
+#: Widths of branch, point, type and label, and of each number.
 WIDTH = 19
 
-#: What begins a row: branch, point, type and label.
+#: The start of a row: branch, point, type and label.
 LEADING = 4
 
-#: Parameters that a file may name; AUTO has 36 unless it was built with more.
+#: Maximal number of parameters in a file; AUTO has 36 by default.
 MOST_PARAMETERS = 10_000
 
 
 #: An entry of ``parnames`` or ``unames``: a number and the name in quotes.
 _NAMED = re.compile(r"(\d{1,9})\s*:\s*(['\"])(.*?)\2")
 
-#: A number as Fortran writes it.
+#: A number in Fortran format.
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf\w*)", re.I | re.A)
 
 
@@ -67,7 +67,7 @@ class AutoCurve:
 
 @dataclass
 class _Reading:
-    """What is known so far while a file is read."""
+    """State of the parser of a diagram file."""
 
     constants: dict[str, Any] = field(default_factory=dict)
     header: str = ""
@@ -76,7 +76,7 @@ class _Reading:
 
 
 def lines_of(path: Path) -> list[str]:
-    """The lines of a text file.
+    """Return the lines of a text file.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def lines_of(path: Path) -> list[str]:
 
 
 def sections_of(path: Path) -> list[AutoCurve]:
-    """Every curve of a diagram file, in order.
+    """Return the curves of a diagram file, in order.
 
     Raises
     ------
@@ -111,13 +111,13 @@ def sections_of(path: Path) -> list[AutoCurve]:
 
 
 def _header(now: _Reading, line: str) -> None:
-    """Take in one line of a header."""
+    """Parse one line of a header."""
     text = line.strip()[1:].strip()
     if text.startswith("PT"):
         now.header = line
         return
     if re.fullmatch(r"[-+.\dE\s]+", text):
-        # the window of the plot begins the header of a new run
+        # the plot window is the first line of the header of a new run
         now.constants = {}
         return
     for name, value in re.findall(r"\b(\w+)\s*=\s*(-?\d{1,9})(?![\d.E])", text):
@@ -130,7 +130,7 @@ def _header(now: _Reading, line: str) -> None:
 
 
 def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
-    """The section whose rows were gathered, if there were any."""
+    """Return the section of the collected rows, if there are any."""
     if not now.rows:
         return
     where = f"{path}, line {now.line}"
@@ -177,7 +177,7 @@ def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
 
 
 def _columns(header: str, count: int) -> tuple[str, ...]:
-    """Names of the numbers, each in the middle of as many characters as the number takes."""
+    """Return the names of the numbers, each centred in the width of its number."""
     text = header.expandtabs()
     names = tuple(text[WIDTH * (k + 1) : WIDTH * (k + 2)].strip() for k in range(count))
     if all(names) and not text[WIDTH * (count + 1) :].strip():
@@ -186,7 +186,7 @@ def _columns(header: str, count: int) -> tuple[str, ...]:
 
 
 def real(word: str, path: Path) -> float:
-    """A number as Fortran writes it, ``1.5D-3`` and ``-1.7976+308`` included.
+    """Parse a number in Fortran format, including ``1.5D-3`` and ``-1.7976+308``.
 
     Examples
     --------
@@ -200,7 +200,7 @@ def real(word: str, path: Path) -> float:
 
 
 def parameters_of(path: Path) -> dict[int, Array]:
-    """All parameters of the labelled equilibria of a solutions file, by label.
+    """Return all parameters of the labelled equilibria of a solutions file, by label.
 
     Periodic solutions are passed over.
 
@@ -229,7 +229,7 @@ def parameters_of(path: Path) -> dict[int, Array]:
             raise FileError(f"{path} is cut short: the solution with label {label} is not whole")
         at += 1 + rows
         if parts == 1:
-            # the parameters stand last
+            # the parameters are last
             found[label] = np.array([real(word, path) for word in block[len(block) - count :]])
     return found
 
@@ -242,7 +242,7 @@ _ROW = re.compile(r"\s*(-?\d{1,15})\s+(-?\d{1,15})\s+(?:[A-Z]{2}\s+)?\d+(?:\s+-?
 
 
 def eigenvalues_of(path: Path, curves: Sequence[AutoCurve], n: int) -> list[NDArray[np.complex128]]:
-    """Eigenvalues at the points of curves, from the file of diagnostics of the same run.
+    """Return the eigenvalues at the points of curves, from the diagnostics file of the run.
 
     Both files go through the curves in the same order; a row of the diagram follows
     the eigenvalues found at it, the last ones for a point that was looked for.

@@ -43,7 +43,7 @@ HIGHEST = 2**16
 
 
 class UnknownOperationError(ValueError):
-    """An operation that is none of the vocabulary; the message says which."""
+    """An operation outside the vocabulary."""
 
 
 _OPERATIONS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
@@ -70,7 +70,7 @@ _NUMPY: Mapping[str, Callable[..., Any]] = {
 
 
 def check_number(text: Any, names: set[str]) -> None:
-    """Refuse a text unless it is arithmetic in some names that gives a number.
+    """Validate a text as arithmetic in given names with a numerical value.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def _parsed(text: Any) -> ast.expr:
 
 
 def check_literal(text: Any) -> None:
-    """Refuse a text that is no literal number, without or with a sign."""
+    """Validate a text as a literal number, with or without a sign."""
     node = _parsed(text)
     if isinstance(node, ast.UnaryOp):
         node = node.operand
@@ -115,7 +115,7 @@ def check_literal(text: Any) -> None:
 
 
 def _check(node: ast.expr, names: set[str], depth: int, number: bool) -> None:
-    """Refuse a node that is no number, or no truth value where that is asked for."""
+    """Validate a node as a number, or as a condition if one is required."""
     if depth > DEEPEST:
         raise UnknownOperationError(f"expected at most {DEEPEST} operations inside one another")
 
@@ -124,7 +124,7 @@ def _check(node: ast.expr, names: set[str], depth: int, number: bool) -> None:
             _check(part, names, depth + 1, kind)
 
     while number and isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
-        # a long sum is no deep one
+        # a long sum does not count as deep nesting
         all_of([node.right], True)
         if isinstance(node.op, ast.Pow):
             _check_power(node)
@@ -158,7 +158,7 @@ def _check(node: ast.expr, names: set[str], depth: int, number: bool) -> None:
 
 
 def _check_power(node: ast.BinOp) -> None:
-    """Refuse high powers, and powers of powers of literals, whole numbers without end."""
+    """Reject high powers and nested powers of literals, which are huge integers."""
     base, exponent = (_holds(side, ast.Name) for side in (node.left, node.right))
     high = not exponent and not _low(node.right)
     if high or (not base and _holds(node.left, ast.Pow)):
@@ -170,7 +170,7 @@ def _holds(node: ast.expr, kind: type[ast.AST]) -> bool:
 
 
 def _low(node: ast.expr) -> bool:
-    """Whether a literal, or a fraction of two, is a power that is written as one."""
+    """Return True if a literal, or a fraction of two, is an allowed exponent."""
     match node:
         case ast.UnaryOp(operand=operand):
             return _low(operand)
@@ -199,7 +199,7 @@ def _may_call(function: ast.expr, arguments: list[ast.expr]) -> bool:
 
 
 def value_of(text: str, values: Mapping[str, Any]) -> NDArray[np.float64]:
-    """The value of arithmetic, element by element.
+    """Evaluate arithmetic elementwise.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def value_of(text: str, values: Mapping[str, Any]) -> NDArray[np.float64]:
 
 
 def evaluated(text: str, values: Mapping[str, Any]) -> Any:
-    """The value of arithmetic, of the kind that Python and NumPy give for the kinds of the values.
+    """Evaluate arithmetic with the result types of Python and NumPy.
 
     Raises
     ------

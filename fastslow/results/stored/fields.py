@@ -1,4 +1,4 @@
-"""The frozen rates of a stored model over one parameter: what tracing branches needs of it."""
+"""The frozen rates of a stored model over one parameter, for the continuation of branches."""
 
 from __future__ import annotations
 
@@ -15,16 +15,17 @@ from fastslow.results.stored.unit_equations import UnitEquations
 
 @dataclass(frozen=True)
 class FieldOperations:
-    """Operations that fill the rates, their slopes, switching functions and theirs.
+    """Expressions of the rates, the switching functions and their derivatives.
 
     Parameters
     ----------
     shared : tuple of str
-        Parts ``s0``, ``s1``, … in ``u0``, … (states, then the varying parameters) and ``p0``, ….
+        Common subexpressions ``s0``, ``s1``, … in ``u0``, … (states, then the varying
+        parameters) and ``p0``, ….
     outputs : tuple of (int, str)
-        Places that are filled, and with what; all others are zero.
+        Indices of nonzero outputs with their expressions; all others are zero.
     size : int
-        How many places there are.
+        Number of outputs.
     """
 
     shared: tuple[str, ...]
@@ -34,7 +35,7 @@ class FieldOperations:
 
 @dataclass(frozen=True)
 class FieldSides:
-    """What sliding along an interface lies between; see `fastslow.diagrams.modes.Sides`."""
+    """The two sides of a sliding motion; see `fastslow.diagrams.modes.Sides`."""
 
     interface: int
     above: int
@@ -44,14 +45,14 @@ class FieldSides:
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Second and third derivatives of rates by states that do not vanish.
+    """Nonzero second and third derivatives of the rates by the states.
 
     Parameters
     ----------
     entries : tuple of tuple of int
         (i, j, k) or (i, j, k, l) with j ≤ k ≤ l.
     shared : tuple of (str, str)
-        Names of parts, and what they are.
+        Common subexpressions by name.
     texts : tuple of str
         The derivatives.
     """
@@ -61,7 +62,7 @@ class Derivatives:
     texts: tuple[str, ...]
 
     def __call__(self, *numbers: Any) -> list[Any]:
-        """Values at states, varying parameters and the others, u0, u1 and so on."""
+        """Evaluate at states, varying parameters and the others, u0, u1 and so on."""
         values = {f"u{k}": number for k, number in enumerate(numbers)}
         for name, text in self.shared:
             values[name] = evaluated(text, values)
@@ -79,7 +80,7 @@ class FieldMode:
     sides : FieldSides or None
     operations : FieldOperations
     derivatives : Derivatives or None
-        None where they hold functions that compiled code alone has.
+        None for functions that are available in compiled code only.
     """
 
     name: str
@@ -96,19 +97,19 @@ class StoredField(Immutable):
     Parameters
     ----------
     parameter : str
-        The one that varies.
+        The continuation parameter.
     names : tuple of str
         The parameters ``p0``, ``p1``, … of the operations.
     modes : tuple of FieldMode
     unit_equations : tuple of UnitEquations
-        For natural units without and with the size of the parameter.
+        For natural units without and with the scale of the parameter.
     levels : tuple of (str, str, str, float)
-        Interfaces that are a value of one state: name, state, the value as text in the
+        Interfaces at a constant value of one state: name, state, the value as text in the
         parameters and as a number.
     values : mapping
         Parameter values of those numbers.
     path : mapping
-        Of a model frozen along a path, each slow quantity as text.
+        For a model frozen along a path, each slow quantity as text.
     """
 
     parameter: str
@@ -120,7 +121,7 @@ class StoredField(Immutable):
     path: Mapping[str, str]
 
     def interface_values(self, values: Mapping[str, float]) -> dict[str, tuple[str, float]]:
-        """For every interface that is a plain value of one state, (state, value)."""
+        """Return (state, value) for each interface at a constant value of one state."""
         if values == self.values:
             return {name: (state, value) for name, state, _, value in self.levels}
         numbers = {f"p{k}": np.float64(values[n]) for k, n in enumerate(self.names) if n in values}
@@ -133,7 +134,7 @@ class StoredField(Immutable):
         return found
 
     def check(self, states: Sequence[str], interfaces: Sequence[str]) -> None:
-        """Refuse everything that is none of the vocabulary, or out of range.
+        """Validate all operations and ranges.
 
         Raises
         ------

@@ -1,10 +1,9 @@
-"""What the code of a model is made from: operations of a small, fixed vocabulary.
+"""Operations from which the code of a model is generated, with a small, fixed vocabulary.
 
-An operation on series names its operands by numbers of rows. What is plain arithmetic stands as
-text in canonical names: ``t`` is time, ``y0`` the first state, ``w0`` the first slow quantity,
-``p0`` the first parameter, and, where there are such, ``c0`` the first scalar, ``s0`` the first
-shared part and ``r0`` the value of the first row. What is read from a file is checked to be
-this and nothing else before anything is made of it.
+An operation on series identifies its operands by rows. Plain arithmetic is stored as text in
+canonical names: ``t`` is time, ``y0`` the first state, ``w0`` the first slow quantity, ``p0``
+the first parameter, ``c0`` the first scalar, ``s0`` the first common subexpression and ``r0``
+the value of the first row. Operations read from a file are validated before use.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from fastslow.results.base.equality import content_hash
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.stored.arithmetic import UnknownOperationError, check_literal, check_number
 
-#: Kinds of operations on series. Behind the kind stand the row that is filled and the operands.
+#: Kinds of operations on series. The kind is followed by the output row and the operands.
 SCALAR, TIME, SUM, MULTIPLE, PRODUCT = "scalar", "time", "sum", "multiple", "product"
 QUOTIENT, ROOT, POWER, LOGARITHM = "quotient", "root", "power", "logarithm"
 FUNCTION = "function"
@@ -26,18 +25,18 @@ FUNCTION = "function"
 
 @dataclass(frozen=True)
 class SeriesOperations:
-    """Operations that fill the Taylor series of one smooth motion, for any order.
+    """Operations that compute the Taylor series of one smooth motion, to any order.
 
     Parameters
     ----------
     name : str
-        Of the motion: a region, or ``"A|B"`` for sliding between two.
+        Name of the motion: a region, or ``"A|B"`` for sliding between two.
     signs : tuple of int
-        Sign of every interface function; 0 along those that are slid along.
+        Sign of every interface function; 0 for the interfaces of a sliding motion.
     scalars : tuple of str
-        Numbers that follow from parameters, computed once.
+        Expressions in parameters only, computed once.
     nodes : tuple of tuple
-        Operations in the order in which values are computed.
+        Operations in order of evaluation.
     rates : tuple of int
         Row of the rate of each state and slow state.
     outputs : tuple of int
@@ -59,13 +58,13 @@ class ValueOperations:
     Parameters
     ----------
     name, signs
-        As of `SeriesOperations`.
+        As in `SeriesOperations`.
     laws : tuple of str
         Values of the slow quantities.
     shared : tuple of str
-        Parts that stand in several of the others.
+        Common subexpressions.
     rates : tuple of str
-        Of states and slow states.
+        Rates of states and slow states.
     heights : tuple of (str, str)
         Each interface function, and its rate along the motion.
     bounds : tuple of str
@@ -94,13 +93,13 @@ class Operations(Immutable):
     motions : tuple of SeriesOperations or ValueOperations
         Regions, then sliding motions; all of one kind.
     gradients : tuple of (tuple of str, tuple of str)
-        For every interface the terms of its function, and its derivatives by states.
+        For every interface the terms of its function, and its derivatives by the states.
     continuous : tuple of bool
         Whether the rates are continuous across each interface.
     values_only : tuple of str
         Functions without a Taylor recurrence.
     undecided : tuple of (str, str)
-        Intersections of discontinuities along which no sliding is derived, and why.
+        Intersections of discontinuities without a sliding motion, with the reason.
     """
 
     sizes: tuple[int, int, int]
@@ -120,7 +119,7 @@ class Operations(Immutable):
 
     @cached_property
     def regions(self) -> Mapping[str, tuple[int, ...]]:
-        """The signs of the interface functions in each region by its name."""
+        """The signs of the interface functions by region."""
         return {motion.name: motion.signs for motion in self.motions if 0 not in motion.signs}
 
     @cached_property
@@ -130,11 +129,11 @@ class Operations(Immutable):
 
     @property
     def first_free(self) -> int:
-        """The first row after those that every motion fills."""
+        """The first row after those common to all motions."""
         return sum(self.sizes) + self.n_bounds
 
     def check(self) -> None:
-        """Refuse everything that is none of the vocabulary, or out of range.
+        """Validate all operations and ranges.
 
         Raises
         ------
@@ -182,7 +181,7 @@ def _check_values(
     m, q, p = whole.sizes
     counts = (len(motion.laws), len(motion.rates), len(motion.heights))
     _expect(counts == (q, m, p), "a text for every row")
-    # a law stands before all quantities
+    # slow quantities are evaluated before all others
     for text in motion.laws:
         check_number(text, known | moving)
     names = known | moving

@@ -1,4 +1,4 @@
-"""Which sign patterns of the interfaces are regions, at given parameter values."""
+"""Sign patterns of the interface functions that are nonempty regions."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ Pattern = tuple[int, ...]
 
 
 def scaled_row(row: Sequence[float]) -> NDArray[np.float64]:
-    """Slopes and constant of an affine function, its largest slope one."""
+    """Return slopes and constant of an affine function, scaled to a largest slope of one."""
     numbers = np.array(row, dtype=float)
     size = np.abs(numbers[:-1]).max(initial=0.0)
     return numbers / size if size else numbers
 
 
 def possible_patterns(rows: Sequence[NDArray[np.float64] | None]) -> list[Pattern]:
-    """All sign patterns not proved empty, in lexicographic order with + before −.
+    """Return the sign patterns not proved empty, in lexicographic order with + before −.
 
     Exact for affine functions: a pattern is kept when its open set holds a
     point. Functions that are not affine never exclude a pattern. Patterns grow
@@ -32,7 +32,7 @@ def possible_patterns(rows: Sequence[NDArray[np.float64] | None]) -> list[Patter
 
 
 class _Lines:
-    """Affine functions, of which those along one direction are compared as numbers."""
+    """Affine functions; those that are parallel are compared by their roots."""
 
     def __init__(self, rows: Sequence[NDArray[np.float64] | None]) -> None:
         self.rows = rows
@@ -53,7 +53,7 @@ class _Lines:
                 self.entries.append((float(row[-1]), along, parallel, zero))
 
     def meet(self, pattern: Pattern) -> bool:
-        """Whether s_j (a_j·z + b_j) > 0 has a solution for the functions of a pattern."""
+        """Return True if s_j (a_j·z + b_j) > 0 has a solution for the signs of a pattern."""
         lower, upper, parallel = -np.inf, np.inf, True
         for entry, side in zip(self.entries, pattern, strict=False):
             if entry is None:
@@ -78,7 +78,7 @@ class _Lines:
 def _feasible(system: NDArray[np.float64]) -> bool:
     from scipy.optimize import linprog
 
-    # maximise the slack, at most 1, that every inequality keeps
+    # maximise the common slack of the inequalities, at most 1
     dimension = system.shape[1]
     result = linprog(
         c=np.r_[np.zeros(dimension - 1), -1.0],

@@ -1,4 +1,4 @@
-"""Whether content from a file is of the types that its fields are annotated with."""
+"""Validation of the types of fields against their annotations, for content from files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 
 def has_types(value: Any) -> bool:
-    """Whether the fields of a dataclass, and all inside of them, are of exactly their types.
+    """Return True if all fields of a dataclass, recursively, have exactly their annotated types.
 
     Examples
     --------

@@ -11,21 +11,21 @@ from numpy.typing import NDArray
 
 from fastslow.results.base.immutable import Immutable
 
-#: Weight, beside that of the equations, by which a unit that they leave open is one.
+#: Weight, relative to the equations, that sets undetermined units to one.
 _UNDETERMINED = 1e-9
 
-#: Smaller coefficients count as zero: no choice of units brings a term that matters here.
+#: Coefficients below this size count as zero; no choice of units makes such a term relevant.
 NEGLIGIBLE = 1e-60
 
 
 def negligible(value: complex) -> bool:
-    """Whether a value is too small, or too large, to count."""
+    """Return True if a value is too small or too large to be relevant."""
     return not NEGLIGIBLE < abs(value) < 1.0 / NEGLIGIBLE
 
 
 @dataclass(frozen=True, eq=False)
 class UnitEquations(Immutable):
-    """Linear equations for the logarithms of units, with those of the parameters' sizes given.
+    """Linear equations for the logarithms of units, from those of parameter values.
 
     Parameters
     ----------
@@ -50,14 +50,14 @@ class UnitEquations(Immutable):
     right: NDArray[np.float64]
 
     def units(self, names: Sequence[str], values: Mapping[str, float]) -> dict[str, float]:
-        """A power of two for each name, at values of the parameters."""
+        """Return the unit of each name, a power of two, at given parameter values."""
         known = {n: math.log2(abs(v)) for n, v in values.items() if v}
         given = [0.0 if n in self.gone else known[n] for n in self.parameters]
         logs = self._solved(np.array(given))
         return {n: _power(logs.get(n, known.get(n, 0.0))) for n in names}
 
     def _solved(self, logs: NDArray[np.float64]) -> dict[str, float]:
-        """Least-squares solution of least norm."""
+        """Return the least-squares solution of minimal norm."""
         if not self.columns:
             return {}
         normal = self.matrix.T @ self.matrix
@@ -68,5 +68,5 @@ class UnitEquations(Immutable):
 
 
 def _power(log: float) -> float:
-    """The nearest power of two, within the range of normal numbers with some to spare."""
+    """Return the nearest power of two, well within the range of normal numbers."""
     return float(2.0 ** round(min(max(log, -500.0), 500.0)))
