@@ -52,7 +52,7 @@ def test_where_nothing_can_be_kept_there_is_nothing_to_compile_ahead(tmp_path, m
     (tmp_path / "file").touch()
     monkeypatch.setenv("FASTSLOW_CACHE", str(tmp_path / "file"))
     monkeypatch.setattr(store, "_own_directory", lambda: None)
-    monkeypatch.setattr(store, "_said", set())
+    monkeypatch.setattr(store, "_warned", set())
     with (
         pytest.warns(RuntimeWarning, match="kept in memory alone"),
         pytest.raises(fs.FileError, match="name one by the environment variable FASTSLOW_CACHE"),

@@ -19,7 +19,7 @@ from fastslow.continuation.spaces import (
     SMALL_STEP,
     WINDOW,
 )
-from fastslow.kernels.decorators import unfused_part
+from fastslow.kernels.decorators import unfused_kernel
 from fastslow.kernels.pointers import call_address
 
 #: A state is measured by this part of its distance from the middle of the equilibria at which
@@ -41,7 +41,7 @@ BETWEEN = 0.01
 TANGENT = 1e-9
 
 
-@unfused_part
+@unfused_kernel
 def solve(matrix, right):  # type: ignore[no-untyped-def]
     """Solve a small dense system in place by elimination with row pivoting.
 
@@ -76,7 +76,7 @@ def solve(matrix, right):  # type: ignore[no-untyped-def]
     return True
 
 
-@unfused_part
+@unfused_kernel
 def _bordered(out, n, border, weight, matrix):  # type: ignore[no-untyped-def]
     for i in range(n):
         for j in range(n + 1):
@@ -85,7 +85,7 @@ def _bordered(out, n, border, weight, matrix):  # type: ignore[no-untyped-def]
         matrix[n, j] = border[j] * weight[j]
 
 
-@unfused_part
+@unfused_kernel
 def _norm(vector, weight):  # type: ignore[no-untyped-def]
     total = 0.0
     for j in range(vector.shape[0]):
@@ -93,7 +93,7 @@ def _norm(vector, weight):  # type: ignore[no-untyped-def]
     return math.sqrt(total)
 
 
-@unfused_part
+@unfused_kernel
 def _dips(h0, s0, h1, s1):  # type: ignore[no-untyped-def]
     """Whether the cubic through two positive values with given slopes is negative between."""
     if not (s0 < 0.0 < s1):
@@ -110,7 +110,7 @@ def _dips(h0, s0, h1, s1):  # type: ignore[no-untyped-def]
     return False
 
 
-@unfused_part
+@unfused_kernel
 def _local_weight(point, weight, middle, local):  # type: ignore[no-untyped-def]
     """Fill the weights at a point; returns how many units the farthest state is away."""
     farthest = 1.0
@@ -125,13 +125,13 @@ def _local_weight(point, weight, middle, local):  # type: ignore[no-untyped-def]
     return farthest
 
 
-@unfused_part
+@unfused_kernel
 def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-def]
     """Follow one curve inside one region until something ends it, or to a pause.
 
     Parameters
     ----------
-    curve : Curve
+    curve : CompiledCurve
     region : Region
     stepping : Stepping
     traced : Traced

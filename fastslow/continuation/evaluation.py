@@ -7,28 +7,28 @@ import math
 import numpy as np
 
 from fastslow.continuation.engine import solve
-from fastslow.continuation.location import DUST, ROUNDING
-from fastslow.kernels.decorators import unfused_part
+from fastslow.continuation.location import FLUSH_THRESHOLD, ROUNDING
+from fastslow.kernels.decorators import unfused_kernel
 from fastslow.kernels.pointers import call_address
 
 #: Rounding of one operation.
 EPS = 2.220446049250313e-16
 
 
-@unfused_part
+@unfused_kernel
 def evaluate(address, modes, points, parameters, out):  # type: ignore[no-untyped-def]
     """Fill in the output of the generated function at every row of points, shape (N, width)."""
     for k in range(points.shape[0]):
         call_address(address, modes[k], points[k], parameters, out[k])
 
 
-@unfused_part
+@unfused_kernel
 def value_at(address, mode, point, parameters, out):  # type: ignore[no-untyped-def]
     """Fill in the output of the generated function at one point, shape (width,)."""
     call_address(address, mode, point, parameters, out)
 
 
-@unfused_part
+@unfused_kernel
 def newton_from(  # type: ignore[no-untyped-def]
     curve, states, converged, value, unit, iterations, space
 ):
@@ -75,7 +75,7 @@ def newton_from(  # type: ignore[no-untyped-def]
             states[k, i] = u[i]
 
 
-@unfused_part
+@unfused_kernel
 def refine(  # type: ignore[no-untyped-def]
     curve, u, scale, row, normal, point, m, iterations, space
 ):
@@ -143,7 +143,7 @@ def refine(  # type: ignore[no-untyped-def]
             size = max(size, abs(right[j]))
     # as `flush_to_zero` and `grown` have it
     for j in range(columns):
-        flushed[j] = 0.0 if abs(u[j]) < DUST * scale[j] else u[j]
+        flushed[j] = 0.0 if abs(u[j]) < FLUSH_THRESHOLD * scale[j] else u[j]
     call_address(address, mode, flushed, parameters, out)
     for i in range(n):
         right[i] = out[i]
@@ -173,7 +173,7 @@ def refine(  # type: ignore[no-untyped-def]
     return residual, size, size < 1e-8 and balanced
 
 
-@unfused_part
+@unfused_kernel
 def correct(  # type: ignore[no-untyped-def]
     curve, points, scales, natural, limits, m, iterations, plain, space
 ):
@@ -214,7 +214,7 @@ def correct(  # type: ignore[no-untyped-def]
         plain[k] = good and abs(u[n] - start[n]) <= limits.beside * scale[n]
 
 
-@unfused_part
+@unfused_kernel
 def survey(  # type: ignore[no-untyped-def]
     curve, points, tangents, scale, reach, vertical, branching, turning, jacobians, space
 ):
@@ -277,7 +277,7 @@ def survey(  # type: ignore[no-untyped-def]
         turning[k] = 0.0 if far * abs(along) < vertical else along
 
 
-@unfused_part
+@unfused_kernel
 def signed_distance(matrix, least, right):  # type: ignore[no-untyped-def]
     """Size of a matrix's smallest singular value, with the sign of its determinant.
 
@@ -341,8 +341,8 @@ def signed_distance(matrix, least, right):  # type: ignore[no-untyped-def]
     return sign * math.sqrt(total / solved)
 
 
-@unfused_part
-def pairs(jacobians, result):  # type: ignore[no-untyped-def]
+@unfused_kernel
+def eigenvalues_of_2x2(jacobians, result):  # type: ignore[no-untyped-def]
     """Fill in the eigenvalues of 2×2 matrices as LAPACK's dlanv2 finds them, shape (N, 2)."""
     count = jacobians.shape[0]
     for k in range(count):
@@ -362,13 +362,13 @@ def pairs(jacobians, result):  # type: ignore[no-untyped-def]
             result[k, 1] = complex(0.5 * (a + d), -math.sqrt(-inside))
 
 
-@unfused_part
+@unfused_kernel
 def _modulus(value):  # type: ignore[no-untyped-def]
     return abs(value.real) if value.imag == 0.0 else math.hypot(value.real, value.imag)
 
 
-@unfused_part
-def sums_of_two(pairs, rounding, result):  # type: ignore[no-untyped-def]
+@unfused_kernel
+def eigenvalue_pair_sums(pairs, rounding, result):  # type: ignore[no-untyped-def]
     """Fill in the relative sums of two eigenvalues each, shape (N, 2).
 
     0 where a sum is so to rounding, or they are no pair or not finite.
@@ -389,13 +389,13 @@ def sums_of_two(pairs, rounding, result):  # type: ignore[no-untyped-def]
             result[k] = total / (first + second)
 
 
-@unfused_part
+@unfused_kernel
 def _alike(one, other):  # type: ignore[no-untyped-def]
     """Whether two numbers have the same sign, neither being zero."""
     return (one > 0.0 and other > 0.0) or (one < 0.0 and other < 0.0)
 
 
-@unfused_part
+@unfused_kernel
 def _fall(test, length, row):  # type: ignore[no-untyped-def]
     """How fast the modulus of a test falls on the step after a row; NaN where its sign changes."""
     if not (_alike(test[row], test[row + 1]) and length[row] > 0.0):
@@ -403,8 +403,8 @@ def _fall(test, length, row):  # type: ignore[no-untyped-def]
     return (abs(test[row]) - abs(test[row + 1])) / length[row]
 
 
-@unfused_part
-def dips(test, length, share, found):  # type: ignore[no-untyped-def]
+@unfused_kernel
+def possible_double_zeros(test, length, share, found):  # type: ignore[no-untyped-def]
     """Rows after which a test that keeps its sign may reach zero and turn back.
 
     The chords of both neighbouring steps are extended into the step: where the
@@ -452,8 +452,8 @@ def dips(test, length, share, found):  # type: ignore[no-untyped-def]
     return number
 
 
-@unfused_part
-def passing(points, scale, u, within, found, apart):  # type: ignore[no-untyped-def]
+@unfused_kernel
+def nearby_chords(points, scale, u, within, found, apart):  # type: ignore[no-untyped-def]
     """Chords of a curve that are nearest to a point, each nearer than its two neighbours.
 
     Parameters

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastslow.continuation.spaces import PAUSED, TABLE_FULL
-from fastslow.kernels.decorators import unfused_part
+from fastslow.kernels.decorators import unfused_kernel
 
 #: By how much a box is enlarged on either side before Krawczyk's test, in units of its width.
 #: A solution on the face of two boxes is then inside both.
@@ -28,7 +28,7 @@ CUT = 0.4871
 EPS = 2.220446049250313e-16
 
 
-@unfused_part
+@unfused_kernel
 def _least(values):  # type: ignore[no-untyped-def]
     """The least of several numbers, NaN if one is."""
     found = values[0]
@@ -40,7 +40,7 @@ def _least(values):  # type: ignore[no-untyped-def]
     return found
 
 
-@unfused_part
+@unfused_kernel
 def _greatest(values):  # type: ignore[no-untyped-def]
     """The greatest of several numbers, NaN if one is."""
     found = values[0]
@@ -52,7 +52,7 @@ def _greatest(values):  # type: ignore[no-untyped-def]
     return found
 
 
-@unfused_part
+@unfused_kernel
 def _total(values):  # type: ignore[no-untyped-def]
     total = 0.0
     for k in range(values.shape[0]):
@@ -60,7 +60,7 @@ def _total(values):  # type: ignore[no-untyped-def]
     return total
 
 
-@unfused_part
+@unfused_kernel
 def _binomials(most, table):  # type: ignore[no-untyped-def]
     for i in range(most + 1):
         table[i, 0] = 1.0
@@ -68,7 +68,7 @@ def _binomials(most, table):  # type: ignore[no-untyped-def]
             table[i, j] = table[i - 1, j - 1] + (table[i - 1, j] if j < i else 0.0)
 
 
-@unfused_part
+@unfused_kernel
 def _along(matrix, degree, stride, tensor, scratch):  # type: ignore[no-untyped-def]
     """Multiply a flat tensor by a matrix along the axis of a degree and stride, in place."""
     size = tensor.shape[0]
@@ -84,7 +84,7 @@ def _along(matrix, degree, stride, tensor, scratch):  # type: ignore[no-untyped-
                 tensor[offset + i * stride] = scratch[i]
 
 
-@unfused_part
+@unfused_kernel
 def _converted(power, degrees, low, high, out, error, space):  # type: ignore[no-untyped-def]
     """Bernstein coefficients on a box of polynomials given by powers, and their rounding."""
     equations, size = power.shape
@@ -116,7 +116,7 @@ def _converted(power, degrees, low, high, out, error, space):  # type: ignore[no
         error[k] = operations * EPS * _greatest(sizes)
 
 
-@unfused_part
+@unfused_kernel
 def _halves(tensor, degree, stride, cut, left):  # type: ignore[no-untyped-def]
     """De Casteljau: the part above the cut in place, the part below into ``left``."""
     size = tensor.shape[0]
@@ -131,7 +131,7 @@ def _halves(tensor, degree, stride, cut, left):  # type: ignore[no-untyped-def]
                 left[offset + level * stride] = tensor[offset]
 
 
-@unfused_part
+@unfused_kernel
 def _inverted(matrix, inverse):  # type: ignore[no-untyped-def]
     """Inverse by elimination with row pivots; False where it is singular to rounding."""
     n = matrix.shape[0]
@@ -167,7 +167,7 @@ def _inverted(matrix, inverse):  # type: ignore[no-untyped-def]
     return True
 
 
-@unfused_part
+@unfused_kernel
 def _deviation(tensor, degrees, strides, row, width, rounding, deviation):  # type: ignore[no-untyped-def]
     """Bounds on row ``row`` of |G' − I| over a box of a width, from coefficients of G."""
     size = tensor.shape[0]
@@ -184,7 +184,7 @@ def _deviation(tensor, degrees, strides, row, width, rounding, deviation):  # ty
         deviation[m] = worst + 2.0 * d * rounding / width
 
 
-@unfused_part
+@unfused_kernel
 def isolate(  # type: ignore[no-untyped-def]
     power, degrees, low, high, logarithmic, floor, tolerance, budget, large, small, share,
     stack, solutions, clusters, progress, space,

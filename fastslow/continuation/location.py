@@ -26,7 +26,7 @@ LARGE = 60
 
 #: Components below this part of the scale are left over by Newton's method where the solution
 #: is zero: each step reduces them by a factor.
-DUST = 1e-20
+FLUSH_THRESHOLD = 1e-20
 
 #: Rounding of a residual, in units of the sum of the moduli of its terms.
 ROUNDING = 2.3e-16
@@ -123,7 +123,7 @@ def flush_to_zero(u: Array, scale: Array) -> Array:
     >>> flush_to_zero(np.array([1.0, -3e-38]), np.ones(2)).tolist()
     [1.0, 0.0]
     """
-    return np.where(np.abs(u) < DUST * scale, 0.0, u)
+    return np.where(np.abs(u) < FLUSH_THRESHOLD * scale, 0.0, u)
 
 
 def grown(after: Array, before: Array, terms: Array) -> bool:
@@ -244,7 +244,7 @@ def fold(curve: Curve, start: Array, scale: Array) -> Located:
     return Located(z[: n + 1], residual, converged, units * z[n + 1 :], size)
 
 
-def turning_pair(curve: Curve, start: Array, scale: Array, squared: float) -> Located:
+def hopf_or_neutral_saddle(curve: Curve, start: Array, scale: Array, squared: float) -> Located:
     """Two eigenvalues of opposite sign: F = 0, J a = σb, J b = −(κ/σ) a, |a| = 1, ⟨l, a⟩ = 0.
 
     κ = ω² > 0 is a Hopf point, κ < 0 a neutral saddle; ``extra`` is (κ,). With the two

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.spaces import (
     Boxes,
-    Curve,
+    CompiledCurve,
     IsolationSpace,
     Limits,
     NewtonSpace,
@@ -34,7 +34,7 @@ _LOOPS = [
         _ENGINE,
         "trace",
         {
-            "curve": Curve, "region": Region, "stepping": Stepping, "traced": Traced,
+            "curve": CompiledCurve, "region": Region, "stepping": Stepping, "traced": Traced,
             "space": TraceSpace,
         },
         results=(int,),
@@ -54,7 +54,7 @@ _LOOPS = [
         _EVALUATION,
         "refine",
         {
-            "curve": Curve, "u": Vector, "scale": Vector, "row": int, "normal": Vector,
+            "curve": CompiledCurve, "u": Vector, "scale": Vector, "row": int, "normal": Vector,
             "point": Vector, "m": int, "iterations": int, "space": NewtonSpace,
         },
         results=(float, float, bool),
@@ -64,7 +64,7 @@ _LOOPS = [
         _EVALUATION,
         "correct",
         {
-            "curve": Curve, "points": Matrix, "scales": Matrix, "natural": Matrix,
+            "curve": CompiledCurve, "points": Matrix, "scales": Matrix, "natural": Matrix,
             "limits": Limits, "m": int, "iterations": int, "plain": Flags, "space": NewtonSpace,
         },
         kept=("space",),
@@ -73,27 +73,28 @@ _LOOPS = [
         _EVALUATION,
         "survey",
         {
-            "curve": Curve, "points": Matrix, "tangents": Matrix, "scale": Vector, "reach": float,
-            "vertical": float, "branching": Vector, "turning": Vector, "jacobians": Tensor,
+            "curve": CompiledCurve, "points": Matrix, "tangents": Matrix, "scale": Vector,
+            "reach": float, "vertical": float, "branching": Vector, "turning": Vector,
+            "jacobians": Tensor,
             "space": NewtonSpace,
         },
         kept=("space",),
     ),
-    Loop(_EVALUATION, "pairs", {"jacobians": Tensor, "result": ComplexMatrix}),
+    Loop(_EVALUATION, "eigenvalues_of_2x2", {"jacobians": Tensor, "result": ComplexMatrix}),
     Loop(
         _EVALUATION,
-        "sums_of_two",
+        "eigenvalue_pair_sums",
         {"pairs": ComplexMatrix, "rounding": float, "result": Vector},
     ),
     Loop(
         _EVALUATION,
-        "dips",
+        "possible_double_zeros",
         {"test": Vector, "length": Vector, "share": float, "found": Integers},
         results=(int,),
     ),
     Loop(
         _EVALUATION,
-        "passing",
+        "nearby_chords",
         {
             "points": Matrix, "scale": Vector, "u": Vector, "within": float, "found": Integers,
             "apart": Vector,
@@ -104,8 +105,8 @@ _LOOPS = [
         _EVALUATION,
         "newton_from",
         {
-            "curve": Curve, "states": Matrix, "converged": Flags, "value": float, "unit": Vector,
-            "iterations": int, "space": NewtonSpace,
+            "curve": CompiledCurve, "states": Matrix, "converged": Flags, "value": float,
+            "unit": Vector, "iterations": int, "space": NewtonSpace,
         },
         kept=("space",),
     ),

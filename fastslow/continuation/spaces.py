@@ -41,7 +41,7 @@ FULL, RANGE, INTERFACE, SMALL_STEP, WINDOW, CLOSED = range(6)
 PAUSED, TABLE_FULL = -1, -2
 
 
-class Curve(NamedTuple):
+class CompiledCurve(NamedTuple):
     """The generated function of curves, the number of the region, and the parameters."""
 
     address: int

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.continuation.location import REACH, Located, with_condition
 from fastslow.continuation.loops import blocks, loop, writeable
-from fastslow.continuation.spaces import Curve, Limits, newton_space
+from fastslow.continuation.spaces import CompiledCurve, Limits, newton_space
 from fastslow.errors import ModelError
 from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
 from fastslow.results.angles import periods_of, principal
@@ -369,7 +369,7 @@ class FrozenField:
         turning, branching = np.empty(count), np.empty(count)
         jacobians = np.empty((count, self.n, self.n))
         space = newton_space(self.n, self.compiled.size)
-        curve = Curve(self.compiled.address, region, self.values)
+        curve = CompiledCurve(self.compiled.address, region, self.values)
         for s in blocks(count, 48 * self.compiled.size + 2 * self.n**3):
             loop("survey")(
                 curve, points[s], tangents[s], scale, REACH, VERTICAL, branching[s], turning[s],
@@ -391,7 +391,7 @@ class FrozenField:
         if jacobian.shape[-1] == 2:
             flat = writeable(np.ascontiguousarray(jacobian).reshape(-1, 2, 2))
             found = np.empty((len(flat), 2), dtype=complex)
-            loop("pairs")(flat, found)
+            loop("eigenvalues_of_2x2")(flat, found)
             return found.reshape(jacobian.shape[:-1])
         finite = np.asarray(np.isfinite(jacobian).all(axis=(-1, -2)))[..., None]
         if jacobian.shape[-1] < 2:
@@ -420,7 +420,7 @@ class FrozenField:
         point = writeable(start if point is None else point)
         u = start.copy()
         residual, size, converged = loop("refine")(
-            Curve(self.compiled.address, region, self.values), u, scale, row, normal, point,
+            CompiledCurve(self.compiled.address, region, self.values), u, scale, row, normal, point,
             self.compiled.m, ITERATIONS, newton_space(self.n, self.compiled.size),
         )  # fmt: skip
         if converged:
@@ -460,7 +460,7 @@ class FrozenField:
         """
         points, plain = starts.copy(), np.empty(len(starts), dtype=bool)
         space = newton_space(self.n, self.compiled.size)
-        curve = Curve(self.compiled.address, region, self.values)
+        curve = CompiledCurve(self.compiled.address, region, self.values)
         for s in blocks(len(starts), ITERATIONS * (16 * self.compiled.size + self.n**3)):
             loop("correct")(
                 curve, points[s], scales[s], natural[s], limits, self.compiled.m, ITERATIONS,

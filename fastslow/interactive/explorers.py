@@ -215,7 +215,7 @@ class Explorer:
         sliders: Mapping[Any, Any] | None = None,
         title: str = "",
         source: str = "",
-        most: int = 500,
+        max_frames: int = 500,
         progress: bool = True,
     ) -> Path:
         """Write an HTML page with sliders and picking, which needs no Python or network.
@@ -234,7 +234,7 @@ class Explorer:
             Heading of the page.
         source : str
             Python source that defines the model, for the calls shown in the page.
-        most : int
+        max_frames : int
             Largest number of combinations.
         progress : bool
             Whether to show a progress bar.
@@ -248,13 +248,13 @@ class Explorer:
         UnknownNameError
             For a name without a slider.
         ArgumentError
-            For invalid values, or more combinations than ``most``.
+            For invalid values, or more combinations than ``max_frames``.
         FileError
             If the file cannot be written.
         """
         from fastslow.interactive.pages import write_page
 
-        return write_page(self, Path(path), sliders, title, source, most, progress)
+        return write_page(self, Path(path), sliders, title, source, max_frames, progress)
 
     @property
     def widget(self) -> Any:

@@ -35,11 +35,11 @@ def write_page(
     sliders: Mapping[Any, Any] | None,
     title: str,
     source: str,
-    most: int,
+    max_frames: int,
     progress: bool,
 ) -> Path:
     """Compute all frames and write the page; see `Explorer.export`."""
-    data = page_data(explorer, sliders, source, most, progress)
+    data = page_data(explorer, sliders, source, max_frames, progress)
     heading = title or f"Model of {', '.join(explorer.model.states)}"
     write_text(path, page_text(heading, data))
     return path
@@ -49,18 +49,19 @@ def page_data(
     explorer: Explorer,
     sliders: Mapping[Any, Any] | None,
     source: str = "",
-    most: int = 500,
+    max_frames: int = 500,
     progress: bool = False,
 ) -> dict[str, Any]:
     """Compute the data of a page, with a frame for each combination of values."""
     chosen = _selected_sliders(explorer.sliders, sliders)
     values = {slider.name: slider.values(wanted).tolist() for slider, wanted in chosen}
     count = math.prod(map(len, values.values()))
-    if count > most:
+    if count > max_frames:
         each = " × ".join(f"{len(v)} of {name}" for name, v in values.items())
         raise ArgumentError(
-            f"the page would have {count} frames ({each}), more than most={most}; give fewer "
-            "values, as in sliders={'" + next(iter(values)) + "': 5}, or raise most="
+            f"the page would have {count} frames ({each}), more than "
+            f"max_frames={max_frames}; give fewer values, as in "
+            "sliders={'" + next(iter(values)) + "': 5}, or raise max_frames="
         )
     store = Store()
     frames = []

@@ -21,7 +21,7 @@ OPTIONS: dict[str, Any] = {
 }
 
 
-class _Part:
+class _Kernel:
     """A function that Numba compiles into the loops that call it; Python calls its source."""
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
@@ -66,22 +66,22 @@ class _Intrinsic:
         return context.resolve_value_type(made)
 
 
-def part(function: F) -> F:
+def kernel(function: F) -> F:
     """Let a function be compiled into the loops that call it.
 
     Products and sums are fused, which is faster and rounds once less; nothing is reordered.
     """
-    return cast(F, _Part(function, fastmath={"contract"}))
+    return cast(F, _Kernel(function, fastmath={"contract"}))
 
 
-def inlined_part(function: F) -> F:
-    """As `part`, put where it is called: to hand over large records took a tenth of a short run."""
-    return cast(F, _Part(function, fastmath={"contract"}, forceinline=True))
+def inlined_kernel(function: F) -> F:
+    """As `kernel`, inlined: passing large records took a tenth of a short run."""
+    return cast(F, _Kernel(function, fastmath={"contract"}, forceinline=True))
 
 
-def unfused_part(function: F) -> F:
-    """As `part`, with every product and sum rounded by itself."""
-    return cast(F, _Part(function))
+def unfused_kernel(function: F) -> F:
+    """As `kernel`, with every product and sum rounded by itself."""
+    return cast(F, _Kernel(function))
 
 
 def instructions(function: F) -> F:

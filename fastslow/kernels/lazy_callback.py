@@ -24,7 +24,7 @@ def {function}(pointer):
 
 
 @dataclass(frozen=True, eq=False)
-class Late(Entry):
+class LazyCallback(Entry):
     """A function of one record, which `fastslow.kernels.pointers.call_with` calls.
 
     Parameters

@@ -126,7 +126,7 @@ def _kept(entry: Entry) -> bytes:
     name = f"fastslow_{entry.function}_{_digest(entry.key + _versions())}"
     code = store.read(name)
     if code is None:
-        with store.alone(name, between_passes):
+        with store.exclusively(name, between_passes):
             # by now another process may have compiled it
             code = store.read(name)
             if code is None:

@@ -90,7 +90,7 @@ def _load(
 def _code(name: str, build: Callable[[ir.Module], None]) -> bytes:
     code = store.read(name)
     if code is None:
-        with store.alone(name, between_passes):
+        with store.exclusively(name, between_passes):
             # by now another process may have compiled it
             code = store.read(name)
             if code is None:

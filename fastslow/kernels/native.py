@@ -192,14 +192,14 @@ class _Function:
         self.flags = ("contract",) if fused else ()
         function.attributes.add("nounwind")
         start, body = (function.append_basic_block(name) for name in ("start", "body"))
-        #: Where room for variables is made.
+        #: Block in which variables are allocated.
         self.start = ir.IRBuilder(start)
         self.builder = ir.IRBuilder(body)
         self.body = body
         self.arrays: dict[str, Any] = {}
         #: Kinds of the variables that are assigned on every way to here.
         self.variables: dict[str, ir.Type] = {}
-        self.rooms: dict[tuple[str, str], Any] = {}
+        self.allocated: dict[tuple[str, str], Any] = {}
         #: Where the loops that are open go on after them, and the variables known there.
         self.ends: list[tuple[Any, list[dict[str, ir.Type]]]] = []
 
@@ -271,11 +271,11 @@ class _Function:
 
     def assign(self, name: str, value: _Value) -> None:
         self.variables[name] = value.kind
-        room = self.rooms.get((name, str(value.kind)))
-        if room is None:
-            room = self.start.alloca(value.kind, name=name)
-            self.rooms[name, str(value.kind)] = room
-        self.builder.store(value.value, room)
+        allocation = self.allocated.get((name, str(value.kind)))
+        if allocation is None:
+            allocation = self.start.alloca(value.kind, name=name)
+            self.allocated[name, str(value.kind)] = allocation
+        self.builder.store(value.value, allocation)
 
     def condition(self, s: ast.If) -> None:
         test = self.truth(self.expression(s.test), s)
@@ -389,7 +389,7 @@ class _Function:
         if e.id not in self.variables:
             raise self.unknown(e, f"'{e.id}' is not assigned on every way to here")
         kind = self.variables[e.id]
-        return _Value(kind, self.builder.load(self.rooms[e.id, str(kind)]))
+        return _Value(kind, self.builder.load(self.allocated[e.id, str(kind)]))
 
     def place(self, e: ast.Subscript) -> Any:
         """Pointer to an element of an array."""
@@ -568,11 +568,11 @@ class _Function:
         which = _constant(e.args[-1])
         if not isinstance(which, int) or not 0 <= which < callee.results:
             raise self.unknown(e, f"expected one of {callee.results} results")
-        rooms = [self.start.alloca(REAL) for _ in range(callee.results)]
+        allocated = [self.start.alloca(REAL) for _ in range(callee.results)]
         kinds = [REAL] * callee.arguments + [ARRAY] * callee.results
         function = declared(module, callee.symbol, ir.VoidType(), kinds)
-        self.builder.call(function, [*given[:-1], *rooms])
-        return _Value(REAL, self.builder.load(rooms[which]))
+        self.builder.call(function, [*given[:-1], *allocated])
+        return _Value(REAL, self.builder.load(allocated[which]))
 
     def translated(self, tree: ast.FunctionDef) -> Any:
         """A function that is known by its source, translated once for a module."""

@@ -18,7 +18,7 @@ from fastslow.results.stored.sign_patterns import possible_patterns
 Values = Mapping[str, NDArray[np.float64]]
 
 
-def alike(model: Model, values: Values, count: int) -> list[tuple[Model, NDArray[np.intp]]]:
+def same_regions(model: Model, values: Values, count: int) -> list[tuple[Model, NDArray[np.intp]]]:
     """Groups of parameter sets with the same regions, each with a model of that group.
 
     Which regions are empty depends on parameter values, and so does the

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from fastslow.kernels.lazy_callback import Late
+from fastslow.kernels.lazy_callback import LazyCallback
 from fastslow.kernels.loops import Loop
 from fastslow.simulation.stepper.lanes import Pool, Runs
 from fastslow.simulation.stepper.problems import Problem, Record, Run
 from fastslow.simulation.stepper.workspace import Workspace
 
-DRIVE = Loop(
+INTEGRATE = Loop(
     "fastslow.simulation.stepper.driver",
-    "drive",
+    "integrate",
     {"problem": Problem, "run": Run, "record": Record, "workspace": Workspace, "handed": int},
     results=(int,),
     kept=("problem", "workspace"),
 )
 
-DRIVE_MANY = Loop(
+INTEGRATE_MANY = Loop(
     "fastslow.simulation.stepper.lanes",
-    "drive_many",
+    "integrate_many",
     {
         "problem": Problem, "steps": int, "regions": int, "runs": Runs, "pool": Pool,
         "workspace": Workspace, "first": int, "last": int,
@@ -26,7 +26,9 @@ DRIVE_MANY = Loop(
     results=(int,),
 )  # fmt: skip
 
-COLLOCATION = Late("fastslow.simulation.stepper.collocation", "collocate", "CollocationStep")
-RADAU = Late("fastslow.simulation.stepper.radau", "radau_step", "RadauStep")
+COLLOCATION = LazyCallback(
+    "fastslow.simulation.stepper.collocation", "collocate", "CollocationStep"
+)
+RADAU = LazyCallback("fastslow.simulation.stepper.radau", "radau_step", "RadauStep")
 
-LOOPS = (DRIVE, DRIVE_MANY, COLLOCATION, RADAU)
+LOOPS = (INTEGRATE, INTEGRATE_MANY, COLLOCATION, RADAU)

@@ -15,7 +15,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.trajectory.lyapunov import DECIDED, GROWN, LyapunovExponent, sign_of
 from fastslow.results.trajectory.periodicity import STILL
 from fastslow.simulation.arguments import initial_state, require_values, time_span
-from fastslow.simulation.many import arrivals
+from fastslow.simulation.many import final_states
 from fastslow.simulation.many_arguments import threads_of
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration, Resolved, integration_settings, resolve
@@ -304,7 +304,7 @@ def exponents(
     opening = first - lead * length
     if (opening > begin).all():
         spans = np.stack([begin, opening], axis=1)
-        states, codes = arrivals(model, starts, swept, spans, resolved, workers)[:2]
+        states, codes = final_states(model, starts, swept, spans, resolved, workers)[:2]
     followed = _Followed(model, resolved, workers, starts, states)
     followed.measure(swept, np.linspace(opening, last, RANGING, axis=1))
     each = np.full(m, max(1, -(-FIRST // units)))
@@ -362,7 +362,7 @@ class _Followed:
         self.starts, self.states = starts, states
         self.size = np.empty(0)
 
-    def arrivals(
+    def final_states(
         self, states: Floats, swept: dict[str, Floats], spans: Floats, times: Floats | None = None
     ) -> Floats:
         """Where runs arrive, or what they are at some times; NaN where they ended early."""
@@ -371,7 +371,7 @@ class _Followed:
         found = np.full(shape, np.nan)
         if good.any():
             given = {name: np.ascontiguousarray(values[good]) for name, values in swept.items()}
-            ends, codes, samples = arrivals(
+            ends, codes, samples = final_states(
                 self.model,
                 np.ascontiguousarray(states[good]),
                 given,
@@ -389,7 +389,7 @@ class _Followed:
     def references(self, swept: dict[str, Floats], grid: Floats, rows: NDArray[np.intp]) -> Floats:
         """States of some runs at the times of a grid (m, k), shape (m, k, n)."""
         states = self.states[rows]
-        found = self.arrivals(
+        found = self.final_states(
             states, {n: v[rows] for n, v in swept.items()}, grid[:, [0, -1]], grid
         )
         found[:, 0] = states
@@ -445,7 +445,7 @@ class _Followed:
             begin[:, :, j, 1, j] -= displaced[:, None, j]
         own = {name: np.repeat(values[rows], k * n * 2) for name, values in swept.items()}
         spread = np.broadcast_to(spans[:, :, None, None, :], (m, k, n, 2, 2)).reshape(-1, 2)
-        ends = self.arrivals(begin.reshape(-1, n), own, spread).reshape(m, k, n, 2, n)
+        ends = self.final_states(begin.reshape(-1, n), own, spread).reshape(m, k, n, 2, n)
         # the displacement as it was rounded
         width = np.einsum("mkjj->mkj", begin[:, :, :, 0] - begin[:, :, :, 1])
         with np.errstate(invalid="ignore"):

@@ -28,8 +28,8 @@ from fastslow.results.trajectory.regimes import (
     repeats,
 )
 from fastslow.simulation.arguments import gap_regions
-from fastslow.simulation.grouping import alike
-from fastslow.simulation.loops import DRIVE_MANY
+from fastslow.simulation.grouping import same_regions
+from fastslow.simulation.loops import INTEGRATE_MANY
 from fastslow.simulation.many_arguments import (
     periods_of,
     spans_of,
@@ -42,7 +42,7 @@ from fastslow.simulation.one import (
     error_rules,
     problem_of,
 )
-from fastslow.simulation.pauses import Pace, provide, with_late_code
+from fastslow.simulation.pauses import Pace, provide, with_lazy_callbacks
 from fastslow.simulation.settings import (
     DEFAULT,
     Integration,
@@ -163,7 +163,7 @@ def simulate_many(
     times = times_of(samples, spans, since)
     groups = [
         (one, chosen, compile_series(one, resolved.order), compile_steps(one, resolved.order))
-        for one, chosen in alike(model, swept, count)
+        for one, chosen in same_regions(model, swept, count)
     ]
     gaps = [gap_regions(one, gap) for one, *_ in groups]
     modes = tuple(dict.fromkeys(name for *_, compiled, _ in groups for name in compiled.modes))
@@ -260,7 +260,7 @@ def simulate_many(
     )
 
 
-def arrivals(
+def final_states(
     model: Model,
     starts: Floats,
     swept: Mapping[str, Floats],
@@ -295,7 +295,7 @@ def arrivals(
     ends, codes = np.empty((count, n)), np.empty(count, dtype=np.int64)
     grid = np.empty((count, 0)) if times is None else times
     samples = np.empty((count, n, grid.shape[1]))
-    for one, chosen in alike(model, swept, count):
+    for one, chosen in same_regions(model, swept, count):
         compiled = compile_series(one, resolved.order)
         problem = problem_of(model, compiled, resolved, error_rules(one, resolved, compiled))
         run = _run(
@@ -445,7 +445,7 @@ def _run(
     places, carried, whole = beginnings(spans[:, 0], starts, compiled.n_forcing, problem.rules)
     codes = np.empty(count, dtype=np.int64)
     samples = np.full((count, n_columns, times.shape[1]), np.nan)
-    many = load_loop(DRIVE_MANY)
+    many = load_loop(INTEGRATE_MANY)
     stops = spans.copy()
     runs = Runs(
         values, stops, since, times, samples, extremes, hits, seen, places, carried, whole, codes
@@ -468,7 +468,7 @@ def _run(
         pace = Pace(compiled.n_rows, compiled.order)
         while True:
             pool.progress[LEFT] = pace.begin()
-            given = with_late_code(problem)
+            given = with_lazy_callbacks(problem)
             code = many(given, lanes.address, lanes.regions, runs, pool, workspace, *chunk)
             if code == REACHED_END:
                 return
@@ -481,22 +481,22 @@ def _run(
 
     size = min(_CHUNK, max(1, count // (4 * threads)))
     chunks = [(i, min(i + size, count)) for i in range(0, count, size)]
-    under_way = {follow(chunk): chunk[1] - chunk[0] for chunk in chunks}
+    in_progress = {follow(chunk): chunk[1] - chunk[0] for chunk in chunks}
     if min(threads, len(chunks)) == 1:
-        for following, number in under_way.items():
+        for following, number in in_progress.items():
             for code in following:
                 provide(code, problem.n_fast)
             report(number)
     else:
         executor = ThreadPoolExecutor(min(threads, len(chunks)))
         try:
-            waiting = {executor.submit(next, f, None): f for f in under_way}
+            waiting = {executor.submit(next, f, None): f for f in in_progress}
             while waiting:
                 # signals are handled in this thread, on some systems between two waits only
                 for done in wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED).done:
                     following, needed = waiting.pop(done), done.result()
                     if needed is None:
-                        report(under_way[following])
+                        report(in_progress[following])
                     else:
                         provide(needed, problem.n_fast)
                         waiting[executor.submit(next, following, None)] = following

@@ -27,9 +27,9 @@ from fastslow.simulation.arguments import (
     simulated,
     time_span,
 )
-from fastslow.simulation.loops import DRIVE
+from fastslow.simulation.loops import INTEGRATE
 from fastslow.simulation.noise_notes import with_noise
-from fastslow.simulation.pauses import Pace, provide, with_late_code
+from fastslow.simulation.pauses import Pace, provide, with_lazy_callbacks
 from fastslow.simulation.settings import (
     DEFAULT,
     Integration,
@@ -151,11 +151,11 @@ def simulate(
     stride = kept * (compiled.order + 1) if dense else 0
     tables = _memory.tables(compiled.n_states, stride)
     workspace = _memory.workspace(prepared)
-    loop, pace = load_loop(DRIVE), Pace(compiled.n_rows, compiled.order)
+    loop, pace = load_loop(INTEGRATE), Pace(compiled.n_rows, compiled.order)
     while True:
         counted[WORK] = pace.begin()
         record = Record(times, sampled, *tables, *_LISTED)
-        code = loop(with_late_code(problem), run, record, workspace, 0)
+        code = loop(with_lazy_callbacks(problem), run, record, workspace, 0)
         if code == OUT_OF_WORK:
             pace.end()
         elif code == TABLE_FULL:
@@ -309,7 +309,7 @@ _BLOCK, _LEAST, _MOST = 2**22, 2**12, 2**23
 
 
 class _Tables(NamedTuple):
-    """What `drive` fills: steps, crossings, and the coefficients of all steps one after another."""
+    """Tables that `integrate` fills: steps, crossings, and the coefficients of all steps."""
 
     steps: NDArray[np.float64]
     crossings: NDArray[np.float64]

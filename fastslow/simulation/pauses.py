@@ -50,15 +50,15 @@ class Pace:
         self._work *= min(max(SLICE / seconds, 1.0 / CHANGE), CHANGE)
 
 
-_late: dict[int, int] = {}
+_addresses: dict[int, int] = {}
 
 
-def with_late_code(problem: Problem) -> Problem:
+def with_lazy_callbacks(problem: Problem) -> Problem:
     """A problem with the addresses of its steps by collocation and of Radau, as far as known.
 
     A step by collocation could not be taken again for want of the other: both, then, or none.
     """
-    collocation, radau = _late.get(NEEDS_COLLOCATION, 0), _late.get(NEEDS_RADAU, 0)
+    collocation, radau = _addresses.get(NEEDS_COLLOCATION, 0), _addresses.get(NEEDS_RADAU, 0)
     collocation = collocation if radau or not problem.n_fast else 0
     if (collocation, radau) == (problem.collocation, problem.radau):
         return problem
@@ -76,6 +76,6 @@ def provide(code: int, n_fast: int) -> None:
         States that implicit steps may be tried for, 0 if none.
     """
     if code == NEEDS_RADAU or n_fast:
-        _late[NEEDS_RADAU] = load_address(RADAU)
+        _addresses[NEEDS_RADAU] = load_address(RADAU)
     if code == NEEDS_COLLOCATION:
-        _late[NEEDS_COLLOCATION] = load_address(COLLOCATION)
+        _addresses[NEEDS_COLLOCATION] = load_address(COLLOCATION)

@@ -57,7 +57,7 @@ KINDS = ("stroboscopic", "extremes", "section")
 def bifurcation_sweep(
     model: Model,
     parameter: object,
-    values: ArrayLike,
+    over: ArrayLike,
     state: Sequence[float] | Mapping[Any, float] | NDArray[np.float64],
     *,
     column: object = None,
@@ -84,8 +84,9 @@ def bifurcation_sweep(
     model : Model
     parameter : str or Symbol
         A parameter, or the slow quantity of a frozen model.
-    values : array_like, shape (m,)
-        Rising or falling; the first pass takes them in this order.
+    over : array_like, shape (m,)
+        Values of the parameter, increasing or decreasing; the first pass takes them in this
+        order.
     state : sequence of float, shape (n,), or mapping
         Initial states of the first run.
     column : str or Symbol, optional
@@ -137,7 +138,7 @@ def bifurcation_sweep(
     known = dict.fromkeys([*model.parameters, *model.free])
     if str(parameter) not in known:
         raise unknown_name("parameter", parameter, known)
-    order = _values(values)
+    order = _values(over)
     columns = (*model.states, *model.slow_states, *model.forcing)
     name = columns[0] if column is None else str(column)
     if name not in columns:
@@ -190,15 +191,15 @@ class _Settings:
     integration: Integration
 
 
-def _values(values: ArrayLike) -> Array:
-    order = finite_numbers("values", values)
+def _values(over: ArrayLike) -> Array:
+    order = finite_numbers("over", over)
     if order.ndim != 1 or not len(order):
         raise ArgumentError(
-            f"values of shape {order.shape}; expected a one-dimensional array, not empty"
+            f"over has shape {order.shape}; expected a non-empty one-dimensional array"
         )
     change = np.diff(order)
     if not ((change > 0).all() or (change < 0).all()):
-        raise ArgumentError("values: expected strictly rising or strictly falling numbers")
+        raise ArgumentError("over: expected strictly increasing or strictly decreasing numbers")
     return order
 
 

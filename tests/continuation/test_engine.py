@@ -13,12 +13,12 @@ from fastslow.continuation import engine
 from fastslow.continuation.location import (
     branch_point,
     fold,
+    hopf_or_neutral_saddle,
     newton,
-    turning_pair,
     with_condition,
 )
 from fastslow.continuation.loops import loop
-from fastslow.continuation.spaces import Curve, newton_space
+from fastslow.continuation.spaces import CompiledCurve, newton_space
 from fastslow.diagrams.field import FrozenField
 from fastslow.kernels.loops import Loop, load_loop
 from fastslow.kernels.records import Matrix, Vector
@@ -109,7 +109,7 @@ def test_the_compiled_loop_tells_what_has_not_converged(steps):
     compiled = field.compiled
     u, normal = np.array([1e6 + 1, 0.0]), np.array([0.0, 1.0])
     _, _, converged = loop("refine")(
-        Curve(compiled.address, 0, field.values), u, np.ones(2), -1, normal, u.copy(),
+        CompiledCurve(compiled.address, 0, field.values), u, np.ones(2), -1, normal, u.copy(),
         compiled.m, steps, newton_space(1, compiled.size),
     )  # fmt: skip
     assert converged == (steps == 50)
@@ -122,7 +122,7 @@ def test_newton_s_method_does_not_converge_where_the_slope_vanishes():
     field = FrozenField(fs.Model({x: x**3 - 5 * x**2 + p}, parameters={p: 0}), "p")
     compiled = field.compiled
     starts, converged = np.array([[0.0], [4.9]]), np.zeros(2, dtype=bool)
-    curve = Curve(compiled.address, 0, field.values)
+    curve = CompiledCurve(compiled.address, 0, field.values)
     space = newton_space(1, compiled.size)
     loop("newton_from")(curve, starts, converged, 0.0, np.ones(1), 100, space)
     assert converged.tolist() == [False, True]
@@ -137,7 +137,7 @@ def spiral(u):
 
 
 def test_hopf_frequency():
-    found = turning_pair(spiral, np.array([0.0, 0.0, 0.1]), np.ones(3), 3.5)
+    found = hopf_or_neutral_saddle(spiral, np.array([0.0, 0.0, 0.1]), np.ones(3), 3.5)
     np.testing.assert_allclose(found.u, 0, atol=1e-13)
     assert np.sqrt(found.extra[0]) == pytest.approx(2, abs=1e-12)
 

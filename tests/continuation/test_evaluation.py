@@ -17,14 +17,14 @@ def in_place(values):
 
 def pairs_of(matrices):
     found = np.empty((len(matrices), 2), dtype=complex)
-    loop("pairs")(matrices, found)
+    loop("eigenvalues_of_2x2")(matrices, found)
     return found
 
 
 def passed(points, scale, u, within):
     """The chords, as the compiled loop numbers them."""
     found = np.empty(len(points) - 1, dtype=np.int64)
-    return found[: loop("passing")(points, scale, u, within, found, np.empty(len(found)))]
+    return found[: loop("nearby_chords")(points, scale, u, within, found, np.empty(len(found)))]
 
 
 DISTANCE = Loop(
@@ -106,7 +106,8 @@ def test_the_chords_of_a_curve_nearest_to_a_point():
 
 def dips(test, steps, share=0.5):
     found = np.empty(len(steps), dtype=np.int64)
-    return found[: loop("dips")(np.array(test), np.array(steps), share, found)].tolist()
+    count = loop("possible_double_zeros")(np.array(test), np.array(steps), share, found)
+    return found[:count].tolist()
 
 
 def test_a_dip_is_where_both_neighbouring_chords_lead_below_the_smaller_value():

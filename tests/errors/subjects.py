@@ -149,7 +149,7 @@ def simulations(r):
         "bifurcation_sweep": {
             "model": gear,
             "parameter": "C",
-            "values": [2.0],
+            "over": [2.0],
             "state": [0.0, 0.0],
             "settle": 0,
             "keep": 1,

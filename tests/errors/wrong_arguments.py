@@ -219,11 +219,11 @@ BY_FUNCTION = {
     "bifurcation_sweep.level": NUMBER,
     "bifurcation_sweep.phase": [*NUMBER, (2, Wrong, "phase = 2; expected a part of the period")],
     "bifurcation_sweep.settle": COUNT,
-    "bifurcation_sweep.values": [
-        ([1, 3, 2], Wrong, "values: expected strictly rising or strictly falling numbers"),
-        ([], Wrong, "values of shape (0,); expected a one-dimensional array"),
-        ([NAN], Wrong, "values = [nan]; expected finite numbers"),
-        ("12", Wrong, "values: expected numbers, received '12'"),
+    "bifurcation_sweep.over": [
+        ([1, 3, 2], Wrong, "over: expected strictly increasing or strictly decreasing numbers"),
+        ([], Wrong, "over has shape (0,); expected a non-empty one-dimensional array"),
+        ([NAN], Wrong, "over = [nan]; expected finite numbers"),
+        ("12", Wrong, "over: expected numbers, received '12'"),
     ],
     "continue_equilibria.marks": [
         ([5], Wrong, "mark p = 5 is outside the range [-1, 1]"),

@@ -241,7 +241,9 @@ def test_numbers_that_are_none_survive():
 
 def test_too_many_frames_are_refused_with_their_number(explorer, tmp_path):
     path = tmp_path / "page.html"
-    with pytest.raises(fs.ArgumentError, match=r"900 frames \(30 of D × 30 of omega\).*most=500"):
+    with pytest.raises(
+        fs.ArgumentError, match=r"900 frames \(30 of D × 30 of omega\).*max_frames=500"
+    ):
         explorer.export(path, sliders={"D": 30, "omega": 30})
     assert not path.exists()
 

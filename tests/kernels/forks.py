@@ -66,7 +66,7 @@ class Child:
             os.setgid(uid)
             os.setuid(uid)
         compiled_here.clear()
-        store._said.clear()
+        store._warned.clear()
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
             value = function(*arguments)

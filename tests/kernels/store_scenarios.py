@@ -51,7 +51,7 @@ def at_once(folder):
 
 def hold(name, folder):
     """Keep the lock until the process is killed."""
-    with store.alone(name, lambda: None):
+    with store.exclusively(name, lambda: None):
         (folder / "held").touch()
         time.sleep(60)
 

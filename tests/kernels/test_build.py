@@ -30,7 +30,7 @@ def hook(monkeypatch, tmp_path):
     monkeypatch.setattr(module.CompiledLoops, "root", str(tmp_path), raising=False)
     monkeypatch.setattr(module.CompiledLoops, "target_name", "wheel", raising=False)
     monkeypatch.delenv("FASTSLOW_BUILD", raising=False)
-    loops = [LOOPS["value_at"], LOOPS["pairs"]]
+    loops = [LOOPS["value_at"], LOOPS["eigenvalues_of_2x2"]]
     monkeypatch.setattr(fastslow.wheel, "entries", lambda: iter(loops))
     objects = tmp_path / "fastslow" / "kernels" / "objects"
     return types.SimpleNamespace(run=made.initialize, loops=loops, objects=objects, said=said)

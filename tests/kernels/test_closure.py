@@ -28,7 +28,7 @@ FILES = {name_of(path): path for path in sorted(ROOT.rglob("*.py"))}
 KERNELS = sorted(
     name
     for name, path in FILES.items()
-    if re.search(r"^@((inlined_|unfused_)?part|(literal_)?instructions)$", path.read_text(), re.M)
+    if re.search(r"^@((inlined_|unfused_)?kernel|(literal_)?instructions)$", path.read_text(), re.M)
 )
 
 

@@ -12,7 +12,7 @@ from fastslow.continuation.loops import LOOPS
 from fastslow.kernels import loop_target, loops
 from fastslow.kernels.cache import shipped, store
 from fastslow.kernels.calling import entry_source
-from fastslow.kernels.decorators import part
+from fastslow.kernels.decorators import kernel
 from fastslow.kernels.loops import Loop, load_loop
 from fastslow.kernels.records import Matrix, Vector, construction, leaves, type_of, zeros
 from fastslow.kernels.slots import fields_of_arrays
@@ -25,7 +25,7 @@ C_LIBRARY = {
     *("memcpy", "memmove", "memset"),
 }
 
-PASSING = LOOPS["passing"]
+NEARBY_CHORDS = LOOPS["nearby_chords"]
 
 
 def undefined(code):
@@ -52,7 +52,7 @@ def test_loops_call_nothing_but_the_c_library(entry):
     assert b"NRT_" not in code
 
 
-@part
+@kernel
 def allocating(n):
     return np.ones(n).sum()
 
@@ -109,7 +109,7 @@ ARGUMENTS = [LINE, np.ones(2), np.array([0.5, 0.1]), 0.2, np.zeros(2, dtype=int)
 
 
 def test_a_loop_takes_numbers_and_arrays():
-    assert load_loop(PASSING)(*ARGUMENTS) == 1
+    assert load_loop(NEARBY_CHORDS)(*ARGUMENTS) == 1
     assert ARGUMENTS[4].tolist() == [0, 0]
 
 
@@ -132,13 +132,13 @@ def test_a_loop_takes_no_other_arrays(place, wrong, received):
     arguments = [*ARGUMENTS]
     arguments[place] = wrong
     with pytest.raises(TypeError, match=f"expected an array .*{received}"):
-        load_loop(PASSING)(*arguments)
+        load_loop(NEARBY_CHORDS)(*arguments)
 
 
 def test_read_only_and_strided_arrays_are_copied():
     found, apart = np.full((2, 2), 7), np.zeros((2, 3))
     arguments = [np.asfortranarray(LINE), read_only(np.ones(2)), *ARGUMENTS[2:4]]
-    assert load_loop(PASSING)(*arguments, found[:, 1], apart[:, 0]) == 1
+    assert load_loop(NEARBY_CHORDS)(*arguments, found[:, 1], apart[:, 0]) == 1
     assert found.tolist() == [[7, 0], [7, 7]]
     assert apart[:, 0].tolist() == [pytest.approx(0.1), pytest.approx(np.hypot(0.5, 0.1))]
     assert not apart[:, 1:].any()
@@ -161,18 +161,20 @@ def test_what_a_loop_only_reads_is_not_copied(monkeypatch):
 def installed(tmp_path, monkeypatch):
     """An installation with the machine code of one loop, made where no other is at hand."""
     monkeypatch.setattr(shipped, "FOLDER", tmp_path)
-    monkeypatch.setattr(store, "_said", set())
+    monkeypatch.setattr(store, "_warned", set())
     (tmp_path / shipped.PLATFORM).write_text(loop_target.platform_name())
-    file = tmp_path / f"{PASSING.name}.code"
-    file.write_bytes(store.wrapped(PASSING.name, loops._kept(PASSING)))
+    file = tmp_path / f"{NEARBY_CHORDS.name}.code"
+    file.write_bytes(store.wrapped(NEARBY_CHORDS.name, loops._kept(NEARBY_CHORDS)))
     file.chmod(0o644)
     return file
 
 
 def test_an_installed_loop_is_read_and_not_looked_for_elsewhere(installed, monkeypatch):
     monkeypatch.setattr(store, "read", None)
-    address = loops.load_address(Loop(*PASSING.__dict__.values()))
-    call = loops.caller(PASSING.function, PASSING.arguments, PASSING.results, address)
+    address = loops.load_address(Loop(*NEARBY_CHORDS.__dict__.values()))
+    call = loops.caller(
+        NEARBY_CHORDS.function, NEARBY_CHORDS.arguments, NEARBY_CHORDS.results, address
+    )
     assert call(*ARGUMENTS) == 1
 
 
@@ -180,32 +182,32 @@ def test_a_damaged_object_is_not_loaded(installed):
     content = bytearray(installed.read_bytes())
     content[-100] ^= 1
     installed.write_bytes(content)
-    with pytest.warns(RuntimeWarning, match=r"passing_.*is not loaded: it is damaged"):
-        assert shipped.read(PASSING.name) is None
+    with pytest.warns(RuntimeWarning, match=r"nearby_chords_.*is not loaded: it is damaged"):
+        assert shipped.read(NEARBY_CHORDS.name) is None
 
 
 def test_an_object_that_others_can_write_to_is_not_loaded(installed):
     installed.chmod(0o666)
     with pytest.warns(RuntimeWarning, match="others than the sources beside it can write to it"):
-        assert shipped.read(PASSING.name) is None
+        assert shipped.read(NEARBY_CHORDS.name) is None
 
 
 def test_a_link_is_not_followed(installed, tmp_path):
     other = tmp_path / "elsewhere"
     installed.rename(other)
     installed.symlink_to(other)
-    assert shipped.read(PASSING.name) is None
+    assert shipped.read(NEARBY_CHORDS.name) is None
 
 
 def test_sources_that_have_changed_and_other_platforms_find_nothing(installed, monkeypatch):
-    assert shipped.read(PASSING.name) is not None
+    assert shipped.read(NEARBY_CHORDS.name) is not None
     assert "sources" in shipped.missing()
     monkeypatch.setattr(loops, "digest_of_imports", lambda source: "another")
-    assert shipped.read(PASSING.name) is None
+    assert shipped.read(NEARBY_CHORDS.name) is None
     monkeypatch.undo()
     monkeypatch.setattr(shipped, "FOLDER", installed.parent)
     monkeypatch.setattr(loops, "platform_name", lambda: "aarch64-unknown-linux-gnu-generic")
-    assert shipped.read(PASSING.name) is None
+    assert shipped.read(NEARBY_CHORDS.name) is None
     (installed.parent / shipped.PLATFORM).write_text("aarch64-apple-darwin-generic\n")
     assert re.fullmatch(
         "this installation brings machine code for aarch64-apple-darwin-generic; this is .*",

@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 from fastslow.model.model import Model
-from fastslow.simulation.grouping import alike
+from fastslow.simulation.grouping import same_regions
 
 x, y, k, a, b = sp.symbols("x y k a b")
 
@@ -40,7 +40,7 @@ def test_every_member_has_the_regions_of_its_group(name):
     random = np.random.default_rng(1)
     values = {n: random.choice([-0.7, -0.2, 0.3, 0.5, 2.0], 30) for n in "abk"}
     values["k"][:4] = 0.3 if name in ("sign of a factor", "parameters alone") else 0.0
-    groups = alike(model, values, 30)
+    groups = same_regions(model, values, 30)
     assert sorted(np.concatenate([chosen for _, chosen in groups])) == list(range(30))
     for one, chosen in groups:
         for i in chosen:
@@ -51,7 +51,7 @@ def test_every_member_has_the_regions_of_its_group(name):
 def test_most_often_there_is_one_group():
     model = Model(MODELS["gap and another"], parameters={a: 0.5, b: 0.2, k: 1.0})
     many = np.linspace(0.1, 1.0, 1000)
-    groups = alike(model, {"a": many, "b": many**2, "k": many - 0.5}, 1000)
+    groups = same_regions(model, {"a": many, "b": many**2, "k": many - 0.5}, 1000)
     assert len(groups) == 1
     assert groups[0][0] is model
-    assert alike(model, {}, 5)[0][1].tolist() == [0, 1, 2, 3, 4]
+    assert same_regions(model, {}, 5)[0][1].tolist() == [0, 1, 2, 3, 4]

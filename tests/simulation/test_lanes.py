@@ -16,7 +16,7 @@ from fastslow.simulation import many
 from fastslow.simulation.many import simulate_many
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.simulation.stepper.lanes import UNDER_WAY
+from fastslow.simulation.stepper.lanes import IN_PROGRESS
 
 x, v, y, t = sp.symbols("x v y t")
 
@@ -33,7 +33,7 @@ def assert_same_bits(one: Ensemble, other: Ensemble, chosen=slice(None)) -> None
 def table():
     """States and parameters of gears that do many different things."""
     rng = np.random.default_rng(5)
-    m = UNDER_WAY + 2 * WIDTH + 3
+    m = IN_PROGRESS + 2 * WIDTH + 3
     return {
         "states": rng.uniform([-0.6, -2], [0.6, 2], (m, 2)),
         "D": rng.uniform(0.02, 0.5, m),
@@ -95,7 +95,7 @@ def test_neighbours_order_and_threads_change_no_bit(gear, gears, table, data):
 
 
 def test_chunks_change_no_bit(gear, gears, table, monkeypatch):
-    for size in (1, WIDTH - 1, UNDER_WAY + 1):
+    for size in (1, WIDTH - 1, IN_PROGRESS + 1):
         monkeypatch.setattr(many, "_CHUNK", size)
         assert_same_bits(gears, many_gears(gear, table, threads=2))
 

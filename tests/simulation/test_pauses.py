@@ -49,7 +49,7 @@ def pausing(monkeypatch):
     def start():
         monkeypatch.setattr(pauses, "FIRST", 0.0)
         monkeypatch.setattr(pauses, "SLICE", 0.0)
-        monkeypatch.setattr(pauses, "_late", {})
+        monkeypatch.setattr(pauses, "_addresses", {})
         monkeypatch.setattr(loops, "WORK", 0)
 
     return start
@@ -133,7 +133,7 @@ def test_code_that_cannot_be_compiled_is_an_error(monkeypatch):
     model, start, span = special()
     expected = fs.simulate(model, start, t=span)
     with monkeypatch.context() as patched:
-        patched.setattr(pauses, "_late", {})
+        patched.setattr(pauses, "_addresses", {})
         patched.setattr(pauses, "load_address", failing)
         with pytest.raises(OSError, match="no space left"):
             fs.simulate(model, start, t=span)

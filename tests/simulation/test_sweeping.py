@@ -205,7 +205,7 @@ def test_the_slow_quantity_of_a_frozen_model_is_swept():
     ],
 )
 def test_wrong_arguments(pair, changes, error, text):
-    given = {"parameter": "Omega", "values": [0.5], "state": [1.1, 0], **changes}
+    given = {"parameter": "Omega", "over": [0.5], "state": [1.1, 0], **changes}
     with pytest.raises(error, match=text):
         fs.bifurcation_sweep(pair, **given)
 

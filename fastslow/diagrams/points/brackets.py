@@ -189,7 +189,7 @@ def sign_changes(test: Array) -> list[tuple[int, int]]:
 def _minima(test: Array, steps: Array) -> list[int]:
     """Return rows after which a test without a change of sign may touch zero."""
     found = np.empty(len(steps), dtype=np.int64)
-    count = loop("dips")(writeable(test), steps, MINIMUM_RATIO, found)
+    count = loop("possible_double_zeros")(writeable(test), steps, MINIMUM_RATIO, found)
     rows: list[int] = found[:count].tolist()
     return rows
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation.location import Located, branch_point, fold, turning_pair
+from fastslow.continuation.location import Located, branch_point, fold, hopf_or_neutral_saddle
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.brackets import Search
 from fastslow.diagrams.points.normal_forms import first_lyapunov, fold_form, forms_at
@@ -173,7 +173,7 @@ def _hopf_and_neutral_saddles(
         nonlocal product
         here = product_of_pair(field.finite_eigenvalues(region, u), rounding)
         product = product if np.isnan(here) else here
-        return turning_pair(curve, u, window.scale, product)
+        return hopf_or_neutral_saddle(curve, u, window.scale, product)
 
     for bracket in search.brackets(tests.pairs):
         nearer = int(abs(bracket.values[1]) < abs(bracket.values[0]))

@@ -69,7 +69,7 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     if n == 2:
         pairs = writeable(np.ascontiguousarray(values).reshape(-1, 2))
         sums = np.empty(len(pairs))
-        loop("sums_of_two")(pairs, rounding, sums)
+        loop("eigenvalue_pair_sums")(pairs, rounding, sums)
         return sums.reshape(values.shape[:-1])
     finite = np.isfinite(values).all(axis=-1)
     values = np.where(finite[..., None], values, 1.0)

@@ -25,7 +25,7 @@ from fastslow.continuation.polynomial_systems import (
     at_value,
     solve_polynomials,
 )
-from fastslow.continuation.spaces import Curve, newton_space
+from fastslow.continuation.spaces import CompiledCurve, newton_space
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.modes import Sides
 from fastslow.diagrams.points.correcting import POLE, Corrections
@@ -512,7 +512,7 @@ class RegionEquations(Corrections):
             space = newton_space(n, field.compiled.size)
             for s in blocks(len(starts), 100 * (16 * field.compiled.size + n**3)):
                 loop("newton_from")(
-                    Curve(field.compiled.address, self.region, field.values), starts[s],
+                    CompiledCurve(field.compiled.address, self.region, field.values), starts[s],
                     converged[s], value, unit, 100, space,
                 )  # fmt: skip
             for state in field.wrapped(starts[converged]):

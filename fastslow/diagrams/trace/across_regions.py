@@ -220,7 +220,7 @@ def _traced(
         progress = np.array([1, 0])
         status = spaces.PAUSED
         space = spaces.trace_space(len(start) - 1, len(signs))
-        curve = spaces.Curve(field.compiled.address, region, field.values)
+        curve = spaces.CompiledCurve(field.compiled.address, region, field.values)
         limits = spaces.Region(
             signs, window.weight, window.lower, window.upper, low, high,
             window.states.middle(), field.periods,

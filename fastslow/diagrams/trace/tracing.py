@@ -502,7 +502,7 @@ def _contains(field: FrozenField, branch: Branch, rows: Array, u: Array, window:
     scale = window.scale.copy()
     scale[:-1] = np.maximum(scale[:-1], FAR * np.abs(u[:-1]))
     chords, apart = np.empty(len(rows) - 1, dtype=np.int64), np.empty(len(rows) - 1)
-    for k in chords[: loop("passing")(writeable(rows), scale, u, 1e-2, chords, apart)]:
+    for k in chords[: loop("nearby_chords")(writeable(rows), scale, u, 1e-2, chords, apart)]:
         chord = (rows[k + 1] - rows[k]) / scale
         length = max(float(chord @ chord), 1e-300)
         part = float(np.clip(((u - rows[k]) / scale) @ chord / length, 0.0, 1.0))

@@ -30,11 +30,13 @@ def read(name: str) -> bytes | None:
     with os.fdopen(descriptor, "rb") as stream:
         status = os.fstat(descriptor)
         if not _as_trusted(status, Path(__file__).stat()):
-            store.say(f"{file} is not loaded: others than the sources beside it can write to it")
+            store.warn_once(
+                f"{file} is not loaded: others than the sources beside it can write to it"
+            )
             return None
         content = store.unwrapped(name, stream.read())
     if content is None:
-        store.say(f"{file} is not loaded: it is damaged")
+        store.warn_once(f"{file} is not loaded: it is damaged")
     return content
 
 

@@ -93,7 +93,7 @@ def read(name: str) -> bytes | None:
                 content = folder.read(name)
             except OSError as error:
                 file = folder.path / f"{name}{SUFFIX}"
-                say(f"{file} is not loaded ({_reason(error)}): it is compiled again")
+                warn_once(f"{file} is not loaded ({_reason(error)}): it is compiled again")
                 continue
             if content is not None:
                 return content
@@ -117,14 +117,14 @@ def write(name: str, content: bytes) -> None:
             except OSError as error:
                 refusals.append(f"{folder.path} takes no compiled code ({_reason(error)})")
             else:
-                _say_instead(refusals, f"{folder.path} does")
+                _warn_of_fallback(refusals, f"{folder.path} does")
                 _sweep(folder)
                 return
-        _say_instead(refusals, _MEMORY)
+        _warn_of_fallback(refusals, _MEMORY)
 
 
 @contextmanager
-def alone(name: str, waiting: Callable[[], None]) -> Iterator[None]:
+def exclusively(name: str, waiting: Callable[[], None]) -> Iterator[None]:
     """Let one process at a time compile what will have this name; others wait here.
 
     The system ends the lock with the process, however it ends. Where there are no locks, and
@@ -148,7 +148,9 @@ def _wait(descriptor: int, name: str, waiting: Callable[[], None]) -> None:
             fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, byte)
         except (BlockingIOError, PermissionError):
             if time.monotonic() > end:
-                say(f"{name} is compiled here too: another process has been at it for too long")
+                warn_once(
+                    f"{name} is compiled here too: another process has been at it for too long"
+                )
                 return
             waiting()
             time.sleep(_PAUSE)
@@ -175,7 +177,7 @@ def _folders() -> Iterator[list[_Folder]]:
                 break
         if not found and not refusals:
             refusals = ["there is no home directory, and FASTSLOW_CACHE is not set"]
-        _say_instead(refusals, f"{found[0].path} is used" if found else _MEMORY)
+        _warn_of_fallback(refusals, f"{found[0].path} is used" if found else _MEMORY)
         yield found
 
 
@@ -296,18 +298,18 @@ def _sweep(folder: _Folder) -> None:
             folder.remove(file)
 
 
-_said: set[str] = set()
+_warned: set[str] = set()
 
 
-def _say_instead(refusals: list[str], instead: str) -> None:
+def _warn_of_fallback(refusals: list[str], instead: str) -> None:
     if refusals:
-        say(f"{'; '.join(refusals)}: {instead}")
+        warn_once(f"{'; '.join(refusals)}: {instead}")
 
 
-def say(sentence: str) -> None:
+def warn_once(sentence: str) -> None:
     """Warn once in a process."""
-    if sentence not in _said:
-        _said.add(sentence)
+    if sentence not in _warned:
+        _warned.add(sentence)
         warnings.warn(sentence, RuntimeWarning, stacklevel=2)
 
 

@@ -102,7 +102,7 @@ def _step(
     taken = (longest < added(number(LIMIT) - t) - late) & (h > 0.0) & (h <= 2.0 * usual)
     left = number(LEFT)
     taken &= (allowed >= 1.0) & known & ((left < 0.0) | (longest >= SUDDEN * usual))
-    taken &= ~((calm <= 0.0) & _settled(rows, scales, longest, tolerance, order))
+    taken &= ~((calm <= 0.0) & _limited_by_stability(rows, scales, longest, tolerance, order))
     state = [polynomial(row, h) for row in rows[:n]]
     for value in (*state, *(row[k] for row in rows[n:kept] for k in (0, order))):
         taken &= value - value <= 0.0
@@ -185,14 +185,14 @@ def _length(
     return exp2(shortest), known
 
 
-def _settled(
+def _limited_by_stability(
     rows: Sequence[Sequence[Lanes]],
     sizes: Sequence[Lanes],
     h: Lanes,
     tolerance: Lanes,
     order: int,
 ) -> Mask:
-    """Whether stability and not accuracy limits a step, as `settled` has it."""
+    """Whether stability and not accuracy limits a step, as `limited_by_stability` has it."""
     k = order // 2
     before = h
     for _ in range(k - 2):

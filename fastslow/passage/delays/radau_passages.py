@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastslow.kernels.decorators import part
+from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address
 from fastslow.kernels.records import (
     ComplexMatrix,
@@ -178,7 +178,7 @@ def space_for(n: int, count: int, width: int) -> Space:
     return zeros(Space, *shapes, *stages, *[size] * 5, (STAGES, count + 1), *ends)
 
 
-@part
+@kernel
 def pass_through(motion, law, end, z, times, unit, space):
     """Integrate within one region up to an event or an interface.
 
@@ -307,7 +307,7 @@ def pass_through(motion, law, end, z, times, unit, space):
     return -1, FAILED
 
 
-@part
+@kernel
 def copied(values, into):
     """Copy the values of all stages."""
     for j in range(values.shape[0]):
@@ -315,7 +315,7 @@ def copied(values, into):
             into[j, i] = values[j, i]
 
 
-@part
+@kernel
 def first_below(heights, floor):
     """First stage at which a height is below its floor, STAGES if none."""
     for j in range(STAGES):
@@ -324,7 +324,7 @@ def first_below(heights, floor):
     return STAGES
 
 
-@part
+@kernel
 def another(heights, floor, met):
     """Index of a height below its floor, other than ``met``; -1 if none."""
     found = -1
@@ -334,14 +334,14 @@ def another(heights, floor, met):
     return found
 
 
-@part
+@kernel
 def between(low, high, left, right):
     """Zero of the straight line through two values, or the midpoint."""
     found = (low * right - high * left) / (right - left) if right < left else low
     return found if low < found < high else 0.5 * (low + high)
 
 
-@part
+@kernel
 def continued(kept, last, h, Z):
     """Extrapolate the increments of the last step as initial guess of the next."""
     # the polynomial of the last step is not extrapolated far
@@ -360,7 +360,7 @@ def continued(kept, last, h, Z):
                 Z[j, i] += coefficient * (s ** (k + 1) - 1.0)
 
 
-@part
+@kernel
 def rates_at(motion, law, t, z, space, rates):
     """Evaluate the rates and all outputs of the compiled function at a point."""
     out, inputs, slopes = space.out, space.inputs, space.slopes
@@ -382,7 +382,7 @@ def rates_at(motion, law, t, z, space, rates):
     rates[size - 1] = speed
 
 
-@part
+@kernel
 def by_table(breaks, coefficients, t):
     """Evaluate a piecewise Chebyshev sum by Clenshaw's algorithm."""
     low, high = 0, breaks.shape[0] - 1
@@ -399,7 +399,7 @@ def by_table(breaks, coefficients, t):
     return s * one - other + coefficients[low, 0]
 
 
-@part
+@kernel
 def heights_of(motion, end, z, rates, space, sense, heights):
     """Interface functions, nonnegative within the region, and the event function."""
     out, size, count = space.out, z.shape[0], motion.signs.shape[0]
@@ -416,7 +416,7 @@ def heights_of(motion, end, z, rates, space, sense, heights):
     heights[count] = sense * value if end.kind != INTERFACES else 1.0
 
 
-@part
+@kernel
 def step(motion, law, end, t, z, h, scale, sense, space, Z, heights):
     """Compute one step: increments and heights at its stages, from an initial guess.
 

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from fastslow.kernels.decorators import unfused_part
+from fastslow.kernels.decorators import unfused_kernel
 
 
-@unfused_part
+@unfused_kernel
 def count_below(chain, value, included):
     """Count the vertices whose last coordinate is below a value, or equal if included."""
     last = chain.shape[1] - 1
@@ -23,7 +23,7 @@ def count_below(chain, value, included):
     return low
 
 
-@unfused_part
+@unfused_kernel
 def square_to_vertex(points, i, chain, k):
     """Squared distance of a point from a vertex."""
     square = 0.0
@@ -32,7 +32,7 @@ def square_to_vertex(points, i, chain, k):
     return square
 
 
-@unfused_part
+@unfused_kernel
 def nearest_vertex(points, i, chain, first, stop):
     """Squared distance of a point from the nearest of some vertices, and its index."""
     last = chain.shape[1] - 1
@@ -58,7 +58,7 @@ def nearest_vertex(points, i, chain, first, stop):
     return least, nearest
 
 
-@unfused_part
+@unfused_kernel
 def nearness_of(points, i, chain, radius):
     """Radius minus the distance of one point from a curve."""
     count, size = chain.shape
@@ -87,7 +87,7 @@ def nearness_of(points, i, chain, radius):
     return radius - math.sqrt(least)
 
 
-@unfused_part
+@unfused_kernel
 def nearness_to_chain(points, chain, radius, near):
     """Radius minus the distances of points from a curve with nondecreasing last coordinate.
 
@@ -105,7 +105,7 @@ def nearness_to_chain(points, chain, radius, near):
         near[i] = nearness_of(points, i, chain, radius)
 
 
-@unfused_part
+@unfused_kernel
 def beside_chain(points, chain, radius, beside):
     """Points of a path nearer than a radius to a curve, consistent with `nearness_to_chain`.
 

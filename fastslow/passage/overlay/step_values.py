@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from fastslow.kernels.decorators import unfused_part
+from fastslow.kernels.decorators import unfused_kernel
 
 
-@unfused_part
+@unfused_kernel
 def step_of(starts, time):
     """Index of the last step that begins at or before a time, else 0."""
     low, high = 0, starts.shape[0]
@@ -18,7 +18,7 @@ def step_of(starts, time):
     return max(low - 1, 0)
 
 
-@unfused_part
+@unfused_kernel
 def values_in_steps(series, starts, begin, end, times, values):
     """Evaluate the series of steps at times, identical to `fastslow.results.trajectory.dense`.
 

@@ -145,9 +145,9 @@ class LongTime:
         """
         return spectrum_of(self._run, name, since, window, samples)
 
-    @validated(period=positive, tol=positive, most=whole(1, 10**6))
+    @validated(period=positive, tol=positive, max_multiple=whole(1, 10**6))
     def periodicity(
-        self, period: float | None = None, tol: float = 1e-6, most: int = 16
+        self, period: float | None = None, tol: float = 1e-6, max_multiple: int = 16
     ) -> Periodicity:
         """Detect the period of the motion at the end of the run.
 
@@ -160,7 +160,7 @@ class LongTime:
             By default that of the forcing.
         tol : float
             Largest difference that counts as a repeat, in units of each state's range.
-        most : int
+        max_multiple : int
             Largest multiple of the period that is tried.
 
         Returns
@@ -168,7 +168,7 @@ class LongTime:
         Periodicity
             If nothing repeats, ``multiple`` is None and ``outcome`` gives the reason.
         """
-        return periodicity_of(self._run, period, tol, most)
+        return periodicity_of(self._run, period, tol, max_multiple)
 
     @validated(since=finite, until=finite)
     def extremes(

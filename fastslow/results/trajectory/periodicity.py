@@ -81,12 +81,12 @@ class Periodicity(Result):
         return f"Periodicity: {self.outcome}"
 
 
-def periodicity_of(run: Trajectory, period: float | None, tol: float, most: int) -> Periodicity:
+def periodicity_of(run: Trajectory, period: float | None, tol: float, max_multiple: int) -> Periodicity:
     """Detect a period; see `Trajectory.periodicity`."""
     if not tol > 0:
         raise ArgumentError(f"tol = {tol!r}; expected a positive number")
-    if most < 1:
-        raise ArgumentError(f"most = {most!r}; expected at least 1")
+    if max_multiple < 1:
+        raise ArgumentError(f"max_multiple = {max_multiple!r}; expected at least 1")
     # raises the appropriate error for a run without dense output or steps
     run.dense_columns(run.span[1])
     assert run.series is not None
@@ -120,7 +120,7 @@ def periodicity_of(run: Trajectory, period: float | None, tol: float, most: int)
     states = section.table[: len(run.states)] / scale[:, None]
     noise = ERRORS * float(run.settings.get("rtol", 0.0))
     smallest = np.inf
-    for multiple in range(1, most + 1):
+    for multiple in range(1, max_multiple + 1):
         if multiple >= len(section):
             break
         later, former = states[:, multiple:], states[:, :-multiple]
@@ -162,8 +162,8 @@ def periodicity_of(run: Trajectory, period: float | None, tol: float, most: int)
         text += stopped_early(run)
         return Periodicity(None, None, None, smallest, section, Outcome("too short", text, False))
     text = (
-        f"no repeat within {tol:g} after up to {most} {unit}: quasi-periodic, chaotic, or not "
-        "yet settled; simulate for longer, or raise most= or tol=."
+        f"no repeat within {tol:g} after up to {max_multiple} {unit}: quasi-periodic, chaotic, or "
+        "not yet settled; simulate for longer, or raise max_multiple= or tol=."
     )
     text += stopped_early(run)
     return Periodicity(None, None, None, smallest, section, Outcome("not periodic", text, False))

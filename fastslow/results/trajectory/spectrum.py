@@ -104,8 +104,8 @@ class Spectrum(Table, Result):
         """Angular frequencies, shape (N,)."""
         return 2.0 * np.pi * self.frequency
 
-    @validated(n=whole(0), least=within(0.0, 1.0))
-    def peaks(self, n: int = 5, least: float = 1e-6) -> tuple[Peak, ...]:
+    @validated(n=whole(0), min_amplitude=within(0.0, 1.0))
+    def peaks(self, n: int = 5, min_amplitude: float = 1e-6) -> tuple[Peak, ...]:
         """Return the largest lines except the mean, largest first.
 
         The frequency of a line is interpolated from the ratio of two bins by the
@@ -117,7 +117,7 @@ class Spectrum(Table, Result):
         ----------
         n : int
             Maximal number of lines.
-        least : float
+        min_amplitude : float
             Lines below this fraction of the largest amplitude are omitted.
 
         Returns
@@ -132,7 +132,7 @@ class Spectrum(Table, Result):
         around = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
         top = np.flatnonzero((around.max(axis=1) == a) & (a > 0))
         top = top[(top > 0) & (top < len(a) - 1)]
-        top = top[a[top] >= least * a[top].max(initial=0.0)]
+        top = top[a[top] >= min_amplitude * a[top].max(initial=0.0)]
         top = top[np.argsort(-a[top], kind="stable")][:n]
         return tuple(self._interpolated(int(k)) for k in top)
 

@@ -1,10 +1,10 @@
-"""Steps by collocation, where a Taylor series does not exist.
+"""Collocation steps, for rates without a Taylor series.
 
 The polynomial of degree n through the state at the beginning of a step whose
-derivative equals the rates at n points of Lobatto (Hairer and Wanner 1996,
+derivative equals the rates at n Lobatto points (Hairer and Wanner 1996,
 section IV.5, Lobatto IIIA) is of order n throughout the step and of order
-2 n - 2 at its end. It is found by fixed-point iteration from the polynomial of
-the step before, and takes the place of the series: rows of coefficients in time.
+2 n - 2 at its end. It is computed by fixed-point iteration, started from the polynomial
+of the previous step, and replaces the series: rows of coefficients in time.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastslow.kernels.decorators import part
+from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address
 from fastslow.kernels.records import Matrix, Vector, zeros
 from fastslow.simulation.stepper.lobatto import (
@@ -31,30 +31,30 @@ from fastslow.simulation.stepper.polynomials import EPSILON
 from fastslow.simulation.stepper.problems import Problem, Run
 from fastslow.simulation.stepper.scales import NOW
 
-#: Most iterations of one attempt, and most attempts for one step.
+#: Maximum numbers of iterations in one attempt, and of attempts for one step.
 ITERATIONS, ATTEMPTS = 40, 100
 
-#: How much of the tolerance the estimate may reach, and the iteration may leave.
+#: Fractions of the tolerance allowed for the error estimate and for the iteration error.
 SHARE, LEFT = 0.5, 0.02
 
 
 class Collocation(NamedTuple):
-    """What collocation goes on from, and its work space.
+    """State carried between collocation steps, and work space.
 
     Parameters
     ----------
     memory : float64 array
-        Whether the last step was such a one, the length to try next, its own length, its time
-        and mode, then its rates; zeros at the beginning of a run.
+        Whether the last step was a collocation step, the step length to try next, the last step's
+        length, time and mode, then its rates; zeros at the beginning of a run.
     start, scale : float64 arrays, shape (n_rates,)
-        Values at the beginning and inverse sizes of what rates are known of: the states and
-        the interface functions.
+        Initial values and inverse scales of the quantities with known rates: the states and
+        the switching functions.
     rates : float64 array, shape (n_rates, n)
     defect : float64 array, shape (n_rates, n + 1)
     values : float64 array, shape (n_forcing + n_bounds, n + 2)
     point : float64 array, shape (1 + n_states + n_forcing,)
     out : float64 array
-        As large as the series.
+        Same size as the series.
     states : float64 array, shape (n, n_states)
     work : float64 array, shape (n + 2,)
     """
@@ -74,10 +74,10 @@ class Collocation(NamedTuple):
 def collocation_for(
     n_states: int, n_forcing: int, n_interfaces: int, order: int, n_rows: int
 ) -> Collocation:
-    """Work space for a model of these sizes, whose series fills so many rows."""
+    """Allocate the work space for a model of these sizes, whose series has ``n_rows`` rows."""
     n = min(order, HIGHEST)
     n_rates = n_states + n_interfaces
-    # each interface may be slid along, between two bounds
+    # sliding along an interface has two bounds
     n_bounds = min(2 * n_interfaces, n_rows - n_rates - n_forcing)
     return zeros(
         Collocation,
@@ -94,7 +94,7 @@ def collocation_for(
 
 
 class CollocationStep(NamedTuple):
-    """What `collocate` is given; see `modes.expand`."""
+    """Arguments of `collocate`; see `modes.expand`."""
 
     problem: Problem
     run: Run
@@ -106,7 +106,7 @@ class CollocationStep(NamedTuple):
     going_on: bool
 
 
-@part
+@kernel
 def collocate(step):
     """Replace the values and rates in ``W`` by collocation polynomials; see `modes.expand`."""
     problem, run, mode, W, scales = step.problem, step.run, step.mode, step.W, step.scales
@@ -147,7 +147,7 @@ def collocate(step):
         if taken == 0:
             h *= 0.4
             continue
-        # a state that begins at zero, and has reached nothing yet, is measured by its change
+        # a state that starts at zero has no scale yet: use its change
         for i in range(n_rates):
             if scales[NOW, i if i < n_states else i + n_forcing] == 0.0:
                 change = 0.0
@@ -198,9 +198,9 @@ def collocate(step):
     return h
 
 
-@part
+@kernel
 def first_length(problem, run, mode, longest, W, space):
-    """A length to try first, from the rates and how they change (Hairer et al. 1993, II.4)."""
+    """Estimate the first step length from the rates and their change (Hairer et al. 1993, II.4)."""
     n_states, order, inputs = problem.n_states, problem.order, run.inputs
     scale, point, out, columns = space.scale, space.point, space.out, order + 1
     rate = 0.0
@@ -222,14 +222,14 @@ def first_length(problem, run, mode, longest, W, space):
     return length if length > 0.0 else short
 
 
-@part
+@kernel
 def predict(problem, t, mode, h, going_on, space):
-    """Rates at the points of a step, continued from the step before or constant."""
+    """Predict the rates at the collocation points, from the previous step or as constants."""
     n_states, memory, rates = problem.n_states, space.memory, space.rates
     n = rates.shape[1]
     known = going_on and memory[2] > 0.0 and memory[4] == mode
     offset = t - memory[3] if known else 0.0
-    # far beyond the step before its polynomial is no guide
+    # far beyond the previous step its polynomial is a poor predictor
     known = known and offset + h <= 2.5 * memory[2]
     table = n - LOWEST
     for i in range(rates.shape[0]):
@@ -248,14 +248,14 @@ def predict(problem, t, mode, h, going_on, space):
                     rates[i, j] += value - here
 
 
-@part
+@kernel
 def iterate(problem, run, mode, h, space):
-    """Iterate the rates at the points of a step until the states there stand still.
+    """Iterate the rates at the collocation points until the states there converge.
 
     Returns
     -------
     int
-        How often, 0 where they do not.
+        Number of iterations, 0 without convergence.
     """
     n_states, n_forcing, inputs = problem.n_states, problem.n_forcing, run.inputs
     start, scale, rates, states = space.start, space.scale, space.rates, space.states
@@ -291,15 +291,17 @@ def iterate(problem, run, mode, h, space):
     return 0
 
 
-@part
+@kernel
 def check(problem, run, mode, h, scales, space):
-    """Evaluate the rates between the points of a step, slow quantities and bounds of sliding.
+    """Estimate the error of a step from the defect between the collocation points.
+
+    Slow quantities and sliding bounds are evaluated as well.
 
     Returns
     -------
     float
-        The largest integral of the difference between the rates and the derivatives of
-        the polynomials, relative to the sizes of the rows, not finite where the rates are not.
+        The largest integral of the defect (rates minus derivatives of the polynomials),
+        relative to the scales of the rows; not finite where the rates are not.
     """
     n_states, n_forcing, n_interfaces = problem.n_states, problem.n_forcing, problem.n_interfaces
     start, scale, rates, defect = space.start, space.scale, space.rates, space.defect
@@ -340,7 +342,7 @@ def check(problem, run, mode, h, scales, space):
                 total += INTEGRALS[table, j, k] * defect[i, k]
             error = max(error, abs(h * total) * scale[i])
     for k in range(n_forcing):
-        # slow quantities depend on time alone: the states at that place play no part
+        # slow quantities depend on time alone, so the states there do not matter
         between = newton(values[k], F[table], n + 1, WORST[table], space.work)
         difference = abs(between - values[k, n + 1])
         size = max(scales[NOW, n_states + k], abs(values[k, n // 2]))
@@ -349,9 +351,9 @@ def check(problem, run, mode, h, scales, space):
     return error if finite == 0.0 else np.nan
 
 
-@part
+@kernel
 def newton(data, points, count, s, work):
-    """Value at one place of the polynomial through data at points (Neville)."""
+    """Evaluate the interpolating polynomial at one point by Neville's scheme."""
     for k in range(count):
         work[k] = data[k]
     for level in range(1, count):
@@ -361,13 +363,12 @@ def newton(data, points, count, s, work):
     return work[0]
 
 
-@part
+@kernel
 def to_powers(data, points, count, work):
-    """Coefficients of the powers of s of the polynomial through data at points.
+    """Compute the power coefficients of the interpolating polynomial.
 
-    Divided differences, then their sum by Horner's rule: what rounding adds is
-    as small as rounding of the data, other than with a matrix, whose large
-    entries would cancel.
+    Divided differences, summed by Horner's rule: rounding errors stay at the size of
+    those of the data, whereas a matrix with large entries would cancel.
     """
     for k in range(count):
         work[k] = data[k]
@@ -375,6 +376,6 @@ def to_powers(data, points, count, work):
         for k in range(count - 1, level - 1, -1):
             work[k] = (work[k] - work[k - 1]) / (points[k] - points[k - level])
     for k in range(count - 2, -1, -1):
-        # multiply what stands above by s - points[k]
+        # multiply the higher terms by s - points[k]
         for j in range(k, count - 1):
             work[j] -= points[k] * work[j + 1]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from fastslow.kernels.decorators import inlined_part
+from fastslow.kernels.decorators import inlined_kernel
 from fastslow.kernels.pointers import call_address
 from fastslow.kernels.simd.lane_steps import SUDDEN
-from fastslow.simulation.stepper.events import find_event, holds, put_on_all
+from fastslow.simulation.stepper.events import error_acceptable, find_event, project_onto_interfaces
 from fastslow.simulation.stepper.extremes import widen_extremes
 from fastslow.simulation.stepper.implicit import (
     DAMPING,
@@ -16,20 +16,20 @@ from fastslow.simulation.stepper.implicit import (
     WAIT,
     Lengths,
     Series,
+    limited_by_stability,
     long_step,
-    settled,
 )
 from fastslow.simulation.stepper.modes import (
     MANY_MODES,
     MISSING,
     NOT_DEFINED,
     UNKNOWN_MODE,
-    across,
     choose_mode,
+    departs,
     expand,
     expanded,
     interface_noise,
-    leaves,
+    neighbour_mode,
 )
 from fastslow.simulation.stepper.polynomials import ZERO, horner, take_samples
 from fastslow.simulation.stepper.scales import (
@@ -66,53 +66,54 @@ from fastslow.simulation.stepper.workspace import (
     WORK,
 )
 
-#: How the loop ended.
+#: Outcomes of the loop.
 REACHED_END = 0
 TOO_MANY_STEPS = 1
 TOO_MANY_CROSSINGS = 2
 STEP_TOO_SMALL = 3
 NOT_FINITE = 4
 NOT_UNIQUE = 5
-NO_WAY_ON = 6
+NO_CONTINUATION = 6
 ACCUMULATION = 7
 
-#: It did not end: in a region, after a plain step or a crossing, others may take the next one.
+#: Not finished: after a plain step or a crossing in a region, the lanes may take the next step.
 HANDED_OVER = -1
 
-#: It pauses between two steps, and goes on as if it had not when it is called again: its work is
-#: done, there is no room for another step or crossing, or it needs code that is not there.
+#: Paused between two steps, to be resumed by the next call with identical results: the work
+#: quota is used up, a table is full, or code is needed that is not loaded.
 OUT_OF_WORK, TABLE_FULL, NEEDS_COLLOCATION, NEEDS_RADAU = -2, -3, -4, -5
 
-#: Crossings in a row, none farther from the last than rounding of time, that end a run.
+#: Consecutive crossings, separated by no more than rounding of time, that end a run.
 CROWD = 40
 
-#: A crossing is near-tangential when moving h by this part of its scale would undo it.
+#: A crossing is near-tangential (near grazing) when shifting h by this fraction of its scale
+#: removes it.
 TANGENTIAL = 1e-6
 
 
-@inlined_part
-def drive(problem, run, record, workspace, handed):
-    """Follow one trajectory to its end, until others may take its next step, or to a pause.
+@inlined_kernel
+def integrate(problem, run, record, workspace, handed):
+    """Integrate one trajectory to its end, to a hand-over to the lanes, or to a pause.
 
-    Every step and every crossing is put into a table, or, where there are
-    arrays for it, they are summed up as the run goes.
+    Steps and crossings are listed in tables or, if arrays are given for it, accumulated
+    into extremes and counts.
 
     Parameters
     ----------
     problem : Problem
     run : Run
-        Changed here.
+        Updated in place.
     record : Record
-        Filled here.
+        Filled in.
     workspace : Workspace
-        From `workspace_for`; after a pause the one that the run paused in.
+        From `workspace_for`; after a pause the same one.
     handed : int
-        In one of so many first modes the run is handed over after a plain step or a crossing.
+        Number of leading modes in which the run is handed over after a plain step or a crossing.
 
     Returns
     -------
     int
-        How it ended, `HANDED_OVER`, or why it pauses. Nothing but a number is returned: to make
+        The outcome, `HANDED_OVER`, or the reason of a pause. Only a number is returned: to create
         an array Numba runs Python, in which an interrupt would be raised and lost.
     """
     address, n_states, n_modes, tol = problem.series, problem.n_states, problem.n_modes, problem.tol
@@ -125,7 +126,7 @@ def drive(problem, run, record, workspace, handed):
     search, collocation = workspace.search, workspace.collocation
     implicit, memory = workspace.implicit, workspace.collocation.memory
     right, poly, phase = implicit.right, implicit.poly, implicit.radau.phase
-    on, hit, rests, side, noise = search.on, search.hit, search.rests, search.side, search.noise
+    on, hit, remains, side, noise = search.on, search.hit, search.remains, search.side, search.noise
     gradient, offsets, samples = search.gradient, workspace.offsets, record.samples
     columns = order + 1
     kept = n_states + problem.n_forcing
@@ -138,7 +139,7 @@ def drive(problem, run, record, workspace, handed):
     n_samples, crowd = counted[SAMPLES], counted[CROWDED]
     mode, interface = counted[MODE], ZERO - 1
     usual, last_event, depth, floor = carried[USUAL], carried[LAST_EVENT], 1.0, 0.0
-    # implicit steps: when to try again, how long to wait after a failure, how many, how long
+    # implicit steps: steps until the next attempt, wait after a failure, number, lengths
     calm, pause, in_a_row = counted[CALM], counted[PAUSE], ZERO
     wanted = longest = 0.0
     code = REACHED_END
@@ -156,10 +157,10 @@ def drive(problem, run, record, workspace, handed):
         for i in range(n_rows):
             scales[REACHED, i] = carried[SIZES + i]
         for j in range(n_interfaces):
-            on[j] = hit[j] = rests[j] = False
+            on[j] = hit[j] = remains[j] = False
         interface = counted[INTERFACE]
         if interface >= 0:
-            # others did not take the step that leaves an interface after all
+            # the lanes did not take the step that leaves the interface
             on[interface], noise[interface], fresh = True, carried[FLOOR], True
     while True:
         if listing and (
@@ -171,9 +172,13 @@ def drive(problem, run, record, workspace, handed):
             break
         if choosing:
             left -= n_modes
-            # most often one interface is crossed where the rates are continuous
+            # the common case: one interface is crossed and the rates are continuous
             before = mode
-            mode = across(signs, before, interface) if interface >= 0 and not touched else before
+            mode = (
+                neighbour_mode(signs, before, interface)
+                if interface >= 0 and not touched
+                else before
+            )
             call_address(address, max(mode, 0), inputs, parameters, W)
             for i in range(n_states, kept):
                 inputs[1 + i] = W[i * columns]
@@ -189,12 +194,12 @@ def drive(problem, run, record, workspace, handed):
                 mode != before
                 and others == 0
                 and continuous[interface]
-                and leaves(problem, W, interface, signs[mode, interface], whole, scales, noise)
+                and departs(problem, W, interface, signs[mode, interface], whole, scales, noise)
             )
             if not ahead:
                 mode = choose_mode(problem, run, before, whole, work, scales, search, collocation)
             if mode < 0:
-                code = NO_WAY_ON
+                code = NO_CONTINUATION
                 if mode == MANY_MODES:
                     code = NOT_UNIQUE
                 elif mode == NOT_DEFINED:
@@ -236,7 +241,7 @@ def drive(problem, run, record, workspace, handed):
             code = TOO_MANY_STEPS
             break
         if in_a_row > 0:
-            # an implicit step has left the first coefficients of the series at its end
+            # an implicit step leaves the first coefficients of the series at its end
             W, right = right, W
         else:
             if ahead:
@@ -248,7 +253,7 @@ def drive(problem, run, record, workspace, handed):
                 code = NEEDS_COLLOCATION
                 break
             if fresh and longest < SUDDEN * (usual if usual > 0.0 else remaining):
-                # should the step have to be taken again, it begins with the sizes as they were
+                # a repeated step starts from the sizes before it
                 raised = True
                 for i in range(n_rows):
                     carried[SIZES + i] = scales[REACHED, i]
@@ -264,7 +269,11 @@ def drive(problem, run, record, workspace, handed):
         for i in range(n_states, kept):
             inputs[1 + i] = W[i * columns]
         calm -= 1
-        if n_fast > 0 and calm <= 0 and (in_a_row > 0 or settled(problem, W, longest, scales)):
+        if (
+            n_fast > 0
+            and calm <= 0
+            and (in_a_row > 0 or limited_by_stability(problem, W, longest, scales))
+        ):
             if in_a_row == 0:
                 wanted = 1.25 * longest
                 phase[0] = 0.0
@@ -310,7 +319,7 @@ def drive(problem, run, record, workspace, handed):
         fresh = False
         if not long:
             final = longest >= remaining
-            # a step between two times that are exact in floating point loses none of it
+            # a step between two floating-point times loses no time to rounding
             h = remaining if final else (t + longest) - t
             if h == 0.0:
                 code = STEP_TOO_SMALL
@@ -318,12 +327,12 @@ def drive(problem, run, record, workspace, handed):
             while True:
                 s, interface, touched, depth, floor = find_event(problem, run, mode, W, h, search)
                 taken = s * h if interface >= 0 else h
-                # where a step grew much its last terms may be small by accident
+                # after strong growth of the step the last terms may be small by accident
                 doubtful = taken > 2.0 * usual or longest > 4.0 * remaining
                 if (
                     h == 0.0
                     or not doubtful
-                    or holds(problem, run, mode, W, taken, scales, work, search)
+                    or error_acceptable(problem, run, mode, W, taken, scales, work, search)
                 ):
                     break
                 h, final = (t + 0.25 * taken) - t, False
@@ -365,12 +374,12 @@ def drive(problem, run, record, workspace, handed):
         inputs[0] = t
         for j in range(n_interfaces):
             hit[j] = signs[mode, j] == 0
-            # a motion that rests on an interface may leave it in the next step: look again
-            on[j] = rests[j]
-            choosing = choosing or rests[j]
+            # a motion that remains on an interface may leave it in the next step: check again
+            on[j] = remains[j]
+            choosing = choosing or remains[j]
         if interface >= 0:
             hit[interface] = choosing = True
-        put_on_all(problem, run, search)
+        project_onto_interfaces(problem, run, search)
         left -= 1
         if interface >= 0:
             crowd = crowd + 1 if t - last_event <= 1e-13 * max(abs(t), whole) else 0
@@ -387,7 +396,7 @@ def drive(problem, run, record, workspace, handed):
     counted[PAUSED] = code < HANDED_OVER
     if code < HANDED_OVER:
         if in_a_row > 0:
-            # the arrays have changed their places
+            # the arrays have been swapped
             held_W, held_right = workspace.W, implicit.right
             for i in range(W.shape[0]):
                 work[i] = right[i]
@@ -400,7 +409,7 @@ def drive(problem, run, record, workspace, handed):
         carried[WANTED], carried[LONGEST] = wanted, longest
         carried[DEPTH], carried[FLOOR] = depth, floor
     else:
-        # the interface that it has crossed, where it is handed over before the step that leaves it
+        # the interface crossed, if the run is handed over before the step that leaves it
         counted[INTERFACE] = interface if code == HANDED_OVER else -1
         if code == HANDED_OVER and interface >= 0:
             carried[FLOOR] = noise[interface]

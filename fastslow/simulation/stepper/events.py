@@ -1,48 +1,48 @@
-"""Where within a step its smooth motion ends."""
+"""Event location: the first time within a step at which its smooth motion ends."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from fastslow.kernels.decorators import part
+from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address
 from fastslow.kernels.records import Flags, Integers, Matrix, Vector, zeros
 from fastslow.simulation.stepper.modes import (
     BEGINNING,
     bounds_of,
     interface_noise,
+    orientation,
     scaled,
-    turned_round,
 )
 from fastslow.simulation.stepper.polynomials import (
     EPSILON,
     ONE,
     ZERO,
+    bounded_away,
     curvature,
     excluded,
     first_root,
     first_strong,
     horner,
-    kept_away,
     slope,
 )
 from fastslow.simulation.stepper.scales import NOW
 
-#: Rows of the stack in which intervals are halved.
+#: Rows of the bisection stack.
 STACK_ROWS = 46
 
 
 class Search(NamedTuple):
-    """Work space for events, and what is known of every interface.
+    """Work space of event location, and the status of every interface.
 
     Parameters
     ----------
-    on, hit, rests : bool array, shape (n_interfaces,)
-        Whether a step begins on it, has ended on it, or begins on it and does not leave.
+    on, hit, remains : bool array, shape (n_interfaces,)
+        Whether a step starts on it, has ended on it, or starts on it and does not leave.
     side : int64 array, shape (n_interfaces,)
         Sign of h.
     noise : float64 array, shape (n_interfaces,)
-        Size of h that is rounding error.
+        Rounding error of h.
     gradient : float64 array, shape (2 + n_states,)
     b, d : float64 arrays, shape (order + 1,)
     stack : float64 array, shape (STACK_ROWS, order + 4)
@@ -54,7 +54,7 @@ class Search(NamedTuple):
 
     on: Flags
     hit: Flags
-    rests: Flags
+    remains: Flags
     side: Integers
     noise: Vector
     gradient: Vector
@@ -68,7 +68,7 @@ class Search(NamedTuple):
 
 
 def search_for(n_states: int, n_forcing: int, n_interfaces: int, order: int) -> Search:
-    """Work space for the events of a model of these sizes."""
+    """Allocate the work space of event location for a model of these sizes."""
     columns, n = order + 1, n_states
     return zeros(
         Search,
@@ -83,37 +83,37 @@ def search_for(n_states: int, n_forcing: int, n_interfaces: int, order: int) -> 
     )
 
 
-@part
+@kernel
 def find_event(problem, run, mode, W, h, search):
-    """The first time in a step at which its motion ends, as a part of the step.
+    """Locate the first event in a step, as a fraction of the step.
 
-    Fills ``rests``: the interfaces that it began on and does not leave.
+    Fills ``remains``: the interfaces on which the step starts and which it does not leave.
 
     Returns
     -------
     s : float
-        Above 1 when the whole step is free of events.
+        Above 1 without an event.
     j : int
-        The interface (that is slid along, where sliding ends), -1 for none.
+        The interface (at the end of sliding, the sliding interface), -1 for none.
     touch : bool
-        Whether h does not change its sign there.
+        Whether h touches zero without a change of sign (grazing).
     depth : float
-        Relative change of h that would undo the crossing.
+        Relative change of h that would remove the crossing.
     floor : float
-        Size of h that is rounding error there.
+        Rounding error of h there.
     """
     signs, n_interfaces, order = problem.signs, problem.n_interfaces, problem.order
-    on, rests, noise, b = search.on, search.rests, search.noise, search.b
+    on, remains, noise, b = search.on, search.remains, search.noise, search.b
     stack, gradient = search.stack, search.gradient
     first_h = problem.n_states + problem.n_forcing
     drift = first_h + n_interfaces
     best, interface, touched, depth, floor = 2.0, ZERO - 1, False, 1.0, 0.0
     for j in range(n_interfaces):
-        rests[j] = False
+        remains[j] = False
         sign = signs[mode, j]
         if sign == 0:
             row, several = bounds_of(signs, mode, j, drift)
-            turned = turned_round(W, row, several, order + 1)
+            turned = orientation(W, row, several, order + 1)
             for k in range(2):
                 scaled(W, row + k, order, h, b)
                 small = 32.0 * EPSILON * abs(b[0])
@@ -128,7 +128,7 @@ def find_event(problem, run, mode, W, h, search):
                         best, interface, touched, depth = s, j, False, 1.0
             continue
         row = (first_h + j) * (order + 1)
-        if W[row] * sign > 0.0 and not on[j] and kept_away(W, row, row + order, h):
+        if W[row] * sign > 0.0 and not on[j] and bounded_away(W, row, row + order, h):
             continue
         start = ZERO
         if on[j]:
@@ -137,9 +137,9 @@ def find_event(problem, run, mode, W, h, search):
         total = scaled(W, first_h + j, order, h, b)
         if on[j]:
             if start > order:
-                rests[j] = True
+                remains[j] = True
                 if total > noise[j] and best > BEGINNING:
-                    # only the beginning is known to rest: look again after it
+                    # it is known to remain at the beginning only: check again after it
                     best, interface, touched = BEGINNING, j, False
                 continue
         elif b[0] * sign <= 0.0:
@@ -150,19 +150,19 @@ def find_event(problem, run, mode, W, h, search):
         small = max(small, 8.0 * EPSILON * total)
         s, touch = first_root(b, start, order, small, stack)
         if s <= 1.0 and not touch:
-            s, touch = turning_point(b, order, s, small, sign)
+            s, touch = grazing_point(b, order, s, small, sign)
         if s < best and s <= 1.0:
             best, interface, touched, floor = s, j, touch, small
-            depth = undoing(b, order, s, max(gradient[1], total))
+            depth = crossing_depth(b, order, s, max(gradient[1], total))
     return best, interface, touched, depth, floor
 
 
-@part
-def holds(problem, run, mode, W, taken, scales, work, search):
-    """Whether the rates at the end of a step are the derivatives of its series.
+@kernel
+def error_acceptable(problem, run, mode, W, taken, scales, work, search):
+    """Check the rates at the end of a step against the derivatives of its series.
 
-    As far as rounding of the states lets them be known: where they differ, the rates are
-    evaluated again at states that differ by it.
+    If they differ, the rates are evaluated again at states perturbed by rounding, and the
+    difference is allowed for.
     """
     n_states, order, tol = problem.n_states, problem.order, problem.tol
     columns = order + 1
@@ -191,9 +191,9 @@ def holds(problem, run, mode, W, taken, scales, work, search):
     return True
 
 
-@part
-def turning_point(b, order, s, small, sign):
-    """The root again, or where h turns back just there: a touch, as far as rounding can tell."""
+@kernel
+def grazing_point(b, order, s, small, sign):
+    """The root, or the nearby extremum of h where the two agree to rounding: a grazing point."""
     rate = slope(b, ZERO, order, s)
     bend = curvature(b, order, s)
     if bend * sign <= 0.0 or 0.5 * rate * rate > small * bend * sign:
@@ -205,9 +205,9 @@ def turning_point(b, order, s, small, sign):
     return s, False
 
 
-@part
-def undoing(b, order, s, size):
-    """Depth of the parabola that h follows beyond its root, relative to its size."""
+@kernel
+def crossing_depth(b, order, s, size):
+    """Depth of the osculating parabola of h beyond its root, relative to the size of h."""
     rate = slope(b, ZERO, order, s)
     bend = curvature(b, order, s)
     if bend == 0.0 or size == 0.0:
@@ -215,9 +215,9 @@ def undoing(b, order, s, size):
     return min(1.0, 0.5 * rate * rate / (abs(bend) * size))
 
 
-@part
-def put_on(problem, run, j, gradient):
-    """Move the state onto an interface, by Newton along its gradient."""
+@kernel
+def project_onto_interface(problem, run, j, gradient):
+    """Project the state onto an interface by one Newton step along its gradient."""
     inputs, n_states = run.inputs, problem.n_states
     call_address(problem.series, problem.n_modes + j, inputs, run.parameters, gradient)
     square = 0.0
@@ -228,11 +228,11 @@ def put_on(problem, run, j, gradient):
             inputs[1 + i] -= gradient[0] * gradient[2 + i] / square
 
 
-@part
-def put_on_all(problem, run, search):
-    """Move the state onto every interface that is hit, by the least-norm Newton step.
+@kernel
+def project_onto_interfaces(problem, run, search):
+    """Project the state onto all interfaces hit, by the least-norm Newton step.
 
-    Of interfaces that coincide, or whose gradients depend on one another, the first decide.
+    Of interfaces with linearly dependent gradients the first ones are used.
     """
     hit, gradient, n_states = search.hit, search.gradient, problem.n_states
     count = ZERO
@@ -243,10 +243,10 @@ def put_on_all(problem, run, search):
     if count == 1:
         for j in range(hit.shape[0]):
             if hit[j]:
-                put_on(problem, run, j, gradient)
+                project_onto_interface(problem, run, j, gradient)
         return
-    # gradients made orthogonal one after the other (Gram and Schmidt), each with what is
-    # left of its function's value once the moves along those before are made
+    # Gram-Schmidt on the gradients, each with the value of its function that remains after
+    # the moves along the previous ones
     basis, move = search.basis, search.move
     for i in range(n_states):
         move[i] = 0.0

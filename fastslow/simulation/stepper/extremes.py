@@ -1,8 +1,8 @@
-"""What is kept of a run that keeps neither its steps nor its crossings."""
+"""Extremes of a run that stores neither its steps nor its crossings."""
 
 from __future__ import annotations
 
-from fastslow.kernels.decorators import part
+from fastslow.kernels.decorators import kernel
 from fastslow.simulation.stepper.polynomials import (
     DEEPEST,
     EPSILON,
@@ -16,9 +16,9 @@ from fastslow.simulation.stepper.polynomials import (
 )
 
 
-@part
+@kernel
 def widen_extremes(W, order, begin, taken, extremes, search):
-    """Widen the extremes of every state by those within a step, from an offset into it.
+    """Update the extremes of every state with those within a step, from an offset on.
 
     Parameters
     ----------
@@ -26,9 +26,9 @@ def widen_extremes(W, order, begin, taken, extremes, search):
         Coefficients of the step, row by row.
     order : int
     begin, taken : float
-        The part of the step that counts, as offsets in time.
+        The interval of the step that counts, as offsets in time.
     extremes : float64 array, shape (2, n_states)
-        Smallest and largest values so far, changed here.
+        Smallest and largest values so far, updated in place.
     search : Search
         Work space.
     """
@@ -38,7 +38,7 @@ def widen_extremes(W, order, begin, taken, extremes, search):
         first = i * columns
         low, high = extremes[0, i], extremes[1, i]
         if begin <= 0.0:
-            # most steps cannot reach the extremes so far, whatever they do
+            # a bound excludes new extremes in most steps
             most = reach(W, first, first + order, taken)
             if W[first] - most >= low and W[first] + most <= high:
                 continue
@@ -58,18 +58,17 @@ def widen_extremes(W, order, begin, taken, extremes, search):
         for k in range(order):
             d[k] = (k + 1) * b[k + 1]
         if not excluded(d, ZERO, order - 1):
-            low, high = turning_values(b, d, order, low, high, search.stack)
+            low, high = widen_by_extrema(b, d, order, low, high, search.stack)
         extremes[0, i], extremes[1, i] = low, high
 
 
-@part
-def turning_values(b, d, order, low, high, stack):
-    """Widen [low, high] by the values of sum b_k s**k at its turning points on [0, 1].
+@kernel
+def widen_by_extrema(b, d, order, low, high, stack):
+    """Widen [low, high] by the extrema of sum b_k s**k on [0, 1].
 
-    An interval whose Bernstein coefficients lie between the extremes so far
-    holds no others; one whose coefficients rise or fall throughout has them at
-    its ends, and one where they turn once has one more between. Every other
-    is halved.
+    An interval whose Bernstein coefficients are between the current extremes contains no
+    new ones; monotone coefficients put the extremes at its ends, and one change of
+    direction adds one extremum inside. Every other interval is bisected.
 
     Parameters
     ----------

@@ -1,15 +1,15 @@
-"""Long implicit steps through settled phases, where stability and not accuracy limits a series.
+"""Long implicit steps where stability, not accuracy, limits the Taylor series.
 
-A step of Hermite and Obreshkov matches the Taylor series at its two ends: with
+A Hermite-Obreshkov step matches the Taylor series at its two ends: with
 the Taylor coefficients Y_j at both, P of the first and Q of the second,
 
     sum_{j=0}^{Q} (-1)^j c_j(Q, P) h^j Y_j(y_1) = sum_{j=0}^{P} c_j(P, Q) h^j Y_j(y_0),
     c_j(q, p) = q! (q + p - j)! / ((p + q)! (q - j)!)
 
 (Obreshkov 1940; Nedialkov and Jackson 1999, eq. 2.4), of order P + Q. Its
-stability function is Padé's, L-stable for Q = P + 1 and P + 2 (Ehle 1973; Hairer
+stability function is a Padé approximant, L-stable for Q = P + 1 and P + 2 (Ehle 1973; Hairer
 and Wanner 1996, thm. IV.4.12). The polynomial of degree P + Q + 1 that has the
-same coefficients at both ends takes the place of the series of the step.
+same coefficients at both ends replaces the series of the step.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.kernels.decorators import part
+from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address, call_with
 from fastslow.kernels.records import Matrix, Tensor, Vector, zeros
 from fastslow.kernels.taylor.modes import SHORT
@@ -28,54 +28,52 @@ from fastslow.simulation.stepper.events import find_event
 from fastslow.simulation.stepper.matrices import (
     Spectrum,
     factorise_in_place,
-    forgotten_in,
     solve_in_place,
     spectrum_for,
+    undamped_modulus,
 )
 from fastslow.simulation.stepper.modes import MISSING
 from fastslow.simulation.stepper.polynomials import EPSILON
 from fastslow.simulation.stepper.radau import STAGES, Radau, RadauStep, accept, radau_for
 from fastslow.simulation.stepper.scales import NOW, REACHED, ratio_of
 
-#: Taylor coefficients that are matched at the beginning and at the end of a step.
+#: Numbers of Taylor coefficients matched at the beginning and at the end of a step.
 P, Q = 2, SHORT
 
-#: Order of a step, and degree of its polynomial, which its series must have at least.
+#: Order of a step, and degree of its polynomial, the minimum order of the series.
 SETTLED_ORDER = P + Q
 DEGREE = P + Q + 1
 
-#: A step must be this much longer than that of the series to be worth its cost, except
-#: for the first ones, which damp what the series has left of fast motions.
+#: Ratio to the step of the series from which an implicit step pays, except for the first
+#: ones, which damp the remaining fast transients.
 PAYS = 3.0
 DAMPING = 6
 
-#: Steps of the series after a crossing before the first is tried; failures double it.
+#: Series steps after a crossing before the first attempt; failures double the wait.
 WAIT, LONGEST_WAIT = 4, 64
 
-#: What marks such a step in the table of a run's steps, and one of Radau.
+#: Codes of implicit and of Radau steps in the table of steps.
 IMPLICIT, RADAU = 2, 3
 
-#: How much at least a motion of the fast states decays within a step of the series for an
-#: implicit one to forget it.
+#: Minimum decay of a fast mode within a series step for an implicit step to damp it.
 CONTRACTION = 0.01
 
-#: How far at most a motion that does not decay so fast goes within an implicit step, |lambda| h:
-#: those are followed, and not damped.
+#: Maximum |lambda| h in an implicit step of a mode that decays less: it is resolved, not damped.
 RESOLVED = 0.5
 
-#: A step so much longer than that of the series is one of Radau: the middle coefficients at its
-#: ends would be rounding, magnified.
+#: Ratio to the step of the series from which Radau steps are used: the middle coefficients at
+#: the ends would be amplified rounding.
 RIGID = 300.0
 
-#: Corrections this much smaller than what is allowed may be rounding, and are the last.
+#: Corrections below this fraction of the allowed error may be rounding and end the iteration.
 ROUNDED = 1e-2
 
-#: Relative step of the differences that give the derivatives of the equation, and the least.
+#: Relative step of the difference quotients of the equation, and its minimum.
 DIFFERENCE, TINY = 1e-7, 1e-150
 
 
 def weights(q: int, p: int) -> tuple[float, ...]:
-    """The factors c_j(q, p) of the Taylor coefficients, without signs.
+    """Factors c_j(q, p) of the Taylor coefficients, without signs.
 
     Examples
     --------
@@ -98,7 +96,7 @@ _HUMP = (P + 1) ** (P + 1) * (Q + 1) ** (Q + 1) / (P + Q + 2) ** (P + Q + 2)
 
 
 def _quotient() -> NDArray[np.float64]:
-    """From the coefficients of s**(P + 1) q(s) about s = 1 to those of q about s = 0."""
+    """Matrix from the coefficients of s**(P + 1) q(s) about s = 1 to those of q about s = 0."""
     rows = np.eye(Q + 1)
     for _ in range(P + 1):
         for i in range(1, Q + 1):
@@ -119,7 +117,7 @@ class Implicit(NamedTuple):
     Parameters
     ----------
     right, poly : float64 arrays
-        As large as the series: the short series at the end of a step, and its polynomials.
+        Same size as the series: the short series at the end of a step, and its polynomials.
     slopes : float64 array, shape (n_states, n_states + 1)
     jacobian : float64 array, shape (n_states, n_states)
     derivatives : float64 array, shape (Q, n_states, n_states)
@@ -146,7 +144,7 @@ class Implicit(NamedTuple):
 
 
 def implicit_for(n_states: int, n_forcing: int, n_interfaces: int, size: int) -> Implicit:
-    """Work space for a model of these sizes, whose series is so large."""
+    """Allocate the work space for a model of these sizes, whose series has ``size`` entries."""
     n = n_states
     return zeros(
         Implicit,
@@ -163,16 +161,16 @@ def implicit_for(n_states: int, n_forcing: int, n_interfaces: int, size: int) ->
 
 
 class Lengths(NamedTuple):
-    """Lengths of an implicit step.
+    """Step lengths of an implicit step.
 
     Parameters
     ----------
     wanted, least : float
-        The one to try first, and the least that is worth while.
+        First attempt, and the minimum that pays.
     longest : float
-        That of the series.
+        Step length of the series.
     remaining : float
-        Time that is left.
+        Remaining time.
     """
 
     wanted: float
@@ -182,7 +180,7 @@ class Lengths(NamedTuple):
 
 
 class Series(NamedTuple):
-    """Coefficients that an implicit step begins with, and those that it fills.
+    """Coefficients at the beginning of an implicit step, and those it fills in.
 
     Parameters
     ----------
@@ -191,7 +189,7 @@ class Series(NamedTuple):
     right, poly : float64 arrays
         Filled: the short series at the end, and the polynomials of the step.
     work : float64 array
-        As large; work space.
+        Work space of the same size.
     """
 
     left: Vector
@@ -200,9 +198,9 @@ class Series(NamedTuple):
     work: Vector
 
 
-@part
+@kernel
 def long_step(problem, run, mode, lengths, series, scales, search, space):
-    """An implicit step that pays and that ends before anything happens.
+    """Take an implicit step that pays and contains no event.
 
     Parameters
     ----------
@@ -212,16 +210,16 @@ def long_step(problem, run, mode, lengths, series, scales, search, space):
     lengths : Lengths
     series : Series
     scales : float64 array, shape (2, rows)
-        In which errors are measured, those now at the beginning.
+        Error scales, those now at the beginning.
     search : Search
     space : Implicit
 
     Returns
     -------
     length : float
-        0 where no such step pays, `MISSING` where Radau's steps are needed and are not there.
+        0 if no such step pays, `MISSING` if Radau steps are needed and not loaded.
     growth : float
-        How much longer the next one may be.
+        Growth factor for the next step.
     """
     inputs, on, signs = run.inputs, search.on, problem.signs
     wanted, least, longest, remaining = lengths
@@ -242,7 +240,7 @@ def long_step(problem, run, mode, lengths, series, scales, search, space):
                 problem, run, mode, CONTRACTION / longest, h, series, scales, space
             )
         if rigid or (error < 0.0 and CONTRACTION * h > RESOLVED * longest):
-            found = by_radau(
+            found = call_radau(
                 problem, run, mode, CONTRACTION / longest, h, series, scales, space.radau
             )
             if found == MISSING:
@@ -257,15 +255,15 @@ def long_step(problem, run, mode, lengths, series, scales, search, space):
                     accept(problem, run, mode, h, poly, series.right, space.radau)
                 keep_forcing(problem, run, mode, h, series, scales)
                 return h, min(4.0, 0.8 * max(error, 1e-9) ** power)
-            # the series goes through events; end a little before this one
+            # events are located by the series: end shortly before this one
             h *= 0.9 * s
         else:
             h *= max(0.2, 0.8 * error**power) if error < np.inf else 0.25
     return 0.0, 1.0
 
 
-@part
-def by_radau(problem, run, mode, rate, h, series, scales, space):
+@kernel
+def call_radau(problem, run, mode, rate, h, series, scales, space):
     """Call `radau_step`."""
     if problem.radau == 0:
         return MISSING
@@ -273,13 +271,13 @@ def by_radau(problem, run, mode, rate, h, series, scales, space):
     return call_with(problem.radau, step)
 
 
-@part
-def settled(problem, W, h, scales):
-    """Whether a step is limited by stability: its middle terms are small beside what is allowed.
+@kernel
+def limited_by_stability(problem, W, h, scales):
+    """Check whether stability limits a step: its middle terms are small beside the tolerance.
 
-    A motion exp(lambda t) of size a has the terms a z**k / k!, z = lambda h. Where
-    accuracy limits the step the middle ones far exceed the last, which is the
-    tolerance; on the edge of stability, |z| = order / e, all of them are near it.
+    A mode exp(lambda t) of amplitude a has the terms a z**k / k!, z = lambda h. If
+    accuracy limits the step, the middle terms far exceed the last, which equals the
+    tolerance; at the stability limit, |z| = order / e, all of them are close to it.
     """
     order = problem.order
     most = problem.tol * math.exp(0.5 * order)
@@ -291,12 +289,12 @@ def settled(problem, W, h, scales):
     return True
 
 
-@part
+@kernel
 def implicit_step(problem, run, mode, rate, h, series, scales, space):
-    """One implicit step, its polynomials put into ``poly``; returns its error in units of ``tol``.
+    """Take one implicit step, fill ``poly``, and return its error in units of ``tol``.
 
-    Infinite where the equation is not solved, and negative where it is not tried, because the
-    fast states do not contract at the given rate: an implicit method would damp what grows.
+    Infinite if the equation is not solved, negative if it is not attempted because the fast
+    states do not contract at the given rate: an implicit method would damp growing modes.
     """
     n, tol, inputs, parameters = problem.n_states, problem.tol, run.inputs, run.parameters
     n_forcing, n_interfaces = problem.n_forcing, problem.n_interfaces
@@ -326,14 +324,14 @@ def implicit_step(problem, run, mode, rate, h, series, scales, space):
             for j in range(Q):
                 derivatives[j, i, k] = (poly[row + 1 + j] - right[row + 1 + j]) / step
         ahead[1 + k] = kept
-    # also says no where something is not finite
-    unresolved = forgotten_in(jacobian, problem.n_fast, rate, space.spectrum) * h
+    # also false for values that are not finite
+    unresolved = undamped_modulus(jacobian, problem.n_fast, rate, space.spectrum) * h
     if unresolved > RESOLVED:
-        # as an error of this order, so that the next attempt is as short as it must be
+        # as an error of this order, so that the next attempt is short enough
         return -((unresolved / RESOLVED) ** (P + Q))
     if not unresolved >= 0.0 or not factorise_in_place(slopes, n):
         return np.inf
-    # a state is known no better than rounding of the others lets it be
+    # the accuracy of a state is limited by rounding of the others
     for i in range(n):
         noise = 0.0
         for k in range(n):
@@ -349,20 +347,20 @@ def implicit_step(problem, run, mode, rate, h, series, scales, space):
             allowed = allowed_of(tol, W[i * columns], ahead[1 + i], scales[REACHED, i], least[i])
             size = max(size, ratio_of(moved[i], allowed))
         call_address(problem.series, short, ahead, parameters, right)
-        # rounding, magnified by the condition of the equation, is where it cannot go on
+        # at rounding, amplified by the condition of the equation, no further progress is possible
         done = size <= ROUNDED
         if not done:
             if not size <= 0.5 * before or turn == 7:
                 return np.inf
-            # nothing is known of the rate of convergence before the second turn
+            # the rate of convergence is unknown before the second iteration
             ratio, before = size / before if turn > 0 else 0.1, size
             done = size * ratio <= 1e-6 * (1.0 - ratio)
         for i in range(n):
             residual[i] = matched(right, i * columns, -h, _RIGHT) - start[i]
         if done:
             break
-    # what is left is mostly rounding of the states, which stiff rates magnify: the
-    # coefficients at the end are those of the state that solves the equation exactly
+    # the residual is mostly rounding of the states, amplified by stiff rates: correct the
+    # coefficients at the end to those of the exact solution of the equation
     solve_in_place(slopes, residual, moved, n)
     for i in range(n):
         row = i * columns
@@ -380,7 +378,7 @@ def implicit_step(problem, run, mode, rate, h, series, scales, space):
     for i in range(n + n_forcing + n_interfaces):
         row = i * columns
         join(W, right, row, h, poly, rest)
-        # the first coefficient that is not matched tells how far the motion within leaves it
+        # the first unmatched coefficient estimates the error within the step
         power = h ** (P + 1)
         error_within = abs(W[row + P + 1] - poly[row + P + 1]) * power * _HUMP
         error = max(error, ratio_of(error_within, least[i] if i < n else tol * scales[NOW, i]))
@@ -389,17 +387,17 @@ def implicit_step(problem, run, mode, rate, h, series, scales, space):
     return error if error < np.inf else np.inf
 
 
-@part
+@kernel
 def allowed_of(tol, before, after, reached, least):
-    """The error that is allowed in a state, by its smaller value at both ends of a step."""
+    """Error allowed in a state, from the smaller of its moduli at the ends of a step."""
     return max(tol * max(reached, min(abs(after), abs(before))), least)
 
 
-@part
+@kernel
 def keep_forcing(problem, run, mode, h, series, scales):
-    """Let the slow quantities keep their own series where it holds throughout a step.
+    """Keep the series of the slow quantities where it converges throughout a step.
 
-    They do not depend on the states, so that only the states need be implicit.
+    They do not depend on the states, so only the states need an implicit step.
     """
     n, n_forcing, order = problem.n_states, problem.n_forcing, problem.order
     poly, work = series.poly, series.work
@@ -414,21 +412,21 @@ def keep_forcing(problem, run, mode, h, series, scales):
                 poly[row + k] = work[row + k]
 
 
-@part
+@kernel
 def matched(W, row, h, factors):
-    """The sum of c_j h**j Y_j over one row."""
+    """Sum of c_j h**j Y_j over one row."""
     value = 0.0
     for j in range(factors.shape[0] - 1, -1, -1):
         value = value * h + factors[j] * W[row + j]
     return value
 
 
-@part
+@kernel
 def join(W, right, row, h, poly, rest):
-    """The polynomial with the first coefficients of ``W`` at 0 and of ``right`` at h, one row.
+    """Interpolate one row: the first coefficients of ``W`` at 0 and of ``right`` at h.
 
-    It is the Taylor polynomial at 0 and s**(P + 1) times another one of degree Q:
-    what the first leaves of the coefficients at s = 1, divided by that power.
+    The sum of the Taylor polynomial at 0 and of s**(P + 1) times a polynomial of degree Q,
+    which matches the remaining coefficients at s = 1.
     """
     power = 1.0
     for i in range(Q + 1):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastslow.kernels.decorators import part
+from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address
 from fastslow.kernels.records import (
     IntegerMatrix,
@@ -24,7 +24,7 @@ from fastslow.kernels.records import (
 )
 from fastslow.kernels.simd import lane_steps as step
 from fastslow.kernels.simd.lanes import WIDTH
-from fastslow.simulation.stepper.driver import HANDED_OVER, OUT_OF_WORK, REACHED_END, drive
+from fastslow.simulation.stepper.driver import HANDED_OVER, OUT_OF_WORK, REACHED_END, integrate
 from fastslow.simulation.stepper.extremes import widen_extremes
 from fastslow.simulation.stepper.polynomials import ZERO, take_samples
 from fastslow.simulation.stepper.problems import Problem, Record, Run
@@ -42,7 +42,7 @@ from fastslow.simulation.stepper.workspace import (
 )
 
 #: Trajectories under way at a time, so that some region has one for every lane.
-UNDER_WAY = 8 * WIDTH
+IN_PROGRESS = 8 * WIDTH
 
 #: Steps in lanes before the loop is asked whether to go on.
 IN_LANES = 1000
@@ -125,16 +125,16 @@ def pool_for(problem: Problem, regions: int, n_values: int, count: int) -> Pool:
     """An empty pool for so many runs, with so many parameters."""
     n, n_forcing, order = problem.n_states, problem.n_forcing, problem.order
     rows = n + n_forcing + problem.n_interfaces
-    under_way = min(UNDER_WAY, count)
+    in_progress = min(IN_PROGRESS, count)
     return zeros(
         Pool,
         (1 + n + step.ROWS + 2 * n + rows, WIDTH),
         (n_values + 1 + 2 * rows, WIDTH),
         ((n + n_forcing) * (order + 1), WIDTH),
         WIDTH,
-        (max(1, regions), under_way),
+        (max(1, regions), in_progress),
         max(1, regions),
-        under_way,
+        in_progress,
         WIDTH,
         LEFT + 1,
         (0, 0),
@@ -142,8 +142,8 @@ def pool_for(problem: Problem, regions: int, n_values: int, count: int) -> Pool:
     )
 
 
-@part
-def drive_many(problem, steps, regions, runs, pool, workspace, first, last):
+@kernel
+def integrate_many(problem, steps, regions, runs, pool, workspace, first, last):
     """Follow the trajectories from one number to another to their ends, or to a pause.
 
     Parameters
@@ -163,7 +163,7 @@ def drive_many(problem, steps, regions, runs, pool, workspace, first, last):
     Returns
     -------
     int
-        `REACHED_END`, or why it pauses, as `drive`.
+        `REACHED_END`, or why it pauses, as `integrate`.
     """
     n_states, n_values = problem.n_states, runs.parameters.shape[1]
     rules, times = problem.rules, runs.times
@@ -211,7 +211,7 @@ def drive_many(problem, steps, regions, runs, pool, workspace, first, last):
                 runs.hits[i],
                 runs.seen[i],
             )
-            codes[i] = drive(problem, run, record, workspace, regions)
+            codes[i] = integrate(problem, run, record, workspace, regions)
             left = counted[i, WORK]
             if codes[i] < HANDED_OVER:
                 code = codes[i]
@@ -236,7 +236,7 @@ def drive_many(problem, steps, regions, runs, pool, workspace, first, last):
             for lane in range(WIDTH):
                 i = held[lane]
                 if i >= 0:
-                    put_down(problem, runs, pool, lane, i)
+                    store_lane(problem, runs, pool, lane, i)
                     ready[mode, n_ready[mode]] = i
                     n_ready[mode] += 1
                     held[lane] = -1
@@ -248,9 +248,9 @@ def drive_many(problem, steps, regions, runs, pool, workspace, first, last):
                 n_ready[mode] -= 1
                 count += 1
                 i = held[lane] = ready[mode, n_ready[mode]]
-                take_up(problem, runs, pool, lane, i)
+                load_lane(problem, runs, pool, lane, i)
         if count < WIDTH:
-            copy_into_the_rest(held, rows, given)
+            fill_empty_lanes(held, rows, given)
         allowed = rows[1 + n_states + step.ALLOWED, 0]
         call_address(steps, mode, rows, given, pool.series)
         # the lanes go together, two steps of a trajectory alone in one of theirs
@@ -266,7 +266,7 @@ def drive_many(problem, steps, regions, runs, pool, workspace, first, last):
                 if rows[1 + n_states + step.ALLOWED, lane] < 1.0 and beyond[lane] > 0:
                     allow(rows, lane, n_states, beyond, beyond[lane])
                     continue
-                put_down(problem, runs, pool, lane, i)
+                store_lane(problem, runs, pool, lane, i)
                 held[lane] = -1
                 count -= 1
                 alone[n_alone] = i
@@ -280,7 +280,7 @@ def drive_many(problem, steps, regions, runs, pool, workspace, first, last):
     return code
 
 
-@part
+@kernel
 def allow(rows, lane, n, beyond, steps):
     """Allow a lane so many steps, a part of them at a time."""
     first = min(steps, IN_LANES)
@@ -288,8 +288,8 @@ def allow(rows, lane, n, beyond, steps):
     beyond[lane] = steps - first
 
 
-@part
-def take_up(problem, runs, pool, lane, i):
+@kernel
+def load_lane(problem, runs, pool, lane, i):
     """Give a trajectory a lane."""
     n, rows, given, begin = problem.n_states, pool.rows, pool.given, runs.places[i, 0]
     carried, counted, extremes, since = runs.carried, runs.counted, runs.extremes, runs.since[i]
@@ -315,8 +315,8 @@ def take_up(problem, runs, pool, lane, i):
         given[k, lane] = runs.parameters[i, k]
 
 
-@part
-def put_down(problem, runs, pool, lane, i):
+@kernel
+def store_lane(problem, runs, pool, lane, i):
     """Take a trajectory from its lane."""
     n, rows, places = problem.n_states, pool.rows, runs.places
     carried, counted, extremes = runs.carried, runs.counted, runs.extremes
@@ -339,8 +339,8 @@ def put_down(problem, runs, pool, lane, i):
         carried[i, SIZES + k] = rows[first + k, lane]
 
 
-@part
-def copy_into_the_rest(held, rows, given):
+@kernel
+def fill_empty_lanes(held, rows, given):
     """Put copies of one trajectory into the lanes that hold none."""
     first = 0
     while held[first] < 0:
@@ -353,7 +353,7 @@ def copy_into_the_rest(held, rows, given):
                 given[k, lane] = given[k, first]
 
 
-@part
+@kernel
 def report(problem, runs, pool, workspace, lane, i):
     """Add the samples and the extremes within the last step of a lane."""
     n, order, rows, times = problem.n_states, problem.order, pool.rows, runs.times
@@ -377,7 +377,7 @@ def report(problem, runs, pool, workspace, lane, i):
     rows[1 + n + step.NEXT, lane] = next_time(times, i, counted[i, SAMPLES])
 
 
-@part
+@kernel
 def next_time(times, i, k):
     """When a sample of a trajectory is due, infinite after the last."""
     return times[min(i, times.shape[0] - 1), k] if k < times.shape[1] else np.inf

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastslow.kernels.decorators import part
+from fastslow.kernels.decorators import kernel
 from fastslow.kernels.records import ComplexVector, Matrix, Vector, zeros
 from fastslow.simulation.stepper.polynomials import EPSILON
 
@@ -33,7 +33,7 @@ def spectrum_for(n: int) -> Spectrum:
     return zeros(Spectrum, (n, n), (n, n), (n, n), n + 1, half, half, n)
 
 
-@part
+@kernel
 def contracts(jacobian, n, rate, space):
     """Whether all eigenvalues of the first rows and columns have a real part below -rate.
 
@@ -88,8 +88,8 @@ def contracts(jacobian, n, rate, space):
     return below[0] > 0.0
 
 
-@part
-def forgotten_in(jacobian, n, rate, space):
+@kernel
+def undamped_modulus(jacobian, n, rate, space):
     """The largest modulus of the eigenvalues whose real parts are not below -rate.
 
     Of the first rows and columns. 0 where there is none, NaN where they are not known.
@@ -108,7 +108,7 @@ def forgotten_in(jacobian, n, rate, space):
     return largest
 
 
-@part
+@kernel
 def eigenvalues_of(matrix, n, space):
     """Fill in the eigenvalues of the first rows and columns; whether they are known.
 
@@ -163,7 +163,7 @@ def eigenvalues_of(matrix, n, space):
     return True
 
 
-@part
+@kernel
 def balance(h, n):
     """Scale rows and columns by powers of two, until their lengths are alike."""
     changed = True
@@ -192,7 +192,7 @@ def balance(h, n):
                     h[j, i] *= factor
 
 
-@part
+@kernel
 def to_hessenberg(h, n, v):
     """Bring a matrix to Hessenberg's form by Householder's reflections."""
     for m in range(1, n - 1):
@@ -227,7 +227,7 @@ def to_hessenberg(h, n, v):
             h[i, m - 1] = 0.0
 
 
-@part
+@kernel
 def uncoupled(h, last, size):
     """The row in which the lowest block begins that nothing couples to those above."""
     first = last
@@ -239,7 +239,7 @@ def uncoupled(h, last, size):
     return first
 
 
-@part
+@kernel
 def double_step(h, first, last, x, y, w):
     """One step of Francis in the rows from the first to the last, with two shifts.
 
@@ -296,7 +296,7 @@ def double_step(h, first, last, x, y, w):
             h[i, k] -= total
 
 
-@part
+@kernel
 def factorise_in_place(matrix, n):
     """LU factors with the largest pivots; the last column keeps the exchanges of rows."""
     for k in range(n):
@@ -316,7 +316,7 @@ def factorise_in_place(matrix, n):
     return True
 
 
-@part
+@kernel
 def solve_in_place(factors, right, solution, n):
     """Solve with the factors of `factorise_in_place`; the right-hand side is kept."""
     for i in range(n):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fastslow.kernels.decorators import part
+from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address, call_with
 from fastslow.simulation.stepper.collocation import CollocationStep
 from fastslow.simulation.stepper.polynomials import EPSILON, ONE, ZERO, first_nonzero, first_strong
@@ -13,7 +13,7 @@ from fastslow.simulation.stepper.scales import step_length
 BEGINNING = 1.0 / 16.0
 
 #: How well a mode agrees with an interface that it starts on.
-AGREES, LEANS, RESTS, LEANS_AWAY, DISAGREES = 3, 2, 1, 0, -1
+AGREES, WEAKLY_AGREES, UNDETERMINED, WEAKLY_DISAGREES, DISAGREES = 3, 2, 1, 0, -1
 
 #: No mode agrees; more than one does; the rates of none that could are finite; this is not known
 #: before the code for collocation is there.
@@ -23,7 +23,7 @@ NO_MODE, MANY_MODES, NOT_DEFINED, UNKNOWN_MODE = -1, -2, -3, -4
 MISSING = -1.0
 
 
-@part
+@kernel
 def expand(problem, run, mode, longest, W, scales, space, going_on):
     """Fill ``W`` with polynomials of time from a point on.
 
@@ -56,7 +56,7 @@ def expand(problem, run, mode, longest, W, scales, space, going_on):
     return expanded(problem, run, mode, longest, W, scales, space, going_on)
 
 
-@part
+@kernel
 def expanded(problem, run, mode, longest, W, scales, space, going_on):
     """`expand` where the series is there already."""
     rows = problem.n_states + problem.n_forcing + problem.n_interfaces
@@ -65,11 +65,11 @@ def expanded(problem, run, mode, longest, W, scales, space, going_on):
         space.memory[0] = 0.0
     if length > 0.0:
         return length
-    return instead(problem, run, mode, longest, W, scales, space, going_on)
+    return collocation_fallback(problem, run, mode, longest, W, scales, space, going_on)
 
 
-@part
-def instead(problem, run, mode, longest, W, scales, space, going_on):
+@kernel
+def collocation_fallback(problem, run, mode, longest, W, scales, space, going_on):
     """Call `collocate`: apart, so that the common case stays short."""
     if problem.collocation == 0:
         return MISSING
@@ -77,7 +77,7 @@ def instead(problem, run, mode, longest, W, scales, space, going_on):
     return call_with(problem.collocation, step)
 
 
-@part
+@kernel
 def scaled(W, row, order, h, b):
     """Scale the coefficients of one row to the step, and sum their moduli but the first."""
     power = 1.0
@@ -90,15 +90,15 @@ def scaled(W, row, order, h, b):
     return total
 
 
-@part
+@kernel
 def interface_noise(problem, run, j, gradient):
     """Size of h that is rounding error, from the moduli of its terms; fills the gradient."""
     call_address(problem.series, problem.n_modes + j, run.inputs, run.parameters, gradient)
     return 8.0 * EPSILON * gradient[1]
 
 
-@part
-def across(signs, mode, j):
+@kernel
+def neighbour_mode(signs, mode, j):
     """The mode on the other side of one interface, the same mode where there is none."""
     for other in range(signs.shape[0]):
         alike = signs[mode, j] != 0 and signs[other, j] == -signs[mode, j]
@@ -109,8 +109,8 @@ def across(signs, mode, j):
     return mode
 
 
-@part
-def leaves(problem, W, j, side, longest, scales, noise):
+@kernel
+def departs(problem, W, j, side, longest, scales, noise):
     """Whether a motion from an interface goes to one side at once, by its drift.
 
     Where the rates are continuous it does so in no other mode, as `choose_mode`
@@ -126,7 +126,7 @@ def leaves(problem, W, j, side, longest, scales, noise):
     return drift * side * BEGINNING * length > noise[j]
 
 
-@part
+@kernel
 def agreement(b, order, noise, side):
     """How the motion away from an interface agrees with one side of it.
 
@@ -138,11 +138,11 @@ def agreement(b, order, noise, side):
         return AGREES if b[k] * side > 0.0 else DISAGREES
     k = first_nonzero(b, ONE, order)
     if k <= order:
-        return LEANS if b[k] * side > 0.0 else LEANS_AWAY
-    return RESTS
+        return WEAKLY_AGREES if b[k] * side > 0.0 else WEAKLY_DISAGREES
+    return UNDETERMINED
 
 
-@part
+@kernel
 def choose_mode(problem, run, current, longest, W, scales, search, space):
     """The mode in which the solution goes on.
 
@@ -213,7 +213,9 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
                 else:
                     row, several = bounds_of(signs, mode, j, drift)
                     length = BEGINNING * shared
-                    score = min(score, slides(W, row, several, order, length, noise[j], b))
+                    score = min(
+                        score, sliding_agreement(W, row, several, order, length, noise[j], b)
+                    )
             if score > best_score:
                 best, best_score, equals = mode, score, 1
             elif score == best_score and best != NO_MODE:
@@ -226,7 +228,7 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
     return NOT_DEFINED if broken and best_score <= DISAGREES else best
 
 
-@part
+@kernel
 def bounds_of(signs, mode, j, first):
     """The first of the two rows that bound sliding along an interface, and whether others slide.
 
@@ -240,8 +242,8 @@ def bounds_of(signs, mode, j, first):
     return first + 2 * before, count > 1
 
 
-@part
-def slides(W, row, several, order, h, noise, b):
+@kernel
+def sliding_agreement(W, row, several, order, h, noise, b):
     """Whether sliding goes on along an interface: its two bounds have opposite signs, now or next.
 
     Along a single interface these are the drifts on both sides, and both point at the
@@ -253,7 +255,7 @@ def slides(W, row, several, order, h, noise, b):
     columns = order + 1
     small = 32.0 * EPSILON * (abs(W[row * columns]) + abs(W[(row + 1) * columns]))
     small = max(small, noise / h)
-    turned = turned_round(W, row, several, columns)
+    turned = orientation(W, row, several, columns)
     for k in range(2):
         scaled(W, row + k, order, h, b)
         first = first_strong(b, ZERO, order, small)
@@ -262,7 +264,7 @@ def slides(W, row, several, order, h, noise, b):
     return AGREES
 
 
-@part
-def turned_round(W, row, several, columns):
+@kernel
+def orientation(W, row, several, columns):
     """−1 where the first of two bounds is the positive one, else 1."""
     return -1.0 if several and W[row * columns] > W[(row + 1) * columns] else 1.0

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fastslow.kernels.decorators import part
+from fastslow.kernels.decorators import kernel
 from fastslow.kernels.vectors import horner_of_four
 
 EPSILON = float(np.finfo(float).eps)
@@ -28,7 +28,7 @@ ZERO: Any = np.int64(0)
 ONE: Any = np.int64(1)
 
 
-@part
+@kernel
 def horner(b, first, last, s):
     """Value of sum b_k s**(k - first) over first <= k <= last."""
     if last - first < 2:
@@ -44,7 +44,7 @@ def horner(b, first, last, s):
     return even * s + odd
 
 
-@part
+@kernel
 def take_samples(W, columns, step, times, out, first, offsets):
     """Evaluate rows of a step at all the times in it, from the first on; returns the next.
 
@@ -72,7 +72,7 @@ def take_samples(W, columns, step, times, out, first, offsets):
     return first
 
 
-@part
+@kernel
 def sample(W, columns, s, out, first):
     """Evaluate rows of a step at the offsets s, into the columns of ``out`` from the first."""
     n, rows = s.shape[0], out.shape[0]
@@ -84,7 +84,7 @@ def sample(W, columns, s, out, first):
             out[i, first + c] = horner(W, i * columns, last, s[c])
 
 
-@part
+@kernel
 def slope(b, first, last, s):
     """Derivative by s of the same sum."""
     value = 0.0
@@ -93,7 +93,7 @@ def slope(b, first, last, s):
     return value
 
 
-@part
+@kernel
 def curvature(b, order, s):
     """Second derivative by s of sum b_k s**k."""
     value = 0.0
@@ -102,13 +102,13 @@ def curvature(b, order, s):
     return value
 
 
-@part
-def kept_away(c, first, last, h):
+@kernel
+def bounded_away(c, first, last, h):
     """Whether |c_0| > sum |c_k| h**k, so that there is no root on [0, h]."""
     return abs(c[first]) > reach(c, first, last, h)
 
 
-@part
+@kernel
 def reach(c, first, last, h):
     """The sum of |c_k| h**(k - first) over first < k <= last."""
     square = h * h
@@ -121,7 +121,7 @@ def reach(c, first, last, h):
     return (even * square + abs(c[first + 1])) * h + odd * square
 
 
-@part
+@kernel
 def excluded(b, first, last):
     """Whether the coefficients alone prove that there is no root on (0, 1]."""
     rest = 0.0
@@ -130,7 +130,7 @@ def excluded(b, first, last):
     return abs(b[first]) > rest
 
 
-@part
+@kernel
 def to_bernstein(b, first, n, stack):
     """Bernstein coefficients on [0, 1] of sum b_k s**(k - first), then its begin and width."""
     # divide by the binomials, then sum as in Pascal's triangle
@@ -151,7 +151,7 @@ def to_bernstein(b, first, n, stack):
     stack[0, n + 2] = 1.0
 
 
-@part
+@kernel
 def halve(stack, row, n):
     """Halve an interval by de Casteljau; its left half goes on top of the stack."""
     for j in range(n + 1):
@@ -170,7 +170,7 @@ def halve(stack, row, n):
     stack[row + 1, n + 1], stack[row + 1, n + 2] = begin, half
 
 
-@part
+@kernel
 def first_root(b, first, last, noise, stack):
     """First root on (0, 1] of sum b_k s**(k - first), and whether it is a touch.
 
@@ -228,7 +228,7 @@ def first_root(b, first, last, noise, stack):
     return 2.0, False
 
 
-@part
+@kernel
 def refine(b, first, last, low, high):
     """The root of a sign change on [low, high] to rounding: Newton, kept inside the bracket."""
     at_low = horner(b, first, last, low)
@@ -265,7 +265,7 @@ def refine(b, first, last, low, high):
     return s
 
 
-@part
+@kernel
 def first_strong(b, first, last, noise):
     """Index of the first coefficient above the noise, last + 1 when none is."""
     for k in range(first, last + 1):
@@ -274,7 +274,7 @@ def first_strong(b, first, last, noise):
     return last + 1
 
 
-@part
+@kernel
 def first_nonzero(b, first, last):
     """Index of the first coefficient that is not exactly zero, last + 1 when none is."""
     return first_strong(b, first, last, 0.0)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial import Polynomial, legendre
 from numpy.typing import NDArray
 
-from fastslow.kernels.decorators import part
+from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address
 from fastslow.kernels.records import (
     ComplexMatrix,
@@ -194,7 +194,7 @@ class RadauStep(NamedTuple):
     space: Radau
 
 
-@part
+@kernel
 def radau_step(step):
     """One step; its polynomials are put into ``poly``; returns its error in units of ``tol``.
 
@@ -345,17 +345,17 @@ def radau_step(step):
     now, then = carried[1 : 1 + 2 * n], carried[1 + 2 * n :]
     if n_fast > 0:
         if not last > 0.0:
-            in_order(jacobian, n_fast, now, space.spectrum)
+            sorted_eigenvalues(jacobian, n_fast, now, space.spectrum)
         jacobian_at(problem, run, mode, space)
-        in_order(jacobian, n_fast, then, space.spectrum)
-        unresolved = in_doubt(now, then, n_fast, rate, h) * h
+        sorted_eigenvalues(jacobian, n_fast, then, space.spectrum)
+        unresolved = unresolved_modulus(now, then, n_fast, rate, h) * h
         if not unresolved <= FOLLOWED:
             # as an error of this order, so that the next attempt is as short as it must be
             return (unresolved / FOLLOWED) ** (STAGES + 1) if unresolved < np.inf else np.inf
     return error
 
 
-@part
+@kernel
 def accept(problem, run, mode, h, poly, right, space):
     """Go on from a step: values and rates at its end are put into ``right``."""
     n, point = problem.n_states, space.point
@@ -371,7 +371,7 @@ def accept(problem, run, mode, h, poly, right, space):
         space.phase[1 + i] = space.phase[1 + 2 * n + i]
 
 
-@part
+@kernel
 def value_at(poly, row, s):
     """A polynomial of one row."""
     value = 0.0
@@ -380,7 +380,7 @@ def value_at(poly, row, s):
     return value
 
 
-@part
+@kernel
 def slope_at(poly, row, s):
     """Its derivative."""
     value = 0.0
@@ -389,7 +389,7 @@ def slope_at(poly, row, s):
     return value
 
 
-@part
+@kernel
 def jacobian_at(problem, run, mode, space):
     """The derivatives of the rates by the states at a point, column by column."""
     n, columns, out = problem.n_states, problem.order + 1, space.out
@@ -402,8 +402,8 @@ def jacobian_at(problem, run, mode, space):
             space.jacobian[i, k] = 2.0 * out[i * columns + 2]
 
 
-@part
-def in_order(jacobian, n, found, spectrum):
+@kernel
+def sorted_eigenvalues(jacobian, n, found, spectrum):
     """Real parts of the eigenvalues, in descending order, then their moduli, NaN where unknown."""
     if not eigenvalues_of(jacobian, n, spectrum):
         for i in range(found.shape[0]):
@@ -418,8 +418,8 @@ def in_order(jacobian, n, found, spectrum):
         found[place], found[n + place] = values[i].real, abs(values[i])
 
 
-@part
-def in_doubt(now, then, n, rate, h):
+@kernel
+def unresolved_modulus(now, then, n, rate, h):
     """The largest modulus of the eigenvalues of modes that a step must follow.
 
     Of those that do not decay at the given rate, nor by the exponent `FOLLOWED` within the step,
@@ -429,7 +429,7 @@ def in_doubt(now, then, n, rate, h):
     Parameters
     ----------
     now, then : float64 arrays, shape (2 n,)
-        From `in_order`, at the beginning and end of the step.
+        From `sorted_eigenvalues`, at the beginning and end of the step.
     """
     largest = 0.0
     for k in range(n):

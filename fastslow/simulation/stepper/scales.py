@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.kernels.decorators import part
+from fastslow.kernels.decorators import kernel
 
 #: Rows of the array of sizes: at the beginning of this step, and what the run has reached.
 NOW, REACHED = 0, 1
@@ -53,7 +53,7 @@ def rules_of(
     return np.stack([np.concatenate([fixed, nothing]), np.concatenate([lasting, others])])
 
 
-@part
+@kernel
 def step_length(W, n_rows, order, tol, scales):
     """The step whose last terms are as large as the tolerance (Jorba and Zou 2005).
 
@@ -103,7 +103,7 @@ def step_length(W, n_rows, order, tol, scales):
     return length
 
 
-@part
+@kernel
 def own_length(W, row, order, tol):
     """The step whose last terms are the tolerance times the largest of the leading ones."""
     length = np.inf
@@ -120,7 +120,7 @@ def own_length(W, row, order, tol):
     return length
 
 
-@part
+@kernel
 def within(W, row, h):
     """The largest of the leading terms of a row within a step; infinite lengths count as 0."""
     size = abs(W[row])
@@ -132,7 +132,7 @@ def within(W, row, h):
     return size
 
 
-@part
+@kernel
 def raise_sizes(W, n_rows, order, tol, room, rules, scales):
     """Let every size that follows the run be at least what the row's series gives it."""
     columns = order + 1
@@ -146,14 +146,14 @@ def raise_sizes(W, n_rows, order, tol, room, rules, scales):
                 scales[REACHED, i] = max(scales[REACHED, i], size)
 
 
-@part
+@kernel
 def remember_sizes(rules, scales):
     """Go on from a step: what the run has reached after it."""
     for i in range(rules.shape[1]):
         scales[REACHED, i] = max(rules[FIXED, i], rules[LASTING, i] * scales[NOW, i])
 
 
-@part
+@kernel
 def flush(rules, inputs, n_states):
     """Let a state be zero that is measured by itself alone and has no digits left."""
     for i in range(n_states):
@@ -161,7 +161,7 @@ def flush(rules, inputs, n_states):
             inputs[1 + i] = 0.0
 
 
-@part
+@kernel
 def ratio_of(error, allowed):
     """An error in units of what is allowed; nothing is allowed in what is and stays zero."""
     if error == 0.0:

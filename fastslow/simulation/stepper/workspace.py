@@ -47,7 +47,7 @@ def beginnings(
     n_forcing: int,
     rules: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """What `drive` carries from step to step, of several runs at their beginnings.
+    """What `integrate` carries from step to step, of several runs at their beginnings.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def beginnings(
 
 
 class Workspace(NamedTuple):
-    """Work space of `drive`, for one run after the other; one that paused goes on in its own.
+    """Work space of `integrate`, for one run after the other; one that paused goes on in its own.
 
     Parameters
     ----------
