@@ -1,1 +1,1 @@
-"""How any curve F(u) = 0 is traced; knows no model."""
+"""Numerical continuation of curves F(u) = 0, independent of any model."""

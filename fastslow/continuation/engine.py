@@ -1,7 +1,7 @@
-"""The compiled loop: pseudo-arclength along a curve F(u) = 0 inside one region.
+"""Compiled pseudo-arclength continuation of a curve F(u) = 0 inside one region.
 
-Keller (1977). The loop knows a curve only by the address of a function that
-fills F, its Jacobian, and switching functions h with their gradients.
+Keller (1977). A curve is given by the address of a function that fills in F, its
+Jacobian, and the switching functions h with their gradients.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from fastslow.continuation.spaces import (
 from fastslow.kernels.decorators import unfused_kernel
 from fastslow.kernels.pointers import call_address
 
-#: A state is measured by this part of its distance from the middle of the equilibria at which
-#: branches start, once that exceeds its unit: a branch to infinity has rows equal in log(x).
+#: A state is scaled by this fraction of its distance from the centre of the starting equilibria,
+#: once that exceeds its unit: a branch to infinity has rows equally spaced in log(x).
 FAR = 0.5
 
-#: By how much the largest step may grow where a state is so far away.
+#: Maximum growth of the largest step where a state is far away.
 GROWTH = 10.0
 
-#: Newton's method may move a prediction by this part of the step. A smooth curve that turns by
-#: the angle a in one step is off its tangent by a/2 of it; farther off is another curve.
+#: Maximum Newton displacement of a prediction, as a fraction of the step. A smooth curve that
+#: turns by the angle a in one step deviates from its tangent by a/2; more is another curve.
 ASIDE = 0.2
 
-#: Half way between two points, Newton's method moves the cubic through both by less than this
-#: part of the step: if not, the second point is on another curve, over a fold or a pole.
+#: Maximum Newton displacement of the cubic midpoint between two points, as a fraction of the
+#: step: beyond it the second point is on another curve, across a fold or a pole.
 BETWEEN = 0.01
 
-#: How far beyond an edge of the window, in units of its state, a branch tangent to it may be.
+#: Tolerance for a branch tangent to an edge of the window, in units of the state.
 TANGENT = 1e-9
 
 
@@ -45,7 +45,7 @@ TANGENT = 1e-9
 def solve(matrix, right):  # type: ignore[no-untyped-def]
     """Solve a small dense system in place by elimination with row pivoting.
 
-    Returns False, with the arrays spoiled, when a pivot is zero or not finite.
+    Returns False, with the arrays overwritten, if a pivot is zero or not finite.
     """
     size = right.shape[0]
     for k in range(size):
@@ -95,7 +95,7 @@ def _norm(vector, weight):  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def _dips(h0, s0, h1, s1):  # type: ignore[no-untyped-def]
-    """Whether the cubic through two positive values with given slopes is negative between."""
+    """Check whether the cubic through two positive values with given slopes becomes negative."""
     if not (s0 < 0.0 < s1):
         return False
     a = 2.0 * (h0 - h1) + s0 + s1
@@ -112,13 +112,13 @@ def _dips(h0, s0, h1, s1):  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def _local_weight(point, weight, middle, local):  # type: ignore[no-untyped-def]
-    """Fill the weights at a point; returns how many units the farthest state is away."""
+    """Fill in the weights at a point; return the distance of the farthest state in its unit."""
     farthest = 1.0
     for j in range(point.shape[0]):
         local[j] = weight[j]
         if j < middle.shape[0]:
             away = FAR * abs(point[j] - middle[j]) * math.sqrt(weight[j])
-            # a periodic state has no middle (NaN) and is never far away
+            # a periodic state has no centre (NaN) and is never far away
             if away > 1.0:
                 local[j] = weight[j] / (away * away)
                 farthest = max(farthest, away)
@@ -127,7 +127,7 @@ def _local_weight(point, weight, middle, local):  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-def]
-    """Follow one curve inside one region until something ends it, or to a pause.
+    """Trace one curve inside one region to its end, or to a pause.
 
     Parameters
     ----------
@@ -135,13 +135,13 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
     region : Region
     stepping : Stepping
     traced : Traced
-        Changed here.
+        Updated in place.
     space : TraceSpace
 
     Returns
     -------
     int
-        What ended it, or PAUSED. With RANGE, INTERFACE and WINDOW the last row lies beyond
+        The kind of end, or PAUSED. With RANGE, INTERFACE and WINDOW the last row is beyond
         the end.
     """
     address, mode, parameters = curve
@@ -222,7 +222,7 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
             aside = _norm(right, local)
             accepted = cosine > widest and aside <= max(ASIDE, turn) * step
         if accepted and step > 4.0 * smallest:
-            # where Newton's method has left for another curve, nothing lies between the two
+            # if Newton's method has converged to another curve, the midpoint is on neither
             for j in range(size):
                 bend = direction[j] * unit - turned[j] * new_unit
                 middle_point[j] = 0.5 * (last[j] + guess[j]) + 0.125 * step * bend
@@ -252,7 +252,7 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
                     before = step * unit * direction[i]
                     after = step * new_unit * turned[i]
                     if not (before < 0.0 < after or after < 0.0 < before):
-                        # no turn, and so no dip
+                        # no extremum, and so no dip
                         continue
                     slack = TANGENT / math.sqrt(local[i])
                     if guess[i] > low[i] and _dips(

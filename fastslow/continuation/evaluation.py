@@ -1,4 +1,4 @@
-"""Compiled evaluation along curves: rates, tests at rows, Newton at a condition."""
+"""Compiled evaluation along curves: rates, test functions at rows, Newton's method."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ EPS = 2.220446049250313e-16
 
 @unfused_kernel
 def evaluate(address, modes, points, parameters, out):  # type: ignore[no-untyped-def]
-    """Fill in the output of the generated function at every row of points, shape (N, width)."""
+    """Evaluate the generated function at every row of ``points`` into ``out``, shape (N, width)."""
     for k in range(points.shape[0]):
         call_address(address, modes[k], points[k], parameters, out[k])
 
 
 @unfused_kernel
 def value_at(address, mode, point, parameters, out):  # type: ignore[no-untyped-def]
-    """Fill in the output of the generated function at one point, shape (width,)."""
+    """Evaluate the generated function at one point into ``out``, shape (width,)."""
     call_address(address, mode, point, parameters, out)
 
 
@@ -34,12 +34,12 @@ def newton_from(  # type: ignore[no-untyped-def]
 ):
     """Newton's method at a fixed last component from many starts.
 
-    A step longer than ten times the state's size, in the units, is shortened to it.
+    A step longer than ten times the size of the state, in its units, is shortened to it.
 
     Parameters
     ----------
     states : ndarray, shape (m, n)
-        The starts; where each leads is put in its place.
+        Initial guesses, replaced by the results.
     converged : ndarray of bool, shape (m,)
         Filled in.
     """
@@ -84,15 +84,15 @@ def refine(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     u : ndarray, shape (n + 1,)
-        The start; the solution is put in its place.
+        Initial guess, replaced by the solution.
     row : int
-        Number of the switching function that vanishes; -1 for the plane through
-        ``point`` with ``normal``.
+        Number of the switching function to vanish; -1 for the plane through ``point`` with
+        ``normal``.
 
     Returns
     -------
     residual, size : float
-        Of the equations, and of the last correction in units of the scale.
+        Residual of the equations, and size of the last correction in units of the scale.
     converged : bool
     """
     address, mode, parameters = curve
@@ -141,7 +141,7 @@ def refine(  # type: ignore[no-untyped-def]
         for j in range(columns):
             u[j] += right[j] * scale[j]
             size = max(size, abs(right[j]))
-    # as `flush_to_zero` and `grown` have it
+    # as in `flush_to_zero` and `grown`
     for j in range(columns):
         flushed[j] = 0.0 if abs(u[j]) < FLUSH_THRESHOLD * scale[j] else u[j]
     call_address(address, mode, flushed, parameters, out)
@@ -177,18 +177,18 @@ def refine(  # type: ignore[no-untyped-def]
 def correct(  # type: ignore[no-untyped-def]
     curve, points, scales, natural, limits, m, iterations, plain, space
 ):
-    """Newton's method at a fixed last component, and whether it plainly solved the equations.
+    """Newton's method at a fixed last component, with strict tests of the solutions.
 
     Parameters
     ----------
     points : ndarray, shape (N, n + 1)
-        The starts; where each leads is put in its place.
+        Initial guesses, replaced by the results.
     scales : ndarray, shape (N, n + 1)
     natural : ndarray, shape (N, n)
         Natural size of each equation.
     limits : Limits
     plain : ndarray of bool, shape (N,)
-        Filled in; of the others nothing is known.
+        Filled in: whether a solution passed all tests; the others are undecided.
     """
     address, mode, parameters = curve
     out, start, normal = space.out, space.beside, space.constant
@@ -218,7 +218,7 @@ def correct(  # type: ignore[no-untyped-def]
 def survey(  # type: ignore[no-untyped-def]
     curve, points, tangents, scale, reach, vertical, branching, turning, jacobians, space
 ):
-    """What is tested at every row of a piece.
+    """Evaluate the test functions at every row of a traced segment.
 
     Parameters
     ----------
@@ -279,12 +279,12 @@ def survey(  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def signed_distance(matrix, least, right):  # type: ignore[no-untyped-def]
-    """Size of a matrix's smallest singular value, with the sign of its determinant.
+    """Estimate of the smallest singular value, with the sign of the determinant.
 
-    The rows are brought to length one, so that neither depends on units or on the
-    number of rows, except that a row is never divided by less than ``least``: one that
-    vanishes makes the matrix singular. The size is 1/|A⁻¹ b| for a fixed vector b of length
-    one, at least the smallest singular value and zero with it. The matrix is spoiled.
+    The rows are normalised, so that the result depends neither on units nor on the number
+    of rows, except that no row is divided by less than ``least``: a vanishing row makes the
+    matrix singular. The estimate is 1/|A⁻¹ b| for a fixed unit vector b, an upper bound of
+    the smallest singular value that vanishes with it. The matrix is overwritten.
     """
     size = matrix.shape[0]
     total = 0.0
@@ -301,7 +301,7 @@ def signed_distance(matrix, least, right):  # type: ignore[no-untyped-def]
         for j in range(size):
             matrix[i, j] /= largest
             squares += matrix[i, j] * matrix[i, j]
-        # the least length counts as one entry of it
+        # the minimum length counts as one entry
         for j in range(size):
             matrix[i, j] /= max(math.sqrt(squares), 1.0)
         # in general position: no symmetry of a model makes it orthogonal to a null vector
@@ -343,7 +343,7 @@ def signed_distance(matrix, least, right):  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def eigenvalues_of_2x2(jacobians, result):  # type: ignore[no-untyped-def]
-    """Fill in the eigenvalues of 2×2 matrices as LAPACK's dlanv2 finds them, shape (N, 2)."""
+    """Compute the eigenvalues of 2×2 matrices as LAPACK's dlanv2 does, shape (N, 2)."""
     count = jacobians.shape[0]
     for k in range(count):
         a, b = jacobians[k, 0, 0], jacobians[k, 0, 1]
@@ -369,9 +369,9 @@ def _modulus(value):  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def eigenvalue_pair_sums(pairs, rounding, result):  # type: ignore[no-untyped-def]
-    """Fill in the relative sums of two eigenvalues each, shape (N, 2).
+    """Compute the relative sums of pairs of eigenvalues.
 
-    0 where a sum is so to rounding, or they are no pair or not finite.
+    0 if a sum vanishes to rounding, or the values are no pair or not finite.
     """
     for k in range(pairs.shape[0]):
         one, other = pairs[k, 0], pairs[k, 1]
@@ -382,7 +382,7 @@ def eigenvalue_pair_sums(pairs, rounding, result):  # type: ignore[no-untyped-de
         first = _modulus(one)
         second = first if other == one.conjugate() else _modulus(other)
         noise = rounding * 2.0 * max(first, second)
-        # of a complex pair the noise is that of the real part
+        # for a complex pair the noise is that of the real part
         if one.imag != 0.0 or other.imag != 0.0:
             noise *= 2.0
         if abs(total) >= noise:
@@ -391,13 +391,13 @@ def eigenvalue_pair_sums(pairs, rounding, result):  # type: ignore[no-untyped-de
 
 @unfused_kernel
 def _alike(one, other):  # type: ignore[no-untyped-def]
-    """Whether two numbers have the same sign, neither being zero."""
+    """Check whether two numbers have the same nonzero sign."""
     return (one > 0.0 and other > 0.0) or (one < 0.0 and other < 0.0)
 
 
 @unfused_kernel
 def _fall(test, length, row):  # type: ignore[no-untyped-def]
-    """How fast the modulus of a test falls on the step after a row; NaN where its sign changes."""
+    """Rate of decrease of the modulus of a test on a step; NaN at a change of sign."""
     if not (_alike(test[row], test[row + 1]) and length[row] > 0.0):
         return np.nan
     return (abs(test[row]) - abs(test[row + 1])) / length[row]
@@ -405,25 +405,25 @@ def _fall(test, length, row):  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def possible_double_zeros(test, length, share, found):  # type: ignore[no-untyped-def]
-    """Rows after which a test that keeps its sign may reach zero and turn back.
+    """Find the steps in which a test function without a change of sign may touch zero.
 
-    The chords of both neighbouring steps are extended into the step: where the
-    modulus is convex they lie below it.
+    The chords of both neighbouring steps are extended into the step: for a convex modulus
+    they are lower bounds.
 
     Parameters
     ----------
     test : ndarray, shape (N,)
     length : ndarray, shape (N - 1,)
-        Of every step.
+        Length of every step.
     share : float
-        The part of the smaller of its two values to which the modulus must be able to fall.
+        Fraction of the smaller end value that the bound must fall below.
     found : ndarray of int, shape (N - 1,)
-        Filled in.
+        Rows before these steps, filled in.
 
     Returns
     -------
     int
-        How many.
+        Their number.
     """
     number = 0
     steps = length.shape[0]
@@ -433,13 +433,13 @@ def possible_double_zeros(test, length, share, found):  # type: ignore[no-untype
         left, right, step = abs(test[row]), abs(test[row + 1]), length[row]
         falls = _fall(test, length, row - 1) if row > 0 else np.nan
         rises = -_fall(test, length, row + 1) if row + 1 < steps else np.nan
-        # a slope that is not known leaves it to the other one
+        # with one unknown slope the other one decides
         if falls != falls and rises > 0.0:
             least = right - rises * step
         elif rises != rises and falls > 0.0:
             least = left - falls * step
         elif falls > 0.0 and rises > 0.0:
-            # where the two lines meet, within the step or at its nearer end
+            # intersection of the two lines, within the step or at its nearer end
             meet = (left - right + rises * step) / (falls + rises)
             meet = 0.0 if meet < 0.0 else step if meet > step else meet
             one, other = left - falls * meet, right - rises * (step - meet)
@@ -454,7 +454,7 @@ def possible_double_zeros(test, length, share, found):  # type: ignore[no-untype
 
 @unfused_kernel
 def nearby_chords(points, scale, u, within, found, apart):  # type: ignore[no-untyped-def]
-    """Chords of a curve that are nearest to a point, each nearer than its two neighbours.
+    """Find the chords of a curve nearest to a point, each nearer than its two neighbours.
 
     Parameters
     ----------
@@ -466,7 +466,7 @@ def nearby_chords(points, scale, u, within, found, apart):  # type: ignore[no-un
     Returns
     -------
     int
-        How many.
+        Their number.
     """
     count, columns = points.shape
     for k in range(count - 1):

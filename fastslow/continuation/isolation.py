@@ -1,10 +1,10 @@
 """Compiled isolation of all real solutions of a square polynomial system in boxes.
 
 Subdivision in the Bernstein basis (Sherbrooke & Patrikalakis 1993; Garloff & Smith 2001): a box
-holds no solution where the coefficients of one polynomial, or of one preconditioned by the
-inverse Jacobian at the middle, have one sign. It holds exactly one where Krawczyk's operator
-(Krawczyk 1969; Neumaier 1990, theorem 5.1.8) maps the slightly larger box into itself. Rounding
-is bounded along with the coefficients, so that it excludes nothing.
+contains no solution if the coefficients of one polynomial, or of one preconditioned by the
+inverse Jacobian at the centre, have one sign. It contains exactly one if the Krawczyk operator
+(Krawczyk 1969; Neumaier 1990, theorem 5.1.8) maps a slightly larger box into itself. Rounding
+errors are bounded along with the coefficients, so that no solution is lost.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ import numpy as np
 from fastslow.continuation.spaces import PAUSED, TABLE_FULL
 from fastslow.kernels.decorators import unfused_kernel
 
-#: By how much a box is enlarged on either side before Krawczyk's test, in units of its width.
-#: A solution on the face of two boxes is then inside both.
+#: Enlargement of a box on either side for Krawczyk's test, in units of its width: a solution on
+#: a common face is then inside both boxes.
 MARGIN = 0.1
 
-#: An interval of one sign is divided at its geometric mean as long as its ends differ by more.
+#: An interval of one sign with a larger ratio of its ends is divided at its geometric mean.
 RATIO = 4.0
 
-#: Where other intervals are divided: not in the middle, on which solutions often lie.
+#: Cut of other intervals: not the midpoint, where solutions are common.
 CUT = 0.4871
 
 #: Rounding of one operation.
@@ -30,7 +30,7 @@ EPS = 2.220446049250313e-16
 
 @unfused_kernel
 def _least(values):  # type: ignore[no-untyped-def]
-    """The least of several numbers, NaN if one is."""
+    """Minimum, NaN if any value is NaN."""
     found = values[0]
     for k in range(values.shape[0]):
         if not values[k] >= found:
@@ -42,7 +42,7 @@ def _least(values):  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def _greatest(values):  # type: ignore[no-untyped-def]
-    """The greatest of several numbers, NaN if one is."""
+    """Maximum, NaN if any value is NaN."""
     found = values[0]
     for k in range(values.shape[0]):
         if not values[k] <= found:
@@ -86,7 +86,7 @@ def _along(matrix, degree, stride, tensor, scratch):  # type: ignore[no-untyped-
 
 @unfused_kernel
 def _converted(power, degrees, low, high, out, error, space):  # type: ignore[no-untyped-def]
-    """Bernstein coefficients on a box of polynomials given by powers, and their rounding."""
+    """Convert polynomials from the power to the Bernstein basis on a box, with error bounds."""
     equations, size = power.shape
     matrix, scratch, sizes = space.conversion, space.scratch, space.moduli
     strides, table = space.strides, space.table
@@ -118,7 +118,7 @@ def _converted(power, degrees, low, high, out, error, space):  # type: ignore[no
 
 @unfused_kernel
 def _halves(tensor, degree, stride, cut, left):  # type: ignore[no-untyped-def]
-    """De Casteljau: the part above the cut in place, the part below into ``left``."""
+    """De Casteljau subdivision: the upper part in place, the lower part into ``left``."""
     size = tensor.shape[0]
     block = stride * (degree + 1)
     for first in range(0, size, block):
@@ -133,7 +133,7 @@ def _halves(tensor, degree, stride, cut, left):  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def _inverted(matrix, inverse):  # type: ignore[no-untyped-def]
-    """Inverse by elimination with row pivots; False where it is singular to rounding."""
+    """Inverse by elimination with row pivoting; False if singular to rounding."""
     n = matrix.shape[0]
     for i in range(n):
         largest = 0.0
@@ -169,7 +169,7 @@ def _inverted(matrix, inverse):  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def _deviation(tensor, degrees, strides, row, width, rounding, deviation):  # type: ignore[no-untyped-def]
-    """Bounds on row ``row`` of |G' − I| over a box of a width, from coefficients of G."""
+    """Bounds on row ``row`` of |G' − I| over a box, from the coefficients of G."""
     size = tensor.shape[0]
     for m in range(degrees.shape[0]):
         d = degrees[m]
@@ -189,14 +189,14 @@ def isolate(  # type: ignore[no-untyped-def]
     power, degrees, low, high, logarithmic, floor, tolerance, budget, large, small, share,
     stack, solutions, clusters, progress, space,
 ):  # fmt: skip
-    """Every solution of N polynomial equations in N unknowns inside boxes, or a pause.
+    """Isolate all solutions of N polynomial equations in N unknowns inside boxes, or pause.
 
     Parameters
     ----------
     power : ndarray, shape (N, S)
-        Coefficients of powers, the last unknown running fastest, S = ∏ (degree + 1).
+        Power coefficients, the last unknown varying fastest, S = ∏ (degree + 1).
     degrees : ndarray of int, shape (N,)
-        Of all equations in each unknown.
+        Maximum degree in each unknown.
     low, high : ndarray, shape (B, N)
         The boxes.
     logarithmic : ndarray of bool, shape (N,)
@@ -204,33 +204,32 @@ def isolate(  # type: ignore[no-untyped-def]
     floor : ndarray, shape (N,)
         Size of each unknown below which ``tolerance`` is absolute.
     tolerance : float
-        Width of a box along one of the unknowns, in units of its place, at which it is not
-        divided further.
+        Relative width of a box along one of the unknowns at which it is not divided further.
     budget : int
-        Boxes that are looked at.
+        Maximum number of boxes processed.
     large : int
         Number of the unknown that is the inverse of a large one, or -1.
     small : ndarray of bool, shape (N,)
-        Unknowns that are looked at up to ``share`` times the large one only.
+        Unknowns that are searched up to ``share`` times the large one only.
     share : float
     stack : tuple of ndarray
-        Memory for the boxes that wait: coefficients (B, N, S), their rounding (B, N), and the
-        two corners (B, N).
+        Memory for the waiting boxes: coefficients (B, N, S), their rounding errors (B, N), and
+        the two corners (B, N).
     solutions : ndarray, shape (R, N)
-        Filled in: each in a box of its own, accurate to Krawczyk's operator; some are given
+        Filled in: one for each isolating box, accurate to the Krawczyk operator; some occur
         twice.
     clusters : ndarray, shape (C, 2, N)
-        Filled in: boxes with nothing proved, at the tolerance or at rounding, around multiple
-        solutions and along what runs to infinity.
+        Filled in: undecided boxes, at the tolerance or at rounding, around multiple solutions
+        and along solution sets that extend to infinity.
     progress : ndarray of int64, shape (6,)
-        At first zeros: boxes begun, boxes that wait, solutions, clusters, and boxes looked at,
-        above the budget where it did not suffice; last how many to look at before a pause.
+        Initially zeros: boxes started, boxes waiting, solutions, clusters, and boxes processed,
+        above the budget if it did not suffice; last the number to process before a pause.
     space : IsolationSpace
 
     Returns
     -------
     int
-        0, `PAUSED`, or `TABLE_FULL` where there is no room for a solution or cluster more.
+        0, `PAUSED`, or `TABLE_FULL` if there is no space for another solution or cluster.
     """
     n = degrees.shape[0]
     size = power.shape[1]
@@ -241,7 +240,7 @@ def isolate(  # type: ignore[no-untyped-def]
         stride *= degrees[m] + 1
         most = max(most, degrees[m])
     _binomials(most, table)
-    # value and derivatives at the middle of the unit box, as sums over coefficients
+    # value and derivatives at the centre of the unit box, as sums over coefficients
     for row in range(n + 1):
         for s in range(size):
             weights[row, s] = 1.0
@@ -415,16 +414,16 @@ def isolate(  # type: ignore[no-untyped-def]
                             solutions[found, m] = lows[here, m] + centre[m] * wide
                         found += 1
                         continue
-            # divided along the axis on which the polynomials change most, but where one of them
-            # is rounding all over the box nothing more can be said
+            # divide along the axis of the largest change; if one polynomial is rounding on the
+            # whole box, no decision is possible
             axis = -1
             most_change = -1.0
             for m in range(0 if spent else n):
                 a = lows[here, m]
                 b = highs[here, m]
                 if b - a <= tolerance * max(abs(a), abs(b), floor[m]):
-                    # near a multiple solution, or along what runs to infinity, the other
-                    # unknowns would be divided without end
+                    # near a multiple solution, or along a set that extends to infinity, the
+                    # other unknowns would be divided without end
                     axis = -1
                     break
                 change = 0.0

@@ -1,9 +1,9 @@
-"""Special points of a curve F(u) = 0, u = (states, parameter), solved as extended systems.
+"""Special points of a curve F(u) = 0, u = (states, parameter), by extended systems.
 
 Each is a regular square system at a generic point (Kuznetsov 2004, chapter 10).
-The Jacobian of F is analytic; what the extended equations need of second
-derivatives is differenced along a direction or two, which costs Newton its last
-bit of speed but nothing of the solution's accuracy.
+The Jacobian of F is analytic; second derivatives in the extended systems are
+difference quotients along one or two directions, which slows down Newton's method
+slightly but does not affect the accuracy of the solution.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ Array = NDArray[np.float64]
 Curve = Callable[[Array], tuple[Array, Array]]
 
 
-#: Unknowns beyond which the singular values of a system are too dear: elimination is some
-#: thirty times as fast.
+#: Number of unknowns beyond which elimination, about thirty times as fast, replaces the singular
+#: value decomposition.
 LARGE = 60
 
-#: Components below this part of the scale are left over by Newton's method where the solution
-#: is zero: each step reduces them by a factor.
+#: Components below this fraction of the scale are remainders of Newton's method at a zero
+#: solution, since each step only reduces them by a factor.
 FLUSH_THRESHOLD = 1e-20
 
 #: Rounding of a residual, in units of the sum of the moduli of its terms.
 ROUNDING = 2.3e-16
 
-#: Part of the scale beside a point at which the slopes of a rate are looked at as well, to know
-#: their size where they vanish.
+#: Offset from a point, as a fraction of the scale, at which the slopes of a rate are evaluated as
+#: well, for their size where they vanish.
 REACH = 0.1
 
 
@@ -44,7 +44,7 @@ class Located:
     ----------
     u : ndarray, shape (n + 1,)
     residual : float
-        Largest component of the extended equations that is left.
+        Largest component of the residual of the extended system.
     converged : bool
     extra : ndarray
         The remaining unknowns (null vectors and the like).
@@ -68,14 +68,14 @@ def newton(
     *,
     iterations: int = 30,
 ) -> tuple[Array, float, bool, float]:
-    """Newton's method until the correction is at rounding.
+    """Newton's method until the correction reaches rounding.
 
     Parameters
     ----------
     equations : callable
     start, scale : ndarray
     slopes : callable, optional
-        Derivative of the equations; differenced where it is not given.
+        Derivative of the equations; by default by difference quotients.
 
     Returns
     -------
@@ -108,15 +108,15 @@ def newton(
 
 
 def _balanced(value: Array, slopes: Array, u: Array, scale: Array) -> bool:
-    """Whether the residual is rounding, measured by what each equation's terms may be."""
+    """Check whether the residual is rounding, relative to the terms of each equation."""
     terms = np.abs(slopes) @ np.maximum(np.abs(u), scale)
     return bool(np.all(np.abs(value) <= 1e-9 * terms + 1e-300))
 
 
 def flush_to_zero(u: Array, scale: Array) -> Array:
-    """The point with components far below rounding of the scale set to zero.
+    """Set components far below rounding of the scale to zero.
 
-    The scale may be wrong: what the equations need is kept, see `grown`.
+    The scale may be wrong: `grown` checks that the residual permits it.
 
     Examples
     --------
@@ -127,7 +127,7 @@ def flush_to_zero(u: Array, scale: Array) -> Array:
 
 
 def grown(after: Array, before: Array, terms: Array) -> bool:
-    """Whether a residual has grown by more than rounding in its terms, or is not a number.
+    """Check whether a residual has grown by more than rounding of its terms, or is NaN.
 
     Examples
     --------
@@ -140,9 +140,9 @@ def grown(after: Array, before: Array, terms: Array) -> bool:
 
 
 def _solved(matrix: Array, right: Array) -> Array:
-    """Least-norm solution, with every equation brought to size one first.
+    """Least-norm solution of the equations, each normalised to size one.
 
-    Large systems are solved by elimination where they are not singular.
+    Large systems are solved by elimination unless they are singular.
     """
     size = np.abs(matrix).max(axis=1)
     size[size == 0] = 1.0
@@ -173,12 +173,12 @@ def with_condition(
     scale: Array,
     iterations: int = 40,
 ) -> Located:
-    """The point of the curve where a function with a known gradient vanishes.
+    """Locate the point of the curve at which a function with a known gradient vanishes.
 
     Parameters
     ----------
     condition : callable
-        u to its value and gradient, shape (n + 1,).
+        Maps u to its value and gradient, shape (n + 1,).
     """
     u = start.copy()
     size, least = np.inf, np.inf
@@ -207,7 +207,7 @@ def with_condition(
 
 
 def _bending(curve: Curve, u: Array, along: Array, scale: Array) -> Array:
-    """Derivative of F_x v by u, shape (n, n + 1), for a direction v of the states."""
+    """Derivative of F_x v with respect to u, shape (n, n + 1), for a direction v of the states."""
     n = len(along)
     length = float(np.abs(along / scale[:n]).max())
     if length == 0.0:
@@ -218,7 +218,7 @@ def _bending(curve: Curve, u: Array, along: Array, scale: Array) -> Array:
 
 
 def fold(curve: Curve, start: Array, scale: Array) -> Located:
-    """F = 0, F_x q = 0, |q| = 1; ``extra`` is the null vector q."""
+    """Locate a fold (saddle-node): F = 0, F_x q = 0, |q| = 1; ``extra`` is the null vector q."""
     n = len(start) - 1
     units = scale[:n]
     _, _, right = np.linalg.svd(curve(start)[1][:, :n] * units)
@@ -245,16 +245,18 @@ def fold(curve: Curve, start: Array, scale: Array) -> Located:
 
 
 def hopf_or_neutral_saddle(curve: Curve, start: Array, scale: Array, squared: float) -> Located:
-    """Two eigenvalues of opposite sign: F = 0, J a = σb, J b = −(κ/σ) a, |a| = 1, ⟨l, a⟩ = 0.
+    """Locate two eigenvalues of opposite sign.
 
-    κ = ω² > 0 is a Hopf point, κ < 0 a neutral saddle; ``extra`` is (κ,). With the two
-    first-order equations, in place of (J² + κ) a = 0, slow pairs beside fast
-    eigenvalues are not lost in the squares of these. The constant σ is a size of κ^½.
+    The system is F = 0, J a = σb, J b = −(κ/σ) a, |a| = 1, ⟨l, a⟩ = 0.
+
+    κ = ω² > 0 is a Hopf point, κ < 0 a neutral saddle; ``extra`` is (κ,). The two
+    first-order equations, in place of (J² + κ) a = 0, resolve slow pairs beside fast
+    eigenvalues, whose squares would dominate. The constant σ is of the size of κ^½.
 
     Parameters
     ----------
     squared : float
-        About the product of the two eigenvalues: the pair is chosen by it.
+        Approximate product of the two eigenvalues, by which the pair is selected.
     """
     n = len(start) - 1
     units = scale[:n]
@@ -301,10 +303,10 @@ def hopf_or_neutral_saddle(curve: Curve, start: Array, scale: Array, squared: fl
 
 
 def _pair_near(matrix: Array, squared: float) -> tuple[Array, Array, float]:
-    """Orthonormal vectors of the plane of two eigenvalues with sum near zero, and their product.
+    """Orthonormal basis of the eigenspace of a pair with sum near zero, and the product.
 
-    Of all pairs with a real sum the one whose sum is small and whose product is near
-    to a given one, both relative to its own size.
+    Of all pairs with a real sum, the one with a small sum and a product near the given
+    one, both relative to the size of the pair.
     """
     values, vectors = np.linalg.eig(matrix)
     first, second = np.triu_indices(len(values), 1)
@@ -326,15 +328,16 @@ def _pair_near(matrix: Array, squared: float) -> tuple[Array, Array, float]:
 
 
 def branch_point(curve: Curve, start: Array, scale: Array) -> Located:
-    """F + βψ = 0, [F_x F_p]ᵀψ = 0, |ψ| = 1; β = 0 at a true branch point (``extra`` is (β,)).
+    """Locate a branch point: F + βψ = 0, [F_x F_p]ᵀψ = 0, |ψ| = 1, with ``extra`` (β,).
 
-    Each rate is in units of its largest slope around the start (`slope_sizes`).
+    β = 0 at a true branch point. Each rate is in units of its largest slope around the start
+    (`slope_sizes`).
     """
     n = len(start) - 1
     sizes = slope_sizes(curve, start, scale)
     slopes = curve(start)[1] * scale / sizes[:, None]
     if not np.isfinite(slopes).all():
-        # the motion is not defined there, as that along a discontinuity at a two-fold
+        # the motion is not defined there, as sliding at a two-fold
         return Located(start, np.inf, False, np.array([np.nan]), np.inf)
     left, _, _ = np.linalg.svd(slopes)
     guide = left[:, -1]
@@ -357,8 +360,7 @@ def branch_point(curve: Curve, start: Array, scale: Array) -> Located:
 def slope_sizes(curve: Curve, u: Array, scale: Array) -> Array:
     """Largest slope of each rate at a point and `REACH` of the scale beside it, shape (n,).
 
-    At a branch point in an invariant plane all slopes of one rate vanish, so that its size
-    there is none.
+    At a branch point in an invariant plane all slopes of one rate vanish.
     """
     moves = np.vstack([np.zeros(len(u)), REACH * np.diag(scale), -REACH * np.diag(scale)])
     slopes = np.array([np.abs(curve(u + move)[1] * scale).max(axis=1) for move in moves])
@@ -370,8 +372,8 @@ def crossing_tangents(curve: Curve, u: Array, scale: Array) -> Array | None:
     """Tangents of the two curves that cross at a branch point, shape (2, n + 1).
 
     Solutions of ψᵀB(φ, φ) = 0 in the null plane of [F_x F_p] (Kuznetsov 2004,
-    section 10.2.3), of length one in units of the scale; None where the two do
-    not cross with different tangents.
+    section 10.2.3), of length one in units of the scale; None unless the two
+    cross transversally.
     """
     n = len(u) - 1
     units = scale / slope_sizes(curve, u, scale)[:, None]

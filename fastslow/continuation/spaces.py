@@ -1,4 +1,4 @@
-"""What the loops of this package are given and work in, and how they return."""
+"""Arguments, work spaces and return codes of the loops of this package."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from fastslow.kernels.records import Integers, Matrix, Tensor, Vector, zeros
 P = ParamSpec("P")
 R = TypeVar("R")
 
-#: Work spaces of one kind that a thread keeps.
+#: Maximum number of work spaces of one kind that a thread keeps.
 KEPT = 8
 
 
 def _kept(function: Callable[P, R]) -> Callable[P, R]:
-    """Make a work space once for every thread and size: no loop reads what another has left."""
+    """Allocate a work space once per thread and size; no loop reads what another has left."""
     own = threading.local()
 
     @wraps(function)
@@ -34,15 +34,15 @@ def _kept(function: Callable[P, R]) -> Callable[P, R]:
     return kept
 
 
-#: How `trace` ends.
+#: Return codes of `trace`.
 FULL, RANGE, INTERFACE, SMALL_STEP, WINDOW, CLOSED = range(6)
 
-#: How a loop returns that is to be called again: its work is done, or a table is full.
+#: Return codes of a loop that is to be called again: work quota used up, or a table full.
 PAUSED, TABLE_FULL = -1, -2
 
 
 class CompiledCurve(NamedTuple):
-    """The generated function of curves, the number of the region, and the parameters."""
+    """A curve F(u) = 0: address of the generated function, number of the region, parameters."""
 
     address: int
     mode: int
@@ -50,22 +50,22 @@ class CompiledCurve(NamedTuple):
 
 
 class Region(NamedTuple):
-    """Where a curve may go.
+    """Domain of a curve.
 
     Parameters
     ----------
     signs : ndarray, shape (m,)
-        Sign of each h in the region; 0 leaves an interface out.
+        Sign of each h in the region; 0 ignores an interface.
     weight : ndarray, shape (n + 1,)
         Inverse squares of the scales.
     lower, upper : float
         Range of the last component.
     low, high : ndarray, shape (n,)
-        Window of the others.
+        Window of the other components.
     middle : ndarray, shape (n,)
-        Where each of the others is not far away; NaN if it never is.
+        Centre from which the distance of the others is measured; NaN if it is not.
     periods : ndarray, shape (n,)
-        Period of each of the others, 0 if there is none.
+        Period of each of the others, 0 without one.
     """
 
     signs: Vector
@@ -79,7 +79,7 @@ class Region(NamedTuple):
 
 
 class Stepping(NamedTuple):
-    """How steps are made; ``closing`` says whether a return to the start ends the curve."""
+    """Step control; ``closing``: whether a return to the start ends the curve."""
 
     smallest: float
     largest: float
@@ -90,17 +90,16 @@ class Stepping(NamedTuple):
 
 
 class Traced(NamedTuple):
-    """What `trace` fills in.
+    """Output of `trace`.
 
     Parameters
     ----------
     rows, tangents : ndarray, shape (N, n + 1)
-        Points of the curve and unit tangents (in the weighted norm), the first of which is to
-        be given.
+        Points of the curve and unit tangents (in the weighted norm); the first row is input.
     in_use : ndarray, shape (1,)
-        The step.
+        Current step length.
     progress : ndarray of int64, shape (2,)
-        How many rows there are, and how many steps are tried before the next pause.
+        Number of rows, and number of steps until the next pause.
     """
 
     rows: Matrix
@@ -128,27 +127,27 @@ class TraceSpace(NamedTuple):
 
 @_kept
 def trace_space(n: int, m: int) -> TraceSpace:
-    """Work space for n states and m interfaces."""
+    """Work space of `trace` for n states and m interfaces."""
     size, width = n + 1, n * (n + 2) + m * (n + 2)
     shapes = (width, width, (size, size), *[size] * 4, *[m] * 4, size)
     return zeros(TraceSpace, *shapes)
 
 
 class Limits(NamedTuple):
-    """What solves equations plainly, as `correct` tells.
+    """Limits of the tests that `correct` applies to a solution.
 
     Parameters
     ----------
     residual : float
         Largest residual, in natural units.
     correction : float
-        Last correction of Newton's method, in units of the scale.
+        Largest last Newton correction, in units of the scale.
     pole : float
-        By how much rounding of the state changes the equations at most, in natural units.
+        Largest effect of rounding of the state on the equations, in natural units.
     moved, farthest : float
-        How far the state may move and be, in units of the scale.
+        Largest displacement and modulus of the state, in units of the scale.
     beside : float
-        How far off the last component may be, in units of its scale.
+        Largest deviation of the last component, in units of its scale.
     """
 
     residual: float
@@ -162,7 +161,7 @@ class Limits(NamedTuple):
 class NewtonSpace(NamedTuple):
     """Work space of `newton_from`, `refine`, `correct` and `survey`.
 
-    Vectors of n + 1 numbers, and others.
+    Mostly vectors of length n + 1.
     """
 
     out: Vector
@@ -179,13 +178,13 @@ class NewtonSpace(NamedTuple):
 
 @_kept
 def newton_space(n: int, width: int) -> NewtonSpace:
-    """Work space for n states, and so many numbers that the generated function fills in."""
+    """Newton work space for n states and ``width`` outputs of the generated function."""
     size = n + 1
     return zeros(NewtonSpace, width, (size, size), (size, size), *[size] * 7)
 
 
 class Boxes(NamedTuple):
-    """Boxes that wait to be looked at: coefficients, their rounding, and the two corners."""
+    """Waiting boxes: coefficients, their rounding errors, and the two corners."""
 
     coefficients: Tensor
     rounding: Matrix
@@ -194,7 +193,7 @@ class Boxes(NamedTuple):
 
 
 class IsolationSpace(NamedTuple):
-    """Work space of `isolate`; ``most`` is the highest degree."""
+    """Work space of `isolate`; ``max_degree`` is the highest degree."""
 
     strides: Integers
     table: Matrix
@@ -215,9 +214,9 @@ class IsolationSpace(NamedTuple):
 
 
 @_kept
-def isolation_space(n: int, size: int, most: int) -> IsolationSpace:
-    """Work space for n unknowns and so many coefficients of each polynomial."""
-    square, d = (n, n), most + 1
+def isolation_space(n: int, size: int, max_degree: int) -> IsolationSpace:
+    """Work space for n unknowns and ``size`` coefficients of each polynomial."""
+    square, d = (n, n), max_degree + 1
     tables = ((d, d), (n + 1, size), (n, d, d), d, (d, d))
     vectors = (size, size, n, n, n, d, n)
     return zeros(IsolationSpace, n, *tables, square, square, (n, size), *vectors)

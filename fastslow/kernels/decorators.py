@@ -1,6 +1,6 @@
-"""How the functions that a generic loop is made of are compiled.
+"""Decorators of the functions that are compiled into loops.
 
-Numba is imported when one of them is compiled, which few processes do.
+Numba is imported only when one of them is compiled, which few processes do.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-#: How all of them are. Wrappers for calls from Python would double the time to compile.
-#: Nothing is allocated, and no array is counted: to count them took half of the time.
+#: Options of all of them. Wrappers for calls from Python would double the compilation time.
+#: Nothing is allocated and arrays are not reference-counted, which took half of the time.
 OPTIONS: dict[str, Any] = {
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
@@ -39,7 +39,7 @@ class _Kernel:
 
     @property
     def _numba_type_(self) -> Any:
-        """What Numba asks of a global name of a function that it compiles."""
+        """Type of this function, which Numba requests for global names."""
         return self._dispatcher._numba_type_
 
 
@@ -61,13 +61,13 @@ class _Intrinsic:
         from numba.core.registry import cpu_target
 
         made, context = self._made, cpu_target.typing_context
-        # it may be new to a compilation that has begun
+        # it may be new to a compilation in progress
         context.refresh()
         return context.resolve_value_type(made)
 
 
 def kernel(function: F) -> F:
-    """Let a function be compiled into the loops that call it.
+    """Declare a function that is compiled into the loops that call it.
 
     Products and sums are fused, which is faster and rounds once less; nothing is reordered.
     """
@@ -80,7 +80,7 @@ def inlined_kernel(function: F) -> F:
 
 
 def unfused_kernel(function: F) -> F:
-    """As `kernel`, with every product and sum rounded by itself."""
+    """As `kernel`, with every product and sum rounded separately."""
     return cast(F, _Kernel(function))
 
 
@@ -90,5 +90,5 @@ def instructions(function: F) -> F:
 
 
 def literal_instructions(function: F) -> F:
-    """As `instructions`, of literal numbers and texts where they are given."""
+    """As `instructions`, with literal types for numbers and strings where given."""
     return cast(F, _Intrinsic(function, literal=True))

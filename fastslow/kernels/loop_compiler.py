@@ -1,4 +1,4 @@
-"""Numba's part in machine code: a loop, with all that it calls, as one object."""
+"""Compilation of a loop, with all functions it calls, into one object by Numba."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fastslow.kernels.decorators import OPTIONS
 from fastslow.kernels.loop_target import ENTRY, processor, target_machine
 from fastslow.kernels.signals import between_passes
 
-#: What Numba announces before and after each pass of its compiler.
+#: Numba's event before and after each pass of its compiler.
 _PASS = "numba:run_pass"
 
 
@@ -34,12 +34,12 @@ class _Passes(event.Listener):
 
 
 def watched_passes() -> AbstractContextManager[None]:
-    """Let what Numba compiles meanwhile be interrupted between its passes."""
+    """Context in which compilations by Numba can be interrupted between passes."""
     return event.install_listener(_PASS, _Passes())
 
 
 class _Library(JITCodeLibrary):
-    """A function that is only ever part of others: it is neither optimised nor loaded."""
+    """A function that is only linked into others: neither optimised nor loaded."""
 
     def _optimize_final_module(self) -> None:
         pass
@@ -53,7 +53,7 @@ class _Library(JITCodeLibrary):
 
 
 class _Codegen(JITCPUCodegen):
-    """Numba's instructions for the processor that loops are made for."""
+    """Numba's code generator for the target processor of loops."""
 
     _library_class = _Library
 
@@ -70,14 +70,14 @@ class _Codegen(JITCPUCodegen):
 
 _codegen: _Codegen | None = None
 
-#: Every function that was begun. Numba forgets one in a finaliser, which loses an interrupt that
-#: comes while garbage is collected; so those whose compilation was interrupted are kept as well.
+#: All functions whose compilation was started. Numba removes one in a finaliser, which loses an
+#: interrupt during garbage collection; so interrupted ones are kept as well.
 _begun: list[Any] = []
 
 
 @contextmanager
 def _in_place() -> Iterator[None]:
-    """Let Numba's one context for processors make what is compiled meanwhile by `_Codegen`."""
+    """Replace the code generator of Numba's CPU context by `_Codegen` meanwhile."""
     global _codegen
     with global_compiler_lock:
         context = cpu_target.target_context
@@ -114,7 +114,7 @@ def compiled_object(source: str, function: str) -> bytes:
 
 
 def _object(module: Any, entry: str) -> bytes:
-    """An optimised object of a module, in which nothing but its entry can be seen."""
+    """Optimised object code of a module with its entry as the only exported symbol."""
     machine = target_machine()
     for function in module.functions:
         if function.name == entry:

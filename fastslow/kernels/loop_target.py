@@ -1,6 +1,6 @@
-"""What the machine code of loops is made for: a class of processors, and not the one at hand.
+"""Target of the machine code of loops: a class of processors instead of the current one.
 
-So that an object which was made elsewhere has the bits of one that is made here.
+Objects built elsewhere are therefore identical to those built here.
 """
 
 from __future__ import annotations
@@ -10,16 +10,16 @@ from typing import Any
 
 import llvmlite.binding as llvm
 
-#: The one function of an object that can be seen.
+#: The exported function of an object.
 ENTRY = "fastslow_loop"
 
-#: What a processor of the class x86-64-v3 has, after those of 2013.
+#: Features of a processor of the class x86-64-v3 (from 2013 on).
 _V3 = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2", "ssse3")
 
 
 @cache
 def processor() -> str:
-    """LLVM's name of the class that the processor at hand belongs to."""
+    """LLVM's name of the class of the current processor."""
     if not llvm.get_process_triple().startswith("x86_64"):
         return "generic"
     features = llvm.get_host_cpu_features()
@@ -27,13 +27,13 @@ def processor() -> str:
 
 
 def platform_name() -> str:
-    """The platform and the class of processors of an object."""
+    """Platform and class of processors of an object."""
     return f"{llvm.get_process_triple()}-{processor()}"
 
 
 @cache
 def target_machine() -> Any:
-    """LLVM's machine for loops: position-independent code that can be put anywhere."""
+    """LLVM's target machine for loops, with position-independent code."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     target = llvm.Target.from_triple(llvm.get_process_triple())

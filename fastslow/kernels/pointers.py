@@ -2,7 +2,7 @@
 
 Every generated function has the one signature
 ``void (int64 mode, double* inputs, double* parameters, double* outputs)``.
-A first-class function argument would cost half the speed of a series step;
+A first-class function argument would halve the speed of a series step;
 a raw address costs a few per cent.
 """
 
@@ -47,9 +47,9 @@ def call_address(  # type: ignore[no-untyped-def]
 
 @instructions
 def call_with(typingctx, address, record):  # type: ignore[no-untyped-def]
-    """Call the function at an address with a record, which it loads; the result is a float64.
+    """Call the function at an address with a record and return its float64 result.
 
-    It is no number if the function has failed.
+    The result is NaN if the function has failed.
     """
     from numba import types
     from numba.core import cgutils
@@ -71,7 +71,7 @@ def call_with(typingctx, address, record):  # type: ignore[no-untyped-def]
 
 
 def loader(record: type) -> Any:
-    """A function for Numba that loads the record that `call_with` was given."""
+    """A Numba function that loads the record passed by `call_with`."""
     kind = type_of(record)
 
     @instructions

@@ -1,6 +1,6 @@
-"""Records of what compiled functions take together: named tuples, which cost them nothing.
+"""Named tuples as records of arguments of compiled functions, at no cost.
 
-The fields say their types, so that those of the whole record are known without one.
+The annotations of the fields give the type of a record without an instance.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 R = TypeVar("R")
 
-#: Arrays, contiguous in the order of C, with the name of their type and the number of axes.
+#: C-contiguous arrays with the name of their type and the number of axes.
 Vector = Annotated[NDArray[np.float64], "float64", 1]
 Matrix = Annotated[NDArray[np.float64], "float64", 2]
 Tensor = Annotated[NDArray[np.float64], "float64", 3]
@@ -36,19 +36,19 @@ _TYPES: dict[str, Any] = {
 
 @cache
 def _kinds(record: type) -> tuple[Any, ...]:
-    """What each field is: a record, a number, or name and axes of an array."""
+    """Kind of each field: a record, a number, or type name and axes of an array."""
     hints = get_type_hints(record, include_extras=True).values()
     return tuple(h.__metadata__ if get_origin(h) is Annotated else h for h in hints)
 
 
 def zeros(record: type[R], *fields: Any) -> R:
-    """A record of arrays of zeros.
+    """Create a record of zero arrays.
 
     Parameters
     ----------
     record : type
     *fields
-        The shape of every array, or its length; a record within this one as it is.
+        Shape or length of every array; a nested record is passed as it is.
     """
     kinds: Any = _kinds(cast(Any, record))
     made = (
@@ -59,7 +59,7 @@ def zeros(record: type[R], *fields: Any) -> R:
 
 
 def type_of(kind: Any) -> Any:
-    """The type to Numba of a record, of a number, or of an array by its name and axes."""
+    """Numba type of a record, of a number, or of an array given by type name and axes."""
     from numba import types
 
     plain = {int: types.int64, float: types.float64, bool: types.boolean}
@@ -72,14 +72,14 @@ def type_of(kind: Any) -> Any:
 
 
 def records_within(record: type) -> list[type]:
-    """A record, and those within it; none for a number."""
+    """A record type and the record types nested in it; empty for a number."""
     if not hasattr(record, "_fields"):
         return []
     return [record, *(r for kind in _kinds(record) for r in records_within(kind))]
 
 
 def construction(record: Any, names: Iterator[str]) -> str:
-    """Source that makes a record from names, one for each field of it and of those within it.
+    """Source that constructs a record from names, one for each leaf.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def construction(record: Any, names: Iterator[str]) -> str:
 
 
 class Leaf(NamedTuple):
-    """A number or an array within an argument: how it is reached, its type, and its axes."""
+    """A number or an array within an argument: access path, type, and number of axes."""
 
     path: str
     kind: str
@@ -103,7 +103,7 @@ class Leaf(NamedTuple):
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Its type to NumPy."""
+        """NumPy type."""
         return np.dtype(_TYPES[self.kind])
 
 
@@ -111,7 +111,7 @@ _NUMBERS = {int: "int64", float: "float64", bool: "boolean"}
 
 
 def leaves(path: str, kind: Any) -> Iterator[Leaf]:
-    """The numbers and arrays of an argument, in the order of the fields of its records.
+    """Numbers and arrays of an argument, in the order of the fields of its records.
 
     Examples
     --------

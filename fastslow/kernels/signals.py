@@ -1,9 +1,9 @@
-"""Signals that arrive during a compilation.
+"""Deferral of signals that arrive during a compilation.
 
 A signal handler may raise between any two instructions of Python: the usual one for Ctrl-C
 raises KeyboardInterrupt. The compiler calls Python from C, where an exception is printed and
-lost, and changes tables that must not be left half-changed. So what arrives while it works
-is kept, and handled between two of its passes, where nothing is half-done.
+lost, and updates tables that must not be left inconsistent. So signals that arrive meanwhile
+are stored, and handled between two passes of the compiler.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ R = TypeVar("R")
 
 
 class _PassStoppedError(BaseException):
-    """Ends a compilation; no handler of exceptions in the compiler takes it for one of its own."""
+    """Ends a compilation; not caught by the exception handlers of the compiler."""
 
 
 class _Deferral:
-    """Takes the place of the handlers of signals."""
+    """Replaces the signal handlers during a compilation."""
 
     def __init__(self) -> None:
         self.handlers: dict[int, Callable[[int, FrameType | None], Any]] = {}
@@ -37,7 +37,7 @@ class _Deferral:
             self.handlers[number](number, frame)
 
     def start(self) -> None:
-        """Take the place of every handler that is written in Python."""
+        """Replace every handler written in Python."""
         for kind in signal.valid_signals():
             handler = signal.getsignal(kind)
             # the two constants for no handler are not callable
@@ -48,9 +48,9 @@ class _Deferral:
             signal.signal(number, self)
 
     def stop(self) -> None:
-        """Give the handlers their places back."""
+        """Restore the handlers."""
         while self.active:
-            # a handler that is back may raise before the others are
+            # a restored handler may raise before the others are restored
             try:
                 for number, handler in self.handlers.items():
                     if signal.getsignal(number) is self:
@@ -60,7 +60,7 @@ class _Deferral:
                 self.raised = self.raised or error
 
     def handle(self) -> None:
-        """Call the handlers of what was received; the first exception is kept."""
+        """Call the handlers of the stored signals; the first exception is kept."""
         while self.received:
             number, frame = self.received.pop(0)
             try:
@@ -69,7 +69,7 @@ class _Deferral:
                 self.raised = self.raised or error
 
     def between_passes(self) -> None:
-        """Call the handlers, and end the compilation if one of them has raised."""
+        """Call the handlers, and end the compilation if one of them raises."""
         if threading.current_thread() is threading.main_thread():
             self.handle()
             if self.raised is not None:
@@ -80,7 +80,7 @@ _deferral: _Deferral | None = None
 
 
 def between_passes() -> None:
-    """Handle signals that have been kept, where nothing of a compilation is half-done."""
+    """Handle stored signals at a point where the compilation is consistent."""
     if _deferral is not None:
         _deferral.between_passes()
 
@@ -88,8 +88,8 @@ def between_passes() -> None:
 def deferring_signals(compiling: Callable[..., R], *arguments: Any) -> R:
     """Call a function that compiles; signals are handled at its end, or `between_passes`.
 
-    What a handler raises then ends the compilation and comes out as it is, whatever
-    the compiler made of it. The next call compiles again what was not finished.
+    An exception of a handler ends the compilation and is raised unchanged. The next call
+    repeats an unfinished compilation.
 
     Parameters
     ----------

@@ -1,10 +1,9 @@
-"""What a compiled loop is called with: an array of slots of 64 bits, from which it takes numbers.
+"""Calling convention of compiled loops: an array of 64-bit slots.
 
-A loop has the one C signature ``int32 (results*, error**, int64* slots)``. A slot holds a
-number, or the address of an array as an object of Python, whose data, shape and strides the loop
-finds there where NumPy's own C interface has them (``PyArrayObject_fields``). How far these
-fields are from the beginning of the object, which depends on the build of Python, is in the first
-slot.
+Every loop has the C signature ``int32 (results*, error**, int64* slots)``. A slot contains a
+number, or the address of a NumPy array object, whose data, shape and strides the loop reads
+according to NumPy's C interface (``PyArrayObject_fields``). The first slot contains the offset
+of these fields in the object, which depends on the build of Python.
 """
 
 from __future__ import annotations
@@ -21,19 +20,19 @@ from fastslow.kernels.decorators import literal_instructions
 
 _WORD = ir.IntType(64)
 
-#: Where NumPy has the number of axes, and the pointers to shape and strides, in bytes after that
+#: Byte offsets of the number of axes and of the pointers to shape and strides from the pointer
 #: to the data.
 _AXES, _SHAPE, _STRIDES = 8, 16, 24
 
 
 @cache
 def fields_of_arrays() -> int:
-    """How many bytes into an array as an object its fields begin.
+    """Byte offset of the fields in an array object.
 
     Raises
     ------
     RuntimeError
-        If this Python keeps them elsewhere, so that no compiled loop can be called.
+        If this Python has another layout, so that no compiled loop can be called.
     """
     arrays = [np.zeros((2, 3)), np.zeros((5, 7))[1:, ::2]]
     for offset in range(8, np.ndarray.__basicsize__ - _STRIDES, 8):
@@ -43,7 +42,7 @@ def fields_of_arrays() -> int:
 
 
 def _begin_at(address: int, array: NDArray[np.float64]) -> bool:
-    """Whether the fields of an array begin at an address within it."""
+    """Check whether the fields of an array begin at an address within it."""
     if (_word(address), _word(address + _AXES) & 0xFFFFFFFF) != (array.ctypes.data, array.ndim):
         return False
     rows = (_word(address + field) for field in (_SHAPE, _STRIDES))
@@ -57,7 +56,7 @@ def _word(address: int) -> int:
 
 @literal_instructions
 def slot(typingctx: Any, slots: Any, place: Any, name: Any, axes: Any) -> Any:
-    """The number or array of a slot: its place, the name of its type, and its axes, 0 if none."""
+    """Read the number or array of a slot, given its index, type name, and number of axes."""
     from numba import types
     from numba.core import cgutils
     from numba.np.arrayobj import populate_array

@@ -1,4 +1,4 @@
-"""Instructions on several numbers at once, for loops: LLVM would not find them by itself."""
+"""SIMD instructions for loops that LLVM does not vectorise by itself."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ def horner_of_four(  # type: ignore[no-untyped-def]
 ):
     """Evaluate a polynomial at four numbers s[c], s[c + 1], …, into ``out`` from a place on.
 
-    Its coefficients are the ``count`` ones of ``W`` that end with the last, which is the
-    highest. Each of the four is what Horner's rule gives for it alone, products and sums fused.
+    The coefficients are ``count`` entries of ``W``, the last of which is the highest. Each
+    result equals that of Horner's rule for one number, with products and sums fused.
     """
     from numba import types
     from numba.core import cgutils

@@ -1,8 +1,8 @@
 """Plain steps of several trajectories at once, for the regions of one model.
 
-A plain step is one of the Taylor series that stays in a region and comes to
-the end of nothing. The recurrences are those of `fastslow.kernels.taylor.series`;
-whatever is not certain about a step is left to the loop of one trajectory.
+A plain step is a Taylor step inside a region without any event. The recurrences are
+those of `fastslow.kernels.taylor.series`; a step that is not certainly plain is left to
+the loop of one trajectory.
 """
 
 from __future__ import annotations
@@ -18,19 +18,18 @@ from fastslow.kernels.native import ENTRY, WHOLE
 from fastslow.kernels.simd.functions import Mathematics, exp2, log2
 from fastslow.kernels.simd.lanes import Lanes, Mask, Trace, Workspace, added, polynomial
 
-#: Rows that come after time and states, then those of the smallest and largest
-#: values of the states: by how much the time is late, the time that no step may
-#: reach, the one that is to be reported, the usual length of a step, how many
-#: more steps are allowed, how many until an implicit one is tried; of the last step
-#: its time, its length and how it went; and the interface that was crossed just now, -1 for none.
+#: Rows after time and states, followed by the smallest and largest values of the
+#: states: compensation of the time, limit of the time, time of the next sample, usual
+#: step length, steps allowed, steps until an implicit attempt; time, length and outcome
+#: of the last step; and the interface just crossed, -1 for none.
 LATE, LIMIT, NEXT, USUAL, ALLOWED, CALM, BEGAN, LENGTH, OUTCOME, LEFT = range(10)
 ROWS = 10
 
-#: How a step went: it was not taken; it was; or it was, and its series is wanted.
+#: Outcome of a step: not taken, taken, or taken with its series reported.
 NOT_TAKEN, TAKEN, REPORTED = 0.0, 1.0, 2.0
 
-#: A first step, or one after an event, that is this much shorter than the last one is due to
-#: a state that has no size yet.
+#: A first step, or one after an event, shorter by this factor than the last one indicates a
+#: state without a scale yet.
 SUDDEN = 0.01
 
 #: Smallest coefficient that limits a step, in units of its row's size, and the largest.
@@ -43,16 +42,16 @@ def plain_steps(
     signs: Sequence[Sequence[int]],
     sizes: tuple[int, int, int, int],
 ) -> None:
-    """Add a function to a module that takes the plain steps of several trajectories.
+    """Add a function for the plain steps of several trajectories to a module.
 
     Parameters
     ----------
     module : llvmlite.ir.Module
         Its new function is called ``steps``.
     regions : sequence of callable
-        Each fills a workspace from inputs and parameters, as the series does.
+        Each fills a work space from inputs and parameters, as the series does.
     signs : sequence of sequence of int
-        Side of every interface, for each region.
+        Side of every interface for each region.
     sizes : tuple of int
         (n_states, n_forcing, n_parameters, order).
     """
@@ -78,7 +77,7 @@ def _step(
     pointers: Sequence[Any],
     blocks: tuple[Any, Any],
 ) -> None:
-    """Trace a step and the branch to the next one or to the end."""
+    """Emit a step and the branch to the next one or to the end."""
     n, forcing, n_parameters, order = sizes
     lanes, parameters, W = pointers
     kept = n + forcing
@@ -96,7 +95,7 @@ def _step(
     t, late, usual, allowed = inputs[0], number(LATE), number(USUAL), number(ALLOWED)
     calm = number(CALM) - 1.0
     longest, known = _length(rows, scales, tolerance, order)
-    # as in the loop of one trajectory, a step between two times that are exact
+    # a step between two floating-point times, as in the loop of one trajectory
     h = added(added(t + longest) - t)
     after = added(t + h)
     taken = (longest < added(number(LIMIT) - t) - late) & (h > 0.0) & (h <= 2.0 * usual)
@@ -144,7 +143,7 @@ def _series(
     count: int,
     order: int,
 ) -> list[list[Lanes]]:
-    """The coefficients of states, slow quantities and interface functions."""
+    """Coefficients of states, slow quantities and switching functions."""
     W = Workspace()
     region(inputs, given, W, Mathematics(trace))
     columns = order + 1
@@ -158,10 +157,10 @@ def _larger(a: Lanes, b: Lanes) -> Lanes:
 def _length(
     rows: Sequence[Sequence[Lanes]], sizes: Sequence[Lanes], tolerance: Lanes, order: int
 ) -> tuple[Lanes, Mask]:
-    """The step whose last three terms are within the tolerance, as `step_length` has it.
+    """Step length for which the last three terms are within the tolerance, as in `step_length`.
 
-    And whether every row that moves has a size. One that is and stays zero has
-    none, and counts for nothing: 0/0 is no number, which no comparison lets through.
+    Returned with a mask: whether every moving row has a scale. A row that is identically
+    zero has none and does not count: 0/0 is NaN, which fails every comparison.
     """
     # rows that differ in c_0 alone are judged by the smallest of their sizes
     smallest: dict[tuple[int, ...], tuple[Sequence[Lanes], Lanes]] = {}
@@ -192,7 +191,7 @@ def _limited_by_stability(
     tolerance: Lanes,
     order: int,
 ) -> Mask:
-    """Whether stability and not accuracy limits a step, as `limited_by_stability` has it."""
+    """Mask of lanes in which stability limits the step, as in `limited_by_stability`."""
     k = order // 2
     before = h
     for _ in range(k - 2):
@@ -214,12 +213,11 @@ def _nothing_happens(
     sides: tuple[Sequence[int], Lanes],
     h: Lanes,
 ) -> list[Mask]:
-    """Whether no interface is met in a step, and whether its ends hold all new extremes.
+    """Masks: no interface is reached in a step, and all new extremes are at its ends.
 
-    An interface that was crossed just now is not met again where the motion leaves it.
-
-    The sums of the moduli of the terms tell for most steps; for the others
-    their Bernstein coefficients, between which the values lie.
+    An interface just crossed does not count while the motion leaves it. The sums of the
+    moduli of the terms decide for most steps, bounds by Bernstein coefficients for the
+    others.
     """
     signs, left = sides
 
@@ -242,7 +240,7 @@ _Judged = tuple[Lanes, Lanes, Mask, Mask]
 
 
 class _Bounds:
-    """What bounds the change of a row within a step, once for rows that differ in c_0 alone."""
+    """Bounds on the change of a row within a step, shared by rows that differ in c_0 alone."""
 
     def __init__(self, h: Lanes, rule: Callable[[Sequence[Lanes], Lanes], _Judged]) -> None:
         self.h, self.rule = h, rule
@@ -256,7 +254,7 @@ class _Bounds:
 
 
 def _by_moduli(row: Sequence[Lanes], h: Lanes) -> _Judged:
-    """Least and largest change, whether it goes one way and whether it has one sign, by moduli."""
+    """Bounds of the change by moduli, and masks: monotone, of one sign."""
     first = added(abs(row[1]) * h)
     rest = added(polynomial([abs(c) for c in row[2:]], h) * added(h * h))
     most = added(first + rest)
@@ -284,7 +282,7 @@ def _by_bernstein(row: Sequence[Lanes], h: Lanes) -> _Judged:
 
 
 def _report(trace: Trace, rows: Sequence[Sequence[Lanes]], W: Any) -> None:
-    """Put the coefficients where the caller finds them."""
+    """Store the coefficients for the caller."""
     for place, c in enumerate(c for row in rows for c in row):
         trace.store(c, W, place)
 
@@ -292,7 +290,7 @@ def _report(trace: Trace, rows: Sequence[Sequence[Lanes]], W: Any) -> None:
 def _branch(
     trace: Trace, taken: Mask, plain: Mask, blocks: tuple[Any, Any], report: Callable[[], None]
 ) -> None:
-    """Go on after a plain step in every lane; else end, with a report where one is due."""
+    """Loop while every lane takes a plain step; else end, with a report where one is due."""
     step, end = blocks
     builder = trace.builder
     stop, reporting = (builder.append_basic_block(name) for name in ("stop", "report"))

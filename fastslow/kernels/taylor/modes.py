@@ -1,12 +1,12 @@
-"""What loops ask of the compiled series of a model."""
+"""Mode numbers by which loops request parts of the compiled series of a model."""
 
 #: Order of the short series.
 SHORT = 4
 
-#: What a mode and so many times the number of all modes ask for: the short series, the rates
-#: alone, and the derivative of the rates in a direction.
+#: Multiples of the number of modes that are added to a mode to request the short series, the
+#: rates alone, and the directional derivative of the rates.
 SHORTENED, RATES, DIRECTIONAL = 1, 2, 3
 
 
-#: Highest degree of the collocation polynomials that take the place of a Taylor series.
+#: Highest degree of the collocation polynomials that replace a Taylor series.
 COLLOCATION = 12

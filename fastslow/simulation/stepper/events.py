@@ -21,8 +21,8 @@ from fastslow.simulation.stepper.polynomials import (
     bounded_away,
     curvature,
     excluded,
+    first_above_noise,
     first_root,
-    first_strong,
     horner,
     slope,
 )
@@ -119,7 +119,7 @@ def find_event(problem, run, mode, W, h, search):
                 small = 32.0 * EPSILON * abs(b[0])
                 start = ZERO
                 if b[0] * (2 * k - 1) * turned <= 0.0:
-                    start = first_strong(b, ONE, order, small)
+                    start = first_above_noise(b, ONE, order, small)
                     if start > order:
                         continue
                 if not excluded(b, start, order):
@@ -133,7 +133,7 @@ def find_event(problem, run, mode, W, h, search):
         start = ZERO
         if on[j]:
             scaled(W, first_h + j, order, BEGINNING * h, b)
-            start = first_strong(b, ONE, order, noise[j])
+            start = first_above_noise(b, ONE, order, noise[j])
         total = scaled(W, first_h + j, order, h, b)
         if on[j]:
             if start > order:

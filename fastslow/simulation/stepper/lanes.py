@@ -1,7 +1,7 @@
-"""Many trajectories: their plain steps several at once, everything else one by one.
+"""Ensembles: plain steps are taken in SIMD lanes, everything else one trajectory at a time.
 
-What becomes of a trajectory depends on itself alone: a step that can be taken in
-lanes is taken in lanes, beside copies of another one where there are too few.
+The result of a trajectory does not depend on the others: a step that can be taken in
+lanes always is, with copies of another trajectory in the unused lanes.
 """
 
 from __future__ import annotations
@@ -41,19 +41,19 @@ from fastslow.simulation.stepper.workspace import (
     WORK,
 )
 
-#: Trajectories under way at a time, so that some region has one for every lane.
+#: Trajectories in progress at a time, enough to fill every lane in some region.
 IN_PROGRESS = 8 * WIDTH
 
-#: Steps in lanes before the loop is asked whether to go on.
+#: Steps in lanes before the work quota is checked.
 IN_LANES = 1000
 
-#: What the loop goes on from after a pause: that it paused, the next trajectory that is not yet
-#: under way, how many are to be followed alone and in lanes, the mode of those, the work left.
+#: State of the loop across a pause: whether it paused, the next trajectory not yet started, the
+#: numbers of those to step alone and of those in lanes, the mode of the lanes, the work left.
 PAUSED, FOLLOWING, ALONE, COUNT, LANES_MODE, LEFT = range(6)
 
 
 class Runs(NamedTuple):
-    """Many runs of a problem, and what is kept of them: as `Run` and `Record`, row by row.
+    """Many runs of a problem with their records: as `Run` and `Record`, row by row.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Runs(NamedTuple):
     carried : float64 array, shape (m, SIZES + rows)
     counted : int64 array, shape (m, 14)
     codes : int64 array, shape (m,)
-        How each ended.
+        Outcome of each.
     """
 
     parameters: Matrix
@@ -87,23 +87,23 @@ class Runs(NamedTuple):
 
 
 class Pool(NamedTuple):
-    """Who is in the lanes, and who waits for what.
+    """Assignment of runs to lanes, and the queues of waiting runs.
 
     Parameters
     ----------
     rows, given, series : float64 arrays, shape (., WIDTH)
-        What the compiled steps are called with.
+        Arguments of the compiled steps.
     held : int64 array, shape (WIDTH,)
         The run in each lane, -1 for none.
     ready : int64 array, shape (regions, under way)
-        Runs that wait for a lane, region by region; ``n_ready`` says how many.
+        Runs waiting for a lane, per region; ``n_ready`` is their number.
     n_ready : int64 array, shape (regions,)
     alone : int64 array, shape (under way,)
         Runs whose next step is taken alone.
     beyond : int64 array, shape (WIDTH,)
-        Steps that each lane is allowed beyond those that it was told of.
+        Steps allowed to each lane beyond its current quota.
     progress : int64 array, shape (6,)
-        What the loop goes on from after a pause, and the work up to the next one.
+        State of the loop across a pause, and the work until the next one.
     table : float64 array, shape (0, 0)
     nothing : float64 array, shape (0,)
     """
@@ -122,7 +122,7 @@ class Pool(NamedTuple):
 
 
 def pool_for(problem: Problem, regions: int, n_values: int, count: int) -> Pool:
-    """An empty pool for so many runs, with so many parameters."""
+    """Allocate an empty pool for ``count`` runs with ``n_values`` parameters."""
     n, n_forcing, order = problem.n_states, problem.n_forcing, problem.order
     rows = n + n_forcing + problem.n_interfaces
     in_progress = min(IN_PROGRESS, count)
@@ -144,26 +144,26 @@ def pool_for(problem: Problem, regions: int, n_values: int, count: int) -> Pool:
 
 @kernel
 def integrate_many(problem, steps, regions, runs, pool, workspace, first, last):
-    """Follow the trajectories from one number to another to their ends, or to a pause.
+    """Integrate a range of trajectories to their ends, or to a pause.
 
     Parameters
     ----------
     problem : Problem
     steps, regions : int
-        Address of the plain steps, and the number of their regions.
+        Address of the plain steps, and number of regions.
     runs : Runs
-        Changed here.
+        Updated in place.
     pool : Pool
         From `pool_for`.
     workspace : Workspace
-        Both keep what the loop goes on from after a pause.
+        Both keep the state of the loop across a pause.
     first, last : int
-        The runs from the first up to, but not including, the last are followed.
+        Range of runs, the last excluded.
 
     Returns
     -------
     int
-        `REACHED_END`, or why it pauses, as `integrate`.
+        `REACHED_END`, or the reason of a pause, as in `integrate`.
     """
     n_states, n_values = problem.n_states, runs.parameters.shape[1]
     rules, times = problem.rules, runs.times
@@ -253,7 +253,7 @@ def integrate_many(problem, steps, regions, runs, pool, workspace, first, last):
             fill_empty_lanes(held, rows, given)
         allowed = rows[1 + n_states + step.ALLOWED, 0]
         call_address(steps, mode, rows, given, pool.series)
-        # the lanes go together, two steps of a trajectory alone in one of theirs
+        # one step of all lanes counts as two steps of a single trajectory
         left -= 2 + 2 * np.int64(allowed - rows[1 + n_states + step.ALLOWED, 0])
         for lane in range(WIDTH):
             i = held[lane]
@@ -282,7 +282,7 @@ def integrate_many(problem, steps, regions, runs, pool, workspace, first, last):
 
 @kernel
 def allow(rows, lane, n, beyond, steps):
-    """Allow a lane so many steps, a part of them at a time."""
+    """Set the step quota of a lane, in portions."""
     first = min(steps, IN_LANES)
     rows[1 + n + step.ALLOWED, lane] = first
     beyond[lane] = steps - first
@@ -290,7 +290,7 @@ def allow(rows, lane, n, beyond, steps):
 
 @kernel
 def load_lane(problem, runs, pool, lane, i):
-    """Give a trajectory a lane."""
+    """Load a trajectory into a lane."""
     n, rows, given, begin = problem.n_states, pool.rows, pool.given, runs.places[i, 0]
     carried, counted, extremes, since = runs.carried, runs.counted, runs.extremes, runs.since[i]
     for k in range(1 + n):
@@ -301,11 +301,11 @@ def load_lane(problem, runs, pool, lane, i):
     for k in range(rows.shape[0] - first):
         rows[first + k, lane] = carried[i, SIZES + k]
     allow(rows, lane, n, pool.beyond, problem.max_steps - counted[i, STEPS])
-    # without a fast state there are no implicit steps to be tried
+    # no implicit steps without fast states
     rows[1 + n + step.CALM, lane] = counted[i, CALM] if problem.n_fast > 0 else np.inf
     rows[1 + n + step.NEXT, lane] = next_time(runs.times, i, counted[i, SAMPLES])
     rows[1 + n + step.LEFT, lane] = counted[i, INTERFACE]
-    # no extremes are widened before they count, and no step goes from there to where they do
+    # extremes do not change before ``since``, and no step crosses it
     counting, stop = begin >= since, runs.spans[i, 1]
     rows[1 + n + step.LIMIT, lane] = stop if counting else min(since, stop)
     for k in range(n):
@@ -317,7 +317,7 @@ def load_lane(problem, runs, pool, lane, i):
 
 @kernel
 def store_lane(problem, runs, pool, lane, i):
-    """Take a trajectory from its lane."""
+    """Store a trajectory from its lane."""
     n, rows, places = problem.n_states, pool.rows, runs.places
     carried, counted, extremes = runs.carried, runs.counted, runs.extremes
     steps = problem.max_steps - pool.beyond[lane] - np.int64(rows[1 + n + step.ALLOWED, lane])
@@ -341,7 +341,7 @@ def store_lane(problem, runs, pool, lane, i):
 
 @kernel
 def fill_empty_lanes(held, rows, given):
-    """Put copies of one trajectory into the lanes that hold none."""
+    """Fill unused lanes with copies of one trajectory."""
     first = 0
     while held[first] < 0:
         first += 1
@@ -379,5 +379,5 @@ def report(problem, runs, pool, workspace, lane, i):
 
 @kernel
 def next_time(times, i, k):
-    """When a sample of a trajectory is due, infinite after the last."""
+    """Time of the next sample of a trajectory, infinite after the last."""
     return times[min(i, times.shape[0] - 1), k] if k < times.shape[1] else np.inf

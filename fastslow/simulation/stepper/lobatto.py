@@ -1,4 +1,4 @@
-"""Points of Lobatto and the matrices of collocation at them, computed for every degree."""
+"""Lobatto points and the collocation matrices at them, for every degree."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LOWEST, HIGHEST = 4, COLLOCATION
 
 
 def lobatto_points(n: int) -> Array:
-    """The n points of Lobatto on [0, 1]: the ends and the turning points of Legendre's polynomial.
+    """The n Lobatto points on [0, 1]: the ends and the extrema of a Legendre polynomial.
 
     Examples
     --------
@@ -28,7 +28,7 @@ def lobatto_points(n: int) -> Array:
 
 
 def _in_order(points: Array) -> Array:
-    """Points in an order that is stable for divided differences (Leja), the first one first."""
+    """Leja ordering of points, stable for divided differences; the first point stays first."""
     left, chosen = list(points[1:]), [points[0]]
     while left:
         chosen.append(max(left, key=lambda x: abs(np.prod([x - c for c in chosen]))))
@@ -37,7 +37,7 @@ def _in_order(points: Array) -> Array:
 
 
 def _matrix(points: Array, at: Array, integrals: bool) -> Array:
-    """Values at some places, or integrals from 0 to there, of the polynomials through points."""
+    """Matrix of interpolated values at given places, or of integrals from 0 to them."""
     n = len(points)
     wanted = legendre.legvander(2.0 * at - 1.0, n)
     if integrals:
@@ -50,7 +50,7 @@ def _matrix(points: Array, at: Array, integrals: bool) -> Array:
 
 
 def _tables() -> tuple[Array, ...]:
-    """Points and matrices of every degree, one row of each array for a degree."""
+    """Points and matrices, one row of each array for every degree."""
     size, count = HIGHEST + 1, HIGHEST - LOWEST + 1
     points, finer = np.zeros((count, size)), np.zeros((count, size))
     to_points, to_finer, slopes, errors = (np.zeros((count, size, size)) for _ in range(4))
@@ -67,8 +67,7 @@ def _tables() -> tuple[Array, ...]:
     return points, finer, to_points, to_finer, slopes, errors, between
 
 
-#: The points c_j, and those f_j at which a step is checked, in the order of Leja, one row for
-#: each degree from the lowest; the integrals of the polynomials through rates at c from 0 to c
-#: and to f, and their values at f; the integrals of those through values at f; and where
-#: polynomials through values at f are worst.
+#: Collocation points c_j and check points f_j in Leja order, one row for each degree from the
+#: lowest; integrals from 0 to c and to f of the interpolants of rates at c, and their values at
+#: f; integrals of the interpolants of values at f; and the place of their largest error.
 C, F, TO_C, TO_F, AT_F, INTEGRALS, WORST = _tables()

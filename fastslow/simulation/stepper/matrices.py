@@ -1,4 +1,4 @@
-"""Small matrices within compiled loops: linear systems, and whether a flow contracts."""
+"""Small dense matrices in compiled loops: linear systems, eigenvalues, contraction."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fastslow.kernels.decorators import kernel
 from fastslow.kernels.records import ComplexVector, Matrix, Vector, zeros
 from fastslow.simulation.stepper.polynomials import EPSILON
 
-#: Iterations for one eigenvalue, and after which of them the shift is another.
+#: Maximum iterations for one eigenvalue, and the interval between exceptional shifts.
 _ITERATIONS, _EXCEPTIONAL = 60, 10
 
 
@@ -28,17 +28,17 @@ class Spectrum(NamedTuple):
 
 
 def spectrum_for(n: int) -> Spectrum:
-    """Work space for matrices of up to n rows."""
+    """Allocate the work space for matrices of up to n rows."""
     half = n // 2 + 2
     return zeros(Spectrum, (n, n), (n, n), (n, n), n + 1, half, half, n)
 
 
 @kernel
 def contracts(jacobian, n, rate, space):
-    """Whether all eigenvalues of the first rows and columns have a real part below -rate.
+    """Check that all eigenvalues of the leading n×n block have real parts below -rate.
 
-    By the coefficients of the characteristic polynomial (Faddeev and Le Verrier)
-    of the matrix moved by the rate, and the scheme of Routh.
+    By the characteristic polynomial of the shifted matrix (Faddeev-Le Verrier) and the
+    Routh-Hurwitz criterion.
     """
     if n < 3:
         second = jacobian[n - 1, n - 1] + rate
@@ -90,9 +90,9 @@ def contracts(jacobian, n, rate, space):
 
 @kernel
 def undamped_modulus(jacobian, n, rate, space):
-    """The largest modulus of the eigenvalues whose real parts are not below -rate.
+    """Largest modulus of the eigenvalues of the leading block with real parts from -rate.
 
-    Of the first rows and columns. 0 where there is none, NaN where they are not known.
+    0 if there is none, NaN if the eigenvalues cannot be computed.
     """
     if contracts(jacobian, n, rate, space):
         return 0.0
@@ -110,10 +110,10 @@ def undamped_modulus(jacobian, n, rate, space):
 
 @kernel
 def eigenvalues_of(matrix, n, space):
-    """Fill in the eigenvalues of the first rows and columns; whether they are known.
+    """Compute the eigenvalues of the leading block; return whether this succeeded.
 
-    They are not where something is not finite, or where the iteration does not converge. By
-    Householder's reflections and Francis's double step, as in EISPACK (Smith et al. 1976).
+    It fails for entries that are not finite and without convergence. Householder reduction
+    and Francis's double-shift QR steps, as in EISPACK (Smith et al. 1976).
     """
     h = space.shifted
     for i in range(n):
@@ -165,7 +165,7 @@ def eigenvalues_of(matrix, n, space):
 
 @kernel
 def balance(h, n):
-    """Scale rows and columns by powers of two, until their lengths are alike."""
+    """Balance a matrix: scale rows and columns by powers of two to similar norms."""
     changed = True
     while changed:
         changed = False
@@ -194,7 +194,7 @@ def balance(h, n):
 
 @kernel
 def to_hessenberg(h, n, v):
-    """Bring a matrix to Hessenberg's form by Householder's reflections."""
+    """Reduce a matrix to Hessenberg form by Householder reflections."""
     for m in range(1, n - 1):
         size = 0.0
         for i in range(m + 1, n):
@@ -229,7 +229,7 @@ def to_hessenberg(h, n, v):
 
 @kernel
 def uncoupled(h, last, size):
-    """The row in which the lowest block begins that nothing couples to those above."""
+    """First row of the trailing block that is decoupled from the rows above."""
     first = last
     while first > 0:
         around = abs(h[first - 1, first - 1]) + abs(h[first, first])
@@ -241,13 +241,13 @@ def uncoupled(h, last, size):
 
 @kernel
 def double_step(h, first, last, x, y, w):
-    """One step of Francis in the rows from the first to the last, with two shifts.
+    """One double-shift Francis step on the rows from the first to the last.
 
     The shifts have the sum x + y and the product x y - w.
     """
     m, p, q, r = last - 2, 0.0, 0.0, 0.0
     while True:
-        # two small entries in a row begin it later
+        # two consecutive small entries allow a later start
         z = h[m, m]
         p = ((x - z) * (y - z) - w) / h[m + 1, m] + h[m, m + 1]
         q = h[m + 1, m + 1] + z - x - y
@@ -298,7 +298,7 @@ def double_step(h, first, last, x, y, w):
 
 @kernel
 def factorise_in_place(matrix, n):
-    """LU factors with the largest pivots; the last column keeps the exchanges of rows."""
+    """LU factors with partial pivoting; the last column stores the row exchanges."""
     for k in range(n):
         pivot = k
         for i in range(k + 1, n):
@@ -318,7 +318,7 @@ def factorise_in_place(matrix, n):
 
 @kernel
 def solve_in_place(factors, right, solution, n):
-    """Solve with the factors of `factorise_in_place`; the right-hand side is kept."""
+    """Solve with the factors of `factorise_in_place`; the right-hand side is not changed."""
     for i in range(n):
         solution[i] = right[i]
     for k in range(n):

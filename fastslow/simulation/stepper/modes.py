@@ -1,56 +1,62 @@
-"""Which smooth motion goes on from a point on one or several interfaces."""
+"""Selection of the smooth motion that continues from a point on one or several interfaces."""
 
 from __future__ import annotations
 
 from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address, call_with
 from fastslow.simulation.stepper.collocation import CollocationStep
-from fastslow.simulation.stepper.polynomials import EPSILON, ONE, ZERO, first_nonzero, first_strong
+from fastslow.simulation.stepper.polynomials import (
+    EPSILON,
+    ONE,
+    ZERO,
+    first_above_noise,
+    first_nonzero,
+)
 from fastslow.simulation.stepper.scales import step_length
 
-#: The part of a step over which the beginning of a motion is judged: over a whole one that
-#: stability limits, the last terms of the series are much larger than the motion itself.
+#: Fraction of a step over which the beginning of a motion is judged: over a whole step limited
+#: by stability, the last terms of the series are much larger than the motion itself.
 BEGINNING = 1.0 / 16.0
 
-#: How well a mode agrees with an interface that it starts on.
+#: Agreement of a mode with an interface on which it starts.
 AGREES, WEAKLY_AGREES, UNDETERMINED, WEAKLY_DISAGREES, DISAGREES = 3, 2, 1, 0, -1
 
-#: No mode agrees; more than one does; the rates of none that could are finite; this is not known
-#: before the code for collocation is there.
+#: No mode agrees; several agree; no candidate has finite rates; the decision needs the
+#: collocation code, which is not loaded.
 NO_MODE, MANY_MODES, NOT_DEFINED, UNKNOWN_MODE = -1, -2, -3, -4
 
-#: The length of a step that needs code which is not there yet.
+#: Step length returned if the step needs code that is not loaded.
 MISSING = -1.0
 
 
 @kernel
 def expand(problem, run, mode, longest, W, scales, space, going_on):
-    """Fill ``W`` with polynomials of time from a point on.
+    """Fill ``W`` with the polynomials in time of the motion from a point.
 
-    The Taylor series where there is one; else, where its coefficients are not
-    known or not finite, a collocation polynomial.
+    The Taylor series, or a collocation polynomial where its coefficients are not known
+    or not finite.
 
     Parameters
     ----------
     problem : Problem
     run : Run
-        Where.
+        Gives the point.
     mode : int
     longest : float
-        Longest step that is of use.
+        Maximum useful step length.
     W : float64 array
-        Rows of coefficients, filled here.
+        Rows of coefficients, filled in.
     scales : float64 array, shape (2, rows)
-        In which errors are measured, see `step_length`.
+        Error scales, see `step_length`.
     space : Collocation
     going_on : bool
-        Whether this is a step of the run, which goes on from the last one by collocation.
+        Whether this is a step of the run, which continues its last collocation step.
 
     Returns
     -------
     float
-        How far the polynomials hold, NaN where the rates are not finite, `MISSING` where
-        collocation is needed and is not there.
+        Length on which the polynomials are valid, NaN if the rates are not finite, `MISSING`
+        if collocation is needed and not loaded.
     """
     call_address(problem.series, mode, run.inputs, run.parameters, W)
     return expanded(problem, run, mode, longest, W, scales, space, going_on)
@@ -58,7 +64,7 @@ def expand(problem, run, mode, longest, W, scales, space, going_on):
 
 @kernel
 def expanded(problem, run, mode, longest, W, scales, space, going_on):
-    """`expand` where the series is there already."""
+    """`expand` with the series already in ``W``."""
     rows = problem.n_states + problem.n_forcing + problem.n_interfaces
     length = step_length(W, rows, problem.order, problem.tol, scales)
     if going_on:
@@ -70,7 +76,7 @@ def expanded(problem, run, mode, longest, W, scales, space, going_on):
 
 @kernel
 def collocation_fallback(problem, run, mode, longest, W, scales, space, going_on):
-    """Call `collocate`: apart, so that the common case stays short."""
+    """Call `collocate`; a separate function keeps the common case short."""
     if problem.collocation == 0:
         return MISSING
     step = CollocationStep(problem, run, mode, longest, W, scales, space, going_on)
@@ -79,7 +85,7 @@ def collocation_fallback(problem, run, mode, longest, W, scales, space, going_on
 
 @kernel
 def scaled(W, row, order, h, b):
-    """Scale the coefficients of one row to the step, and sum their moduli but the first."""
+    """Scale the coefficients of one row to the step; return the sum of moduli beyond the first."""
     power = 1.0
     total = 0.0
     for k in range(order + 1):
@@ -92,14 +98,14 @@ def scaled(W, row, order, h, b):
 
 @kernel
 def interface_noise(problem, run, j, gradient):
-    """Size of h that is rounding error, from the moduli of its terms; fills the gradient."""
+    """Rounding error of h, from the moduli of its terms; fills the gradient."""
     call_address(problem.series, problem.n_modes + j, run.inputs, run.parameters, gradient)
     return 8.0 * EPSILON * gradient[1]
 
 
 @kernel
 def neighbour_mode(signs, mode, j):
-    """The mode on the other side of one interface, the same mode where there is none."""
+    """The mode on the other side of one interface, or the same mode if there is none."""
     for other in range(signs.shape[0]):
         alike = signs[mode, j] != 0 and signs[other, j] == -signs[mode, j]
         for i in range(signs.shape[1]):
@@ -111,10 +117,9 @@ def neighbour_mode(signs, mode, j):
 
 @kernel
 def departs(problem, W, j, side, longest, scales, noise):
-    """Whether a motion from an interface goes to one side at once, by its drift.
+    """Check by the drift whether a motion leaves an interface to one side at once.
 
-    Where the rates are continuous it does so in no other mode, as `choose_mode`
-    would find by looking at them all.
+    With continuous rates no other mode does, so that `choose_mode` would return the same.
     """
     first_h, order = problem.n_states + problem.n_forcing, problem.order
     rows = first_h + problem.n_interfaces
@@ -128,12 +133,12 @@ def departs(problem, W, j, side, longest, scales, noise):
 
 @kernel
 def agreement(b, order, noise, side):
-    """How the motion away from an interface agrees with one side of it.
+    """Agreement of the motion from an interface with one side of it.
 
-    The first coefficient (Lie derivative) of h above the noise decides; where
-    there is none, the first that is not exactly zero leans; else it rests.
+    The first coefficient (Lie derivative) of h above rounding decides; without one, the
+    first nonzero coefficient decides weakly; otherwise it is undetermined.
     """
-    k = first_strong(b, ONE, order, noise)
+    k = first_above_noise(b, ONE, order, noise)
     if k <= order:
         return AGREES if b[k] * side > 0.0 else DISAGREES
     k = first_nonzero(b, ONE, order)
@@ -144,24 +149,24 @@ def agreement(b, order, noise, side):
 
 @kernel
 def choose_mode(problem, run, current, longest, W, scales, search, space):
-    """The mode in which the solution goes on.
+    """Select the mode in which the solution continues.
 
     Parameters
     ----------
     problem : Problem
-        Where the rates are continuous there is one way on, and doubt is rounding.
+        With continuous rates the continuation is unique, and ambiguity is due to rounding.
     run : Run
-        Where.
+        Gives the point.
     current : int
-        The mode before, preferred where the motion rests on the interface.
+        The previous mode, preferred if the motion remains on the interface.
     longest : float
     scales : float64 array
-        The step over which rounding is judged: its longest length, and in which scales.
+        Maximum length of the step over which rounding is judged, and its error scales.
     W : float64 array
         Work space.
     search : Search
-        ``on`` says on which interfaces the point lies, ``side`` the sign of h for the
-        others; ``noise`` holds the rounding error of each h and grows here.
+        ``on``: interfaces that contain the point; ``side``: sign of h for the others;
+        ``noise``: rounding error of each h, increased here.
     space : Collocation
 
     Returns
@@ -179,7 +184,7 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
     for j in range(n_interfaces):
         certain = certain and (continuous[j] or not on[j])
     if certain:
-        # even the worst is then only as wrong as rounding
+        # then even the worst candidate is wrong by rounding only
         best_score = DISAGREES - 1
     # two passes: every mode is judged over the same step, and by the largest rounding error
     shared = longest
@@ -224,15 +229,15 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
                     best = mode
     if equals > 1 and best_score == AGREES and not certain:
         return MANY_MODES
-    # one that disagrees is not taken in the place of one that is not known
+    # a mode that disagrees does not replace one that cannot be evaluated
     return NOT_DEFINED if broken and best_score <= DISAGREES else best
 
 
 @kernel
 def bounds_of(signs, mode, j, first):
-    """The first of the two rows that bound sliding along an interface, and whether others slide.
+    """First of the two bound rows of a sliding interface, and whether there are several.
 
-    The rows follow one another in the order of the interfaces that are slid along.
+    The rows are in the order of the sliding interfaces.
     """
     before = count = ZERO
     for i in range(signs.shape[1]):
@@ -244,13 +249,11 @@ def bounds_of(signs, mode, j, first):
 
 @kernel
 def sliding_agreement(W, row, several, order, h, noise, b):
-    """Whether sliding goes on along an interface: its two bounds have opposite signs, now or next.
+    """Check whether sliding continues: its two bounds have opposite signs, now or next.
 
-    Along a single interface these are the drifts on both sides, and both point at the
-    interface, a < 0 < b; along several, the weight of one lies between −1 and 1 in
-    either order of the signs. A drift that moves h by less than its noise decides as
-    little here as it does of the motion to that side: where sliding ends, one of
-    them goes on.
+    On a single interface these are the drifts on both sides, both towards the interface,
+    a < 0 < b; on several, the Filippov weight of one is between −1 and 1 in either order
+    of the signs. A drift that moves h by less than its rounding error does not decide.
     """
     columns = order + 1
     small = 32.0 * EPSILON * (abs(W[row * columns]) + abs(W[(row + 1) * columns]))
@@ -258,7 +261,7 @@ def sliding_agreement(W, row, several, order, h, noise, b):
     turned = orientation(W, row, several, columns)
     for k in range(2):
         scaled(W, row + k, order, h, b)
-        first = first_strong(b, ZERO, order, small)
+        first = first_above_noise(b, ZERO, order, small)
         if first > order or b[first] * (2 * k - 1) * turned < 0.0:
             return DISAGREES
     return AGREES
@@ -266,5 +269,5 @@ def sliding_agreement(W, row, several, order, h, noise, b):
 
 @kernel
 def orientation(W, row, several, columns):
-    """−1 where the first of two bounds is the positive one, else 1."""
+    """−1 if the first of two bounds is the positive one, else 1."""
     return -1.0 if several and W[row * columns] > W[(row + 1) * columns] else 1.0

@@ -1,7 +1,7 @@
-"""Roots of a step's polynomials: the first crossing of an interface, none missed.
+"""Roots of the polynomials of a step: the first crossing of an interface, none missed.
 
-A polynomial is held by its coefficients scaled to the step, b_k = c_k h**k,
-so that the step is 0 <= s <= 1.
+Polynomials are given by coefficients scaled to the step, b_k = c_k h**k, so that the
+step is 0 <= s <= 1.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from fastslow.kernels.vectors import horner_of_four
 
 EPSILON = float(np.finfo(float).eps)
 
-#: Intervals of the subdivision are not made shorter than 2 to the power of minus this.
+#: Maximum depth of the bisection.
 DEEPEST = 44
 
 _INVERSE_BINOMIALS = np.array(
@@ -46,14 +46,14 @@ def horner(b, first, last, s):
 
 @kernel
 def take_samples(W, columns, step, times, out, first, offsets):
-    """Evaluate rows of a step at all the times in it, from the first on; returns the next.
+    """Evaluate rows of a step at the sample times in it; return the index of the next sample.
 
     Parameters
     ----------
     W : float64 array
     columns : int
     step : tuple of float
-        When it begins, by how much that is late, and when it ends.
+        Begin, its compensation, and end.
     times : float64 array
         Increasing.
     out : float64 array, shape (rows, n_times)
@@ -104,13 +104,13 @@ def curvature(b, order, s):
 
 @kernel
 def bounded_away(c, first, last, h):
-    """Whether |c_0| > sum |c_k| h**k, so that there is no root on [0, h]."""
+    """Check |c_0| > sum |c_k| h**k, which excludes a root on [0, h]."""
     return abs(c[first]) > reach(c, first, last, h)
 
 
 @kernel
 def reach(c, first, last, h):
-    """The sum of |c_k| h**(k - first) over first < k <= last."""
+    """Sum of |c_k| h**(k - first) over first < k <= last."""
     square = h * h
     even, odd = abs(c[last]), abs(c[last - 1])
     for k in range(last - 2, first + 1, -2):
@@ -123,7 +123,7 @@ def reach(c, first, last, h):
 
 @kernel
 def excluded(b, first, last):
-    """Whether the coefficients alone prove that there is no root on (0, 1]."""
+    """Check whether the moduli of the coefficients exclude a root on (0, 1]."""
     rest = 0.0
     for k in range(first + 1, last + 1):
         rest += abs(b[k])
@@ -132,8 +132,8 @@ def excluded(b, first, last):
 
 @kernel
 def to_bernstein(b, first, n, stack):
-    """Bernstein coefficients on [0, 1] of sum b_k s**(k - first), then its begin and width."""
-    # divide by the binomials, then sum as in Pascal's triangle
+    """Bernstein coefficients of sum b_k s**(k - first) on [0, 1], followed by begin and width."""
+    # divide by the binomials, then sum along Pascal's triangle
     for k in range(n + 1):
         stack[0, k] = b[first + k] * _INVERSE_BINOMIALS[n, k]
     # two of its rows at a time, because every number that is put away has to be fetched again
@@ -176,8 +176,8 @@ def first_root(b, first, last, noise, stack):
 
     The signs of the Bernstein coefficients bound the number of roots of an
     interval from above, with equality for 0 and 1 (Descartes' rule); an
-    interval with more is halved. Two roots that cannot be told apart from a
-    touch within the noise are returned as one.
+    interval with more is bisected. Two roots that agree with a double root
+    within the noise are returned as one.
 
     Parameters
     ----------
@@ -191,9 +191,9 @@ def first_root(b, first, last, noise, stack):
     Returns
     -------
     s : float
-        The root, or 2 when there is none.
+        The root, or 2 if there is none.
     touch : bool
-        Whether the sign is the same on both sides, as far as rounding can tell.
+        Whether the sign is the same on both sides, up to rounding.
     """
     n = last - first
     to_bernstein(b, first, n, stack)
@@ -257,7 +257,7 @@ def refine(b, first, last, low, high):
             # at the root, which is an end of the bracket: the correction is rounding
             break
         else:
-            # a halved bracket tells nothing of how fast Newton's method converges
+            # a bisection gives no information on the convergence of Newton's method
             new, moved = 0.5 * (low + high), 0.0
             if new == s:
                 break
@@ -266,8 +266,8 @@ def refine(b, first, last, low, high):
 
 
 @kernel
-def first_strong(b, first, last, noise):
-    """Index of the first coefficient above the noise, last + 1 when none is."""
+def first_above_noise(b, first, last, noise):
+    """Index of the first coefficient above the noise, last + 1 if there is none."""
     for k in range(first, last + 1):
         if abs(b[k]) > noise:
             return k
@@ -276,5 +276,5 @@ def first_strong(b, first, last, noise):
 
 @kernel
 def first_nonzero(b, first, last):
-    """Index of the first coefficient that is not exactly zero, last + 1 when none is."""
-    return first_strong(b, first, last, 0.0)
+    """Index of the first coefficient that is not exactly zero, last + 1 if there is none."""
+    return first_above_noise(b, first, last, 0.0)

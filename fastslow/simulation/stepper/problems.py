@@ -1,4 +1,4 @@
-"""What the compiled loops are given: a problem, a run of it, and what is kept of the run."""
+"""Arguments of the compiled loops: a problem, a run of it, and the record of the run."""
 
 from __future__ import annotations
 
@@ -8,23 +8,22 @@ from fastslow.kernels.records import Flags, IntegerMatrix, Integers, Matrix, Vec
 
 
 class Problem(NamedTuple):
-    """A compiled model, and the errors allowed in its runs.
+    """A compiled model with its error control.
 
     Parameters
     ----------
     series, collocation, radau : int
-        Addresses of the compiled series, and of the steps by collocation and those of Radau,
-        which are 0 where they are not there.
+        Addresses of the compiled series, of collocation and of Radau steps, 0 if not loaded.
     n_states, n_forcing, n_interfaces, n_modes, order : int
     n_fast : int
-        The first states, for which implicit steps are tried; 0 for none.
+        Number of leading (fast) states for which implicit steps are tried, 0 for none.
     max_steps, max_crossings : int
     tol : float
     signs : int64 array, shape (n_modes, n_interfaces)
     continuous : bool array, shape (n_interfaces,)
-        Where the rates are.
+        Whether the rates are continuous across each interface.
     rules : float64 array, shape (2, n_states + n_forcing + n_interfaces)
-        From `rules_of`: in what sizes errors are measured.
+        Error scale rules, from `rules_of`.
     """
 
     series: int
@@ -45,7 +44,7 @@ class Problem(NamedTuple):
 
 
 class Run(NamedTuple):
-    """One run of a problem, at some time.
+    """One run of a problem at an instant.
 
     Parameters
     ----------
@@ -55,11 +54,11 @@ class Run(NamedTuple):
         Time from which extremes and hits count.
     parameters : float64 array
     inputs : float64 array, shape (1 + n_states + n_forcing,)
-        Time, states and slow quantities, changed as the run goes.
+        Time, states and slow quantities, updated in place.
     carried : float64 array, shape (SIZES + n_states + n_forcing + n_interfaces,)
     counted : int64 array, shape (14,)
-        What is carried from step to step, at first that of `beginnings`.
-        The work up to the next pause is to be set, in steps of the series.
+        State carried from step to step, initially from `beginnings`. The caller sets the
+        work until the next pause, in series steps.
     """
 
     begin: float
@@ -72,31 +71,29 @@ class Run(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What is kept of a run, filled as it goes.
+    """Output of a run.
 
-    Steps and crossings are listed, or, where there are extremes, they are summed up.
+    Steps and crossings are listed or, with extremes given, accumulated.
 
     Parameters
     ----------
     times : float64 array
         Increasing times of the samples, within the span.
     samples : float64 array, shape (n_rows, n_times)
-        The first rows at those times, as far as they are reached.
+        The first rows at those times, up to the time reached.
     steps : float64 array, shape (space, 4)
         Begin, length, mode and kind of every step.
     crossings : float64 array, shape (space, 6 + n_states)
         Time, interface, direction, mode before, mode after, near-tangential and state of
         every crossing.
     store : float64 array
-        The coefficients of states and slow quantities, step by step; empty where
-        they are not to be kept.
+        Coefficients of states and slow quantities, step by step; empty if they are not stored.
     extremes : float64 array, shape (2, n_states)
-        Smallest and largest value of every state; without rows
-        where steps and crossings are listed.
+        Smallest and largest value of every state; no rows if steps and crossings are listed.
     hits : int64 array, shape (n_interfaces, 2)
         Crossings upwards and downwards.
     seen : float64 array, shape (n_modes,)
-        When each mode was last left.
+        Time at which each mode was last left.
     """
 
     times: Vector

@@ -1,12 +1,12 @@
-"""Radau IIA steps, for motions so stiff that their Taylor coefficients are rounding.
+"""Radau IIA steps, for problems so stiff that their Taylor coefficients are rounding.
 
 The polynomial of degree s through the state at the beginning of a step whose
-derivative equals the rates at the s points of Radau (Hairer and Wanner 1996,
+derivative equals the rates at the s Radau points (Hairer and Wanner 1996,
 section IV.5) is of order 2 s - 1 at the end of the step and of order s within it,
-and L-stable. A Taylor coefficient of order k has the rounding of the states
-magnified by p**k, where p is the fastest rate; the increments of the stages
-have it only once, and the equations that they solve divide it by p again. Their
-linear systems are taken apart by the eigenvectors of the method (section IV.8).
+and L-stable. In a Taylor coefficient of order k, rounding of the states is amplified
+by p**k, where p is the fastest rate; in the stage increments it is amplified only once,
+and the stage equations divide it by p again. The linear systems are decoupled by the
+eigenvectors of the method (section IV.8).
 """
 
 from __future__ import annotations
@@ -43,21 +43,21 @@ from fastslow.simulation.stepper.scales import NOW, REACHED, ratio_of
 STAGES = 5
 RADAU_ORDER = 2 * STAGES - 1
 
-#: A mode is followed where |lambda| h is not larger, and forgotten where it decays by more.
+#: A mode is resolved for |lambda| h up to this, and damped if it decays by more.
 FOLLOWED = 0.5
 
-#: Decay, as an exponent, after which rounding has erased a motion.
+#: Exponent of decay after which a mode is below rounding.
 ERASED = 36.0
 
 #: Rounding of a rate, in units of the last place of the sum of the moduli of its terms.
 NOISE = 8.0
 
-#: Most iterations of Newton's method, and what they may leave of the error allowed.
+#: Maximum Newton iterations, and the fraction of the allowed error they may leave.
 ITERATIONS, LEFT = 12, 1e-3
 
 
 def _nodes() -> NDArray[np.float64]:
-    """The points c of Radau IIA: roots of P_s - P_(s-1), moved to [0, 1]."""
+    """Radau IIA points c: roots of P_s - P_(s-1), mapped to [0, 1]."""
     rule = np.zeros(STAGES + 1)
     rule[STAGES], rule[STAGES - 1] = 1.0, -1.0
     roots = np.sort(legendre.legroots(rule).real)
@@ -69,17 +69,17 @@ def _nodes() -> NDArray[np.float64]:
 
 
 def _powers() -> NDArray[np.float64]:
-    """From increments at the points to the coefficients of s, ..., s**STAGES."""
+    """Matrix from increments at the points to the coefficients of s, ..., s**STAGES."""
     return np.asarray(np.linalg.inv(C[:, None] ** np.arange(1, STAGES + 1)), dtype=np.float64)
 
 
 def _modes() -> tuple[NDArray[np.complex128], ...]:
     """Eigenvalues of the inverse method, the real one first, with right and left vectors.
 
-    Of each pair of conjugates one is kept, its right vectors doubled.
+    One of each conjugate pair is kept, with its right vectors doubled.
     """
     powers = np.arange(1, STAGES + 1)
-    # derivatives at the points from increments there: the inverse of the matrix of the method
+    # derivatives at the points from increments there: the inverse of the Runge-Kutta matrix
     inverse = (powers * C[:, None] ** (powers - 1)) @ POWERS
     values, right = np.linalg.eig(inverse)
     left = np.linalg.inv(right)
@@ -90,10 +90,10 @@ def _modes() -> tuple[NDArray[np.complex128], ...]:
 
 
 def _interpolation() -> tuple[float, float]:
-    """Where the polynomials are farthest from what they interpolate, and by how much.
+    """Place of the largest interpolation error, and its size.
 
-    The second number: the error within a step in units of the filtered defect at its
-    beginning, both for rates that do not depend on the state.
+    The size is the error within a step in units of the filtered defect at its beginning,
+    for rates that do not depend on the state.
     """
     nodal = Polynomial.fromroots(C)
     s = np.linspace(0.0, 1.0, 4001)
@@ -109,7 +109,7 @@ BETWEEN, WITHIN = _interpolation()
 
 
 class Radau(NamedTuple):
-    """What a phase of such steps goes on from, and the work space of a step.
+    """State carried through a phase of Radau steps, and work space.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Radau(NamedTuple):
     held : float64 array, shape (n_states + n_forcing + n_interfaces, STAGES + 1)
     point : float64 array, shape (1 + n_states + n_forcing,)
     out : float64 array
-        As large as the series.
+        Same size as the series.
     given : complex array, shape (n_states,)
     moved : complex array, shape (pairs, n_states)
     factors : complex array, shape (pairs, n_states, n_states + 1)
@@ -145,7 +145,7 @@ class Radau(NamedTuple):
 
 
 def radau_for(n_states: int, n_forcing: int, n_interfaces: int, size: int) -> Radau:
-    """Work space for a model of these sizes, whose series is so large."""
+    """Allocate the work space for a model of these sizes, whose series has ``size`` entries."""
     n, pairs = n_states, len(VALUES)
     return zeros(
         Radau,
@@ -164,7 +164,7 @@ def radau_for(n_states: int, n_forcing: int, n_interfaces: int, size: int) -> Ra
 
 
 class RadauStep(NamedTuple):
-    """What `radau_step` is given.
+    """Arguments of `radau_step`.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ class RadauStep(NamedTuple):
     run : Run
     mode : int
     rate : float
-        Modes that decay faster are forgotten whatever the length of the step.
+        Modes that decay faster are damped whatever the step length.
     h : float
     right : float64 array
         The polynomials of the last step of the phase.
@@ -196,12 +196,12 @@ class RadauStep(NamedTuple):
 
 @kernel
 def radau_step(step):
-    """One step; its polynomials are put into ``poly``; returns its error in units of ``tol``.
+    """Take one Radau step, fill ``poly``, and return the error in units of ``tol``.
 
     Returns
     -------
     float
-        Infinite where the equations are not solved.
+        Infinite if the stage equations are not solved.
     """
     problem, run, mode, rate, h, right, poly, scales, space = step
     series, parameters, inputs = problem.series, run.parameters, run.inputs
@@ -216,7 +216,7 @@ def radau_step(step):
     factors, given, moved = space.factors, space.given, space.moved
     last = carried[0]
     if last > 0.0:
-        # the last polynomial, continued
+        # extrapolate the last polynomial
         for j in range(STAGES):
             for i in range(n):
                 row = i * columns
@@ -245,7 +245,7 @@ def radau_step(step):
             factors[m, i, i] += VALUES[m] / h
         if not factorise_in_place(factors[m], n):
             return np.inf
-    # no state is known better than rounding of the terms of the rates lets it be
+    # the accuracy of a state is limited by rounding in the terms of the rates
     for i in range(n):
         noise = 0.0
         for k in range(n):
@@ -286,7 +286,7 @@ def radau_step(step):
                     return np.inf
                 Z[j, i] += change
                 size = max(size, ratio_of(change, allowed_in[i]))
-        # rounding is where it cannot go on
+        # at rounding no further progress is possible
         done = size <= LEFT
         if not done:
             if (turn > 0 and not size <= 0.7 * before) or not size < np.inf:
@@ -309,8 +309,8 @@ def radau_step(step):
                 increment = Z[j, i] if i < n else held[i, 1 + j] - held[i, 0]
                 value += POWERS[k, j] * increment
             poly[row + k + 1] = value / power
-    # the defects of the rates where they are largest, filtered by the method (Hairer and Wanner
-    # 1996, eq. IV.8.19); where the rates are stiff what is left is that of the interpolation
+    # defects of the rates where they are largest, filtered by the method (Hairer and Wanner
+    # 1996, eq. IV.8.19); for stiff rates the interpolation error remains
     error = 0.0
     for place in (0.0, BETWEEN):
         if place > 0.0:
@@ -350,14 +350,14 @@ def radau_step(step):
         sorted_eigenvalues(jacobian, n_fast, then, space.spectrum)
         unresolved = unresolved_modulus(now, then, n_fast, rate, h) * h
         if not unresolved <= FOLLOWED:
-            # as an error of this order, so that the next attempt is as short as it must be
+            # as an error of this order, so that the next attempt is short enough
             return (unresolved / FOLLOWED) ** (STAGES + 1) if unresolved < np.inf else np.inf
     return error
 
 
 @kernel
 def accept(problem, run, mode, h, poly, right, space):
-    """Go on from a step: values and rates at its end are put into ``right``."""
+    """Accept a step: values and rates at its end are written to ``right``."""
     n, point = problem.n_states, space.point
     for i in range(run.inputs.shape[0]):
         point[i] = run.inputs[i]
@@ -373,7 +373,7 @@ def accept(problem, run, mode, h, poly, right, space):
 
 @kernel
 def value_at(poly, row, s):
-    """A polynomial of one row."""
+    """Evaluate the polynomial of one row."""
     value = 0.0
     for k in range(STAGES, -1, -1):
         value = value * s + poly[row + k]
@@ -382,7 +382,7 @@ def value_at(poly, row, s):
 
 @kernel
 def slope_at(poly, row, s):
-    """Its derivative."""
+    """Evaluate the derivative of the polynomial of one row."""
     value = 0.0
     for k in range(STAGES, 0, -1):
         value = value * s + k * poly[row + k]
@@ -391,7 +391,7 @@ def slope_at(poly, row, s):
 
 @kernel
 def jacobian_at(problem, run, mode, space):
-    """The derivatives of the rates by the states at a point, column by column."""
+    """Jacobian of the rates at a point, column by column."""
     n, columns, out = problem.n_states, problem.order + 1, space.out
     directional = DIRECTIONAL * (problem.n_modes + problem.n_interfaces) + mode
     for k in range(n):
@@ -404,7 +404,7 @@ def jacobian_at(problem, run, mode, space):
 
 @kernel
 def sorted_eigenvalues(jacobian, n, found, spectrum):
-    """Real parts of the eigenvalues, in descending order, then their moduli, NaN where unknown."""
+    """Real parts of the eigenvalues in descending order, then their moduli; NaN if unknown."""
     if not eigenvalues_of(jacobian, n, spectrum):
         for i in range(found.shape[0]):
             found[i] = np.nan
@@ -420,11 +420,11 @@ def sorted_eigenvalues(jacobian, n, found, spectrum):
 
 @kernel
 def unresolved_modulus(now, then, n, rate, h):
-    """The largest modulus of the eigenvalues of modes that a step must follow.
+    """Largest eigenvalue modulus of the modes that a step must resolve.
 
-    Of those that do not decay at the given rate, nor by the exponent `FOLLOWED` within the step,
-    or that decay so now but will grow before rounding has erased them. The real parts in
-    their order are continuous in time.
+    These are modes that decay neither at the given rate nor by the exponent `FOLLOWED`
+    within the step, or that decay now but will grow before they are below rounding. The
+    ordered real parts are continuous in time.
 
     Parameters
     ----------
@@ -434,7 +434,7 @@ def unresolved_modulus(now, then, n, rate, h):
     largest = 0.0
     for k in range(n):
         largest = max(largest, now[n + k], then[n + k])
-    # what rounding of the others leaves unknown
+    # uncertainty due to rounding of the others
     noise = 8.0 * n * EPSILON * largest
     followed = 0.0
     for k in range(n):

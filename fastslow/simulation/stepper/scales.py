@@ -1,10 +1,9 @@
-"""The sizes in which the errors of a step are measured, read off the run as it goes.
+"""Error scales of a step, determined from the run itself.
 
-In every row of a step (state, slow quantity, interface function) an error of
-rtol times a size is allowed. That size is the largest of the value itself, of a
-fixed one (atol / rtol, where the user gave atol), and of what the run has reached
-of late. Nothing in it has a unit: a run whose states or time are measured in
-others takes the same steps.
+In every row of a step (state, slow quantity, switching function) an error of
+rtol times a size is allowed. That size is the maximum of the value itself, of a
+fixed one (atol / rtol, if atol is given), and of the recent maximum of the run.
+It is free of units: a run in other units of states or time takes the same steps.
 """
 
 from __future__ import annotations
@@ -17,55 +16,54 @@ from numpy.typing import NDArray
 
 from fastslow.kernels.decorators import kernel
 
-#: Rows of the array of sizes: at the beginning of this step, and what the run has reached.
+#: Rows of the array of sizes: at the beginning of this step, and the recent maximum.
 NOW, REACHED = 0, 1
 
-#: Rows of the rules: the fixed size, and the share of a size that is left a step later.
+#: Rows of the rules: the fixed size, and the decay factor of the recent maximum per step.
 FIXED, LASTING = 0, 1
 
-#: What is left of the size that a state had a step ago: half after 35 steps, so that a large
-#: transient does not spoil what follows it, and a passage through zero is no small state.
+#: Decay factor per step of the recent maximum: one half after 35 steps, so that a large
+#: transient does not loosen later errors, and a passage through zero does not tighten them.
 FORGETTING = 0.98
 
-#: What is smaller has no size: its digits are lost soon after, and its reciprocal overflows.
+#: Smallest nonzero size: below it digits are lost, and the reciprocal overflows.
 SMALLEST = 1e-300
 
-#: Terms of a series by which the size of a row is judged that begins at zero.
+#: Leading terms that give the size of a row that starts at zero.
 LEADING = 4
 
 
 def rules_of(
     fixed: NDArray[np.float64], lasting: NDArray[np.float64], n_forcing: int, n_interfaces: int
 ) -> NDArray[Any]:
-    """Rules for the rows of a step, from those of its states.
+    """Scale rules of the rows of a step, from those of its states.
 
     Parameters
     ----------
     fixed : float64 array, shape (n_states,)
-        atol / rtol, 0 where none is given.
+        atol / rtol, 0 if none is given.
     lasting : float64 array, shape (n_states,)
-        `FORGETTING`, or 0 where the size is the value itself or the fixed one.
+        `FORGETTING`, or 0 if the size is the value itself or the fixed one.
     n_forcing, n_interfaces : int
     """
     nothing, ones = np.zeros(n_forcing + n_interfaces), np.ones(n_interfaces)
-    # an interface function that is slid along is rounding: its size is that of the whole run
+    # the function of a sliding interface is rounding: its size is that of the whole run
     others = np.concatenate([np.full(n_forcing, FORGETTING), ones])
     return np.stack([np.concatenate([fixed, nothing]), np.concatenate([lasting, others])])
 
 
 @kernel
 def step_length(W, n_rows, order, tol, scales):
-    """The step whose last terms are as large as the tolerance (Jorba and Zou 2005).
+    """Step length for which the last terms equal the tolerance (Jorba and Zou 2005).
 
-    An error of ``tol`` times its size is allowed in every row. Three terms are
-    looked at, because series of even or odd functions lack every other one.
-    The sizes now are filled in; a row that begins at zero and has reached nothing
-    yet has the size that its series gives it within the step.
+    An error of ``tol`` times its size is allowed in every row. Three terms are used,
+    because series of even or odd functions lack every other one. The current sizes are
+    filled in; a row that starts at zero gets the size of its series within the step.
 
     Returns
     -------
     float
-        Infinite where the series ends, NaN where it is not finite.
+        Infinite if the series terminates, NaN if it is not finite.
     """
     columns = order + 1
     last = before = third = finite = 0.0
@@ -105,7 +103,7 @@ def step_length(W, n_rows, order, tol, scales):
 
 @kernel
 def own_length(W, row, order, tol):
-    """The step whose last terms are the tolerance times the largest of the leading ones."""
+    """Step length for which the last terms are the tolerance times the largest leading one."""
     length = np.inf
     for k in range(order - 2, order + 1):
         last = abs(W[row + k])
@@ -122,7 +120,7 @@ def own_length(W, row, order, tol):
 
 @kernel
 def within(W, row, h):
-    """The largest of the leading terms of a row within a step; infinite lengths count as 0."""
+    """Largest leading term of a row within a step; infinite lengths count as 0."""
     size = abs(W[row])
     if h < np.inf:
         power = 1.0
@@ -134,7 +132,7 @@ def within(W, row, h):
 
 @kernel
 def raise_sizes(W, n_rows, order, tol, room, rules, scales):
-    """Let every size that follows the run be at least what the row's series gives it."""
+    """Raise the sizes that follow the run to those given by the series."""
     columns = order + 1
     length = room
     for i in range(n_rows):
@@ -148,14 +146,14 @@ def raise_sizes(W, n_rows, order, tol, room, rules, scales):
 
 @kernel
 def remember_sizes(rules, scales):
-    """Go on from a step: what the run has reached after it."""
+    """Update the recent maxima after a step."""
     for i in range(rules.shape[1]):
         scales[REACHED, i] = max(rules[FIXED, i], rules[LASTING, i] * scales[NOW, i])
 
 
 @kernel
 def flush(rules, inputs, n_states):
-    """Let a state be zero that is measured by itself alone and has no digits left."""
+    """Set to zero every state below `SMALLEST` whose error is relative to itself alone."""
     for i in range(n_states):
         if abs(inputs[1 + i]) < SMALLEST and rules[LASTING, i] == 0.0 and rules[FIXED, i] == 0.0:
             inputs[1 + i] = 0.0
@@ -163,7 +161,7 @@ def flush(rules, inputs, n_states):
 
 @kernel
 def ratio_of(error, allowed):
-    """An error in units of what is allowed; nothing is allowed in what is and stays zero."""
+    """Error in units of the allowed one; infinite for a nonzero error where none is allowed."""
     if error == 0.0:
         return 0.0
     return abs(error) / allowed if allowed > 0.0 else np.inf

@@ -1,4 +1,4 @@
-"""What a run is between two steps, and the memory that its steps work in."""
+"""State of a run between two steps, and the work space of its steps."""
 
 from __future__ import annotations
 
@@ -14,30 +14,28 @@ from fastslow.simulation.stepper.implicit import WAIT, Implicit, implicit_for
 from fastslow.simulation.stepper.problems import Problem
 from fastslow.simulation.stepper.scales import FIXED
 
-#: Numbers carried from step to step: by how much the time is late, the usual length of a
-#: step, the time of the last event; the length that an implicit step tries first, and that
-#: of the series at the last one; depth and rounding error of h at the last event. From then on
-#: the sizes that the run has reached.
+#: Real numbers carried from step to step: compensation of the time, usual step length, time
+#: of the last event; first length of the next implicit step, length of the series at the last
+#: one; depth and rounding error of h at the last event; then the recent maxima of the run.
 LATE, USUAL, LAST_EVENT, WANTED, LONGEST, DEPTH, FLOOR, SIZES = range(8)
 
-#: Whole numbers carried: steps, crossings and samples so far, crossings crowded
-#: together, the mode, -1 before the first was chosen, steps until an implicit one is
-#: tried, and how many to wait for should it fail. Then what only a run that paused goes on
-#: from: that it did, how many implicit steps in a row, the interface of the last event (of one
-#: that did not pause, the one that it has crossed and is to leave, else -1),
-#: whether it was touched, whether a mode is to be chosen, and whether it has just been. Last
-#: the work that is left before the next pause.
+#: Integers carried: numbers of steps, crossings and samples, crossings in immediate
+#: succession, the mode (-1 before the first), steps until the next implicit attempt, and the
+#: wait after a failed one. Then, for a run that paused: the flag of the pause, consecutive
+#: implicit steps, the interface of the last event (without a pause, the interface crossed
+#: and still to be left, else -1), whether it was touched, whether a mode is to be selected,
+#: and whether one has just been. Last the work left before the next pause.
 (
     STEPS, CROSSINGS, SAMPLES, CROWDED, MODE, CALM, PAUSE,
     PAUSED, IN_A_ROW, INTERFACE, TOUCHED, CHOOSING, FRESH, WORK,
 ) = range(14)  # fmt: skip
 
-#: Work of a step by collocation, and of an attempt at an implicit one with one fast state, in
-#: units of a step of the series.
+#: Work of a collocation step, and of an implicit attempt with one fast state, in units of a
+#: series step.
 COLLOCATED_WORK, IMPLICIT_WORK = 50, 4
 
 
-#: Samples that are taken at a time, a multiple of those that one instruction takes.
+#: Samples evaluated at a time, a multiple of the SIMD width.
 _SAMPLES_AT_A_TIME = 256
 
 
@@ -47,7 +45,7 @@ def beginnings(
     n_forcing: int,
     rules: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """What `integrate` carries from step to step, of several runs at their beginnings.
+    """Initial values of the state that `integrate` carries from step to step, for several runs.
 
     Parameters
     ----------
@@ -59,7 +57,7 @@ def beginnings(
     Returns
     -------
     places : ndarray, shape (m, 1 + n + n_forcing)
-        Times, states, and room for the slow quantities.
+        Times, states, and space for the slow quantities.
     carried : ndarray, shape (m, SIZES + rows)
     counted : ndarray of int64, shape (m, 14)
     """
@@ -75,14 +73,14 @@ def beginnings(
 
 
 class Workspace(NamedTuple):
-    """Work space of `integrate`, for one run after the other; one that paused goes on in its own.
+    """Work space of `integrate`, reused by consecutive runs; a paused run keeps its own.
 
     Parameters
     ----------
     W, work : float64 arrays
-        As large as the series.
+        Same size as the series.
     offsets : float64 array
-        Of samples within a step, some at a time.
+        Offsets of samples within a step.
     scales : float64 array, shape (2, n_states + n_forcing + n_interfaces)
     search : Search
     collocation : Collocation
@@ -99,7 +97,7 @@ class Workspace(NamedTuple):
 
 
 def workspace_for(problem: Problem, n_rows: int) -> Workspace:
-    """Work space for runs of a problem, whose series fills so many rows."""
+    """Allocate the work space for runs of a problem whose series has ``n_rows`` rows."""
     n, forcing, interfaces = problem.n_states, problem.n_forcing, problem.n_interfaces
     size = n_rows * (problem.order + 1)
     fast = problem.n_fast > 0
