@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from fastslow.arguments import positive, settings, whole
 from fastslow.errors import ArgumentError
 
-#: What is counted; everything else is measured.
+#: Integer settings; all others are positive numbers.
 COUNTS = {
     "iterations": whole(1, 10**6),
     "points": whole(2, 10**9),
@@ -19,34 +19,37 @@ COUNTS = {
 @settings
 @dataclass(frozen=True)
 class Continuation:
-    """How a branch is traced. Lengths are in scaled units: the parameter's range is 1.
+    """Settings of pseudo-arclength continuation.
+
+    Lengths are in scaled units: the range of the parameter is 1.
 
     Parameters
     ----------
     step : float
-        First step along the arclength.
+        Initial arclength step.
     smallest_step : float
-        Below it a branch ends with the outcome "step too small".
+        Minimum step; below it a branch ends with the outcome "step too small".
     largest_step : float
-        Bound on the step, for a smooth curve in figures.
+        Maximum step, for smooth curves in figures.
     largest_turn : float
-        Angle in radians that the tangent may turn in one step.
+        Maximum angle in radians between the tangents of consecutive points.
     tolerance : float
-        Newton correction, in scaled units, at which a point is accepted; the
-        convergence is quadratic, so the point itself is known to rounding.
+        Newton correction, in scaled units, at which a point is accepted; convergence is
+        quadratic, so that the point is accurate to rounding.
     iterations : int
-        Newton iterations allowed in one step.
+        Maximum Newton iterations in one step.
     points : int
-        Rows that one branch may have.
+        Maximum number of points of a branch.
     starts : int
-        Values of the parameter, beside both ends, at which branches are looked for.
+        Interior values of the parameter at which equilibria are computed as starting points,
+        in addition to both ends.
     branches : int
-        Branches that one diagram may have; beyond it the search ends and says so.
+        Maximum number of branches of a diagram; reaching it is reported in its outcome.
 
     Raises
     ------
     ArgumentError
-        If a value is not positive or the steps are not in order.
+        If a value is not positive or smallest_step ≤ step ≤ largest_step is violated.
     """
 
     step: float = 1e-2

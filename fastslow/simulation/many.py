@@ -1,4 +1,4 @@
-"""Simulating a model from many states or at many parameter sets."""
+"""Simulation of ensembles: many initial states or parameter sets."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ from fastslow.simulation.stepper.workspace import MODE, STEPS, Workspace, beginn
 Floats = NDArray[np.float64]
 
 
-#: Trajectories that a thread takes at a time, at most.
+#: Maximum number of trajectories that a thread takes at a time.
 _CHUNK = 512
 
 
@@ -88,42 +88,42 @@ def simulate_many(
     threads: int | None = None,
     progress: bool = False,
 ) -> Ensemble:
-    """Follow many trajectories, and keep of each what sums it up.
+    """Simulate many trajectories and return summaries: extremes, hits, final states.
 
-    Plain steps are taken for several trajectories at once, by vector
-    instructions; crossings and all that is not plain one by one, as `simulate`
-    takes them. A trajectory is the same to the last bit whatever the others,
-    their order and the number of threads, and that of `simulate` to the tolerance.
-    One that cannot go on stops nothing; `Ensemble.outcomes` says why it ended.
+    Steps without events are taken for several trajectories at once by SIMD instructions,
+    all others one trajectory at a time as in `simulate`. Each result is bitwise independent
+    of the other trajectories, their order and the number of threads, and agrees with
+    `simulate` to the tolerance. A trajectory that ends early does not affect the others;
+    `Ensemble.outcomes` gives the reason.
 
     Parameters
     ----------
     model : Model
-        With forcing, with slow states, or frozen with every parameter given.
+        With forcing, with slow states, or frozen with all parameters given.
     states : array_like, shape (m, n) or (n,), or mapping
         Initial states and slow states; by name, each a number or of shape (m,).
     parameters : mapping, optional
-        Parameter to its values, a number or of shape (m,): the first values make
-        the first set, and so on; no product is formed.
+        Parameter to its values, a number or of shape (m,). Values are paired, not combined:
+        set k takes the k-th value of each array.
     t : (float, float)
         Start and end of time, for all.
     periods : float
-        Instead of ``t``: how many periods of the forcing, each trajectory by its own.
+        Instead of ``t``: length in periods of the forcing of each trajectory.
     start : float
         Start of time with ``periods``.
     period : float or array_like, shape (m,), optional
-        The period, where the model's own is not wanted or cannot be found.
+        Period, by default that of the forcing.
     settle : float
-        How much is left out of extremes, hits and evenly spaced samples at the
-        beginning: periods with ``periods``, time with ``t``.
+        Transient excluded from extremes, hits and evenly spaced samples: in periods with
+        ``periods``, in time with ``t``.
     integration : Integration
-        Error allowed, order and method of the steps, and where to stop a trajectory.
+        Error control, order and method of the steps, and limits of a trajectory.
     samples : int or sequence of float, optional
-        How many evenly spaced samples of every column to keep, or at which times.
+        Number of evenly spaced samples of every column, or their times.
     gap : str, optional
-        The region that counts as the gap for `Ensemble.regime`.
+        Region that is the gap in `Ensemble.regime`.
     threads : int, optional
-        By default the cores that this process may use.
+        By default the number of cores available to this process.
     progress : bool
         Whether to show a progress bar.
 
@@ -134,12 +134,12 @@ def simulate_many(
     Raises
     ------
     ArgumentError
-        For lengths that differ, numbers that are not finite, a wrong span, or
+        For different lengths, numbers that are not finite, an invalid time span, or
         ``periods`` without a common period.
     UnknownNameError
-        For a state, parameter or gap that is not in the model.
+        For an unknown state, parameter or gap.
     ModelError
-        For a function that cannot be compiled.
+        For a function without compiled code.
 
     Examples
     --------
@@ -201,7 +201,7 @@ def simulate_many(
             extremes[chosen], ends[chosen], codes[chosen], sampled[chosen] = run[0], *run[3:6]
             for j, name in enumerate(one.interfaces):
                 hits[chosen, interfaces.index(name)] = run[1][:, j]
-            # the mode is -1 before any was chosen
+            # the mode is -1 before the first selection
             names = [*map(modes.index, compiled.modes), -1]
             codes[chosen, 1] = np.array(names)[codes[chosen, 1]]
             if run[6] is not None:
@@ -269,7 +269,7 @@ def final_states(
     threads: int,
     times: Floats | None = None,
 ) -> tuple[Floats, NDArray[np.int64], Floats]:
-    """Where trajectories of different spans arrive, and what they are at some times.
+    """Final states of trajectories with different time spans, and samples at given times.
 
     Parameters
     ----------
@@ -287,7 +287,7 @@ def final_states(
     -------
     ends : ndarray, shape (m, n)
     codes : ndarray of int, shape (m,)
-        How each ended, 0 where it reached the end of its span.
+        Outcome of each, 0 at the end of its span.
     samples : ndarray, shape (m, n, k)
         NaN after the end of a trajectory.
     """
@@ -331,14 +331,14 @@ def _parameter_table(
 
 @dataclass(frozen=True, eq=False)
 class _Ends:
-    """The periods at the end of runs that are looked at one by one.
+    """Periods at the end of runs that are classified individually.
 
     Parameters
     ----------
     period, windows : ndarray, shape (m,)
-        Their length and number.
+        Length and number of the periods.
     bits : ndarray of int, shape (n_modes,)
-        The sides of a gap that each mode touches.
+        Sides of a gap touched in each mode.
     """
 
     period: Floats
@@ -347,9 +347,9 @@ class _Ends:
 
 
 class _Kept:
-    """What runs do in their last periods, gathered at stops at the ends of them.
+    """Sides touched and states in the last periods, recorded at stops between periods.
 
-    A run goes on after a stop as if there were none, but for the end of a step.
+    A stop only ends a step; it does not change the run otherwise.
     """
 
     def __init__(self, ending: _Ends, spans: Floats, starts: Floats, n_regions: int) -> None:
@@ -360,11 +360,11 @@ class _Kept:
         self.failed = np.zeros(len(spans), dtype=np.int64)
 
     def stops(self, chunk: tuple[int, int]) -> int:
-        """How often the runs of a chunk stop: before the first of the periods, and after each."""
+        """Number of stops of a chunk: before the first of the periods, and after each."""
         return int(self.ending.windows[slice(*chunk)].max()) + 1
 
     def _edge(self, chunk: tuple[int, int], left: NDArray[np.int64]) -> Floats:
-        """When so many periods are left of each run, at its begin at the earliest."""
+        """Time at which ``left`` periods remain of each run, not before its beginning."""
         rows = slice(*chunk)
         edge = self.spans[rows, 1] - left * self.ending.period[rows]
         return np.asarray(np.maximum(edge, self.spans[rows, 0]))
@@ -377,7 +377,7 @@ class _Kept:
         counted: NDArray[np.int64],
         codes: NDArray[np.int64],
     ) -> None:
-        """Set where the runs of a chunk stop next."""
+        """Set the next stops of the runs of a chunk."""
         rows = slice(*chunk)
         most = self.ending.windows[rows]
         left = np.minimum(self.stops(chunk) - 1 - stop, most)
@@ -386,9 +386,9 @@ class _Kept:
         stops[rows, 1] = self._edge(chunk, left)
         if stop > 0:
             self.failed[rows] = codes[rows]
-            # what has ended goes no further
+            # finished runs do not continue
             stops[rows, 1] = np.where(codes[rows] != 0, -np.inf, stops[rows, 1])
-            # a sliding motion is chosen anew, as at the begin of a run
+            # the mode of sliding is selected anew, as at the beginning of a run
             sliding = counted[rows, MODE] >= self.n_regions
             counted[rows, MODE] = np.where(sliding & (codes[rows] == 0), -1, counted[rows, MODE])
 
@@ -400,7 +400,7 @@ class _Kept:
         seen: Floats,
         codes: NDArray[np.int64],
     ) -> None:
-        """Note which sides were touched since the stop before, and the states."""
+        """Record the sides touched since the previous stop, and the states."""
         rows = slice(*chunk)
         if stop > 0:
             codes[rows] = np.where(self.failed[rows] != 0, self.failed[rows], codes[rows])
@@ -432,7 +432,7 @@ def _run(
 ) -> tuple[Any, ...]:
     """Extremes, hits, times seen, ends, codes, samples and last periods of trajectories.
 
-    All have one series.
+    All share one compiled series.
     """
     values, starts, spans, since = rows
     count, n = starts.shape
@@ -454,7 +454,7 @@ def _run(
     stopping = threading.Event()
 
     def follow(chunk: tuple[int, int]) -> Iterator[int]:
-        """Follow a chunk to its end; what is yielded on the way has to be provided."""
+        """Integrate a chunk to its end, yielding the codes of code that must be loaded first."""
         pool = pool_for(problem, lanes.regions, values.shape[1], count)
         workspace = workspace_for(problem, compiled.n_rows)
         for stop in range(1 if kept is None else kept.stops(chunk)):
@@ -492,7 +492,7 @@ def _run(
         try:
             waiting = {executor.submit(next, f, None): f for f in in_progress}
             while waiting:
-                # signals are handled in this thread, on some systems between two waits only
+                # this thread handles signals, on some systems only between two waits
                 for done in wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED).done:
                     following, needed = waiting.pop(done), done.result()
                     if needed is None:

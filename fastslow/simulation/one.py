@@ -1,4 +1,4 @@
-"""Simulating a model: one trajectory with its crossings."""
+"""Simulation of one trajectory of a model, with event location."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ from fastslow.simulation.stepper.workspace import (
     workspace_for,
 )
 
-#: No extremes, hits and times of modes: steps and crossings are listed instead.
+#: Empty extremes, hits and mode times: steps and crossings are listed instead.
 _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
 
 
@@ -78,55 +78,54 @@ def simulate(
     dense: bool = True,
     gap: str | None = None,
 ) -> Trajectory:
-    """Follow one trajectory, with every crossing of an interface located.
+    """Simulate one trajectory and locate every crossing of a switching manifold.
 
-    Taylor series of the rates, step by step (Jorba and Zou 2005); crossings
-    are roots of the interface functions along the series of a step, so that
-    two crossings within one step are both found. Where a function has no
-    recurrence (gamma, Bessel functions, …), or a series is singular at a point
-    where the rates are not, collocation polynomials take their place.
+    The Taylor method (Jorba and Zou 2005) is used; crossings are the roots of the switching
+    functions along the series of a step, so that two crossings within one step are both
+    located. Functions without a Taylor recurrence (gamma, Bessel functions, …), and points
+    where the series is singular but the rates are not, are treated by collocation.
 
     Parameters
     ----------
     model : Model or StoredModel
-        With forcing, with slow states, or frozen with every parameter given; the model of a
-        run that was loaded is a stored one, and needs no SymPy.
+        With forcing, with slow states, or frozen with all parameters given. The model of a
+        loaded run is a stored one, which does not need SymPy.
     state : sequence of float, shape (n,), or mapping
         Initial states and slow states, in order or by name.
     t : (float, float)
         Start and end of time.
     periods : float
-        Instead of ``t``: how many periods of the forcing.
+        Instead of ``t``: length of the run in periods of the forcing.
     start : float
         Start of time with ``periods``.
     period : float, optional
-        The period, where the model's own is not wanted or cannot be found.
+        Period, by default that of the forcing.
     integration : Integration
-        Error allowed, order and method of the steps, and where to stop.
+        Error control, order and method of the steps, and limits of the run.
     samples : int or sequence of float, optional
-        How many evenly spaced samples, or at which times. By default the
-        steps themselves are refined enough to plot.
+        Number of evenly spaced samples, or their times. By default plots use the dense
+        output of the steps.
     dense : bool
-        Whether the series is kept, for evaluation at any time. Without it the
-        memory does not grow with the number of steps by more than 24 bytes each, and
-        whether noise decided when a state left zero is judged by samples and the end.
+        Whether to store the series, for evaluation at any time. Without it memory grows by at
+        most 24 bytes per step, and notes on states that leave zero by rounding are based on
+        the samples and the final state.
     gap : str, optional
-        The region that counts as the gap for `Trajectory.regime`.
+        Region that is the gap in `Trajectory.regime`.
 
     Returns
     -------
     Trajectory
-        What was computed, whatever the end; ``outcome`` says why it ended.
+        Also if the run ended early; ``outcome`` gives the reason.
 
     Raises
     ------
     ArgumentError
-        For a wrong initial state, span or sample times, a frozen
-        model without values, or ``periods`` without a common period.
+        For an invalid initial state, time span or sample times, a frozen model with free
+        parameters, or ``periods`` without a common period.
     UnknownNameError
-        For an initial value or gap that is not in the model.
+        For an unknown state or gap.
     ModelError
-        For a function that cannot be compiled.
+        For a function without compiled code.
 
     Examples
     --------
@@ -184,7 +183,7 @@ def simulate(
         if series is not None:
             table, known = steps, series[:, :, 0]
         else:
-            # what there is: the beginning, samples and the end
+            # available values: the beginning, the samples and the end
             table = np.zeros((1 + reached, 4))
             table[:, 0], table[:, 2] = [span[0], *times[:reached]], mode
             known = np.full((1 + reached, kept), np.nan)
@@ -213,7 +212,7 @@ def simulate(
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """What all runs of a model with the same settings share.
+    """Data shared by all runs of a model with the same settings.
 
     Parameters
     ----------
@@ -244,7 +243,7 @@ class Prepared:
 
     @cached_property
     def shared(self) -> dict[str, Any]:
-        """The fields of a `Trajectory` that all runs have in common."""
+        """Fields of a `Trajectory` that are common to all runs."""
         model = self.model
         content = {
             "states": self.names,
@@ -263,21 +262,21 @@ class Prepared:
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
-        """What the work space depends on."""
+        """Sizes on which the work space depends."""
         problem = self.problem
         sizes = (problem.n_states, problem.n_forcing, problem.n_interfaces, problem.order)
         return (*sizes, problem.n_fast, self.compiled.n_rows)
 
     @cached_property
     def _beginning(self) -> tuple[NDArray[Any], ...]:
-        """Parameters, and what a run carries at its beginning."""
+        """Parameters, and the initial carried state of a run."""
         (_,), (carried,), (counted,) = beginnings(
             np.zeros(1), np.zeros((1, len(self.names))), 0, self.problem.rules
         )
         return self.compiled.parameter_array(self.model), carried, counted
 
     def run(self, state: NDArray[np.float64], span: tuple[float, float]) -> Run:
-        """A run at its beginning."""
+        """Create a run in its initial state."""
         parameters, carried, counted = self._beginning
         place = np.zeros(1 + len(state) + self.compiled.n_forcing)
         place[0] = span[0]
@@ -287,7 +286,7 @@ class Prepared:
 
 @lru_cache(maxsize=KEPT)
 def prepared_run(model: Simulated, integration: Integration, gap: str | None) -> Prepared:
-    """What a run needs of its model, with every parameter given, and its settings."""
+    """Prepare the runs of a model with all parameters given, for some settings."""
     require_values(model)
     resolved = resolve(integration, model, implicit=True)
     between = gap_regions(model, gap)
@@ -304,7 +303,7 @@ def prepared_run(model: Simulated, integration: Integration, gap: str | None) ->
     )
 
 
-#: Numbers that are copied at a time, with which a table begins at least, and at most.
+#: Numbers copied at a time, and minimum and maximum initial size of a table.
 _BLOCK, _LEAST, _MOST = 2**22, 2**12, 2**23
 
 
@@ -316,7 +315,7 @@ class _Tables(NamedTuple):
     store: NDArray[np.float64]
 
     def filled(self, counted: NDArray[np.int64], stride: int) -> tuple[int, int, int]:
-        """How many rows of each hold something, of `stride` coefficients for each step."""
+        """Numbers of filled rows, with `stride` coefficients for each step."""
         steps = int(counted[STEPS])
         return steps, int(counted[CROSSINGS]), steps * stride
 
@@ -334,7 +333,7 @@ class _Tables(NamedTuple):
 
 
 def _larger(table: NDArray[np.float64], used: int, more: int) -> NDArray[np.float64]:
-    """A copy with space for twice as many rows, made in parts."""
+    """A copy with space for twice as many rows, made in blocks."""
     copy = np.empty((2 * len(table) + more, *table.shape[1:]))
     rows = max(1, _BLOCK // math.prod(table.shape[1:]))
     for first in range(0, used, rows):
@@ -344,7 +343,7 @@ def _larger(table: NDArray[np.float64], used: int, more: int) -> NDArray[np.floa
 
 
 class _Memory(threading.local):
-    """What runs of a thread have in common: work space, and how much the last one kept."""
+    """Memory shared by the runs of a thread: work space, and the sizes of the last tables."""
 
     def __init__(self) -> None:
         self.kept = (0, 0, 0)
@@ -352,18 +351,18 @@ class _Memory(threading.local):
         self.workspaces: dict[tuple[int, ...], Workspace] = {}
 
     def workspace(self, prepared: Prepared) -> Workspace:
-        """Work space, which a run gives back under its shape."""
+        """Take the work space of this shape; the run puts it back."""
         found = self.workspaces.pop(prepared.shape, None)
         if found is None:
-            # of other models there may be many
+            # limits the memory with many models
             self.workspaces.clear()
             found = workspace_for(prepared.problem, prepared.compiled.n_rows)
         return found
 
     def tables(self, n_states: int, stride: int) -> _Tables:
-        """Tables for a run that keeps as much as the last one."""
+        """Allocate tables of the sizes of the last run."""
         steps, crossings, store = self.sizes
-        # an empty store is for none
+        # an empty store means no dense output
         return _Tables(
             np.empty((steps // 4, 4)),
             np.empty((crossings // (6 + n_states), 6 + n_states)),
@@ -371,7 +370,7 @@ class _Memory(threading.local):
         )
 
     def filled(self, tables: _Tables, counted: NDArray[np.int64], stride: int) -> _Tables:
-        """Tables cut, where they are, to what a run has filled of them."""
+        """Truncate the tables in place to their filled rows."""
         for table, used in zip(tables, tables.filled(counted, stride), strict=True):
             table.resize((used, *table.shape[1:]), refcheck=False)
             table.flags.writeable = False
@@ -386,7 +385,7 @@ _memory = _Memory()
 
 
 def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
-    """How a run was stepped, in words."""
+    """Describe the methods of the steps of a run."""
     if not np.count_nonzero(steps[:, 3]):
         return compiled.method
     words = [compiled.method]
@@ -405,7 +404,7 @@ def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
 def problem_of(
     model: Simulated, compiled: CompiledSeries, resolved: Resolved, rules: NDArray[np.float64]
 ) -> Problem:
-    """What the stepping loops need of a model, its series, and the errors allowed."""
+    """Bundle model, series and error control for the stepping loops."""
     settling = resolved.implicit and compiled.order >= DEGREE and not compiled.values_only
     return Problem(
         compiled.address,
@@ -428,7 +427,7 @@ def problem_of(
 def error_rules(
     model: Simulated, resolved: Resolved, compiled: CompiledSeries
 ) -> NDArray[np.float64]:
-    """In what sizes the errors of a run are measured, from its tolerances."""
+    """Error scale rules of a run, from its tolerances."""
     names = (*model.states, *model.slow_states)
     fixed, lasting = np.zeros(len(names)), np.zeros(len(names))
     traits = model.traits

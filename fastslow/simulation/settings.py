@@ -20,7 +20,7 @@ from fastslow.arguments import (
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.named_mapping import NamedMapping
 
-#: Where a run ends that nothing else ends.
+#: Default limits of steps and of crossings.
 MOST = 1_000_000
 
 
@@ -29,36 +29,34 @@ MOST = 1_000_000
 class Integration:
     """How a trajectory is integrated: error control, method and limits.
 
-    In a step an error of rtol |y| is allowed in every state y, or of atol where that
-    is larger.
+    The error allowed in a step is the larger of rtol |y| and atol for every state y.
 
     Parameters
     ----------
     rtol : float
-        Relative error allowed in a step, 1e-16 (rounding) to 0.1.
+        Relative tolerance of a step, 1e-16 (rounding) to 0.1.
     atol : float, sequence or mapping, optional
-        Absolute error allowed in a step, in the unit of the state: one number for all
-        states, one for each in order, or by name; 0 is allowed. A state that is not
-        named, as all are by default, gets rtol times the size that it has had of late
-        in the run, so that no unit plays a part; one whose rate has it as a factor
-        (x' = x g, as of an extinct species or a laser that is off) gets 0, so that a
-        passage along x = 0 keeps its memory down to 1e-300, below which it is zero.
+        Absolute tolerance of a step, in the unit of the state: one number for all states,
+        one for each in order, or by name; 0 is allowed. By default, and for states not
+        named, it is rtol times the recent size of the state in the run, independent of
+        units. A state that is a factor of its own rate (x' = x g, such as an extinct species
+        or a laser below threshold) gets 0, so that a slow passage along the invariant plane
+        x = 0 is resolved down to 1e-300, below which x is set to zero.
     order : int, optional
-        Order of the series, 4 to 40, by default chosen by the tolerance; of
-        collocation polynomials 12 at most.
+        Order of the Taylor series, 4 to 40, by default from the tolerance; at most 12 for
+        collocation.
     implicit : bool, optional
-        Whether an implicit method may take long steps through settled phases, in
-        which stability and not accuracy limits the series; by default in a single
-        run, but not in an ensemble. Plain steps of an ensemble, taken together,
-        are so cheap that implicit ones pay only where the fast motion is some thirty
-        times faster than the slow one lets the steps be, as in stiff contacts.
+        Whether implicit steps may be taken where stability rather than accuracy limits the
+        series (stiff phases); by default in single runs, not in ensembles. Ensembles take
+        explicit steps so cheaply that implicit ones pay only if stability shortens the steps
+        by a factor of about thirty, as in stiff contacts.
     max_steps, max_crossings : int
-        Where to stop a trajectory.
+        Limits at which a trajectory stops.
 
     Raises
     ------
     ArgumentError
-        For a value outside the range that is named here.
+        For a value outside these ranges.
 
     Examples
     --------
@@ -85,15 +83,15 @@ class Integration:
 
     @property
     def default_order(self) -> int:
-        """Order of the series for the tolerance, one of two so that little is compiled."""
+        """Order of the series for the tolerance, one of two to limit compilation."""
         return 16 if self.rtol >= 1e-11 else 24
 
 
 @dataclass(frozen=True, kw_only=True)
 class Resolved:
-    """An `Integration` of which nothing is left open but what the run decides.
+    """An `Integration` with its defaults resolved for a model.
 
-    ``atol`` names every state; None is the size read off the run.
+    ``atol`` names every state; None stands for the scale determined by the run.
     """
 
     rtol: float
@@ -109,7 +107,7 @@ class Resolved:
         return self.max_steps, self.max_crossings
 
     def recorded(self) -> dict[str, Any]:
-        """What a result keeps as its ``settings``."""
+        """The ``settings`` stored in a result."""
         given = {name: value for name, value in self.atol.items() if value is not None}
         return {
             "rtol": self.rtol,
@@ -122,7 +120,7 @@ class Resolved:
 
 
 class HasStates(Protocol):
-    """A model, by the names that settings need."""
+    """Attributes of a model that settings depend on."""
 
     @property
     def states(self) -> tuple[str, ...]: ...
@@ -132,7 +130,7 @@ class HasStates(Protocol):
 
 
 def resolve(integration: Integration, model: HasStates, *, implicit: bool) -> Resolved:
-    """The settings with nothing left open.
+    """Resolve the defaults of settings for a model.
 
     Parameters
     ----------
@@ -144,9 +142,9 @@ def resolve(integration: Integration, model: HasStates, *, implicit: bool) -> Re
     Raises
     ------
     UnknownNameError
-        For an absolute tolerance of what is no state.
+        For an absolute tolerance of an unknown state.
     ArgumentError
-        For a number of absolute tolerances that is not that of the states.
+        If the number of absolute tolerances differs from that of the states.
     """
     order = integration.order
     return Resolved(
@@ -160,7 +158,7 @@ def resolve(integration: Integration, model: HasStates, *, implicit: bool) -> Re
 
 
 def _by_state(atol: Any, names: tuple[str, ...]) -> dict[str, float | None]:
-    """An absolute tolerance for every state, None where the run decides."""
+    """Absolute tolerance of every state, None if determined by the run."""
     if isinstance(atol, Mapping):
         for name in atol:
             if name not in names:
@@ -176,7 +174,7 @@ def _by_state(atol: Any, names: tuple[str, ...]) -> dict[str, float | None]:
 
 
 def _absolute(name: str, value: Any) -> Any:
-    """One absolute tolerance, or one for each of several states."""
+    """Validate one absolute tolerance, or one for each of several states."""
     if isinstance(value, Mapping):
         checked = {str(k): _nonnegative(f"{name} of {k}", v) for k, v in value.items()}
         return NamedMapping("state", checked)

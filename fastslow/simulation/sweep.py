@@ -1,4 +1,4 @@
-"""Bifurcation diagrams by simulation: a parameter swept up and down, the last state carried on."""
+"""Bifurcation diagrams by simulation: a parameter swept up and down from the last state."""
 
 from __future__ import annotations
 
@@ -73,11 +73,11 @@ def bifurcation_sweep(
     integration: Integration = DEFAULT,
     progress: bool = False,
 ) -> BifurcationSweep:
-    """Bifurcation diagram by simulation: what is left after the transient, value by value.
+    """Compute a brute-force bifurcation diagram: the attractor at each parameter value.
 
-    Every run begins in the state in which the last one ended, so that a stable
-    motion is followed until it is lost; swept back, the values between show
-    coexisting motions. The equations are compiled once.
+    Every run starts from the final state of the previous one, so that an attractor is
+    followed until it disappears; sweeping back reveals hysteresis and coexisting
+    attractors. The equations are compiled once.
 
     Parameters
     ----------
@@ -90,41 +90,41 @@ def bifurcation_sweep(
     state : sequence of float, shape (n,), or mapping
         Initial states of the first run.
     column : str or Symbol, optional
-        What is recorded, by default the first state.
+        Recorded column, by default the first state.
     settle, keep : int
-        How many periods are dropped, and how many recorded, at each value.
+        Numbers of periods discarded and recorded at each value.
     what : {"stroboscopic", "extremes", "section"}
         Record the column once every period, its minimum and maximum in every
         period, or its values on a Poincaré section.
     phase : float
-        For stroboscopic points: when in the period, as a part of it, 0 to 1.
+        For stroboscopic points: phase of the period, 0 to 1.
     section : str or Expr
-        For a section: the expression, see `Trajectory.section`. With the rate
-        of a state and direction −1, its maxima are recorded.
+        For a Poincaré section: the expression, see `Trajectory.section`. The rate of a state
+        with direction −1 gives its maxima.
     level, direction
-        The level that the expression passes, and which way (None for both).
+        Level of the section, and direction of crossing (None for both).
     period : float, optional
-        By default that of the forcing at each value. A model without forcing
-        needs it: the unit of time of ``settle`` and ``keep``.
+        By default that of the forcing at each value. Required without forcing, as the unit
+        of time of ``settle`` and ``keep``.
     back : bool
         Whether to sweep back as well.
     integration : Integration
-        Error control of the runs, and where one of them stops.
+        Error control and limits of the runs.
     progress : bool
         Whether to show a progress bar.
 
     Returns
     -------
     BifurcationSweep
-        A value whose run fails has an outcome that says why, and no points; the
-        next value goes on from the last state that did not fail.
+        A value whose run fails has no points, and its outcome gives the reason; the next
+        value continues from the last successful state.
 
     Raises
     ------
     UnknownNameError
         For an unknown parameter, state, column or kind.
     ArgumentError
-        For values that neither rise nor fall, a wrong initial state, or a missing period.
+        For values that are not monotone, an invalid initial state, or a missing period.
 
     Examples
     --------
@@ -176,7 +176,7 @@ def bifurcation_sweep(
 
 @dataclass(frozen=True)
 class _Settings:
-    """What is done at every value."""
+    """Settings of the runs at every value."""
 
     parameter: str
     column: int
@@ -204,16 +204,16 @@ def _values(over: ArrayLike) -> Array:
 
 
 def _rule(settings: _Settings, name: str) -> str:
-    """What is recorded, in words; raises for what cannot be."""
+    """Describe the recorded points; raise for invalid combinations."""
     if settings.what not in KINDS:
         raise unknown_name("kind of point", settings.what, KINDS)
     if (settings.section is not None) != (settings.what == "section"):
         raise ArgumentError(
-            'section= goes with what="section", and what="section" needs it: the expression that '
-            "passes the level"
+            'section= goes with what="section", and what="section" needs it: the expression of '
+            "the Poincaré section"
         )
     if not 0.0 <= settings.phase <= 1.0:
-        raise ArgumentError(f"phase = {settings.phase:g}; expected a part of the period, 0 to 1")
+        raise ArgumentError(f"phase = {settings.phase:g}; expected a fraction of a period, 0 to 1")
     if settings.what == "section":
         way = {1: " upwards", -1: " downwards", 0: " touching", None: ""}
         passed = f"{settings.section} = {settings.level:g}{way[settings.direction]}"
@@ -224,12 +224,12 @@ def _rule(settings: _Settings, name: str) -> str:
 
 
 def _try_first(model: Model, value: float, begin: Array, settings: _Settings) -> None:
-    """A short run at the first value: a wrong argument is wrong at every value."""
+    """Check the arguments by a short run at the first value."""
     here = model.with_parameters({settings.parameter: value})
     if settings.period is None and here.period() is None:
         raise ArgumentError(
             f"nothing in this model has a common period at {settings.parameter} = {value:g}; give "
-            "the time that settle= and keep= count, as period="
+            "the unit of time of settle= and keep= as period="
         )
     run = simulate(
         here,
@@ -306,14 +306,14 @@ def _at_value(
 
 
 def _points(run: Trajectory, settings: _Settings) -> Array:
-    """What is recorded of a run that has settled."""
+    """Recorded points of a settled run."""
     name = run.columns[settings.column]
     assert run.period is not None
     if settings.what == "section":
         level, direction = settings.level, settings.direction
         return run.section(settings.section, level=level, direction=direction)[name]
     if settings.what == "stroboscopic":
-        # the end of the last period is the beginning of the next value's first
+        # the end of the last period belongs to the next value
         return run.stroboscopic(phase=settings.phase * run.period)[name][: settings.keep]
     edges = np.linspace(*run.span, settings.keep + 1)
     pairs = [run.extremes(name, *pair) for pair in pairwise(edges.tolist())]

@@ -217,7 +217,10 @@ BY_FUNCTION = {
     "Trajectory.regimes.tol": POSITIVE,
     "Trajectory.periodicity.tol": POSITIVE,
     "bifurcation_sweep.level": NUMBER,
-    "bifurcation_sweep.phase": [*NUMBER, (2, Wrong, "phase = 2; expected a part of the period")],
+    "bifurcation_sweep.phase": [
+        *NUMBER,
+        (2, Wrong, "phase = 2; expected a fraction of a period"),
+    ],
     "bifurcation_sweep.settle": COUNT,
     "bifurcation_sweep.over": [
         ([1, 3, 2], Wrong, "over: expected strictly increasing or strictly decreasing numbers"),

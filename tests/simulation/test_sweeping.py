@@ -201,7 +201,7 @@ def test_the_slow_quantity_of_a_frozen_model_is_swept():
         ({"section": "v"}, fs.ArgumentError, "goes with"),
         ({"what": "section", "section": "vv"}, fs.UnknownNameError, "column or parameter 'vv'"),
         ({"what": "section", "section": "v", "direction": 3}, fs.ArgumentError, "direction = 3"),
-        ({"phase": 2}, fs.ArgumentError, "part of the period"),
+        ({"phase": 2}, fs.ArgumentError, "fraction of a period"),
     ],
 )
 def test_wrong_arguments(pair, changes, error, text):
