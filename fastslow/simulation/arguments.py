@@ -1,4 +1,4 @@
-"""What `simulate` is given, checked before anything is computed."""
+"""Validation of the arguments of `simulate`."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from fastslow.results.stored.model import StoredModel
 if TYPE_CHECKING:
     from fastslow.model.model import Model
 
-#: What a trajectory is simulated of.
+#: Models that can be simulated.
 Simulated: TypeAlias = "Model | StoredModel"
 
-#: Samples of one run that can be asked for by their number.
+#: Maximum number of evenly spaced samples of a run.
 MOST_SAMPLES = 10**8
 
 
 def simulated(name: str, value: Any) -> Simulated:
-    """The check of a model that is simulated: equations, or what was stored of them.
+    """Validate a model to be simulated: a `Model` or a `StoredModel`.
 
     Raises
     ------
     ArgumentError
         For anything else.
     """
-    # of a class that was not imported there is no object
+    # without its import there are no instances
     module = sys.modules.get("fastslow.model.model")
     if isinstance(value, StoredModel) or (module and isinstance(value, module.Model)):
         return value
@@ -41,7 +41,7 @@ def simulated(name: str, value: Any) -> Simulated:
 
 
 def initial_state(model: Simulated, start: Any) -> NDArray[np.float64]:
-    """The initial state as an array in the order states, slow states.
+    """Validate the initial state; return an array in the order states, slow states.
 
     Parameters
     ----------
@@ -52,9 +52,9 @@ def initial_state(model: Simulated, start: Any) -> NDArray[np.float64]:
     Raises
     ------
     ArgumentError
-        For a wrong number of values, a missing or a non-finite one.
+        For a wrong number of values, or a missing or non-finite value.
     UnknownNameError
-        For a name that is no state.
+        For an unknown state.
     """
     names = (*model.states, *model.slow_states)
     if isinstance(start, Mapping):
@@ -81,14 +81,14 @@ def initial_state(model: Simulated, start: Any) -> NDArray[np.float64]:
     return values
 
 
-#: Instants that a span must hold, so that steps and crossings within it have some digits.
+#: Minimum number of representable times in a span, so that steps and crossings are resolved.
 INSTANTS = 1e5
 
 
 def time_span(
     t: Any, periods: Any, start: float, period: float | None, own_period: Callable[[], float | None]
 ) -> tuple[tuple[float, float], float | None]:
-    """Start and end of time, and the common period: the given one, else the model's own.
+    """Validate the time span; return it with the period, by default that of the model.
 
     Raises
     ------
@@ -123,19 +123,19 @@ def time_span(
 
 
 def _check_resolution(first: float, last: float) -> None:
-    """Refuse a span within which too few times can be told apart."""
+    """Raise if a span contains too few representable times."""
     spacing = math.ulp(max(abs(first), abs(last)))
     if last - first < INSTANTS * spacing:
         raise ArgumentError(
             f"t = ({first:.17g}, {last:.17g}): in double precision times here are {spacing:.3g} "
-            f"apart, too far for a span of {last - first:.3g}; measure time from a later origin"
+            f"apart, too coarse for a span of {last - first:.3g}; shift the origin of time"
         )
 
 
 def sample_times(
     samples: int | Sequence[float] | NDArray[np.float64] | None, span: tuple[float, float]
 ) -> NDArray[np.float64]:
-    """Times to sample at: none, a number of them evenly over the span, or as given.
+    """Validate sample times: none, a number of evenly spaced ones, or given times.
 
     Raises
     ------
@@ -145,22 +145,23 @@ def sample_times(
     if samples is None:
         return np.empty(0)
     if isinstance(samples, (int, np.integer)) and not isinstance(samples, bool):
-        # what NumPy gives is a view
+        # linspace returns a view
         return np.linspace(*span, whole(2, MOST_SAMPLES)("samples", samples)).copy()
     times = np.atleast_1d(numbers("samples", samples))
-    # the largest and the smallest are finite, and what is no number is in no order with others
+    # finite ends suffice: NaN fails every comparison of order
     ends = times[:: max(1, len(times) - 1)]
     if times.ndim != 1 or not (np.isfinite(ends).all() and (times[:-1] <= times[1:]).all()):
         raise ArgumentError("samples: expected increasing, finite times")
     if len(times) and (times[0] < span[0] or times[-1] > span[1]):
         raise ArgumentError(
-            f"samples from {times[0]:g} to {times[-1]:g} leave the run, [{span[0]:g}, {span[1]:g}]"
+            f"samples from {times[0]:g} to {times[-1]:g} are outside the run, "
+            f"[{span[0]:g}, {span[1]:g}]"
         )
     return np.ascontiguousarray(times)
 
 
 def require_values(model: Simulated) -> None:
-    """Raise unless every parameter has a value."""
+    """Raise unless all parameters have values."""
     missing = [name for name in model.free if name not in model.parameters]
     if missing:
         example = f"{missing[0]}=0.5"
@@ -171,13 +172,13 @@ def require_values(model: Simulated) -> None:
 
 
 def gap_regions(model: Simulated, gap: str | None) -> tuple[str, str, str] | None:
-    """The regions below, inside and above the gap, None for a model without one.
+    """Return the regions below, inside and above the gap, None without a gap.
 
     Parameters
     ----------
     model : Model
     gap : str, optional
-        The region inside; otherwise it is found: three regions between two
+        The region inside; by default the middle one of three regions separated by two
         interfaces that differ by a constant.
 
     Raises
@@ -185,7 +186,7 @@ def gap_regions(model: Simulated, gap: str | None) -> tuple[str, str, str] | Non
     UnknownNameError
         If the named region does not exist.
     ArgumentError
-        If the named region does not lie between two others.
+        If the named region is not between two others.
     """
     if gap is not None and str(gap) not in model.regions:
         raise unknown_name("region", gap, model.regions)

@@ -1,4 +1,4 @@
-"""Parameter sets that share one set of regions, so that one compiled series serves them."""
+"""Grouping of parameter sets with the same regions, which share one compiled series."""
 
 from __future__ import annotations
 
@@ -19,11 +19,10 @@ Values = Mapping[str, NDArray[np.float64]]
 
 
 def same_regions(model: Model, values: Values, count: int) -> list[tuple[Model, NDArray[np.intp]]]:
-    """Groups of parameter sets with the same regions, each with a model of that group.
+    """Group parameter sets with the same regions, each group with its model.
 
-    Which regions are empty depends on parameter values, and so does the
-    meaning of a condition with a factor of parameters alone. Most often there
-    is one group, and its model is the one given.
+    Empty regions, and the sense of a condition with a factor of parameters alone, depend
+    on parameter values. In most cases there is one group, with the given model.
 
     Parameters
     ----------
@@ -36,7 +35,7 @@ def same_regions(model: Model, values: Values, count: int) -> list[tuple[Model, 
     Returns
     -------
     list of (Model, ndarray of int)
-        A model at the values of the first set of each group, and the positions of its sets.
+        For each group a model at the values of its first set, and the indices of its sets.
     """
     everything = np.arange(count)
     if not values:
@@ -44,7 +43,7 @@ def same_regions(model: Model, values: Values, count: int) -> list[tuple[Model, 
     own = {name: value for name, value in model.parameters.items() if name not in values}
     complete = all(name in model.parameters for name in values)
     if complete:
-        # the model's own values are one more set, whose group needs no other model
+        # the model's own values are one more set, whose group uses the given model
         values = {n: np.append(v, model.parameters[n]) for n, v in values.items()}
     key = _signs(model, values, own)
     if complete and (key == key[-1]).all():
@@ -60,14 +59,14 @@ def same_regions(model: Model, values: Values, count: int) -> list[tuple[Model, 
         if complete and which[-1] == number:
             groups.append((model, members))
             continue
-        # each from the last, so that a region seen once keeps its name in all
+        # each from the previous one, so that regions keep their names
         current = current.with_parameters({n: v[members[0]] for n, v in values.items()})
         groups.append((current, members))
     return groups
 
 
 def _signs(model: Model, values: Values, own: Mapping[str, float]) -> NDArray[np.float64]:
-    """Numbers that are equal for parameter sets with the same regions, shape (m, any)."""
+    """Keys that are equal for parameter sets with the same regions, shape (m, any)."""
     structure = model.structure
     count = len(next(iter(values.values())))
     swept = {real(name) for name in values}
@@ -87,8 +86,8 @@ def _signs(model: Model, values: Values, own: Mapping[str, float]) -> NDArray[np
         h = interface.function
         slopes = [h.diff(z) for z in moving]
         if any(slope.free_symbols & set(moving) for slope in slopes):
-            # never excludes a region, unless a vanishing parameter makes it affine: such a
-            # set, which is rare, is alike to itself alone
+            # a nonlinear function excludes no region, unless a vanishing parameter makes it
+            # affine: such a rare set forms its own group
             for symbol in h.free_symbols & swept:
                 gone = values[symbol.name] == 0.0
                 columns += [gone, *(np.where(gone, values[s.name], 0.0) for s in swept)]
@@ -102,7 +101,7 @@ def _signs(model: Model, values: Values, own: Mapping[str, float]) -> NDArray[np
 
 @lru_cache(maxsize=KEPT)
 def _scales(structure: Structure, moving: tuple[sp.Symbol, ...]) -> tuple[sp.Expr, ...]:
-    """Factors of the switching expressions that hold parameters alone."""
+    """Factors of the switching expressions that contain parameters alone."""
     written = (*structure.rates.values(), *structure.forcing.values())
     found: list[sp.Expr] = []
     for expression in written:
@@ -115,7 +114,7 @@ def _scales(structure: Structure, moving: tuple[sp.Symbol, ...]) -> tuple[sp.Exp
 
 
 def _patterns(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same for affine functions a·z + b alone, given as (m, functions, moving + 1)."""
+    """Keys for affine functions a·z + b alone, given as (m, functions, moving + 1)."""
     slopes, offsets = table[..., :-1], table[..., -1]
     count, n = offsets.shape
     still = np.all(slopes == 0.0, axis=2)
@@ -123,8 +122,8 @@ def _patterns(table: NDArray[np.float64]) -> NDArray[np.float64]:
     moving = [j for j in range(n) if not still[:, j].any()]
     if len(moving) + np.count_nonzero(still.all(axis=0)) < n:
         return np.hstack([*key, _one_by_one(table)])
-    # among parallel functions the order of the edges decides; others exclude nothing when
-    # one of each direction are independent
+    # for parallel functions the order of the edges decides; if one function per direction are
+    # linearly independent, the directions do not exclude each other's sides
     leaders: list[int] = []
     edges: list[list[NDArray[np.float64]]] = []
     for j in moving:
@@ -146,7 +145,7 @@ def _patterns(table: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _one_by_one(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A number for each set of possible patterns."""
+    """An index for each set of possible sign patterns."""
     unique, which = np.unique(table, axis=0, return_inverse=True)
     seen: dict[tuple[tuple[int, ...], ...], int] = {}
     numbers = []

@@ -1,4 +1,4 @@
-"""The compiled loops of this package, and what they call when it is needed."""
+"""The compiled loops of this package, and the callbacks that they load when needed."""
 
 from __future__ import annotations
 

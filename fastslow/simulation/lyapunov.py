@@ -22,38 +22,38 @@ from fastslow.simulation.settings import Integration, Resolved, integration_sett
 
 Floats = NDArray[np.float64]
 
-#: Tighter than that of a run: separations are differences of states.
+#: Tighter than for a run, because separations are differences of states.
 FINE = Integration(rtol=1e-11)
 
-#: Separation by the root of the tolerance: the error of a central difference is then a few
-#: roots from rounding, and of the order of the tolerance from curvature.
+#: Separation in units of the root of the tolerance: the error of a central difference is then a
+#: few roots from rounding, and of the order of the tolerance from curvature.
 SEPARATION = 3.0
 
-#: Growth of a separation within one interval, between curvature and rounding.
+#: Limits of the growth of a separation within one interval, from rounding and from curvature.
 LEAST, MOST = 1e-2, 1e2
 
-#: Blocks whose spread gives the uncertainty, at most.
+#: Maximum number of blocks, whose spread gives the uncertainty.
 BLOCKS = 10
 
-#: Intervals at first, and at most.
+#: Initial and maximum number of intervals.
 FIRST, COUNTLESS = 60, 200_000
 
-#: The part of the measurement over which the vector turns before anything is counted.
+#: Fraction of the measurement in which the tangent vector aligns before averaging.
 ALIGNED = 0.1
 
-#: Trajectories followed in one call.
+#: Trajectories integrated in one call.
 TOGETHER = 100_000
 
-#: A run that ends with states larger by this factor than where the measurement begins leaves.
+#: Growth of the states over the measurement from which a run counts as unbounded.
 LEAVING = 10.0
 
-#: Periods and steps in which a motion may show that it repeats.
+#: Periods and steps within which a repetition is searched.
 REPEATS, WATCHED = 64, 20_000
 
-#: By which part of the longest interval all of them are moved, the golden section.
+#: Shift of the intervals as a fraction of the longest, by the golden section.
 OFF = 0.381966
 
-#: Points of a run that say how far each state ranges.
+#: Points of a run that give the range of each state.
 RANGING = 256
 
 
@@ -77,7 +77,7 @@ def lyapunov_exponent(
     integration: Integration = FINE,
     threads: int | None = None,
 ) -> LyapunovExponent:
-    """Compute the largest Lyapunov exponent of the motion that a run settles on.
+    """Compute the largest Lyapunov exponent of the attractor that a run approaches.
 
     The run is divided into intervals. From the state at the beginning of each,
     trajectories displaced in both directions of every state are integrated to its end;
@@ -90,39 +90,38 @@ def lyapunov_exponent(
     Parameters
     ----------
     model : Model
-        Forced, with slow states, or frozen with every parameter given.
+        Forced, with slow states, or frozen with all parameters given.
     state : sequence of float, shape (n,), or mapping
         Initial states and slow states, in order or by name.
     t : (float, float)
         Start and end of time.
     periods : float
-        Instead of ``t``: how many periods of the forcing.
+        Instead of ``t``: length of the run in periods of the forcing.
     start : float
         Start of time with ``periods``.
     period : float, optional
-        The period, where the model's own is not wanted or cannot be found.
+        Period, by default that of the forcing.
     discard : float, optional
-        How much of the run is left out at the beginning, in periods with ``periods``, in
-        time with ``t``; a fifth of it by default.
+        Transient excluded at the beginning, in periods with ``periods``, in time with ``t``;
+        by default a fifth of the run.
     integration : Integration
         Error control of all runs; the displacement is three roots of ``rtol`` of each
         state's size.
     threads : int, optional
-        By default the cores that this process may use.
+        By default the number of cores available to this process.
 
     Returns
     -------
     LyapunovExponent
-        Its ``outcome`` says whether the motion is chaotic: the exponent is positive by
-        four standard errors, its sum over the run exceeds 10, and the run neither
-        repeats nor leaves for infinity.
+        Its ``outcome`` is chaotic if the exponent is positive by four standard errors, its
+        sum over the run exceeds 10, and the run neither repeats nor diverges.
 
     Raises
     ------
     ArgumentError
-        For a wrong state or span, or a ``discard`` that leaves nothing.
+        For an invalid state or span, or a ``discard`` as long as the run.
     UnknownNameError
-        For an initial value of what is no state.
+        For an initial value of an unknown state.
 
     Examples
     --------
@@ -144,7 +143,7 @@ def lyapunov_exponent(
         )
     first = span[0] + left_out
     measured = (span[1] - first) / unit
-    # blocks of whole periods, where there are any
+    # blocks of whole periods, if possible
     units = round(measured) if abs(measured - round(measured)) < 1e-9 * measured else 0
     found = exponents(
         model,
@@ -190,14 +189,14 @@ class Exponents:
     ended: dict[int, Outcome]
 
     def sign(self, row: int) -> int:
-        """The sign of an exponent, 0 where it is not decided or the run leaves."""
+        """Sign of an exponent, 0 if undecided or if the run diverges."""
         if self.leaves(row) or row in self.ended:
             return 0
         length = float(self.spans[row, 1] - self.spans[row, 0])
         return sign_of(float(self.value[row]), float(self.uncertainty[row]), length)
 
     def leaves(self, row: int) -> bool:
-        """Whether the states of a run grow throughout."""
+        """Whether the states of a run grow throughout the measurement."""
         before, after = self.largest[row]
         return bool(after > LEAVING * before)
 
@@ -237,11 +236,11 @@ class Exponents:
         )
 
     def _outcome(self, row: int, again: Outcome) -> Outcome:
-        """What the exponent of a run says about its motion."""
+        """Classify the motion of a run by its exponent."""
         if row in self.ended:
             return self.ended[row]
         if self.leaves(row):
-            text = "not decided: the states grow throughout, and the run may leave for infinity."
+            text = "not decided: the states grow throughout, and the run may diverge."
             return Outcome("not decided", text, False)
         sign = self.sign(row)
         if sign < 0:
@@ -281,14 +280,14 @@ def exponents(
     swept : dict
         Parameter to its values, shape (m,).
     times : ndarray, shape (m, 3)
-        Begin of each run, and first and last time of its measurement.
+        Start of each run, and first and last time of its measurement.
     integration : Integration
     threads : int, optional
     units : int
-        Equal parts of the measurement, of whole numbers of which blocks consist; by default
-        there are as many as intervals at first.
+        Equal subdivisions of the measurement that are not split between blocks; by default
+        the initial number of intervals.
     finest : int
-        Intervals in a measurement, at most.
+        Maximum number of intervals in a measurement.
     """
     resolved = resolve(integration, model, implicit=False)
     workers = threads_of(threads)
@@ -298,7 +297,7 @@ def exponents(
     units = units if units > 1 else FIRST
     lead = ALIGNED if ((first - begin) >= 2 * ALIGNED * length).all() else 0.0
     states, codes = starts, np.zeros(m, dtype=np.int64)
-    # a forcing switches at simple parts of its period: no interval begins there
+    # a forcing switches at simple fractions of its period: no interval starts there
     shift = OFF * length / (FIRST if lead else np.inf)
     first, last = first - shift, last - shift
     opening = first - lead * length
@@ -353,7 +352,7 @@ def exponents(
 
 
 class _Followed:
-    """Runs and the derivatives of their flow, in units of each state's size."""
+    """Runs and the derivatives of their flow map, in units of the size of each state."""
 
     def __init__(
         self, model: Model, resolved: Resolved, threads: int, starts: Floats, states: Floats
@@ -433,7 +432,7 @@ class _Followed:
             At the beginning of each interval.
         spans : ndarray, shape (m, k, 2)
         rows : ndarray of int, shape (m,)
-            Which of the runs.
+            Indices of the runs.
         """
         m, k, n = states.shape
         size = self.size[rows]
@@ -476,7 +475,7 @@ def _recurrence(
     integration: Integration,
     length: float,
 ) -> Outcome:
-    """Whether the motion of one run repeats, where its exponent leaves that open."""
+    """Check whether the motion of a run repeats, if its exponent does not exclude it."""
     if found.ended or found.leaves(0) or found.sign(0) < 0:
         return Outcome("not periodic", "", False)
     last = float(found.spans[0, 1])

@@ -1,4 +1,4 @@
-"""What `simulate_many` is given, checked before anything is computed."""
+"""Validation of the arguments of `simulate_many`."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ Floats = NDArray[np.float64]
 def starts_and_parameters(
     model: Model, states: Any, parameters: Any
 ) -> tuple[Floats, dict[str, Floats]]:
-    """Initial states (m, n) and the parameters that vary, each (m,).
+    """Validate initial states (m, n) and varying parameters, each (m,).
 
     Raises
     ------
     ArgumentError
-        For lengths that differ, wrong shapes, or numbers that are not finite.
+        For different lengths, wrong shapes, or numbers that are not finite.
     UnknownNameError
-        For a name that is no state or no parameter.
+        For an unknown state or parameter.
     """
     names = (*model.states, *model.slow_states)
     given = {str(k): numbers(f"parameter {k}", v) for k, v in (parameters or {}).items()}
@@ -77,7 +77,7 @@ def starts_and_parameters(
         )
     count = lengths.pop() if lengths else 1
     if count == 0:
-        raise ArgumentError("received no trajectory: the length of the states or parameters is 0")
+        raise ArgumentError("received no trajectory: the states or parameters have length 0")
     swept = {n: np.ascontiguousarray(np.broadcast_to(v, count)) for n, v in given.items()}
     starts = np.ascontiguousarray(np.broadcast_to(table, (count, len(names))))
     for name, values in (*swept.items(), *zip(names, starts.T, strict=True)):
@@ -96,7 +96,7 @@ def _one_length(what: str, given: Mapping[str, Floats]) -> None:
 
 
 def periods_of(model: Model, period: Any, count: int, swept: Mapping[str, Floats]) -> Floats:
-    """The period of every trajectory, shape (m,), NaN where there is none."""
+    """Period of every trajectory, shape (m,), NaN without one."""
     if period is not None:
         given = numbers("period", period)
         if given.ndim > 1 or given.size not in (1, count):
@@ -116,13 +116,13 @@ def periods_of(model: Model, period: Any, count: int, swept: Mapping[str, Floats
 def spans_of(
     t: Any, periods: Any, start: float, settle: float, own: Floats
 ) -> tuple[Floats, Floats]:
-    """First and last time of every trajectory (m, 2), and the time from which it counts (m,).
+    """Validate time spans (m, 2), and the times from which each trajectory counts (m,).
 
     Raises
     ------
     ArgumentError
-        For none or both of ``t`` and ``periods``, an empty or non-finite span,
-        a trajectory without a period, or nothing left after ``settle``.
+        For none or both of ``t`` and ``periods``, an empty or non-finite span, a trajectory
+        without a period, or a ``settle`` as long as the run.
     """
     if (t is None) == (periods is None):
         received = "both" if t is not None else "neither"
@@ -152,12 +152,14 @@ def spans_of(
         unit = own
         spans = np.stack([np.full(len(own), start), start + length * own], axis=1)
     if settle >= length:
-        raise ArgumentError(f"settle = {settle:g} leaves nothing of the run, which is {length:g}")
+        raise ArgumentError(
+            f"settle = {settle:g}; expected less than the length of the run, {length:g}"
+        )
     return spans, spans[:, 0] + settle * unit
 
 
 def times_of(samples: Any, spans: Floats, since: Floats) -> Floats:
-    """Times to sample at: (1, N) for all, or (m, N); N = 0 for none.
+    """Validate sample times: (1, N) for all, or (m, N); N = 0 for none.
 
     Raises
     ------
@@ -178,14 +180,14 @@ def times_of(samples: Any, spans: Floats, since: Floats) -> Floats:
     low, high = spans[:, 0].max(), spans[:, 1].min()
     if len(times) and (times[0] < low or times[-1] > high):
         raise ArgumentError(
-            f"samples from {times[0]:g} to {times[-1]:g} leave the runs, which share "
-            f"[{low:g}, {high:g}]"
+            f"samples from {times[0]:g} to {times[-1]:g} are outside the runs, whose common span "
+            f"is [{low:g}, {high:g}]"
         )
     return np.ascontiguousarray(times[None, :])
 
 
 def threads_of(threads: int | None) -> int:
-    """The number of threads: as given, else the cores that this process may use."""
+    """Number of threads, by default the cores available to this process."""
     if threads is not None:
         return threads
     if hasattr(os, "sched_getaffinity"):

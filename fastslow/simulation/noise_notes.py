@@ -1,4 +1,4 @@
-"""Whether a run was left by noise: what fell below its tolerance, or the smallest number."""
+"""Notes on states that leave zero by rounding: below their tolerance or underflowed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastslow.simulation.stepper.scales import SMALLEST
 
 Floats = NDArray[np.float64]
 
-#: A state has left zero when it is this much larger than the noise in it.
+#: Ratio to its noise from which a state counts as having left zero.
 LEFT = 1e3
 
 
@@ -30,7 +30,7 @@ def with_noise(
     columns: dict[str, Floats],
     modes: tuple[str, ...],
 ) -> Outcome:
-    """The outcome, with a sentence for every state whose noise decided when it left zero.
+    """Add a note to the outcome for every state that left zero by rounding.
 
     Parameters
     ----------
@@ -38,14 +38,14 @@ def with_noise(
     model : Model
     resolved : Resolved
     vanishing : tuple of str
-        States that their rates have as a factor: only of those, and of those that vanish
-        together, it is known what they leave.
+        States that are factors of their own rates: only these, and states that vanish
+        together, have a known invariant plane.
     together : tuple of tuple of str
         See `jointly_invariant_states`.
     steps : ndarray, shape (N, 4)
-        Time, length and mode of every step, and at last of the end.
+        Time, length and mode of every step, and of the end.
     columns : dict
-        Values of states and slow quantities there, each of shape (N,).
+        Values of states and slow quantities at these times, each of shape (N,).
     modes : tuple of str
     """
     found = []
@@ -59,8 +59,8 @@ def with_noise(
         time = f"t = {steps[first, 0]:.6g}"
         if absolute > SMALLEST and rest.max() > LEFT * absolute:
             found.append(
-                f"{name} fell below its atol = {absolute:g} at {time} and was left from there: the "
-                "tolerance decides when; give atol=0."
+                f"{name} fell below its atol = {absolute:g} at {time} and grew again from there: "
+                "the tolerance determines when; set atol=0."
             )
         elif (
             name in vanishing
@@ -69,7 +69,7 @@ def with_noise(
         ):
             found.append(
                 f"{name} fell below {SMALLEST:g}, the smallest number kept, at {time}: what it "
-                "would grow to afterwards is lost; take its logarithm for a state."
+                "would grow to afterwards is lost; use its logarithm as a state."
             )
     for some in together:
         sizes = np.abs([columns[name] for name in some]).max(axis=0)
@@ -77,8 +77,8 @@ def with_noise(
         if len(gone) and sizes[0] >= SMALLEST:
             found.append(
                 f"{' and '.join(some)} fell below {SMALLEST:g}, the smallest number kept, at "
-                f"t = {steps[gone[0], 0]:.6g}: what they might grow to afterwards is lost; take "
-                "their logarithms for states."
+                f"t = {steps[gone[0], 0]:.6g}: what they might grow to afterwards is lost; use "
+                "their logarithms as states."
             )
     return with_notes(outcome, found)
 
@@ -91,7 +91,7 @@ def _grows(
     modes: tuple[str, ...],
     below: NDArray[np.intp],
 ) -> Iterator[bool]:
-    """Whether the growth rate at zero is positive after a state was lost, region by region."""
+    """Signs of the growth rate at zero after a state underflowed, region by region."""
     traits, names = model.traits, (*model.states, *model.slow_states)
     values: dict[str, Any] = {f"y{k}": columns[n] for k, n in enumerate(names)}
     values["t"] = steps[:, 0]
@@ -117,14 +117,14 @@ def notes_on_noise(
     extremes: Floats,
     final: Floats,
 ) -> tuple[str, ...]:
-    """Sentences on the trajectories of an ensemble in which noise may decide, as `with_noise`.
+    """Notes on an ensemble with states that may leave zero by rounding, as `with_noise`.
 
     Parameters
     ----------
     names : tuple of str
     resolved : Resolved
     vanishing : tuple of str
-        States that their rates have as a factor, or that vanish together.
+        States that are factors of their own rates, or that vanish together.
     start, final : ndarray, shape (m, n)
     extremes : ndarray, shape (m, 2, n)
         Smallest and largest values.
@@ -141,14 +141,14 @@ def notes_on_noise(
         left = int(np.count_nonzero((least < absolute) & (last > LEFT * absolute)))
         if absolute > SMALLEST and left:
             found.append(
-                f"{name} fell below its atol = {absolute:g} in {left} of {len(start)} and was left "
-                "from there: the tolerance decides when; give atol=0."
+                f"{name} fell below its atol = {absolute:g} in {left} of {len(start)} and grew "
+                "again from there: the tolerance determines when; set atol=0."
             )
         lost = int(np.count_nonzero((first >= SMALLEST) & (last < SMALLEST)))
         if absolute <= SMALLEST and lost:
             found.append(
                 f"{name} fell below {SMALLEST:g}, the smallest number kept, in {lost} of "
-                f"{len(start)}: what it might grow to afterwards is lost; take its logarithm for "
+                f"{len(start)}: what it might grow to afterwards is lost; use its logarithm as "
                 "a state."
             )
     return tuple(found)

@@ -1,9 +1,9 @@
-"""Compiled loops a slice at a time.
+"""Execution of compiled loops in time slices.
 
-Python handles signals, Ctrl-C among them, between two instructions of its own, and compiled
-code has none. So a loop returns after some hundredths of a second, and is called again to go
-on from where it was, to the last bit as if it had not paused. What it needs is provided in
-between: code that few runs need, and larger tables.
+Python handles signals such as Ctrl-C only between its own instructions. A compiled loop
+therefore returns after some hundredths of a second and is called again, with bitwise the same
+result as without the pause. In between, code that few runs need is loaded and tables are
+enlarged.
 """
 
 from __future__ import annotations
@@ -15,24 +15,23 @@ from fastslow.simulation.loops import COLLOCATION, RADAU
 from fastslow.simulation.stepper.driver import NEEDS_COLLOCATION, NEEDS_RADAU
 from fastslow.simulation.stepper.problems import Problem
 
-#: Seconds between two pauses, about.
+#: Approximate time between two pauses, in seconds.
 SLICE = 0.02
 
-#: Work of the first slice, in coefficients times order: it takes some hundredths of a second at
-#: most, and short runs less.
+#: Work of the first slice, in coefficients times order: at most some hundredths of a second.
 FIRST = 2.0**24
 
-#: By how much a slice may differ from the one before.
+#: Maximum ratio of consecutive slices.
 CHANGE = 4.0
 
 
 class Pace:
-    """How much work a loop is given at a time, from what the last took.
+    """Work quota of a loop, adapted to the duration of the last slice.
 
     Parameters
     ----------
     rows, order : int
-        Of the series, on which the work of a step depends.
+        Size of the series, on which the work of a step depends.
     """
 
     def __init__(self, rows: int, order: int) -> None:
@@ -40,12 +39,12 @@ class Pace:
         self._began = 0.0
 
     def begin(self) -> int:
-        """The work of the next slice, which begins now."""
+        """Start a slice and return its work quota."""
         self._began = time.perf_counter()
         return max(1, int(self._work))
 
     def end(self) -> None:
-        """Note that a slice has been used up."""
+        """Adapt the quota after a slice that was used up."""
         seconds = max(time.perf_counter() - self._began, 1e-9)
         self._work *= min(max(SLICE / seconds, 1.0 / CHANGE), CHANGE)
 
@@ -54,9 +53,9 @@ _addresses: dict[int, int] = {}
 
 
 def with_lazy_callbacks(problem: Problem) -> Problem:
-    """A problem with the addresses of its steps by collocation and of Radau, as far as known.
+    """A problem with the addresses of its collocation and Radau steps, as far as loaded.
 
-    A step by collocation could not be taken again for want of the other: both, then, or none.
+    A collocation step cannot be repeated if Radau steps are missing: both are set, or none.
     """
     collocation, radau = _addresses.get(NEEDS_COLLOCATION, 0), _addresses.get(NEEDS_RADAU, 0)
     collocation = collocation if radau or not problem.n_fast else 0
@@ -66,14 +65,14 @@ def with_lazy_callbacks(problem: Problem) -> Problem:
 
 
 def provide(code: int, n_fast: int) -> None:
-    """Compile what a loop that paused needs.
+    """Load the code that a paused loop needs.
 
     Parameters
     ----------
     code : int
         `NEEDS_COLLOCATION` or `NEEDS_RADAU`.
     n_fast : int
-        States that implicit steps may be tried for, 0 if none.
+        Number of states with implicit steps, 0 for none.
     """
     if code == NEEDS_RADAU or n_fast:
         _addresses[NEEDS_RADAU] = load_address(RADAU)

@@ -51,7 +51,7 @@ def test_initial_state_by_unknown_name(gear):
         ({"t": (0, 1), "integration": 1e-9}, "integration: expected an Integration"),
         ({"t": (0, 1), "samples": 1}, "samples = 1"),
         ({"t": (0, 1), "samples": [0.5, 0.2]}, "increasing"),
-        ({"t": (0, 1), "samples": [0.5, 2.0]}, r"leave the run, \[0, 1\]"),
+        ({"t": (0, 1), "samples": [0.5, 2.0]}, r"are outside the run, \[0, 1\]"),
         ({"t": (0, 1), "gap": "S1"}, "gap = 'S1'; expected a region with one region below"),
     ],
 )

@@ -296,11 +296,11 @@ def test_progress_and_pickle(gear, swept, capsys):
         ({"t": None}, "received neither"),
         ({"periods": 1}, "received both"),
         ({"t": (1, 0)}, "start < end"),
-        ({"settle": 1}, "settle = 1 leaves nothing of the run"),
+        ({"settle": 1}, "settle = 1; expected less than the length of the run"),
         ({"settle": -1}, "settle = -1; expected a number from 0"),
         ({"period": [1, 2, 3]}, r"period has shape \(3,\)"),
         ({"samples": 1}, "samples = 1; expected an integer from 2"),
-        ({"samples": [0, 2]}, "samples from 0 to 2 leave the runs"),
+        ({"samples": [0, 2]}, "samples from 0 to 2 are outside the runs"),
         ({"integration": 1e-9}, "integration: expected an Integration, received a float"),
     ],
 )
