@@ -1,10 +1,10 @@
-"""Hatchling's hook that compiles the loops of this package when it is installed.
+"""Hatchling build hook that compiles the loops of this package at installation.
 
-A wheel is for one platform and one class of processors. Its objects say what they were made of,
-and the loops are compiled anew where that does not fit (`fastslow.kernels.loops`). Where
-they cannot be compiled, or the environment variable FASTSLOW_BUILD is ``none``, the wheel holds
-no machine code and is for every platform. The objects stay in the checkout, where an editable
-installation, and whoever runs the sources in place, finds them too.
+A wheel is specific to a platform and a class of processors. The names of its objects contain a
+digest of their sources, and loops without a matching object are compiled at run time
+(`fastslow.kernels.loops`). If they cannot be compiled, or the environment variable
+FASTSLOW_BUILD is ``none``, the wheel contains no machine code and is platform-independent. The
+objects remain in the checkout, for editable installations and for running from the sources.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _GLIBC = "manylinux_2_17"
 
 
 class CompiledLoops(BuildHookInterface[Any]):
-    """Makes the objects, and adds them to a wheel."""
+    """Compile the objects and add them to a wheel."""
 
     PLUGIN_NAME = "custom"
 
@@ -34,7 +34,7 @@ class CompiledLoops(BuildHookInterface[Any]):
             self.app.display_info("FASTSLOW_BUILD=none: the wheel holds no machine code")
             return
         inside = "fastslow/kernels/objects"
-        # the root of the project is not always where modules are looked for
+        # the project root is not always on the module search path
         sys.path.insert(0, self.root)
         try:
             from fastslow.wheel import write_objects
@@ -53,7 +53,7 @@ class CompiledLoops(BuildHookInterface[Any]):
 
 
 def _platform() -> str:
-    """The platform's name in the name of a wheel."""
+    """Platform tag of a wheel."""
     name = sysconfig.get_platform().replace("-", "_").replace(".", "_")
     if name.startswith("linux") and platform.libc_ver()[0] == "glibc":
         return name.replace("linux", _GLIBC, 1)

@@ -1,4 +1,4 @@
-"""Calling machine code with numbers, arrays and records."""
+"""Calls of machine code with numbers, arrays and records."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ _CHECK = """    {name} = {path}
         {name} = _taken({name}, {path!r}, {kind!r}, {axes}, {copies})
 """
 
-#: A record that is kept is checked and written to slots when it is not the one of the last call.
+#: A kept record is checked and written to slots only if it differs from that of the last call.
 _KEPT = """    _slots_{name} = _kept_{name}[0]
     if _slots_{name}[0] is not {name}:
 {checks}        _slots_{name} = _kept_{name}[0] = ({name}, {pack})
 """
 
-#: What a function that Numba has compiled returns in C: that it has ended, with a result or none.
+#: Return codes of a function compiled by Numba that has ended, with or without a result.
 _ENDED = (0, -2)
 
 _SIGNATURE = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_char_p, ctypes.c_void_p, ctypes.c_char_p)
@@ -61,7 +61,7 @@ _FORMATS = {int: "q", float: "d", bool: "?7x"}
 
 
 def entry_source(module: str, function: str, arguments: Arguments) -> str:
-    """Source of the function of slots that calls a function of a module."""
+    """Source of the entry function, which calls a function of a module with slots."""
     given = [leaf for name, kind in arguments.items() for leaf in leaves(name, kind)]
     readers = iter(
         f"slot(slots, {place}, {leaf.kind!r}, {leaf.axes})" for place, leaf in enumerate(given, 1)
@@ -83,28 +83,27 @@ def caller(
     kept: Collection[str] = (),
     read: Collection[str] = (),
 ) -> Callable[..., Any]:
-    """A function of Python that calls code at an address with slots.
+    """Create a Python function that calls code at an address with slots.
 
     Parameters
     ----------
     function : str
-        Its name.
+        Name of the function.
     arguments : mapping
-        As `entry_source` was given them.
+        As for `entry_source`.
     results : sequence of type
         Numbers that the code returns.
     address : int
     kept : collection of str, optional
-        Records that are most often the ones of the last call.
+        Records that are usually those of the last call.
     read : collection of str, optional
-        Arguments that the code writes nothing to.
+        Arguments that the code does not write to.
 
     Returns
     -------
     callable
-        Of the arguments by position. Arrays of other types raise TypeError; of those that are
-        strided, or read-only where the code may write, a copy is handed in. Other threads run
-        while the code does.
+        With positional arguments. Arrays of other types raise TypeError; strided arrays, and
+        read-only ones that the code may write to, are copied. The GIL is released.
     """
     returned = struct.Struct("<" + "".join(_FORMATS[kind] for kind in results))
     known: dict[str, Any] = {
@@ -177,9 +176,9 @@ def _end(results: int) -> str:
 
 
 def _taken(value: Any, path: str, kind: str, axes: int, copies: list[Any] | None) -> NDArray[Any]:
-    """A copy of an array that is strided or read-only.
+    """Copy an array that is strided or read-only.
 
-    What the loop writes to the copy is to be copied back, unless the array is read-only.
+    The copy is written back after the call unless the array is read-only.
     """
     wanted = f"expected an array of {kind} with {axes} axes for {path}"
     if not isinstance(value, np.ndarray):

@@ -1,4 +1,4 @@
-"""Rates, Jacobian and interface functions as compiled code, from operations."""
+"""Compiled rates, Jacobian and switching functions, from operations."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from fastslow.errors import ModelError
 from fastslow.kernels.model_code import load_function
 from fastslow.results.stored.fields import FieldOperations
 
-#: Output entries from which zeros are written by a loop: every assignment is compiled by itself.
+#: Number of outputs from which zeros are written by a loop instead of single assignments.
 FILLED = 200
 
 
 class HasParameters(Protocol):
-    """A model, by what its compiled code needs of it."""
+    """Attributes of a model that its compiled code needs."""
 
     @property
     def parameters(self) -> Mapping[str, float]: ...
@@ -53,7 +53,7 @@ class CompiledField:
 
 
 def load_field(bodies: Sequence[FieldOperations], unknowns: int, parameters: int) -> int:
-    """Address of the function that does these operations, one list of them for each region."""
+    """Compile the operations, one list for each region, and return the address."""
     return load_function(_source([_lines(body) for body in bodies], unknowns, parameters), "field")
 
 

@@ -1,4 +1,4 @@
-"""A frozen model's rates, Jacobian and interface functions as compiled code."""
+"""Compiled rates, Jacobian and switching functions of a frozen model."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def compile_field(
     *varying : str
         The continuation parameters.
     modes : sequence of (rates, switching functions), optional
-        What to compile instead of the regions' rates and the interfaces.
+        Equations to compile instead of the rates of the regions and the interfaces.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def named_rows(
 ) -> tuple[
     tuple[tuple[sp.Expr, ...], ...], tuple[tuple[sp.Symbol, sp.Symbol], ...], tuple[str, ...]
 ]:
-    """Rows of every mode, the names of their symbols in code, and the parameters in order."""
+    """Rows of every mode, names of their symbols in code, and ordered parameters."""
     names = (*model.states, *varying)
     others = tuple(dict.fromkeys(n for n in (*model.parameters, *model.free) if n not in varying))
     rename = {real(n): sp.Symbol(f"u{k}") for k, n in enumerate(names)}
@@ -69,14 +69,14 @@ def named_rows(
 def compile_function(
     expression: sp.Expr, unknowns: Sequence[sp.Symbol]
 ) -> tuple[int, NDArray[np.float64]]:
-    """Compile an expression with its derivatives by the unknowns, its numbers as parameters.
+    """Compile an expression with its gradient, with its numbers as parameters.
 
-    Expressions that differ by their numbers alone share their code.
+    Expressions that differ only in their numbers share their code.
 
     Returns
     -------
     address : int
-        Of ``void(int64, double* unknowns, double* parameters, double* out)``, which fills the
+        Of ``void(int64, double* unknowns, double* parameters, double* out)``, which fills in the
         value and its derivatives.
     parameters : ndarray
     """
@@ -107,7 +107,7 @@ def operations_of(
     n: int,
     renaming: tuple[tuple[sp.Symbol, sp.Symbol], ...],
 ) -> list[FieldOperations]:
-    """What computes rows and their slopes by the unknowns u0, u1 and so on."""
+    """Operations that compute rows and their derivatives by the unknowns u0, u1, …"""
     rename = dict(renaming)
     bodies = []
     for rows in rows_of:
@@ -123,7 +123,7 @@ def operations_of(
 
 
 def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -> FieldOperations:
-    """What fills the output array for one region."""
+    """Operations that fill the output array for one region."""
     unknowns = [s for s, new in rename.items() if new.name.startswith("u")]
     values = [r.xreplace(rename) for r in rows]
     slopes = [_slopes(r, unknowns, rename) for r in rows]
@@ -150,7 +150,7 @@ def _slopes(
 
 
 class _Printer(PythonCodePrinter):
-    """Python code in which a pole gives infinity, as every other division does."""
+    """Printer of Python code in which a pole gives infinity."""
 
     def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
         if expr.exp.is_Integer and expr.exp < -1:
@@ -160,7 +160,7 @@ class _Printer(PythonCodePrinter):
 
     def _print_Rational(self, expr: sp.Rational) -> str:
         if max(abs(expr.p), expr.q) >= 2**53:
-            # numba knows no longer integers
+            # numba has 64-bit integers only
             return f"({float(expr)!r})"
         return super()._print_Rational(expr)
 

@@ -1,8 +1,8 @@
-"""Code that few runs need: loaded, or compiled, when the first of them does.
+"""Callbacks of loops that few runs need, loaded or compiled on first use.
 
-It would otherwise be compiled into every loop, and optimised again with each of them. A
-loop that comes to it pauses; what it needs is compiled outside, where an error or an
-interrupt is as any other, and the loop goes on with its address.
+Otherwise they would be compiled into every loop, and optimised again with each. A loop that
+needs one pauses; the callback is compiled outside, where errors and interrupts are handled
+normally, and the loop resumes with its address.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ def {function}(pointer):
 
 @dataclass(frozen=True, eq=False)
 class LazyCallback(Entry):
-    """A function of one record, which `fastslow.kernels.pointers.call_with` calls.
+    """A function of one record, called by `fastslow.kernels.pointers.call_with`.
 
     Parameters
     ----------
     module, function, record : str
-        Where the function and the type of its argument are, e.g.
+        Module, function and type of its argument, e.g.
         ``"fastslow.simulation.stepper.radau"``, ``"radau_step"`` and ``"RadauStep"``.
     """
 

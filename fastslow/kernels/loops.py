@@ -1,8 +1,8 @@
-"""Loops that serve every model: machine code that Python calls with numbers, arrays and records.
+"""Loops shared by all models: machine code called with numbers, arrays and records.
 
-The code of a loop is looked for in three places: among what this package brings with it, on the
-user's disk, and, where neither has it, it is compiled by Numba and kept on disk. All three are
-objects of one form, so that only the last one imports Numba.
+The code of a loop is shipped with this package, else read from the cache of the user, else
+compiled by Numba and stored in the cache. All three are object files of one format, so that
+only compilation imports Numba.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from fastslow.kernels.loop_target import ENTRY, platform_name
 from fastslow.kernels.machine_code import load_object
 from fastslow.kernels.signals import between_passes, deferring_signals
 
-#: Where everything is that loops are made by.
+#: Import of the compiler, part of the key of every loop.
 _MAKER = "from fastslow.kernels import loop_compiler\n"
 
 _lock = threading.RLock()
@@ -35,12 +35,12 @@ _lock = threading.RLock()
 
 @dataclass(frozen=True, eq=False)
 class Entry(ABC):
-    """A function of this package that is compiled once for all models.
+    """A function that is compiled once for all models.
 
     Parameters
     ----------
     module, function : str
-        Where its source is, e.g. ``"fastslow.continuation.engine"`` and ``"trace"``.
+        Its source, e.g. ``"fastslow.continuation.engine"`` and ``"trace"``.
     """
 
     module: str
@@ -49,23 +49,23 @@ class Entry(ABC):
     @property
     @abstractmethod
     def source(self) -> str:
-        """The module that Numba compiles: a function of a pointer that calls this one."""
+        """Source of the compiled module: an entry function that calls this one."""
 
     @property
     def key(self) -> str:
-        """All that its code depends on but the versions of what compiles it."""
+        """Everything that the code depends on except the versions of the compilers."""
         source = self.source
         return "\n".join((platform_name(), digest_of_imports(_MAKER + source), source))
 
     @property
     def name(self) -> str:
-        """Name of its object in an installation."""
+        """Name of the object in an installation."""
         return f"{self.function}_{_digest(self.key)}"
 
 
 @dataclass(frozen=True, eq=False)
 class Loop(Entry):
-    """A function that Python calls.
+    """A compiled function called from Python.
 
     Parameters
     ----------
@@ -73,11 +73,11 @@ class Loop(Entry):
         Kind of each argument by its name: ``int``, ``float``, ``bool``, an array or a record of
         `fastslow.kernels.records`.
     results : tuple of type
-        Numbers that it returns: one, several as a tuple, or none.
+        Types of the returned numbers: one, several as a tuple, or none.
     kept : tuple of str
-        Records that are most often the ones of the last call, and stay in memory.
+        Records that are usually those of the last call, which stay in memory.
     read : tuple of str
-        Arguments that it writes nothing to; their arrays may be read-only.
+        Arguments that it does not write to; their arrays may be read-only.
     """
 
     arguments: Mapping[str, Any]
@@ -96,7 +96,7 @@ def _digest(key: str) -> str:
 
 @cache
 def load_loop(loop: Loop) -> Callable[..., Any]:
-    """A loop in the form that is called from Python, with its arguments by their positions.
+    """Load a loop as a Python function of positional arguments.
 
     See `fastslow.kernels.calling.caller`.
     """
@@ -106,7 +106,7 @@ def load_loop(loop: Loop) -> Callable[..., Any]:
 
 @cache
 def load_address(entry: Entry) -> int:
-    """The address of a function, which is compiled if its code is not at hand."""
+    """Load a function, compiled if necessary, and return its address."""
     with _lock:
         return deferring_signals(_loaded, entry)
 
@@ -116,18 +116,18 @@ def _loaded(entry: Entry) -> int:
 
 
 def code_of(entry: Entry) -> bytes:
-    """The object of a function: what is brought, else what is kept, else compiled now."""
+    """Object of a function: shipped, else cached, else compiled now."""
     code = shipped.read(entry.name)
     return _kept(entry) if code is None else code
 
 
 def _kept(entry: Entry) -> bytes:
-    """The code on the user's disk, compiled if it is not there."""
+    """Code from the cache of the user, compiled if missing."""
     name = f"fastslow_{entry.function}_{_digest(entry.key + _versions())}"
     code = store.read(name)
     if code is None:
         with store.exclusively(name, between_passes):
-            # by now another process may have compiled it
+            # another process may have compiled it meanwhile
             code = store.read(name)
             if code is None:
                 code = compiled(entry, shipped.missing())
@@ -136,13 +136,13 @@ def _kept(entry: Entry) -> bytes:
 
 
 def compiled(entry: Entry, reason: str) -> bytes:
-    """The code of a function, compiled here and now, which is said in one line.
+    """Compile a function, and report it in one line on standard error.
 
     Parameters
     ----------
     entry : Entry
     reason : str
-        Why it is.
+        Reason of the compilation, for the report.
     """
 
     def say(text: str) -> None:

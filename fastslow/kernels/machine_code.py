@@ -1,4 +1,4 @@
-"""LLVM's instructions to machine code, loaded in a millisecond."""
+"""Compilation and loading of LLVM modules."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from llvmlite import ir
 
 from fastslow.kernels.signals import between_passes
 
-#: How far LLVM optimises: the next level takes longer and gains nothing.
+#: Optimisation level of LLVM: the next one takes longer without gain.
 _LEVEL = 2
 
 
 @dataclass(frozen=True)
 class _Machine:
-    """What code is made for, and where it is loaded."""
+    """Target of code, and the linker that loads it."""
 
     triple: str
     target: Any
@@ -50,21 +50,21 @@ def _target(triple: str) -> Any:
 
 @cache
 def platform_key() -> str:
-    """What machine code depends on beside the sources that it is made of."""
+    """Platform and versions that machine code depends on besides its sources."""
     cpu, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
     version = ".".join(map(str, llvm.llvm_version_info))
-    # numbers that NumPy computes are part of functions of lanes
+    # functions of lanes contain constants computed by NumPy
     versions = (llvmlite.__version__, version, np.__version__)
     return "|".join((*versions, llvm.get_process_triple(), cpu, features))
 
 
 def object_code(build: Callable[[ir.Module], None]) -> bytes:
-    """Machine code of a module, for the processor that this runs on.
+    """Machine code of a module for the current processor.
 
     Parameters
     ----------
     build : callable
-        Fills the empty module that it is given.
+        Fills the empty module.
     """
     machine = _machine()
     module = ir.Module("generated")
@@ -76,7 +76,7 @@ def object_code(build: Callable[[ir.Module], None]) -> bytes:
     between_passes()
     options = llvm.create_pipeline_tuning_options(speed_level=_LEVEL)
     options.loop_vectorization = options.slp_vectorization = False
-    # the loops of series are short: unrolled they are no faster, and take three times as long here
+    # the loops of series are short: unrolling triples the compilation time without gain
     options.loop_unrolling = False
     builder = llvm.create_pass_builder(machine.target, options)
     builder.getModulePassManager().run(parsed, builder)
@@ -86,12 +86,12 @@ def object_code(build: Callable[[ir.Module], None]) -> bytes:
 
 _numbers = count()
 
-#: Code is there for as long as what it was loaded with.
+#: Code remains valid as long as its library object.
 _loaded: list[Any] = []
 
 
 def load_object(code: bytes, name: str, symbols: Mapping[str, int]) -> int:
-    """Load machine code, and the address of one of its functions.
+    """Load machine code and return the address of one of its functions.
 
     Parameters
     ----------
@@ -99,12 +99,12 @@ def load_object(code: bytes, name: str, symbols: Mapping[str, int]) -> int:
     name : str
         The function.
     symbols : mapping
-        Addresses of other functions that it calls; those of the C library are known.
+        Addresses of other functions that it calls, except those of the C library.
 
     Raises
     ------
     RuntimeError
-        If the code calls a function that is not known.
+        If the code calls an unknown function.
     """
     library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
     for symbol, address in symbols.items():

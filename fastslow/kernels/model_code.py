@@ -1,7 +1,7 @@
 """Machine code of models, from generated source to an address, without Numba.
 
-Every function has the arguments that `fastslow.kernels.pointers` describes. Code is kept on
-disk under a name that says all that it depends on.
+Every function has the arguments described in `fastslow.kernels.pointers`. Code is cached on
+disk under a name that contains a digest of all it depends on.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ def load_function(source: str, function: str) -> int:
     Parameters
     ----------
     source : str
-        One function, of the Python that `fastslow.kernels.native` translates.
+        One function, in the subset of Python that `fastslow.kernels.native` translates.
     function : str
         Its name.
     """
     if "special." not in source:
         return load_built(source, function, lambda module: translate(source, module))
-    # SciPy's functions are imported where they are used alone
+    # SciPy is imported only if it is used
     from fastslow.kernels import special
 
     def build(module: ir.Module) -> None:
@@ -56,24 +56,24 @@ def load_built(
     build: Callable[[ir.Module], None],
     symbols: Callable[[], Mapping[str, int]] = dict,
 ) -> int:
-    """Address of a function, built if its code is not kept.
+    """Address of a function, built if its code is not cached.
 
     Parameters
     ----------
     text : str
-        All that decides on what is built, beside the sources of this package.
+        Everything that determines the code besides the sources of this package.
     function : str
         Its name.
     build : callable
         Fills a module.
     symbols : callable, optional
-        Gives the addresses of what the function calls.
+        Returns the addresses of the functions it calls.
     """
     key = f"{platform_key()}\n{_digest_of_makers()}\n{text}"
     name = f"fastslow_{function}_{hashlib.sha256(key.encode()).hexdigest()[:24]}"
     with _lock:
         if name not in _addresses:
-            # what a handler of a signal raises in a finaliser would be lost
+            # an exception raised by a signal handler in a finaliser would be lost
             _addresses[name] = deferring_signals(_load, name, function, build, symbols)
         return _addresses[name]
 
@@ -91,7 +91,7 @@ def _code(name: str, build: Callable[[ir.Module], None]) -> bytes:
     code = store.read(name)
     if code is None:
         with store.exclusively(name, between_passes):
-            # by now another process may have compiled it
+            # another process may have compiled it meanwhile
             code = store.read(name)
             if code is None:
                 code = object_code(build)

@@ -1,7 +1,7 @@
 """Special functions of generated code.
 
-Most are SciPy's own, called by their addresses. The others are written here, in the
-Python that generated code may contain, and translated with it.
+Most are those of SciPy, called by address. The others are defined here, in the subset of
+Python of generated code, and translated with it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from scipy.special import cython_special, gamma, psi
 
 from fastslow.kernels.native import External, Names
 
-#: What is translated is what was imported, even if the file changes after that.
+#: Translated from the imported version, even if the file changes later.
 _TREE = ast.parse(Path(__file__).read_bytes())
 
 #: Functions of SciPy by their number of arguments; each returns a number.
@@ -83,7 +83,7 @@ def _pointer(capsule: Any) -> int:
 
 @cache
 def names() -> Names:
-    """What generated source may call as a special function, for its translation."""
+    """Special functions available to generated source, for its translation."""
     written = {f.__name__ for f in (sinc, polygamma, lambertw)}
     functions = {n.name: n for n in _TREE.body if isinstance(n, ast.FunctionDef)}
     return {
@@ -137,7 +137,7 @@ def lambertw(x: float, branch: float) -> float:
     """The real branches 0 and -1 of W exp(W) = x, by Halley's method (Corless et al. 1996)."""
     if math.isnan(x) or x < -1.0 / math.e or (branch < 0.0 and x >= 0.0):
         below = 1.0 + math.e * x
-        # the branch point itself is no number in floating point
+        # the branch point is not representable in floating point
         return -1.0 if abs(below) < 1e-15 else math.nan
     if x == 0.0 or math.isinf(x):
         return x

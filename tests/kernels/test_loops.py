@@ -210,11 +210,11 @@ def test_sources_that_have_changed_and_other_platforms_find_nothing(installed, m
     assert shipped.read(NEARBY_CHORDS.name) is None
     (installed.parent / shipped.PLATFORM).write_text("aarch64-apple-darwin-generic\n")
     assert re.fullmatch(
-        "this installation brings machine code for aarch64-apple-darwin-generic; this is .*",
+        "this installation contains machine code for aarch64-apple-darwin-generic; this is .*",
         shipped.missing(),
     )
     (installed.parent / shipped.PLATFORM).unlink()
-    assert shipped.missing() == "this installation brings no machine code"
+    assert shipped.missing() == "this installation contains no machine code"
 
 
 def test_what_is_compiled_here_has_the_bits_of_what_is_installed(tmp_path, monkeypatch, capsys):

@@ -1,7 +1,7 @@
-"""What compiled code is made of: the modules that its source imports, and those that they import.
+"""Digests of the sources of compiled code: the modules that it imports, directly or not.
 
-Numba compiles functions of other modules into a function, and the numbers that they import,
-and does not see when these change. So their sources are part of the key of compiled code.
+Numba compiles functions and constants of other modules into a function without tracking their
+changes. Their sources are therefore part of the key of compiled code.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _PACKAGE = Path(__file__).parents[2]
 
 @dataclass(frozen=True)
 class _Source:
-    """The file of a module as it was when it was imported."""
+    """File of a module at the time of its import."""
 
     path: str
     written: int
@@ -33,7 +33,7 @@ class _Source:
 
 
 def _sources(folder: str, package: str) -> Iterator[tuple[str, _Source]]:
-    """Every module below a folder by its name; strings, as paths would take ten times as long."""
+    """All modules below a folder by name; path objects would take ten times as long."""
     for entry in os.scandir(folder):
         name = entry.name
         if entry.is_dir():
@@ -46,18 +46,18 @@ def _sources(folder: str, package: str) -> Iterator[tuple[str, _Source]]:
 
 _SOURCES = dict(_sources(str(_PACKAGE), _PACKAGE.name))
 
-#: An import of this package. Parsing whole files instead would take a hundred times as long.
+#: Import statement of this package; parsing whole files would take a hundred times as long.
 _IMPORT = re.compile(r"^[ \t]*((?:from|import)[ \t]+fastslow\b[^\n(]*(?:\([^)]*\))?)", re.MULTILINE)
 
-#: What is imported for its types alone is not compiled.
+#: Imports for type annotations alone are not compiled.
 _FOR_TYPES = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)
 
 
 def digest_of_imports(source: str) -> str:
     """Digest of all modules of this package that a source imports, directly or not.
 
-    Imports inside functions count, as the function may be one that is compiled. Packages
-    count where a name is imported from them; those above a module hold no code of loops.
+    Imports inside functions count, since the function may be compiled. Packages count if a
+    name is imported from them; parent packages contain no code of loops.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def import_closure(source: str) -> set[str]:
 
 
 def imported(source: str) -> Iterator[str]:
-    """Names of the modules of this package that a source imports itself."""
+    """Names of the modules of this package that a source imports directly."""
     for statement in _IMPORT.findall(_FOR_TYPES.sub("", source)):
         (node,) = ast.parse(statement).body
         if isinstance(node, ast.Import):
@@ -109,9 +109,9 @@ def _imports(module: str) -> tuple[str, ...]:
 
 @cache
 def _digest(module: str) -> str:
-    """Digest of a module's source; of no use to another process where the file has changed.
+    """Digest of the source of a module, unique to this process if the file has changed since.
 
-    What is compiled here is not what the file says now.
+    The imported code then differs from the file.
     """
     digest = hashlib.sha256(_read(module)).hexdigest()
     return digest + os.urandom(16).hex() if _SOURCES[module].changed else digest

@@ -1,7 +1,7 @@
-"""Machine code that this package brings with it, made when its wheel was.
+"""Machine code shipped with this package, built with its wheel.
 
-It is trusted as the sources beside it are, which this process has run: it is loaded where it
-has their owner and can be written by nobody who cannot write them.
+It is trusted like the adjacent sources, which this process runs: it is loaded if it has the
+same owner and nobody can write to it who cannot write to the sources.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 from fastslow.kernels.cache import store
 from fastslow.kernels.loop_target import platform_name
 
-#: Where it is, and the file there that says what platform it is for.
+#: Its folder, and the file in it that names the platform.
 FOLDER = Path(__file__).parents[1] / "objects"
 PLATFORM = "platform.txt"
 
@@ -21,7 +21,7 @@ _WRITERS = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 
 
 def read(name: str) -> bytes | None:
-    """An object by its name; None where there is none, or none that can be trusted."""
+    """Read an object by its name; None if there is no trusted one."""
     file = FOLDER / f"{name}{store.SUFFIX}"
     try:
         descriptor = os.open(file, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
@@ -52,11 +52,11 @@ def _as_trusted(status: os.stat_result, source: os.stat_result) -> bool:
 
 
 def missing() -> str:
-    """Why an object that is asked for is not there, in words."""
+    """Describe why a requested object is missing."""
     try:
         made_for = (FOLDER / PLATFORM).read_text(encoding="utf-8").strip()
     except OSError:
-        return "this installation brings no machine code"
+        return "this installation contains no machine code"
     if made_for != platform_name():
-        return f"this installation brings machine code for {made_for}; this is {platform_name()}"
-    return "its sources are not those that the machine code of this installation is made of"
+        return f"this installation contains machine code for {made_for}; this is {platform_name()}"
+    return "its sources differ from those of the machine code of this installation"

@@ -1,10 +1,10 @@
-"""Compiled code on disk: where it is kept, who may have written it, and whether it is whole.
+"""Cache of compiled code on disk: location, permissions and integrity.
 
-What is in these files is run. So they are read only where they belong to this user or to root
-and nobody else can write to them or to their directory. Both are asked of what has been opened,
-and a checksum is taken of the very bytes that are used: nothing can be exchanged in between.
-Windows tells neither owners nor modes in this way, and has no such locks: there, the directory
-of the user is trusted, and processes do not wait for each other.
+The content of these files is executed. They are read only if they belong to this user or to
+root and nobody else can write to them or to their directory. Both are checked on the opened
+file, and the checksum on the bytes that are used, so that nothing can be exchanged in between.
+Windows has neither such owners and modes nor such locks: there the directory of the user is
+trusted, and processes do not wait for each other.
 """
 
 from __future__ import annotations
@@ -33,34 +33,35 @@ OWNERS = hasattr(os, "geteuid")
 _BEGINNING = b"fastslow compiled code "
 SUFFIX, _ASIDE = ".code", ".tmp"
 
-#: Files not used for so many days are removed, and the longest unused ones beyond so many bytes.
+#: Days without use after which a file is removed, and total bytes beyond which the least
+#: recently used are.
 KEPT_DAYS, KEPT_BYTES = 90, 2**30
 _DAY = 86400.0
 
-#: Seconds that a process waits for another one that compiles the same, and between two looks.
+#: Seconds that a process waits for another one compiling the same code, and polling interval.
 LONGEST_WAIT, _PAUSE = 600.0, 0.05
 
 _MEMORY = "compiled code is kept in memory alone, and every process compiles its own"
 
 
 def writable_directory() -> Path | None:
-    """Where compiled code is kept: ``FASTSLOW_CACHE``, else the user's cache directory.
+    """Directory of compiled code: ``FASTSLOW_CACHE``, else the cache directory of the user.
 
-    None where neither can be written.
+    None if neither is writable.
     """
     with _folders() as folders:
         return next((folder.path for folder in folders if folder.writable), None)
 
 
 def _candidates() -> list[Path]:
-    """The chosen directory, then the user's own, for what the first one cannot take."""
+    """The configured directory, then that of the user as a fallback."""
     chosen = os.environ.get("FASTSLOW_CACHE")
     places = [Path(chosen).absolute() if chosen else None, _own_directory()]
     return [place for place in places if place is not None]
 
 
 def _own_directory() -> Path | None:
-    """The user's cache directory, as each system has it."""
+    """Cache directory of the user on each system."""
     home = _home()
     if sys.platform == "win32":
         base = _from_environment("LOCALAPPDATA") or (home and home / "AppData" / "Local")
@@ -72,7 +73,7 @@ def _own_directory() -> Path | None:
 
 
 def _from_environment(variable: str) -> Path | None:
-    """A directory that a variable names; an empty or relative one counts as unset (XDG)."""
+    """Directory in an environment variable; an empty or relative one counts as unset (XDG)."""
     path = Path(os.environ.get(variable, ""))
     return path if path.is_absolute() else None
 
@@ -86,7 +87,7 @@ def _home() -> Path | None:
 
 
 def read(name: str) -> bytes | None:
-    """Compiled code by its name, wherever it is kept; None where it is not, or is damaged."""
+    """Read compiled code by its name from any directory; None if missing or damaged."""
     with _folders() as folders:
         for folder in folders:
             try:
@@ -101,12 +102,12 @@ def read(name: str) -> bytes | None:
 
 
 def write(name: str, content: bytes) -> None:
-    """Keep compiled code, in memory alone where no directory takes it.
+    """Store compiled code, in memory alone if no directory is writable.
 
     Parameters
     ----------
     name : str
-        By which it is read. Says everything that the code depends on.
+        Key for `read`, which determines everything that the code depends on.
     content : bytes
     """
     with _folders() as folders:
@@ -125,10 +126,10 @@ def write(name: str, content: bytes) -> None:
 
 @contextmanager
 def exclusively(name: str, waiting: Callable[[], None]) -> Iterator[None]:
-    """Let one process at a time compile what will have this name; others wait here.
+    """Lock a name, so that one process at a time compiles it; others wait.
 
-    The system ends the lock with the process, however it ends. Where there are no locks, and
-    after `LONGEST_WAIT`, nothing is waited for. Meanwhile ``waiting`` is called again and again.
+    The system releases the lock with the process. Without locks, and after `LONGEST_WAIT`,
+    the wait ends. Meanwhile ``waiting`` is called repeatedly.
     """
     with _folders() as folders, ExitStack() as stack:
         if _LOCKS and folders:
@@ -140,7 +141,7 @@ def exclusively(name: str, waiting: Callable[[], None]) -> Iterator[None]:
 
 
 def _wait(descriptor: int, name: str, waiting: Callable[[], None]) -> None:
-    # a byte of the file, which need not exist, stands for the name
+    # a byte of the lock file, which need not exist, represents the name
     byte = int.from_bytes(hashlib.sha256(name.encode()).digest()[:4])
     end = time.monotonic() + LONGEST_WAIT
     while True:
@@ -160,7 +161,7 @@ def _wait(descriptor: int, name: str, waiting: Callable[[], None]) -> None:
 
 @contextmanager
 def _folders() -> Iterator[list[_Folder]]:
-    """Open directories to read from; only the last one may be written to."""
+    """Open the directories to read from; only the last one may be writable."""
     with ExitStack() as stack:
         found: list[_Folder] = []
         refusals = []
@@ -182,7 +183,7 @@ def _folders() -> Iterator[list[_Folder]]:
 
 
 class _UntrustedError(OSError):
-    """Somebody else could have written this."""
+    """A file or directory that others can write to."""
 
 
 def _check(status: os.stat_result, what: str) -> None:
@@ -217,7 +218,7 @@ class _Folder:
             os.close(self.descriptor)
 
     def at(self, file: str) -> str:
-        """Path of a file for functions that take the descriptor of a directory too."""
+        """Path of a file for functions that accept a directory descriptor."""
         return file if self.descriptor is not None else str(self.path / file)
 
     def open(self, file: str, flags: int) -> int:
@@ -232,7 +233,7 @@ class _Folder:
     def read(self, name: str) -> bytes | None:
         file = name + SUFFIX
         try:
-            # a pipe in the place of the file must not block
+            # a pipe in place of the file must not block
             descriptor = self.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
         except FileNotFoundError:
             return None
@@ -268,19 +269,19 @@ def _checksum(name: str, content: bytes) -> bytes:
 
 
 def wrapped(name: str, content: bytes) -> bytes:
-    """What is written to a file: the content, and before it a checksum."""
+    """Prefix the content with its checksum, for writing to a file."""
     return _BEGINNING + _checksum(name, content) + b"\n" + content
 
 
 def unwrapped(name: str, whole: bytes) -> bytes | None:
-    """What a file holds; None where that is not what was written under its name."""
+    """Content of a file without the checksum; None if it does not match."""
     length = len(_BEGINNING) + 64
     content = whole[length + 1 :]
     return content if whole == wrapped(name, content) else None
 
 
 def _sweep(folder: _Folder) -> None:
-    """Remove what has not been used for long, as code for other versions is."""
+    """Remove files not used recently, such as code for other versions."""
     files = []
     where = folder.path if folder.descriptor is None else folder.descriptor
     # another process may remove them at the same time

@@ -1,4 +1,4 @@
-"""The plain steps of a model, compiled for several trajectories at once."""
+"""Compiled plain steps of a model for several trajectories at once."""
 
 from __future__ import annotations
 
@@ -34,20 +34,19 @@ class CompiledSteps:
         filled with the coefficients of states and slow quantities where a step is
         `REPORTED`.
     regions : int
-        How many, the first modes of the series; none for a model that is too large.
+        Number of regions, the first modes of the series; 0 for a model that is too large.
     """
 
     address: int
     regions: int
 
 
-#: Of a model whose steps are not taken in lanes: without a series, with special
-#: functions, or too large.
+#: For models without steps in lanes: without a series, with special functions, or too large.
 NO_STEPS = CompiledSteps(0, 0)
 
 
 def compile_steps(model: HasOperations, order: int) -> CompiledSteps:
-    """Compile the plain steps of a model, or find them compiled already.
+    """Compile the plain steps of a model, or return the compiled ones.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""Operations on Taylor series as source: the value of each row, and its coefficient of order k.
+"""Source of Taylor series operations: values of the rows, and coefficients of order k.
 
-Every operation has a recurrence that gives its coefficient of order k from those of lower
+Every operation has a recurrence for its coefficient of order k from those of lower
 order (Jorba and Zou 2005; Haro et al. 2016, table 2.1): linear for sums, one
 convolution for products, quotients, powers, exp and log, and for any function
 f with a derivative the row w = f(u) follows from w' = f'(u) u',
@@ -33,7 +33,7 @@ from fastslow.results.stored.operations import (
 
 @dataclass(frozen=True)
 class Recurrences:
-    """The source of the operations of one motion.
+    """Source of the operations of one motion.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Recurrences:
     order : int
         Highest coefficient.
     clock : str
-        Source of the rate of time: 1, or a name where it may be 0.
+        Source of the rate of time: 1, or a name if it may be 0.
     """
 
     nodes: tuple[tuple[Any, ...], ...]
@@ -59,7 +59,7 @@ class Recurrences:
         return [f"{self.at(node[1], '0')} = {self._value(*node)}" for node in self.nodes]
 
     def general(self, rows: Sequence[int] | None = None) -> list[str]:
-        """Source lines of the coefficients of order k, of all rows or of those needed for some."""
+        """Source lines of the coefficients of order k, of all rows or of those that some need."""
         wanted = {node[1] for node in self.nodes} if rows is None else self._ancestors(rows)
         return [line for node in self.nodes if node[1] in wanted for line in self._lines(*node)]
 
@@ -157,7 +157,7 @@ class Recurrences:
         ]
 
     def _chain(self, target: str, slots: Sequence[tuple[int, int, str]]) -> list[str]:
-        """The chain rule, by each argument that moves."""
+        """Chain rule over the varying arguments."""
         lines = ["s = 0.0"]
         for argument, slope, steady in slots:
             U, G = (r * (self.order + 1) for r in (argument, slope))
@@ -175,7 +175,7 @@ def _sign(factor: str) -> str:
 
 
 def _needs(kind: str, row: int, *operands: Any) -> Sequence[int]:
-    """The rows whose coefficients of order k stand in the one of this row."""
+    """Rows whose coefficients of order k enter that of this row."""
     if kind == SUM:
         return [r for _, r in operands[0]]
     if kind == FUNCTION:

@@ -1,8 +1,8 @@
-"""A model's Taylor series as one compiled function.
+"""Taylor series of a model as one compiled function.
 
 The function has a mode for every region, for every sliding motion between two
 regions, and for the gradient of every interface. Its source depends on the
-equations alone: parameter values arrive as an array.
+equations alone; parameter values are passed as an array.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ def series(mode, inputs, parameters, W):
 '''
 
 
-#: Operations whose compiled series is kept in memory.
+#: Number of compiled series kept in memory.
 KEPT = 256
 
 
 class HasOperations(Protocol):
-    """A model, or one that was stored."""
+    """A model or a stored model."""
 
     @property
     def operations(self) -> Operations: ...
@@ -63,18 +63,18 @@ class HasOperations(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class CompiledSeries:
-    """The compiled series of a model and how its arrays are laid out.
+    """The compiled series of a model and the layout of its arrays.
 
     Called with a mode, ``inputs = (t, states, slow states)`` and the parameter
     array, the function fills rows of ``order + 1`` coefficients: states and
-    slow states, slow quantities, interface functions, two bounds for each interface
-    that is slid along (see `Motion`), then work space. In a gradient mode ``inputs``
-    goes on with the slow quantities, and the output is h, the sum of the
-    moduli of its terms, and its gradient by states and slow states. Beyond all
-    these the modes follow again with only `SHORT` coefficients; then with one, the
-    rates; and then for a direction u: the first coefficients of the states are u when
-    it is called, time stands still, and the second ones become J u / 2, with the
-    Jacobian J of the rates, exact as the derivatives of a series are.
+    slow states, slow quantities, switching functions, two bounds for each sliding
+    interface (see `Motion`), then work space. In a gradient mode ``inputs``
+    also contains the slow quantities, and the output is h, the sum of the
+    moduli of its terms, and its gradient by states and slow states. These modes are
+    followed by the same with only `SHORT` coefficients; with one, the rates; and
+    with directional derivatives: the first coefficients of the states are a direction u
+    on entry, time is fixed, and the second ones become J u / 2 with the exact Jacobian J
+    of the rates.
 
     Parameters
     ----------
@@ -87,17 +87,17 @@ class CompiledSeries:
     n_states, n_forcing, n_interfaces, n_rows : int
         Numbers of rows: states with slow states, slow quantities, interfaces, and all.
     signs : ndarray of int64, shape (n_modes, n_interfaces)
-        Side of each interface in every mode, 0 on interfaces that are slid along.
+        Side of each interface in every mode, 0 for sliding interfaces.
     modes : tuple of str
         Region names; sliding between A and B is named ``"A|B"``.
     continuous : ndarray of bool, shape (n_interfaces,)
         Whether the rates are continuous across each interface.
     values_only : tuple of str
-        Functions without a Taylor recurrence. Where there are any, the compiled function
-        fills the values of all rows and the rates of states and interface functions alone,
-        and its last coefficient is NaN.
+        Functions without a Taylor recurrence. If there are any, the compiled function fills
+        only the values of all rows and the rates of states and switching functions, and its
+        last coefficient is NaN.
     undecided : tuple of (str, str)
-        Intersections of discontinuities along which no sliding is derived, and why.
+        Intersections of switching manifolds without derived sliding, with the reason.
     """
 
     address: int
@@ -115,7 +115,7 @@ class CompiledSeries:
 
     @property
     def method(self) -> str:
-        """How this model is stepped, in words."""
+        """Description of the stepping method."""
         if self.values_only:
             names = ", ".join(self.values_only)
             return f"collocation of order {self.order} (no Taylor recurrence for {names})"
@@ -127,15 +127,15 @@ class CompiledSeries:
 
 
 def compile_series(model: HasOperations, order: int) -> CompiledSeries:
-    """Compile the Taylor series of a model, or find it compiled already.
+    """Compile the Taylor series of a model, or return the compiled one.
 
-    A model with a function that has no recurrence is compiled to values and rates.
+    A model with a function without recurrence is compiled to values and rates.
 
     Parameters
     ----------
     model : Model or StoredModel
     order : int
-        Highest coefficient, lowered to `COLLOCATION` where no Taylor series exists.
+        Highest coefficient, at most `COLLOCATION` without a Taylor series.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def _compiled(operations: Operations, order: int) -> CompiledSeries:
 
 
 def _source(operations: Operations, order: int) -> tuple[str, int]:
-    """Source of the generated module, and the number of rows it fills."""
+    """Source of the generated module, and its number of rows."""
     lines = [f"    p{i} = parameters[{i}]" for i in range(len(operations.parameters))]
     n_rows = 0
     bodies: list[list[str]] = []
@@ -203,10 +203,10 @@ def _source(operations: Operations, order: int) -> tuple[str, int]:
 def motion_source(
     operations: Operations, motion: SeriesOperations, order: int, *, clock: str = "1.0"
 ) -> tuple[list[str], int]:
-    """Source lines that fill the series of one motion, and the number of its rows.
+    """Source lines that fill the series of one motion, and its number of rows.
 
-    Where ``clock`` is the name of the rate of time, the first coefficients of the
-    states are kept as they are while it is 0.
+    If ``clock`` names the rate of time, the first coefficients of the states are not
+    changed while it is 0.
     """
     m = operations.sizes[0]
     work = Recurrences(motion.nodes, order, clock)
@@ -233,7 +233,7 @@ def motion_source(
 def _values_source(
     operations: Operations, motion: ValueOperations, order: int
 ) -> tuple[list[str], int]:
-    """What a motion fills without recurrences: values, and rates of states and interfaces."""
+    """Source lines without recurrences: values, and rates of states and switching functions."""
     columns, (m, q, p) = order + 1, operations.sizes
     body = ["t = inputs[0]"]
     for i in range(m):
@@ -246,7 +246,7 @@ def _values_source(
         body += [f"W[{row * columns}] = {height}", f"W[{row * columns + 1}] = {rate}"]
     first = m + q + p
     body += [f"W[{k * columns}] = {bound}" for k, bound in enumerate(motion.bounds, start=first)]
-    # what no recurrence gives
+    # marks the missing recurrence
     return [*body, f"W[{order}] = math.nan"], operations.first_free
 
 
