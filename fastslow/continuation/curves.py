@@ -1,8 +1,8 @@
-"""A curve G(z) = 0 traced by pseudo-arclength where derivatives of G are differenced.
+"""Pseudo-arclength continuation of a curve G(z) = 0 with difference quotients of G.
 
-For curves of special points, whose equations hold derivatives already: short
-tables, few steps, so that plain NumPy serves. The first entries of z are the
-point (states, two parameters); the others, null vectors and the like, follow.
+Used for curves of special points, whose equations already contain derivatives. Their
+tables are short, so that plain NumPy suffices. The first entries of z are the point
+(states, two parameters), followed by null vectors and the like.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from fastslow.continuation.settings import Continuation
 
 Array = NDArray[np.float64]
 
-#: What is beyond a bound by less than this part of its unit is on it.
+#: Tolerance of a bound, as a fraction of the unit: points beyond it by less are on it.
 ON_EDGE = 1e-9
 
-#: How a trace ends.
+#: Kinds of end of a trace.
 FULL, RANGE, SMALL_STEP, WINDOW, CLOSED, STOPPED, BOUND = (
     "full",
     "range",
@@ -35,22 +35,21 @@ FULL, RANGE, SMALL_STEP, WINDOW, CLOSED, STOPPED, BOUND = (
 
 
 class System(Protocol):
-    """Equations G(z) = 0, N in number for N + 1 unknowns, that hold vectors of free length.
+    """N equations G(z) = 0 in N + 1 unknowns, which include vectors of free length.
 
-    A guide is a point z of the curve, by which the vectors in another are
-    normalised.
+    A guide is a reference point z of the curve that normalises the vectors of others.
     """
 
     def residual(self, z: Array, guide: Array) -> Array:
         """G at points z of shape (…, N + 1), shape (…, N)."""
 
     def renewed(self, z: Array) -> Array:
-        """The same point with vectors of length one, good as a guide."""
+        """The same point with unit vectors, usable as a guide."""
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Where a curve is traced, and in which units.
+    """Domain and units of the continuation of a curve.
 
     Parameters
     ----------
@@ -59,7 +58,7 @@ class Frame:
     scale : ndarray, shape (N + 1,)
         Unit of every entry.
     lower, upper : ndarray, shape (size,)
-        Range of every leading entry; infinite where there is none.
+        Range of every leading entry, infinite if unbounded.
     """
 
     size: int
@@ -74,10 +73,10 @@ class Frame:
         return weight
 
     def stretch(self, z: Array, along: Array) -> float:
-        """How much longer a step may be where states are larger than their unit.
+        """Growth factor of the step for states larger than their unit.
 
-        The same relative change of a large state is then one step, so that a
-        curve that goes to infinity has as many rows in every decade.
+        A step is then a fixed relative change of a large state, so that a curve that
+        diverges has equally many rows in every decade.
         """
         size = self.scale[: self.size].copy()
         states = self.size - 2
@@ -85,10 +84,10 @@ class Frame:
         return float(1.0 / np.linalg.norm(along[: self.size] / size))
 
     def passed(self, z: Array) -> NDArray[np.bool_]:
-        """Which ranges a point is outside of, shape (2, size): below and above."""
+        """Masks of the bounds that a point violates, shape (2, size): lower and upper."""
         leading = z[: self.size]
         slack = ON_EDGE * np.maximum(np.abs(leading), self.scale[: self.size])
-        # the ranges of both parameters have no rounding to allow for
+        # the parameter ranges need no tolerance for rounding
         slack[-2:] = 0.0
         return np.stack([leading < self.lower - slack, leading > self.upper + slack])
 
@@ -103,7 +102,7 @@ def slopes(system: System, z: Array, guide: Array, scale: Array) -> Array:
 
 
 def tangent(system: System, z: Array, frame: Frame) -> Array:
-    """Null vector of the derivative, of length one in the frame."""
+    """Null vector of the derivative, a unit vector in the frame."""
     matrix = slopes(system, z, z, frame.scale) * frame.scale
     rows = np.abs(matrix).max(axis=1, keepdims=True)
     _, _, right = np.linalg.svd(matrix / np.where(rows > 0, rows, 1.0))
@@ -116,7 +115,7 @@ def tangent(system: System, z: Array, frame: Frame) -> Array:
 def corrected(
     system: System, guess: Array, direction: Array, frame: Frame, continuation: Continuation
 ) -> tuple[Array, int] | None:
-    """The point of the curve in the plane through a guess, and the Newton steps it took."""
+    """Correct a guess in the normal plane; return the point and the number of Newton steps."""
     z, normal = guess.copy(), direction * frame.weight
     guide = system.renewed(guess)
     for used in range(1, continuation.iterations + 1):
@@ -131,7 +130,7 @@ def corrected(
             return None
         z = z + step * frame.scale
         if np.abs(step).max() <= continuation.tolerance:
-            # one more, whose matrix is the same to rounding
+            # one more step with the same matrix
             left = system.residual(z, guide)
             right = np.append(-left, (guess - z) @ normal)
             z = z + np.linalg.solve(matrix / rows[:, None], right / rows) * frame.scale
@@ -143,7 +142,7 @@ def corrected(
 
 
 def landed(system: System, guess: Array, frame: Frame) -> Array | None:
-    """The point of the curve nearest to a guess, None where Newton's method fails."""
+    """Correct a guess to the nearest point of the curve; None if Newton's method fails."""
     guide = system.renewed(guess)
     z, _, converged, _ = newton(lambda z: system.residual(z, guide), guess, frame.scale)
     return system.renewed(z) if converged else None
@@ -158,7 +157,7 @@ def follow(
     stop: Callable[[Array], bool] = lambda _: False,
     bounds: Callable[[Array], Array] | None = None,
 ) -> tuple[Array, Array, str]:
-    """Follow a curve from one of its points until something ends it.
+    """Trace a curve from one of its points to its end.
 
     Parameters
     ----------
@@ -169,14 +168,14 @@ def follow(
     stop : callable
         Whether the curve ends after a point.
     bounds : callable, optional
-        Numbers that are positive where the curve may be; it ends, exactly, where
+        Functions that are positive in the admissible domain; the curve ends exactly where
         the first of them vanishes.
 
     Returns
     -------
     z, tangents : ndarray, shape (M, N + 1)
-        With ``RANGE`` and ``WINDOW`` the last row is exactly on the edge of the range of
-        a parameter or of a state.
+        With ``RANGE`` and ``WINDOW`` the last row is exactly on the bound of a parameter or
+        of a state.
     status : str
     """
     rows, tangents = [start], [direction]
@@ -226,7 +225,7 @@ def follow(
 def _on_edge(
     system: System, inside: Array, outside: Array, frame: Frame, passed: NDArray[np.bool_]
 ) -> tuple[Array, bool] | None:
-    """Where the curve meets the first edge between two points, and whether it is a state's."""
+    """Locate the first bound crossed between two points, and whether it belongs to a state."""
     best: tuple[float, Array, bool] | None = None
     for side, entry in np.argwhere(passed):
         bound = (frame.lower, frame.upper)[side][entry]
@@ -254,7 +253,7 @@ def _on_bound(
     frame: Frame,
     bounds: Callable[[Array], Array],
 ) -> Array | None:
-    """Where the first of the bounds between two points of the curve vanishes."""
+    """Locate the first zero of the bounds between two points of the curve."""
     before, after = bounds(inside), bounds(outside)
     share, number = min(
         (before[k] / (before[k] - after[k]), int(k)) for k in np.flatnonzero(after < 0)
@@ -276,7 +275,7 @@ def _returns(
     step: float,
     frame: Frame,
 ) -> bool:
-    """Whether the last step passed the start again, in its direction."""
+    """Check whether the last step passed the start again, in its direction."""
     gap = start - last
     ahead = float((gap * frame.weight) @ along)
     off = gap - ahead * along

@@ -28,7 +28,7 @@ _EVALUATION = "fastslow.continuation.evaluation"
 _ISOLATION = "fastslow.continuation.isolation"
 
 
-#: Name, module and arguments of each loop, and the numbers that it returns.
+#: Name, module, arguments and results of each loop.
 _LOOPS = [
     Loop(
         _ENGINE,
@@ -127,14 +127,14 @@ _LOOPS = [
 #: The loops by their names.
 LOOPS = {loop.function: loop for loop in _LOOPS}
 
-#: Work between two pauses, in products: some hundredths of a second.
+#: Work between two pauses, in multiplications: some hundredths of a second.
 WORK = 2**24
 
 
 def blocks(count: int, cost: int) -> Iterator[slice]:
-    """Slices of so many rows, each for one call of a loop that takes rows of some cost.
+    """Divide rows into slices, each for one call of a loop with a given cost per row.
 
-    Python handles signals between two calls, so that none may take long.
+    Python handles signals between two calls, so that each must be short.
 
     Examples
     --------
@@ -148,10 +148,10 @@ def blocks(count: int, cost: int) -> Iterator[slice]:
 
 @cache
 def loop(name: str) -> Callable[..., Any]:
-    """One of the loops by its name, compiled."""
+    """Load a compiled loop by its name."""
     return load_loop(LOOPS[name])
 
 
 def writeable(array: NDArray[Any]) -> NDArray[Any]:
-    """An array that a loop takes: of one that is read-only or not contiguous a copy."""
+    """The array, or a copy if it is read-only or not contiguous."""
     return array if array.flags.carray else np.array(array, order="C")

@@ -1,25 +1,25 @@
-"""The order in which points are listed."""
+"""Ordering of points."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-#: Components nearer to each other than this, relative to their size or unit, are equal.
+#: Relative difference of components, by size or unit, below which they are equal.
 EQUAL = 1e-8
 
 
 def in_order(points: ArrayLike, unit: ArrayLike) -> NDArray[np.intp]:
     """Indices that sort points by their components, first to last.
 
-    Components that differ by rounding are equal, so that the next one decides and the
-    order does not depend on the units.
+    Components that differ by rounding count as equal, so that the order does not depend
+    on the units.
 
     Parameters
     ----------
     points : array_like, shape (m, n)
     unit : array_like, shape (n,)
-        Of every component, for those that are zero but for rounding.
+        Unit of every component, for values that are zero up to rounding.
 
     Returns
     -------
@@ -40,5 +40,5 @@ def in_order(points: ArrayLike, unit: ArrayLike) -> NDArray[np.intp]:
         low, high = column[order[:-1]], column[order[1:]]
         size = np.maximum(np.maximum(np.abs(low), np.abs(high)), least[k])
         ranks[order, k] = np.append(0, np.cumsum(high - low > EQUAL * size))
-    # what is equal in every component keeps the order of the numbers themselves
+    # ties in all components are broken by the values themselves
     return np.lexsort((*table.T[::-1], *ranks.T[::-1]))

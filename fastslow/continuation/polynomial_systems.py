@@ -17,23 +17,23 @@ from fastslow.continuation.spaces import PAUSED, TABLE_FULL, Boxes, isolation_sp
 
 Array = NDArray[np.float64]
 
-#: Exponents of the unknowns to the coefficient of their product.
+#: Maps exponents of the unknowns to the coefficient of their product.
 Terms = Mapping[tuple[int, ...], Fraction | int]
 
-#: The same with whole coefficients, as an equation has up to a factor.
+#: The same with integer coefficients, possible up to a factor.
 WholeTerms = Mapping[tuple[int, ...], int]
 
-#: Solutions are looked for up to this multiple of each unknown's unit (see `units`), and
-#: farther where coefficients differ by many decades.
+#: Solutions are searched up to this multiple of the unit of each unknown (see `units`), and
+#: farther if coefficients differ by many decades.
 FARTHEST = 1e9
 
-#: Next to the largest unknown another one counts as comparable down to this ratio.
+#: Ratio to the largest unknown down to which another one is comparable.
 COMPARABLE = 1e-3
 
-#: Below this multiple of its unit an unknown is resolved absolutely, above it relatively.
+#: Multiple of its unit below which an unknown is resolved absolutely, else relatively.
 NEAREST = 1e-3
 
-#: Widths of boxes, relative as above, that are not divided further.
+#: Width of boxes, relative as above, at which they are not divided further.
 NARROWEST = 1e-12
 
 #: Multiple solutions within boxes of this width, in units of their place, are one cluster.
@@ -149,7 +149,7 @@ def solve_polynomials(
 
 
 def _narrow(boxes: Array, floor: Array, ranges: Mapping[int, object]) -> bool:
-    """Whether boxes are as narrow as the resolution in the unknowns that decide."""
+    """Check that boxes are narrower than the resolution in the decisive unknowns."""
     count = len(floor)
     decisive = np.array([m in ranges or not ranges for m in range(count)])
     wide = np.where(decisive, floor, 1.0) if ranges else np.ones(count)
@@ -166,7 +166,7 @@ def _isolated(
     farthest: float,
     budget: int,
 ) -> tuple[Array, Array, int] | None:
-    """Solutions and clusters in one chart, and the coefficients looked at; None past the budget."""
+    """Solutions, clusters and work in one chart; None if the budget is exceeded."""
     count = len(equations)
     degrees = np.array([max(e[m] for q in equations for e in q) for m in range(count)])
     size = math.prod(int(d) + 1 for d in degrees)
@@ -220,7 +220,7 @@ def _isolated(
 
 
 def _charts(free: Sequence[int]) -> list[tuple[int, ...]]:
-    """The largest unknown and those comparable to it; first the chart where none is large."""
+    """Charts: the largest unknown and those comparable to it; first that without large ones."""
     charts: list[tuple[int, ...]] = [()]
     for largest in free:
         others = [m for m in free if m != largest]
@@ -232,7 +232,7 @@ def _charts(free: Sequence[int]) -> list[tuple[int, ...]]:
 def _charted(
     terms: Mapping[tuple[int, ...], float], chart: tuple[int, ...]
 ) -> Mapping[tuple[int, ...], float]:
-    """The equation in the coordinates of a chart, times a power of the first of them."""
+    """Transform an equation to a chart, times a power of its first coordinate."""
     if not chart:
         return terms
     degree = max(sum(powers[m] for m in chart) for powers in terms)
@@ -245,7 +245,7 @@ def _charted(
 
 
 def _back(points: Array, chart: tuple[int, ...]) -> Array:
-    """Points of a chart, shape (…, N), in the unknowns themselves."""
+    """Transform points of a chart, shape (…, N), to the original unknowns."""
     x = np.array(points, dtype=float)
     if chart:
         x[..., list(chart)] /= points[..., chart[:1]]
@@ -254,7 +254,7 @@ def _back(points: Array, chart: tuple[int, ...]) -> Array:
 
 
 def _around(box: Array, chart: tuple[int, ...]) -> Array:
-    """A box of a chart as one in the unknowns themselves, which holds it."""
+    """Enclosing box in the original unknowns of a box in a chart."""
     count = box.shape[1]
     sides = np.array(list(itertools.product((0, 1), repeat=count)))
     corners = _back(box[sides, np.arange(count)], chart)
@@ -264,16 +264,16 @@ def _around(box: Array, chart: tuple[int, ...]) -> Array:
 def units(
     equations: Sequence[Terms], ranges: Mapping[int, tuple[float, float]]
 ) -> tuple[list[Fraction], list[Fraction]]:
-    """Units of the unknowns and equations, powers of two, that bring coefficients nearest to one.
+    """Scale unknowns and equations by powers of two so that coefficients are close to one.
 
-    The logarithms of all coefficients are made small in least squares, as are their
-    differences within each equation (Morgan 1987, chapter 5). In other units of the unknowns
-    the same solutions are found.
+    The logarithms of all coefficients and their differences within each equation are
+    minimised in least squares (Morgan 1987, chapter 5). The solutions are independent of the
+    units of the unknowns.
 
     Returns
     -------
     list of Fraction, list of Fraction
-        An unknown is its unit times what is solved for, an equation is multiplied by its size.
+        Units of the unknowns, and factors of the equations.
     """
     count = len(equations)
     unknowns = len(next(iter(equations[0])))
@@ -318,7 +318,7 @@ def units(
 
 
 def _units_of_one(terms: Terms) -> tuple[list[Fraction], list[Fraction]]:
-    """The same for one equation in one unknown: the line through logarithms over exponents."""
+    """Scale one equation in one unknown by a linear fit of logarithms over exponents."""
     powers = [e for (e,) in terms]
     logs = [_log2(c) for c in terms.values()]
     power, log = sum(powers) / len(powers), sum(logs) / len(logs)
@@ -331,7 +331,7 @@ def _units_of_one(terms: Terms) -> tuple[list[Fraction], list[Fraction]]:
 
 
 def at_value(terms: Terms, unknown: int, value: Fraction) -> Terms:
-    """The equation with a number in place of an unknown, times a positive whole number.
+    """Substitute a number for an unknown; the result is scaled by a positive integer.
 
     Examples
     --------
@@ -355,7 +355,7 @@ def _log2(value: Fraction | int) -> float:
 def _scaled(
     terms: Terms, scales: Sequence[Fraction], size: Fraction
 ) -> dict[tuple[int, ...], float]:
-    """An equation in the units, rounded only here."""
+    """Coefficients of a scaled equation, rounded once."""
     shifts = [_log2_of_unit(s) for s in scales]
     shift = _log2_of_unit(size)
     found = {}
@@ -368,14 +368,14 @@ def _scaled(
 
 
 def _log2_of_unit(unit: Fraction) -> int:
-    """Of a power of two."""
+    """Binary logarithm of a power of two."""
     return unit.numerator.bit_length() - unit.denominator.bit_length()
 
 
 def _polished(
     equations: Sequence[Mapping[tuple[int, ...], float]], points: Sequence[Array]
 ) -> list[Array]:
-    """Newton's last digits at simple solutions."""
+    """Refine simple solutions by Newton's method."""
     if len(equations) == 1:
         return [_polished_root(equations[0], float(point[0])) for point in points]
     # exponents (T, N) and coefficients (T,) of every equation
@@ -409,7 +409,7 @@ def _polished_point(system: Sequence[tuple[NDArray[np.int64], Array]], point: Ar
 
 
 def _polished_root(terms: Mapping[tuple[int, ...], float], near: float) -> Array:
-    """The same of one polynomial, by Horner's scheme."""
+    """Refine a root of one polynomial by Newton's method."""
     powers = [0.0] * (1 + max(e for (e,) in terms))
     for (exponent,), coefficient in terms.items():
         powers[exponent] = coefficient
@@ -431,7 +431,7 @@ def _polished_root(terms: Mapping[tuple[int, ...], float], near: float) -> Array
 
 
 def _distinct(points: Sequence[Array], floor: Array, within: float) -> Array:
-    """Points that differ by more than a tolerance relative to their place."""
+    """Remove duplicates of points up to a relative tolerance."""
     kept: list[Array] = []
     for point in points:
         near = within * np.maximum(np.abs(point), floor)
@@ -441,7 +441,7 @@ def _distinct(points: Sequence[Array], floor: Array, within: float) -> Array:
 
 
 def _merged(boxes: Sequence[Array], floor: Array) -> Array:
-    """Boxes that touch each other as one, which holds them."""
+    """Merge touching boxes into enclosing boxes."""
     kept = np.empty((0, 2, len(floor)))
     for box in boxes:
         here = box

@@ -1,9 +1,9 @@
-"""Brackets of the zeros of a test function along a sampled curve, two within one step included.
+"""Brackets of the zeros of a test function along a sampled curve, including double crossings.
 
-Between two rows a smooth test may vanish twice although its signs at the rows agree. Its
-absolute value then has a minimum there, so one of the rows beside that step is the smallest
-of its neighbours. The minimum beside each such row is computed by parabolic interpolation;
-where the test has the other sign there, the step is divided.
+Between two rows with equal signs a smooth test function may vanish twice. Its modulus then
+has a minimum there, so that one of the adjacent rows is a local minimum of the samples. The
+minimum near each such row is computed by parabolic interpolation; if the test changes its
+sign there, the step is divided.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: Values below this part of the test's size are rounding and count as zero.
+#: Values below this fraction of the size of the test are rounding and count as zero.
 ROUNDING = 1e-12
 
-#: Evaluations spent on one minimum.
+#: Maximum evaluations for one minimum.
 EVALUATIONS = 30
 
-#: A minimum has been reached where this many evaluations do not halve the value.
+#: A minimum is reached if this many evaluations do not halve the value.
 SETTLED = 5
 
-#: Smallest part of a step that is divided.
+#: Smallest fraction of a step that is divided.
 NARROWEST = 1e-9
 
-#: Parts of a step with a change of sign that are sampled, so that three zeros are told from one.
+#: Fractions of a step with a change of sign that are sampled to separate three zeros from one.
 QUARTERS = (0.25, 0.5, 0.75)
 
-#: The test at the point of the curve after a part of the step behind a row.
+#: The test function at a row and a fraction of the step after it.
 Between = Callable[[int, float], float | None]
 
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A point of the curve: the row behind which it is, the part of that step, the test."""
+    """A point of the curve: its row, the fraction of the step after it, the value of the test."""
 
     row: int
     part: float
@@ -51,22 +51,22 @@ class Node:
 
 @dataclass(frozen=True, eq=False)
 class Bracket:
-    """Two points with tests of opposite sign, between which there is one zero."""
+    """Two points with tests of opposite sign that enclose one zero."""
 
     before: Node
     after: Node
 
 
 def brackets(values: Array, between: Between) -> Iterator[Bracket]:
-    """All changes of sign of a test, in order along the curve.
+    """Bracket all changes of sign of a test function, in order along the curve.
 
     Parameters
     ----------
     values : ndarray, shape (N,)
-        The test at the rows in units of its size; not finite where it has no value.
+        Values at the rows in units of the size of the test; not finite if undefined.
     between : callable
-        A row and a part of the step behind it to the test there, None where the curve
-        cannot be reached.
+        Maps a row and a fraction of the step after it to the test there, None if the curve
+        cannot be evaluated.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def brackets(values: Array, between: Between) -> Iterator[Bracket]:
 
 
 def _runs(values: Array) -> Iterator[NDArray[np.intp]]:
-    """Rows with a value that is not rounding; a single row on a zero is left out of its run."""
+    """Runs of rows with values above rounding; a single row on a zero is skipped."""
     finite = np.isfinite(values)
     known = np.flatnonzero(finite & (np.abs(np.where(finite, values, 0.0)) > ROUNDING))
     start = 0
@@ -102,7 +102,7 @@ def _runs(values: Array) -> Iterator[NDArray[np.intp]]:
 
 
 def _quartered(nodes: list[Node], between: Between) -> list[Node]:
-    """The nodes with three more in every step that changes the sign."""
+    """Add three nodes in every step with a change of sign."""
     result = [nodes[0]]
     for one, other in itertools.pairwise(nodes):
         if one.value * other.value < 0 and other.row == one.row + 1:
@@ -115,10 +115,10 @@ def _quartered(nodes: list[Node], between: Between) -> list[Node]:
 
 
 def _beyond(nodes: list[Node], k: int, between: Between) -> Node | None:
-    """A point with the other sign beside a node that is the smallest of its neighbours."""
+    """Find a point of opposite sign near a node that is a local minimum of the modulus."""
     here = nodes[k]
     sign = np.sign(here.value)
-    # a neighbour of the other sign bounds what is looked at, as an end of the curve does
+    # a neighbour of opposite sign bounds the search, as an end of the curve does
     near = [n for n in nodes[max(k - 1, 0) : k + 2] if n is not here and n.value * sign > 0]
     if not near or any(abs(n.value) < abs(here.value) for n in near):
         return None
@@ -131,7 +131,7 @@ def _beyond(nodes: list[Node], k: int, between: Between) -> Node | None:
     if len(near) == 2:
         low, high = near
     else:
-        # a point beside an end shows which way the test goes
+        # a probe near an end gives the direction of change
         low, high = here, near[0]
         probe = at(here.place + 0.1 * (high.place - here.place))
         if probe is None or probe.value * sign < 0:
@@ -147,7 +147,7 @@ def _beyond(nodes: list[Node], k: int, between: Between) -> Node | None:
 def _lowest(
     low: Node, middle: Node, high: Node, sign: float, at: Callable[[float], Node | None]
 ) -> Node | None:
-    """A point with the other sign between two with a smaller one between them."""
+    """Find a point of opposite sign by minimising the modulus within three points."""
     best: list[float] = []
     for count in range(EVALUATIONS):
         a, b, c = (n.place for n in (low, middle, high))
@@ -158,7 +158,7 @@ def _lowest(
         slope = (fb - fa) / (b - a) + bend * (b - a)
         promised = fb - slope**2 / (4.0 * bend) if bend > 0 else fb
         best.append(fb)
-        # near a zero the values fall by large factors, near a minimum above it they do not
+        # near a zero the values decrease by large factors, near a positive minimum they do not
         settled = len(best) > SETTLED and fb > 0.5 * best[-1 - SETTLED]
         if (settled and promised > 0.5 * fb) or c - a < NARROWEST:
             return None

@@ -107,7 +107,7 @@ def operations_of(
     n: int,
     renaming: tuple[tuple[sp.Symbol, sp.Symbol], ...],
 ) -> list[FieldOperations]:
-    """Operations that compute rows and their derivatives by the unknowns u0, u1, …"""
+    """Operations that compute rows and their derivatives by the unknowns u0, u1 and so on."""
     rename = dict(renaming)
     bodies = []
     for rows in rows_of:
