@@ -81,7 +81,9 @@ class Periodicity(Result):
         return f"Periodicity: {self.outcome}"
 
 
-def periodicity_of(run: Trajectory, period: float | None, tol: float, max_multiple: int) -> Periodicity:
+def periodicity_of(
+    run: Trajectory, period: float | None, tol: float, max_multiple: int
+) -> Periodicity:
     """Detect a period; see `Trajectory.periodicity`."""
     if not tol > 0:
         raise ArgumentError(f"tol = {tol!r}; expected a positive number")
