@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 #: Prints a digest of every result, computed in the order that is asked for.
 PROGRAM = """
 import hashlib, json, sys

@@ -18,6 +18,8 @@ from fastslow.disk import read_file, write_file, write_text
 from fastslow.plot.layout.style import save
 from fastslow.results.trajectory.spectrum import Spectrum
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(fs.__file__).parent
 
 #: The calls of each file that open something else than a file on disk.

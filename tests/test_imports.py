@@ -10,6 +10,8 @@ import pytest
 
 import fastslow
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(fastslow.__file__).parent
 #: Run by what builds wheels, and by nothing of this package.
 HOOK = ROOT / "kernels" / "build.py"

@@ -9,6 +9,8 @@ import pytest
 import fastslow as fs
 from tests.campaigns.interrupts import campaign
 
+pytestmark = pytest.mark.slow
+
 #: What is computed with code that other tests compile as well.
 KINDS = [
     "short_run",

@@ -9,6 +9,8 @@ import pytest
 import fastslow as fs
 from fastslow.kernels.cache import store
 
+pytestmark = pytest.mark.slow
+
 MODEL = """
 import sympy as sp, fastslow as fs
 x, v, t, w, D = sp.symbols("x v t w D")

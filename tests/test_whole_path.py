@@ -8,6 +8,8 @@ from scipy.integrate import solve_ivp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, y, w, t, mu, omega = sp.symbols("x y w t mu omega")
 
 

@@ -17,6 +17,8 @@ from analyses.output import Output
 from analyses.passages import OMEGA
 from fastslow.systems.gears import SCALINGS
 
+pytestmark = pytest.mark.slow
+
 DOCS = Path(everything.__file__).parents[1] / "docs"
 
 

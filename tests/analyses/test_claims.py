@@ -36,6 +36,8 @@ from analyses import (
 from analyses.claims import VERDICTS, Claim, Finding, table
 from fastslow.systems.gears import SCALINGS, gear_scales
 
+pytestmark = pytest.mark.slow
+
 DOCS = Path(claims_page.__file__).parents[1] / "docs"
 
 #: Verdict, whether it holds at the source's values, and numbers of every claim by scaling.

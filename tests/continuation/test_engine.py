@@ -23,6 +23,8 @@ from fastslow.diagrams.field import FrozenField
 from fastslow.kernels.loops import Loop, load_loop
 from fastslow.kernels.records import Matrix, Vector
 
+pytestmark = pytest.mark.slow
+
 #: The compiled elimination, of which loops are made.
 SOLVE = Loop("fastslow.continuation.engine", "solve", {"matrix": Matrix, "right": Vector}, (bool,))
 

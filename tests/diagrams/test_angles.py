@@ -9,6 +9,8 @@ from scipy.optimize import brentq, root
 import fastslow as fs
 from fastslow.plot.quantities import along_branch, of_diagram
 
+pytestmark = pytest.mark.slow
+
 mpl.use("Agg")
 
 theta, omega, p, a, t = sp.symbols("theta omega p a t")

@@ -17,6 +17,8 @@ from fastslow.diagrams.points.center_manifolds import (
 )
 from fastslow.diagrams.points.jets import JetSpace
 
+pytestmark = pytest.mark.slow
+
 u = sp.symbols("u0:5", real=True)
 p, q = sp.symbols("p q", real=True)
 

@@ -8,6 +8,8 @@ import fastslow as fs
 from fastslow.diagrams.solve import starts
 from fastslow.results.points import Equilibria
 
+pytestmark = pytest.mark.slow
+
 x, y, z, p, q, rho, u1, u2, p1, p2, p3 = sp.symbols("x y z p q rho u1 u2 p1 p2 p3")
 
 

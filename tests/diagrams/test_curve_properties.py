@@ -6,6 +6,8 @@ import sympy as sp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, y, p, q, a, b, d, E, alpha, R, k = sp.symbols("x y p q a b d E alpha R k")
 u1, u2, p1, p2 = sp.symbols("u1 u2 p1 p2")
 X, Y, Z, F, G = sp.symbols("X Y Z F G")

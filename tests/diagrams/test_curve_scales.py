@@ -14,6 +14,8 @@ from fastslow.diagrams.field import FrozenField, Source
 from fastslow.results.branch.windows import state_window
 from fastslow.results.points import SpecialPoint
 
+pytestmark = pytest.mark.slow
+
 x, y, p, q, e, d, tau = sp.symbols("x y p q e d tau")
 X, Y, Z, U, F, T = states = sp.symbols("X Y Z U F T")
 sizes = sp.symbols("s1:5")

@@ -8,6 +8,8 @@ import sympy as sp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, y, p, q, c = sp.symbols("x y p q c")
 u1, u2, p1, p2, p3 = sp.symbols("u1 u2 p1 p2 p3")
 PLANE = {"p1": (0, 0.3), "p2": (8, 20)}

@@ -11,6 +11,8 @@ import fastslow as fs
 from fastslow.errors import IncompleteWarning
 from fastslow.results.points import SpecialPoints
 
+pytestmark = pytest.mark.slow
+
 x, y, p = sp.symbols("x y p")
 SPIRAL = {x: (p - x**2 - y**2) * x - y, y: x + (p - x**2 - y**2) * y}
 

@@ -6,6 +6,8 @@ import sympy as sp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, y, p, q = sp.symbols("x y p q")
 
 

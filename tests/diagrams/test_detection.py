@@ -22,6 +22,8 @@ from fastslow.results.points import stability_of
 from tests.campaigns.detection import campaign
 from tests.diagrams.models import LENGTH, brusselator, chafee_infante, crossing_model
 
+pytestmark = pytest.mark.slow
+
 p = sp.Symbol("p")
 
 

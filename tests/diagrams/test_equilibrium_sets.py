@@ -9,6 +9,8 @@ from scipy.optimize import linprog
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, v, w, y, u, a, V, t = sp.symbols("x v w y u a V t")
 
 

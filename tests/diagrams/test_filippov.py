@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, y, z, p, v, w = sp.symbols("x y z p v w")
 
 

@@ -6,6 +6,8 @@ import sympy as sp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 
 def chain(masses, coupling):
     """x'' + x'/10 = x − x³ + coupling · (neighbours), with free ends."""

@@ -13,6 +13,8 @@ from fastslow.diagrams.solve.equations import SlidingEquations, region_equations
 from fastslow.diagrams.solve.exact_polynomials import polynomials_of
 from fastslow.diagrams.solve.parametric import eliminations_of
 
+pytestmark = pytest.mark.slow
+
 x, y, v, w, t, a, b, c, k = sp.symbols("x y v w t a b c k")
 
 MODELS = {

@@ -8,6 +8,8 @@ import sympy as sp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, y, z, v, w, p, q, rho, sigma = sp.symbols("x y z v w p q rho sigma")
 u1, u2, p1, p2, p3 = sp.symbols("u1 u2 p1 p2 p3")
 

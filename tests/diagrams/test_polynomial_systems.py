@@ -15,6 +15,8 @@ from fastslow.diagrams.solve.critical import _exact_roots, critical_values
 from fastslow.diagrams.solve.equations import region_equations
 from tests.campaigns.polynomial_systems import campaign
 
+pytestmark = pytest.mark.slow
+
 x, y, z, p, q = sp.symbols("x y z p q")
 
 

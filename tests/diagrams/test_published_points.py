@@ -5,6 +5,8 @@ import sympy as sp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("speed", [1.0, 1e-3])
 def test_extended_lorenz_84(speed):

@@ -10,6 +10,8 @@ import fastslow as fs
 from fastslow.diagrams.curves.tangency_points import TangencyEquations
 from fastslow.diagrams.modes import modes_of
 
+pytestmark = pytest.mark.slow
+
 x, y, z, p, v, w = sp.symbols("x y z p v w")
 
 

@@ -13,6 +13,8 @@ from fastslow.model.units import natural_units
 from fastslow.results.points import stability_of
 from tests.unit_systems import PARAMETER, SYSTEMS, TIME, drawn, single
 
+pytestmark = pytest.mark.slow
+
 #: Relative to the largest value of the same quantity at the points compared.
 ACCURACY = 1e-9
 

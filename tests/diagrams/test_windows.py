@@ -8,6 +8,8 @@ import sympy as sp
 import fastslow as fs
 from tests.campaigns.windows import campaign
 
+pytestmark = pytest.mark.slow
+
 x, y, v, p = sp.symbols("x y v p")
 TENTH = sp.Rational(1, 10)
 

@@ -16,6 +16,8 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import fsolve
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = {path.stem: path for path in sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))}
 

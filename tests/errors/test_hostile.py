@@ -8,6 +8,8 @@ import fastslow as fs
 from tests.campaigns.arguments import drawn, outcomes_of
 from tests.errors.subjects import subjects
 
+pytestmark = pytest.mark.slow
+
 #: Calls of one function.
 SAMPLE = 100
 

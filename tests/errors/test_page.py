@@ -12,6 +12,8 @@ from tests.errors.wrong_arguments import BY_FUNCTION
 from tests.errors.wrong_by_parameter import BY_PARAMETER
 from tests.errors.wrong_values import SAVE
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(fs.__file__).parent
 PAGE = (ROOT.parent / "docs" / "errors.md").read_text(encoding="utf-8")
 SOURCES = {path: path.read_text(encoding="utf-8") for path in sorted(ROOT.rglob("*.py"))}

@@ -10,6 +10,8 @@ from tests.errors.subjects import RESULTS, SPECIAL, subjects
 from tests.errors.wrong_arguments import BY_FUNCTION, rows_of
 from tests.errors.wrong_by_parameter import BY_PARAMETER
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def elsewhere(tmp_path, monkeypatch):

@@ -1,6 +1,10 @@
 """A sample of the campaign of random texts."""
 
+import pytest
+
 from tests.campaigns.text import campaign, entries
+
+pytestmark = pytest.mark.slow
 
 
 def test_every_text_has_an_answer_or_one_of_our_errors():

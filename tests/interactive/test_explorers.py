@@ -11,6 +11,8 @@ import pytest
 import fastslow as fs
 from fastslow.interactive.controls import DEBOUNCE
 
+pytestmark = pytest.mark.slow
+
 #: ipympl 0.10 makes its toolbar in a way that traitlets will refuse one day
 IPYMPL = pytest.mark.filterwarnings("ignore:Passing unrecognized arguments:DeprecationWarning")
 

@@ -11,6 +11,8 @@ from fastslow.interactive.frames import Store, kept_rows
 from fastslow.interactive.pages import page_data
 from fastslow.interactive.tooltips import text_of
 
+pytestmark = pytest.mark.slow
+
 #: Numbers of a page are stored in 32 bits: seven digits.
 DIGITS = 2e-7
 

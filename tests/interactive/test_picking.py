@@ -8,6 +8,8 @@ from matplotlib.figure import Figure
 import fastslow as fs
 from fastslow.interactive.tooltips import text_of
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def lay(folded):

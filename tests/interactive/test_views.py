@@ -7,6 +7,8 @@ import sympy as sp
 import fastslow as fs
 from fastslow.interactive.views import setup_of, view_of
 
+pytestmark = pytest.mark.slow
+
 
 def executed(view, model):
     names = {"fs": fs, "model": model}

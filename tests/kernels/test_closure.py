@@ -14,6 +14,8 @@ import fastslow
 from fastslow.kernels import model_code
 from fastslow.kernels.cache import digest as closures
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(fastslow.__file__).parent
 
 

@@ -10,6 +10,8 @@ from fastslow.diagrams.field import FrozenField
 from fastslow.kernels.field_code import parameter_array
 from fastslow.kernels.fields import compile_field
 
+pytestmark = pytest.mark.slow
+
 
 def test_field_equals_sympy_to_rounding(gear):
     fast = gear.frozen()

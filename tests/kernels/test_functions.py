@@ -10,6 +10,8 @@ from fastslow.model.known_functions import IN_MPMATH, OPEN, without_recurrence
 from fastslow.model.model import Model
 from tests.kernels.test_recurrences import call
 
+pytestmark = pytest.mark.slow
+
 t, x, a = sp.symbols("t x a", real=True)
 HALF = sp.Rational(1, 2)
 TIMES = (0.05, 0.3, 0.8, 2.5)

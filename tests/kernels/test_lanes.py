@@ -17,6 +17,8 @@ from fastslow.kernels.simd.functions import Mathematics, exp2, log2
 from fastslow.kernels.simd.lane_steps import _by_bernstein, _by_moduli, _length
 from fastslow.kernels.simd.lanes import WIDTH, Trace, Workspace, added, polynomial
 
+pytestmark = pytest.mark.slow
+
 
 def compiled(function, count=1):
     """A function of lanes, from an array of shape (count, m) to one of shape (m,)."""

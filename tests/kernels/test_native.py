@@ -15,6 +15,8 @@ from fastslow.kernels import special
 from fastslow.kernels.machine_code import load_object, object_code
 from fastslow.kernels.native import UnknownSourceError, translate
 
+pytestmark = pytest.mark.slow
+
 KIND = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 3)
 
 

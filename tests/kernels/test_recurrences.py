@@ -11,6 +11,8 @@ from fastslow.model.known_functions import CLOSED, ELEMENTARY, IN_MPMATH
 from fastslow.model.model import Model
 from fastslow.model.recurrences import scalar_code
 
+pytestmark = pytest.mark.slow
+
 t, x, a = sp.symbols("t x a", real=True)
 ORDER = 12
 

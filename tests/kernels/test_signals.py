@@ -12,6 +12,8 @@ from numba.core.typing.context import BaseContext
 from fastslow.kernels.loop_compiler import compiled_object, watched_passes
 from fastslow.kernels.signals import deferring_signals
 
+pytestmark = pytest.mark.slow
+
 
 class Passes(event.Listener):
     """Counts the passes of Numba's compiler, and sends a signal in one of them."""

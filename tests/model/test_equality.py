@@ -16,6 +16,8 @@ from fastslow.model import derived, structure
 from fastslow.model.motions import motions_of
 from fastslow.simulation.arguments import gap_regions
 
+pytestmark = pytest.mark.slow
+
 x, v, w, t, D, k = sp.symbols("x v w t D k")
 GAP = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
 

@@ -10,6 +10,8 @@ from fastslow.kernels.taylor.series import compile_series
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.motions import _vanishes, motions_of
 
+pytestmark = pytest.mark.slow
+
 x, y, z, v, p = sp.symbols("x y z v p", real=True)
 
 

@@ -21,6 +21,8 @@ from fastslow.model.polynomials import (
     used,
 )
 
+pytestmark = pytest.mark.slow
+
 R, x, y, a = ring("x y a", ZZ)
 
 terms = st.dictionaries(

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from fastslow import Model, ModelError
 
+pytestmark = pytest.mark.slow
+
 x, y, v, t, w, D, k = sp.symbols("x y v t w D k")
 
 

@@ -9,6 +9,8 @@ import sympy as sp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, y, w, q, t = sp.symbols("x y w q t")
 LOAD = {w: sp.sin(t / 100)}
 

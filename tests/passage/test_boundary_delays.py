@@ -14,6 +14,8 @@ import fastslow as fs
 from fastslow.passage.delays import boundary_delays
 from fastslow.passage.delays.boundary_delays import boundary_delay, gap_crossing
 
+pytestmark = pytest.mark.slow
+
 
 def corner_point(model):
     return fs.continue_equilibria(model, "p", over=(-1, 1)).boundary_equilibria[0]

@@ -10,6 +10,8 @@ from scipy.integrate import solve_ivp, trapezoid
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, y, w, t, p = sp.symbols("x y w t p")
 EPS = 0.01
 

@@ -10,6 +10,8 @@ from scipy.integrate import solve_ivp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 FOLD_HR = 49 / 27  # z where x³ + 2x² + z = 3 folds, at x = −4/3
 
 

@@ -6,6 +6,8 @@ import pytest
 
 from tests.campaigns import overlays
 
+pytestmark = pytest.mark.slow
+
 SAMPLE = (
     "cusp, ω = 0.005",
     "van der Pol, Liénard, ε = 0.01",

@@ -13,6 +13,8 @@ from fastslow.passage.delays.fold_delays import OMEGA_0
 from tests.passage import slow_models
 from tests.passage.slow_models import CASES, PRECISE, measured, predicted, special
 
+pytestmark = pytest.mark.slow
+
 #: What the reference leaves in a slow quantity of order one.
 REFERENCE = 1e-11
 

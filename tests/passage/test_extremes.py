@@ -7,6 +7,8 @@ from scipy.integrate import solve_ivp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, y, z, v, w, t = sp.symbols("x y z v w t")
 
 

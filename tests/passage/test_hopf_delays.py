@@ -14,6 +14,8 @@ import fastslow as fs
 from fastslow.passage.delays.buffer_points import LevelCurve
 from fastslow.passage.delays.hopf_delays import hopf_mode
 
+pytestmark = pytest.mark.slow
+
 RADIUS, EPS = 1e-3, 0.05
 
 

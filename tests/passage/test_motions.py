@@ -8,6 +8,8 @@ from scipy.integrate import solve_ivp
 import fastslow as fs
 from fastslow.results.trajectory.regimes import labels_of, periods_at_the_end, repeats
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def fast_gear():

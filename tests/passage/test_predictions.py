@@ -9,6 +9,8 @@ from fastslow.passage.delays.drifts import drift_at
 from fastslow.passage.overlay import predictions
 from tests.passage import slow_models
 
+pytestmark = pytest.mark.slow
+
 x, y, p, t = sp.symbols("x y p t")
 
 

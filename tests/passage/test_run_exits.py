@@ -13,6 +13,8 @@ from scipy.optimize import brentq
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, y, v, w, t, p, r, b, K, V, S, E, n = sp.symbols("x y v w t p r b K V S E n")
 I = sp.Symbol("I")  # noqa: E741
 

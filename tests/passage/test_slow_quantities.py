@@ -7,6 +7,8 @@ import sympy as sp
 import fastslow as fs
 from fastslow.passage.overlay.slow_quantities import slow_quantity
 
+pytestmark = pytest.mark.slow
+
 x, t, g, w1, w2, omega = sp.symbols("x t g w1 w2 omega")
 
 

@@ -8,6 +8,8 @@ import fastslow as fs
 from fastslow.passage.overlay.slow_quantities import slow_quantity
 from fastslow.passage.overlay.transitions import Passage
 
+pytestmark = pytest.mark.slow
+
 x, v, w, t, omega = sp.symbols("x v w t omega")
 
 

@@ -7,6 +7,8 @@ import sympy as sp
 import fastslow as fs
 from tests.unit_systems import PARAMETER, SYSTEMS, TIME, drawn
 
+pytestmark = pytest.mark.slow
+
 #: Ramps of the parameter: range and rate.
 RAMPS = {"folded gear": (-1.5, 1.5, 0.004), "FitzHugh-Nagumo": (0.0, 1.2, 0.002)}
 

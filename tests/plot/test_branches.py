@@ -13,6 +13,8 @@ from fastslow.results.base.outcome import Outcome
 
 from .conftest import cubic, diagram_of
 
+pytestmark = pytest.mark.slow
+
 
 def extents(drawn):
     drawn.figure.draw_without_rendering()

@@ -18,6 +18,8 @@ from fastslow.results.branch.branch import Branch
 
 from .cases import CASES, results_by_name
 
+pytestmark = pytest.mark.slow
+
 FUNCTIONS = [n for n in fs.plot.__all__ if inspect.isfunction(getattr(fs.plot, n))]
 MM = 1 / 25.4
 

@@ -15,6 +15,8 @@ from fastslow.plot.layout.labels import place, tag
 from .cases import crowd, swept
 from .conftest import cubic, diagram_of
 
+pytestmark = pytest.mark.slow
+
 
 def clear(drawn, texts=None):
     """Whether visible labels are apart, within the axes, off the markers; how much they cover."""

@@ -6,6 +6,8 @@ from scipy.integrate import trapezoid
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 UNIT = {"x": (0, 1), "y": (0, 1)}
 
 

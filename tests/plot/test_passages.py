@@ -7,6 +7,8 @@ from matplotlib.figure import Figure
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 
 def test_overlay_is_drawn_above_the_branches(gear_lay):
     ax = Figure().add_subplot()

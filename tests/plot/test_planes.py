@@ -9,6 +9,8 @@ import sympy as sp
 import fastslow as fs
 from fastslow.results.points import SpecialPoints
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def curves():

@@ -10,6 +10,8 @@ from fastslow.results.trajectory.section import Section
 from fastslow.results.trajectory.spectrum import Spectrum
 from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
 
+pytestmark = pytest.mark.slow
+
 FINE = Outcome("end of time", "reached the end.", True)
 LOST = Outcome("blow-up", "the state grew.", False)
 

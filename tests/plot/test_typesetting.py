@@ -7,6 +7,8 @@ from matplotlib.figure import Figure
 import fastslow as fs
 from fastslow.plot.layout.typesetting import as_given, plain, typeset, written
 
+pytestmark = pytest.mark.slow
+
 #: Names that Matplotlib, LaTeX or Python read as more than letters.
 HOSTILE = ("m%", "a'b\"c", "x^2", "a&b", "$", "\\", "{", "}", "line\nfeed", "_", "#", "x_", "~")
 

@@ -8,6 +8,8 @@ from scipy.integrate import solve_ivp
 import fastslow as fs
 from fastslow.results.trajectory.regimes import REGIMES, in_words
 
+pytestmark = pytest.mark.slow
+
 x, v, w, t = sp.symbols("x v w t")
 D, k, a, B, C, omega = sp.symbols("D k a B C omega")
 

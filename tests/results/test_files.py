@@ -26,6 +26,8 @@ from fastslow.results.io.npz_netcdf import sealed, write_archive
 from fastslow.results.points import SpecialPoints
 from fastslow.results.trajectory.spectrum import Spectrum
 
+pytestmark = pytest.mark.slow
+
 FORMATS = [".npz", ".nc"]
 
 

@@ -1,6 +1,10 @@
 """A sample of the campaign of crossings, and the case that began it."""
 
+import pytest
+
 from tests.campaigns.crossings import campaign
+
+pytestmark = pytest.mark.slow
 
 
 def test_crossings_of_random_piecewise_linear_systems():

@@ -16,6 +16,8 @@ from fastslow.simulation.many import simulate_many
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
 
+pytestmark = pytest.mark.slow
+
 x, v, t = sp.symbols("x v t")
 D = np.array([0.1, 0.25, 0.4, 0.25, 0.3, 0.05, 0.2])
 C = np.array([3.5, 3.546, 2.0, 1.0, 5.0, 2.9, 4.0])

@@ -16,6 +16,8 @@ from fastslow.simulation.many import simulate_many
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
 
+pytestmark = pytest.mark.slow
+
 x, y, z, v, t = sp.symbols("x y z v t")
 a, mu, k, c, D = sp.symbols("a mu k c D")
 P1 = json.loads((Path(__file__).parent / "gear_p1.json").read_text())

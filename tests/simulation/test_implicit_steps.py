@@ -21,6 +21,8 @@ from fastslow.simulation.stepper.matrices import (
     spectrum_for,
 )
 
+pytestmark = pytest.mark.slow
+
 x, y, z, v, t, w = sp.symbols("x y z v t w")
 a, b, c, k, omega = sp.symbols("a b c k omega")
 

@@ -18,6 +18,8 @@ from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
 from fastslow.simulation.stepper.lanes import IN_PROGRESS
 
+pytestmark = pytest.mark.slow
+
 x, v, y, t = sp.symbols("x v y t")
 
 

@@ -11,6 +11,8 @@ from fastslow.continuation import loops
 from fastslow.simulation import pauses
 from fastslow.simulation.one import _Memory
 
+pytestmark = pytest.mark.slow
+
 x, v, y, w, t = sp.symbols("x v y w t")
 
 

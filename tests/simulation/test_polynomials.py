@@ -11,6 +11,8 @@ from numpy.polynomial import polynomial as P
 
 from fastslow.simulation.stepper.polynomials import DEEPEST, first_root, take_samples, to_bernstein
 
+pytestmark = pytest.mark.slow
+
 
 @njit
 def _call(b, first, last, noise, stack):

@@ -7,6 +7,8 @@ from scipy.integrate import solve_ivp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, y, z, w, t, a, b, c, omega = sp.symbols("x y z w t a b c omega")
 
 

@@ -10,6 +10,8 @@ from scipy.integrate import solve_ivp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x1, x2, v1, v2, a, b, V, k = sp.symbols("x1 x2 v1 v2 a b V k")
 integration = fs.Integration(rtol=1e-12)
 

@@ -15,6 +15,8 @@ from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
 from fastslow.simulation.stepper import radau
 
+pytestmark = pytest.mark.slow
+
 x, y, z, v, w, t = sp.symbols("x y z v w t")
 p, mu = sp.symbols("p mu")
 

@@ -8,6 +8,8 @@ from scipy.integrate import solve_ivp
 import fastslow as fs
 from fastslow.kernels.taylor.series import compile_series
 
+pytestmark = pytest.mark.slow
+
 # folds of the gear pair's orbits and the grazing on the way up, by exact shooting
 UP, DOWN, GRAZING = 0.8284639844, 0.7080316187, 0.8206310877
 

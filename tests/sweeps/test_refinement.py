@@ -10,6 +10,8 @@ from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.results.base.outcome import Outcome
 from fastslow.sweeps.refinement import refined_map
 
+pytestmark = pytest.mark.slow
+
 UNIT = {"x": (0, 1), "y": (0, 1)}
 SQUARE = {"x": (-1, 1), "y": (-1, 1)}
 

@@ -14,6 +14,8 @@ from fastslow.symbolic.solving.candidates import Candidates
 from fastslow.symbolic.solving.solution_families import OPEN, PAST, families
 from tests.symbolic.field_models import daisyworld
 
+pytestmark = pytest.mark.slow
+
 
 @cache
 def world():

@@ -9,6 +9,8 @@ import fastslow as fs
 from fastslow.model.structure import real
 from tests.symbolic.symbolic_models import law
 
+pytestmark = pytest.mark.slow
+
 
 def evaluated(named, values):
     at = {real(n): v for n, v in values.items()}

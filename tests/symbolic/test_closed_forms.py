@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from fastslow.model.structure import real
 from tests.symbolic.symbolic_models import law
 
+pytestmark = pytest.mark.slow
+
 MODELS = [
     "gear",
     "cusp",

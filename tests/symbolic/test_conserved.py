@@ -9,6 +9,8 @@ from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.structure import real
 from fastslow.symbolic.closed_forms.conserved import conserved_quantities
 
+pytestmark = pytest.mark.slow
+
 t = sp.Symbol("t")
 
 

@@ -9,6 +9,8 @@ from fastslow.model.structure import real
 from fastslow.symbolic.derivation import derive
 from tests.symbolic.symbolic_models import gear, law, morris_lecar
 
+pytestmark = pytest.mark.slow
+
 A, D, w, x, q = map(real, ("A", "D", "w", "x", "q"))
 
 

@@ -8,6 +8,8 @@ import fastslow as fs
 from fastslow.model.structure import real
 from tests.unit_systems import PARAMETER, SYSTEMS, drawn
 
+pytestmark = pytest.mark.slow
+
 #: Those whose critical points have closed forms, with how many of them there are.
 CLOSED = {
     "folded gear": 6,

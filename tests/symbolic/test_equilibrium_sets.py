@@ -6,6 +6,8 @@ import sympy as sp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, v, y, u, w, k, mu = sp.symbols("x v y u w k mu", real=True)
 
 

@@ -15,6 +15,8 @@ from fastslow.symbolic.closed_forms.symmetries import free_directions
 from fastslow.systems import harmonic_gear_two_inertias
 from tests.symbolic import field_models
 
+pytestmark = pytest.mark.slow
+
 NAMES = (
     "boost_converter",
     "wheelset",

@@ -11,6 +11,8 @@ from fastslow.symbolic.solving.linear import NOTE, cramer
 from fastslow.symbolic.solving.verification import checked, weakest
 from tests.symbolic.symbolic_models import dense_linear, food_chain, law
 
+pytestmark = pytest.mark.slow
+
 x, y, a = map(real, ("x", "y", "a"))
 
 

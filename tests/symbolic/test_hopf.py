@@ -13,6 +13,8 @@ from fastslow.symbolic.closed_forms.stability import (
     stability_of_matrix,
 )
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("count", range(2, 11))
 def test_the_frequency_of_a_pair_with_sum_zero(count):

@@ -18,6 +18,8 @@ from fastslow.symbolic.signs.inequalities import (
 )
 from fastslow.symbolic.signs.signs import Signs
 
+pytestmark = pytest.mark.slow
+
 A, B, D, x = map(real, ["A", "B", "D", "x"])
 
 

@@ -7,6 +7,8 @@ import pytest
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 
 def whole_path(model, parameter, over, start, **span):
     fast = model.frozen()
