@@ -153,7 +153,7 @@ KNOWN = {
         "folded.folds[1]['x']": (FOLD, 1e-13),
         "folded.bistable()[0, 1]": (-(FOLD**2 - 0.6) * (FOLD - 0.25), 1e-12),
         "len(run.crossings)": (41, 0),
-        "lay.transitions[0].width": (transit, 1e-7),
+        "overlay.transitions[0].width": (transit, 1e-7),
         "gap.exponent": (0.5, 3e-3),
         # the first zero of the Airy function, over the cube root of the curvature
         "late.coefficients[0]": (2.338107410459767 / (3 * FOLD - 0.25) ** (1 / 3), 1e-4),
@@ -173,7 +173,7 @@ KNOWN = {
     },
     "own_model": {
         "hopf['u']": (0.5, 1e-13),
-        "exit_law.value": ((np.sqrt(3 - 3 * 0.49) - 0.7) / 2, 1e-8),
+        "exit_point.value": ((np.sqrt(3 - 3 * 0.49) - 0.7) / 2, 1e-8),
         "releases[-1].time - releases[-2].time": (stick_slip, 1e-9),
         "sticks": (np.sqrt(0.8) / 2, 0.009),
         "swept.up.at(0.48).max()": (2 * np.sqrt(0.25 - 0.48**2), 0.02),

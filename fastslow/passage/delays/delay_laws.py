@@ -55,7 +55,7 @@ def predict_delay(
     `boundary_delay` at a boundary equilibrium with persistence or a non-smooth fold,
     `gap_crossing` at the end of a continuum of equilibria. At a Hopf point, and at a
     branch point of an invariant branch, the loss of stability is delayed: the integral of the
-    critical eigenvalue from the entry to the exit is zero (`hopf_exit`, `branch_exit`), which
+    critical eigenvalue from the entry to the exit is zero (entry-exit relation), which
     requires ``diagram`` and ``entry``. At other branch points the passage is algebraic in the
     rate, and no delay is predicted.
 

@@ -57,4 +57,4 @@ class Saved:
 
 
 class Result(Immutable, Saved):
-    """A result: immutable, compared by content, and saved by `save`."""
+    """A result: immutable, compared by content, and saved by ``save``."""
