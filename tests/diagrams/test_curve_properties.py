@@ -179,7 +179,7 @@ def test_every_curve_is_there_once(traced):
                 first.intersections(second)
             except fs.ArgumentError as error:
                 # of two curves over each other the states differ
-                assert "differ in" in str(error)  # noqa: PT017
+                assert "differ only in" in str(error)  # noqa: PT017
 
 
 def test_two_traces_of_one_curve_do_not_meet(traced):

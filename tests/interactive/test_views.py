@@ -91,7 +91,7 @@ def test_time_in_a_rate_leaves_the_trajectory():
     view = view_of(model, setup_of(model, periods=2))
     assert view.diagram is None
     assert view.run.outcome
-    assert "time itself" in str(view.outcomes[0])
+    assert "depends on time explicitly" in str(view.outcomes[0])
     assert view.call().splitlines()[-1].startswith("# no diagram")
 
 

@@ -161,7 +161,7 @@ def test_regimes_refuse_what_they_cannot_say(fast_gear):
         fs.classify_regime(fast_gear, [0, 0], integration=fs.Integration(max_steps=10))
     light = fs.simulate(fast_gear, [0, 0], periods=4, dense=False)
     assert not light.regimes().settled
-    assert "not known" in repr(light.regimes())
+    assert "unknown" in repr(light.regimes())
 
 
 def test_they_are_kept_in_files(fast_gear, tmp_path):
