@@ -8,6 +8,8 @@ import pytest
 from tests.campaigns import mutations
 from tests.campaigns.single_changes import changes_of, takes_effect
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[1]
 LISTED = mutations.listed()
 

@@ -16,6 +16,8 @@ from fastslow.results.io.files import FORMAT
 from fastslow.results.io.npz_netcdf import write_archive
 from tests.results.conftest import same
 
+pytestmark = pytest.mark.slow
+
 x, y, z, v, p, a = sp.symbols("x y z v p a")
 R2 = x**2 + y**2
 

@@ -8,6 +8,8 @@ from PIL import Image
 import fastslow as fs
 from fastslow.interactive.pictures import Picture, own_figure
 
+pytestmark = pytest.mark.slow
+
 #: ipympl 0.10 makes its toolbar in a way that traitlets will refuse one day
 IPYMPL = pytest.mark.filterwarnings("ignore:Passing unrecognized arguments:DeprecationWarning")
 

@@ -12,6 +12,8 @@ from fastslow.continuation.loops import LOOPS
 from fastslow.kernels import loops
 from fastslow.kernels.cache import shipped, store
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 
 

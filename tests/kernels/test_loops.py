@@ -19,6 +19,8 @@ from fastslow.kernels.slots import fields_of_arrays
 from fastslow.passage.loops import STEP_VALUES
 from fastslow.simulation.stepper.events import Search, search_for
 
+pytestmark = pytest.mark.slow
+
 #: What the loops may call: functions of C99, which every system has.
 C_LIBRARY = {
     *("cos", "exp", "exp2", "fmod", "hypot", "log", "log10", "log2", "pow", "sin"),

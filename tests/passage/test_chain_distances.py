@@ -7,6 +7,8 @@ from fastslow.passage.overlay import chain_distances
 from fastslow.passage.overlay.chain_distances import beside_chain, nearness_to_chain
 from fastslow.passage.overlay.following import _resampled
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("radius", [0.02, 0.1, 0.5])
 def test_the_nearest_of_all_chords_counts(radius):

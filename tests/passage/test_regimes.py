@@ -7,6 +7,8 @@ import sympy as sp
 import fastslow as fs
 from fastslow.systems import slow_load_criterion, slow_load_gap
 
+pytestmark = pytest.mark.slow
+
 OVER = {"D": (0.02, 0.3), "ratio": (0.95, 1.1)}
 
 

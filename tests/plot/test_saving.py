@@ -7,6 +7,8 @@ from matplotlib.figure import Figure
 import fastslow as fs
 from fastslow.plot.layout import style
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def drawn_axes(monkeypatch):

@@ -3,10 +3,13 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import fastslow as fs
 from fastslow.results.trajectory.spectrum import Spectrum
 from tests.campaigns import files
+
+pytestmark = pytest.mark.slow
 
 DATA = Path(__file__).parent / "data"
 

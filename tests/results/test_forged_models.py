@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 import fastslow as fs
 from fastslow.results.io.npz_netcdf import read_archive, write_archive
 
+pytestmark = pytest.mark.slow
+
 x, v, w, t, a, k, D = sp.symbols("x v w t a k D")
 
 

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, v, w, t = sp.symbols("x v w t")
 
 #: x = cos t, v = −sin t.

@@ -12,6 +12,8 @@ from fastslow.simulation.many import simulate_many
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
 
+pytestmark = pytest.mark.slow
+
 x, y, v, t, w = sp.symbols("x y v t w")
 k, c, D = sp.symbols("k c D")
 TOLERANCES = [10.0**-n for n in range(6, 12)]

@@ -7,6 +7,8 @@ import sympy as sp
 from fastslow.model.model import Model
 from fastslow.simulation.grouping import same_regions
 
+pytestmark = pytest.mark.slow
+
 x, y, k, a, b = sp.symbols("x y k a b")
 
 

@@ -13,6 +13,8 @@ from fastslow.model.model import Model
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
 
+pytestmark = pytest.mark.slow
+
 numbers = st.floats(-1.5, 1.5, allow_nan=False).map(lambda z: round(z, 3))
 stiffness = st.floats(0.1, 30.0)
 

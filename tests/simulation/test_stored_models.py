@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 import fastslow as fs
 from tests.results.conftest import same
 
+pytestmark = pytest.mark.slow
+
 x, y, v, w, t, a, k, D = sp.symbols("x y v w t a k D")
 GAP = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
 

@@ -11,6 +11,8 @@ from scipy.integrate import solve_ivp
 import fastslow as fs
 from fastslow.systems import slow_load_criterion, slow_load_gap
 
+pytestmark = pytest.mark.slow
+
 
 def deepest_rigid(B, C, omega, c):
     """Half the depth reached from a rigid contact, from an integral of the load."""
