@@ -3,11 +3,13 @@
 import os
 import re
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from docutils.nodes import image, literal_block
 from sphinx.application import Sphinx
+from sphinx.util.logging import getLogger
 from sphinx.util.nodes import make_refnode
 
 ROOT = Path(__file__).parent.parent
@@ -18,6 +20,9 @@ os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPAT
 
 import fastslow  # noqa: E402
 
+# a package of files; as an extension it would not declare itself safe for parallel reading
+MATHJAX = Path(find_spec("sphinx-mathjax-offline").origin).parent / "static"
+REMOTE = re.compile(r"""<(?:script[^>]*\ssrc|link[^>]*\shref)=["'](https?:[^"']*)""")
 ABSOLUTE = re.compile(r"(``.*?``)|(?<!\\)\|")
 
 project = "fastslow"
@@ -31,7 +36,8 @@ default_role = "py:obj"
 
 html_theme = "furo"
 html_title = f"fastslow {version}"
-html_static_path = ["_static"]
+html_static_path = ["_static", str(MATHJAX)]
+mathjax_path = "mathjax/tex-chtml.js"
 html_css_files = ["pages.css"]
 
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
@@ -104,8 +110,16 @@ def describe_figures(app: Sphinx, doctree: Any) -> None:
                 picture["alt"] = f"Figure: {calls[-1] if calls else 'output of the code above'}"
 
 
+def report_remote_files(app: Sphinx, error: Exception | None) -> None:
+    """Warn about scripts, fonts and style sheets that a page would fetch from a network."""
+    for page in [] if error else sorted(Path(app.outdir).rglob("*.html")):
+        for address in REMOTE.findall(page.read_text("utf-8")):
+            getLogger(__name__).warning("%s loads %s", page.relative_to(app.outdir), address)
+
+
 def setup(app: Sphinx) -> None:
     """Connect the functions above to Sphinx events."""
     app.connect("autodoc-process-docstring", prepare, priority=400)  # before Napoleon
     app.connect("missing-reference", by_last_name)
     app.connect("doctree-read", describe_figures)
+    app.connect("build-finished", report_remote_files)

@@ -1,6 +1,9 @@
 """Documentation: complete reference, executed code, and correct numbers in the text."""
 
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -58,6 +61,23 @@ def test_every_file_of_the_architecture_page_exists():
     paths = set(re.findall(r"`((?:fastslow|tests|docs)/[\w./-]*)`", text))
     assert len(paths) > 100
     assert sorted(path for path in paths if not (ROOT / path).exists()) == []
+
+
+def test_formulas_are_displayed_without_a_network(tmp_path):
+    """The build warns of every remote file, and the files of MathJax are among the pages."""
+    formula = "# Page\n\nA formula, $x^2$.\n"
+    remote = '```{raw} html\n<script src="https://example.org/remote.js"></script>\n```\n'
+    (tmp_path / "index.md").write_text(formula + remote, "utf-8")
+    build = [sys.executable, "-m", "sphinx", "-q", "-c", str(DOCS), tmp_path, tmp_path / "built"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(build, capture_output=True, text=True, check=True, env=environment)
+    assert done.stderr.strip() == "WARNING: index.html loads https://example.org/remote.js"
+
+    page = (tmp_path / "built" / "index.html").read_text("utf-8")
+    (script,) = re.findall(r'src="([^"?]*mathjax[^"?]*)', page)
+    assert (tmp_path / "built" / script).is_file()
+    fonts = (tmp_path / "built" / script).parent / "output" / "chtml" / "fonts" / "woff-v2"
+    assert len(list(fonts.glob("*.woff"))) > 20
 
 
 def test_the_readme_links_to_pages():
