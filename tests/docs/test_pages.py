@@ -120,17 +120,19 @@ def test_the_tutorial(tmp_path, monkeypatch, capsys):
     assert list(names["gear"].regions) == ["S1", "S2", "S3"]
     assert [str(form.admissible) for form in names["derivation"].folds].count("A < -D**2") == 2
     assert names["diagram"].completeness == "complete"
-    assert [p.subtype for p in names["diagram"].boundary_equilibria] == ["degenerate"] * 2
-    assert len(names["run"].crossings) == 41
-    assert names["run"].regime == "bilateral"
-    assert {t.kind for t in names["overlay"].transitions} == {"gap crossing"}
-    assert "the diagram has no fold" in printed
-    assert len(names["soft_diagram"].folds) == 2
-    (bistable,) = names["soft_diagram"].bistable()
+    assert len(names["diagram"].folds) == 2
+    (bistable,) = names["diagram"].bistable()
     assert bistable == pytest.approx([-0.0894402097712473, 0.0894402097712473], abs=1e-12)
-    assert names["soft_overlay"].bursting.name.startswith("relaxation oscillation")
-    assert {t.kind for t in names["soft_overlay"].transitions} == {"jump"}
-    assert names["again"].delays == pytest.approx(names["soft_overlay"].delays, rel=1e-12)
+    assert names["run"].regime == "bilateral"
+    assert names["overlay"].bursting.name.startswith("relaxation oscillation")
+    assert {t.kind for t in names["overlay"].transitions} == {"jump"}
+    assert names["overlay"].delays == pytest.approx(0.024, abs=5e-5)
+    assert "delay 0.024 (predicted 0.0249 ± 0.0011)" in printed
+    assert names["again"].delays == pytest.approx(names["overlay"].delays, rel=1e-12)
+    assert names["stiff_diagram"].folds == ()
+    assert [p.subtype for p in names["stiff_diagram"].boundary_equilibria] == ["degenerate"] * 2
+    assert {t.kind for t in names["stiff_overlay"].transitions} == {"gap crossing"}
+    assert len(names["stiff_run"].crossings) == 41
 
     box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+)", (tmp_path / "overlay.pdf").read_bytes())
     assert float(box[1]) * 25.4 / 72 == pytest.approx(85, abs=0.01)
