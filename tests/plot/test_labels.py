@@ -153,6 +153,25 @@ def test_regions_on_a_logarithmic_axis():
     assert ax.get_ylim() == (1, 1000)
 
 
+@pytest.mark.parametrize("jumps", [(0.13, 0.27, 0.58, 0.8), (0.3, 0.58, 0.83)])
+def test_the_name_of_a_region_fits_between_the_jumps_of_a_curve(jumps):
+    figure = Figure((2.3, 2.6), dpi=100)
+    ax = figure.add_axes((0.03, 0.03, 0.96, 0.94))
+    ax.set(xlim=(0, 1), ylim=(-1, 2))
+    x = np.repeat([0.0, *jumps, 1.0], 2)[1:-1]
+    (line,) = ax.plot(x, np.repeat(np.arange(len(jumps) + 1) % 2, 2) * 2.0 - 0.5)
+    values = {"one": ("x", 0.0), "other": ("x", 1.0)}
+    bands = draw_bands(ax, "x", values, np.array([0.5]), np.array(["middle"]))
+    place(ax, bands=[bands])
+    figure.draw_without_rendering()
+    (name,) = bands.names
+    box = name.get_window_extent()
+    left, right = ax.transData.inverted().transform([[box.x0, box.y0], [box.x1, box.y1]])[:, 0]
+    assert name.get_visible()
+    assert not any(left <= at <= right for at in jumps)
+    assert line in ax.lines
+
+
 def test_room_is_made_for_a_legend_where_the_curves_leave_none():
     ax = Figure((2.2, 2.0), dpi=150, layout="constrained").add_subplot()
     drawn = fs.plot.sweep(swept(), ax=ax)

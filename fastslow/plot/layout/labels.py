@@ -35,9 +35,16 @@ FAR = 20.0
 #: Margin between texts and the edges of the axes, in points.
 AIR = 1.5
 
-#: Positions of the name of a region: across its band, and along it as fractions of the axes.
-DEPTHS = (0.5, 0.25, 0.75)
-SIDES = (0.95, 0.05, 0.9, 0.1, 0.8, 0.2, 0.65, 0.35, 0.5)
+#: Positions of the name of a region, the best first: across its band, and along it as fractions
+#: of the axes. The finer grid is for names between the curves.
+DEPTHS, SIDES = (0.5, 0.25, 0.75), (0.95, 0.05, 0.9, 0.1, 0.8, 0.2, 0.65, 0.35, 0.5)
+FINE_DEPTHS, FINE_SIDES = np.linspace(0.15, 0.85, 15), np.linspace(0.97, 0.03, 95)
+SPOTS = np.vstack(
+    [
+        np.reshape(np.meshgrid(depths, sides, indexing="ij"), (2, -1)).T
+        for depths, sides in ((DEPTHS, SIDES), (FINE_DEPTHS, FINE_SIDES))
+    ]
+)
 
 #: Cost from which a position is excluded: over another text, or outside the axes.
 TAKEN = 1e3
@@ -185,8 +192,8 @@ def _move(
     axis = (ax.xaxis if vertical else ax.yaxis).get_transform()
     ends = axis.transform([start, stop])
     air = AIR * root(ax).dpi / 72.0 * np.array([-1.0, -1.0, 1.0, 1.0])
-    inside = axis.inverted().transform(ends[0] + np.array(DEPTHS) * (ends[1] - ends[0]))
-    across, along = np.repeat(inside, len(SIDES)), np.tile(SIDES, len(DEPTHS))
+    across = axis.inverted().transform(ends[0] + SPOTS[:, 0] * (ends[1] - ends[0]))
+    along = SPOTS[:, 1]
     spots = np.column_stack([across, along] if vertical else [along, across])
     seat = name.get_transform()
     around = box_of(name, renderer) - np.tile(seat.transform(name.get_position()), 2)
