@@ -117,3 +117,17 @@ def test_where_the_diagram_holds_another_slow_quantity_no_delay_is_given():
     assert [t_.kind for t_ in lay.transitions] == ["jump"]
     assert np.isnan(lay.delays).all()
     assert lay.transitions[0].law is None
+
+
+def test_a_fold_at_a_compared_row_is_accepted():
+    """At a fold the Jacobian has a row of zeros, so that rounding has no scale there."""
+    v, delta, a, b, g = sp.symbols("v delta a b g")
+    laws = {w: a * sp.cos(t / 200), q: b * sp.cos(t / 100)}
+    model = fs.Model(
+        {x: v, v: -delta * v + (1 + q) * x - x**3 + w},
+        forcing=laws,
+        parameters={delta: 0.5, a: 0.8, b: 1.5},
+    )
+    fast = model.frozen(slow={w: a * g, q: b * (2 * g**2 - 1)})
+    diagram = fs.continue_equilibria(fast, "g", over=(-1.1, 1.1))
+    assert fs.overlay(diagram, fs.simulate(model, [1, 0], periods=1)).outcome

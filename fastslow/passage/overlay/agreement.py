@@ -96,12 +96,16 @@ def _agrees(model: Model, branch: Branch, diagram: Diagram) -> bool | None:
     columns = [np.broadcast_to(known[symbol.name], len(rows)) for symbol in symbols]
     both = numpy_function(symbols, [*rates, *slopes], cse=True)
     with np.errstate(all="ignore"):
-        found = [[float(v) for v in both(*numbers)] for numbers in zip(*columns, strict=True)]
+        found = np.array(
+            [[float(v) for v in both(*numbers)] for numbers in zip(*columns, strict=True)]
+        )
     n = len(states)
-    reach = np.abs(branch.state).max(axis=0)
-    for number, row in zip(rows, np.array(found), strict=True):
-        rest, jacobian = row[:n], row[n:].reshape(n, n)
-        if not (np.abs(rest) <= SAME * (np.abs(jacobian) @ reach)).all():
+    jacobians = found[:, n:].reshape(-1, n, n)
+    sizes = np.abs(jacobians) @ np.abs(branch.state).max(axis=0)
+    # a Jacobian with a row of zeros, as of a fold, gives no scale for the rates there
+    typical = np.where(np.isfinite(sizes), sizes, 0.0).max(axis=0)
+    for number, rest, jacobian, size in zip(rows, found[:, :n], jacobians, sizes, strict=True):
+        if not (np.abs(rest) <= SAME * np.fmax(size, typical)).all():
             return False
         here = np.sort_complex(branch.eigenvalues[number])
         if np.isfinite(here).all() and np.isfinite(jacobian).all():
