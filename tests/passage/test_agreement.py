@@ -119,15 +119,16 @@ def test_where_the_diagram_holds_another_slow_quantity_no_delay_is_given():
     assert lay.transitions[0].law is None
 
 
-def test_a_fold_at_a_compared_row_is_accepted():
-    """At a fold the Jacobian has a row of zeros, so that rounding has no scale there."""
-    v, delta, a, b, g = sp.symbols("v delta a b g")
-    laws = {w: a * sp.cos(t / 200), q: b * sp.cos(t / 100)}
-    model = fs.Model(
-        {x: v, v: -delta * v + (1 + q) * x - x**3 + w},
-        forcing=laws,
-        parameters={delta: 0.5, a: 0.8, b: 1.5},
-    )
-    fast = model.frozen(slow={w: a * g, q: b * (2 * g**2 - 1)})
-    diagram = fs.continue_equilibria(fast, "g", over=(-1.1, 1.1))
-    assert fs.overlay(diagram, fs.simulate(model, [1, 0], periods=1)).outcome
+@pytest.mark.parametrize(
+    ("damping", "path"),
+    [(0.5, {w: "0.8*g", q: "1.5*(2*g**2 - 1)"}), (1.5, {w: "1.1*(4*g**3 - 3*g)", q: "0.9*g"})],
+)
+def test_rounding_at_folds_and_of_states_that_are_zero_is_accepted(damping, path):
+    """At a fold the Jacobian has a row of zeros; v is zero but for rounding on the branch."""
+    v, g = sp.symbols("v g")
+    path = {slow: sp.sympify(law) for slow, law in path.items()}
+    laws = {slow: law.subs(g, sp.cos(t / 500)) for slow, law in path.items()}
+    model = fs.Model({x: v, v: -damping * v + (1 + q) * x - x**3 + w}, forcing=laws)
+    diagram = fs.continue_equilibria(model.frozen(slow=path), "g", over=(-1.1, 1.1))
+    run = fs.simulate(model, [1, 0], t=(0, 500))
+    assert fs.overlay(diagram, run).outcome

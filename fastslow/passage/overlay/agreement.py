@@ -24,6 +24,9 @@ ROWS = 5
 #: AUTO files have few digits.
 SAME = 1e-4
 
+#: Size of a state, in units of the largest one, below which it may be rounding.
+ROUNDING = 1e-12
+
 #: Relative tolerance of eigenvalues; a double eigenvalue has half the digits.
 NEAR = 1e-2
 
@@ -101,8 +104,10 @@ def _agrees(model: Model, branch: Branch, diagram: Diagram) -> bool | None:
         )
     n = len(states)
     jacobians = found[:, n:].reshape(-1, n, n)
-    sizes = np.abs(jacobians) @ np.abs(branch.state).max(axis=0)
-    # a Jacobian with a row of zeros, as of a fold, gives no scale for the rates there
+    reach = np.abs(branch.state).max(axis=0)
+    # a state that is zero but for rounding has no size of its own
+    sizes = np.abs(jacobians) @ np.fmax(reach, ROUNDING * reach.max())
+    # a Jacobian with a row of zeros, as at a fold, gives no scale for the rates there
     typical = np.where(np.isfinite(sizes), sizes, 0.0).max(axis=0)
     for number, rest, jacobian, size in zip(rows, found[:, :n], jacobians, sizes, strict=True):
         if not (np.abs(rest) <= SAME * np.fmax(size, typical)).all():
