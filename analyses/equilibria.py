@@ -176,7 +176,7 @@ def _draw_cases(ax: Axes, figure: str, scaling: str) -> None:
             look: dict[str, Any] = {"color": colour, "linewidth": width, "zorder": 2 + k}
             if region == "S2":
                 look |= {"linestyle": LINES["neutral"]["linestyle"], "linewidth": 0.9}
-            ax.plot(branch.parameter[rows], branch["x"][rows], **look)
+            ax.plot(branch.values[rows], branch["x"][rows], **look)
         for point in case.diagram.boundary_equilibria:
             marker, fill = POINT_TYPES["BE"].marker, point_colour("BE")
             ax.plot(point["w"], point["x"], marker, color=fill, markersize=4, zorder=6)
@@ -235,7 +235,7 @@ def draw_eigenvalues(into: Output) -> None:
             ax.axvline(side, color=GREY, linewidth=0.7)
         if letter == "b":
             load = node_load(SOFT, GAP)
-            x = float(np.interp(load, branch.parameter, along))
+            x = float(np.interp(load, branch.values, along))
             for place in (-x, x):
                 if along.min() < place < along.max():
                     ax.axvline(place, color=GREEN, linewidth=0.9, linestyle=(0, (4, 2)))

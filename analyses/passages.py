@@ -104,7 +104,7 @@ def row(case: Case) -> Row:
     """The numbers of a case for the summary table."""
     values = case.setting.model.parameters
     delays = np.abs(case.lay.delays)
-    kinds = [t.kind for t in case.lay.transitions]
+    kinds = [t.type for t in case.lay.transitions]
     return Row(
         case.setting.name,
         values["A"],

@@ -101,7 +101,7 @@ def story(case: Case) -> Story:
         shares.get("S1", 0.0),
         shares.get("S3", 0.0),
         float(np.nanmedian(lay.lag)),
-        found[0].kind if found else "",
+        found[0].type if found else "",
         len(found),
         arrivals.get("S1", nan),
         arrivals.get("S3", nan),
@@ -185,7 +185,7 @@ def near_equilibria(case: Case) -> float:
     p = case.setting.model.parameters
     load = p["B"] + p["C"] * np.sin(p["omega"] * times)
     low, high = extent(case)
-    apart = np.abs(x - np.interp(load, branch.parameter, branch["x"]))
+    apart = np.abs(x - np.interp(load, branch.values, branch["x"]))
     return float((apart < 0.01 * max(-low, high)).mean())
 
 
@@ -214,7 +214,7 @@ def _draw_panel(ax: Axes, figure: str, scaling: str) -> None:
         (branch,) = case.diagram.branches
         for side in ("S1", "S3"):
             rows = branch.region == side
-            line = (branch.parameter[rows], branch["x"][rows] / p["D"])
+            line = (branch.values[rows], branch["x"][rows] / p["D"])
             ax.plot(*line, color=BLACK, zorder=2, **LINES["stable"])
         times = np.linspace(end * (1 - 1 / PERIODS), end, 60001)
         x, _ = case.run(times)

@@ -112,8 +112,7 @@ def _without_name(
     """Return the error for a positional value that must be passed by keyword."""
     if any(p.kind is inspect.Parameter.VAR_KEYWORD for p in parameters.values()):
         owner = args[0] if "self" in parameters else None
-        names = (getattr(owner, n, None) for n in ("parameter_name", "parameter"))
-        name = next((n for n in names if isinstance(n, str)), "t" if owner is not None else "name")
+        name = getattr(owner, "parameter", "t" if owner is not None else "name")
         wanted = f"its name, such as {function}({name}={shown(value)})"
     else:
         named = [n for n, p in parameters.items() if p.kind is inspect.Parameter.KEYWORD_ONLY]

@@ -21,7 +21,7 @@ def test_the_example_runs(tmp_path, monkeypatch):
     names = {}
     exec(compile(example, "README.md", "exec"), names)
     assert (tmp_path / "gear.pdf").stat().st_size > 10_000
-    assert [p.subtype for p in names["diagram"].boundary_equilibria] == ["degenerate"] * 2
+    assert [p.type for p in names["diagram"].boundary_equilibria] == ["degenerate"] * 2
     assert len(names["run"].crossings) == 41
     assert names["run"].regime == "bilateral"
 

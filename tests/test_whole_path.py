@@ -85,7 +85,7 @@ def test_piecewise_linear_with_two_interfaces(beam):
     diagram = fs.continue_equilibria(fast, "w", over=(-7, 7))
     corners = diagram.boundary_equilibria
     assert [c["w"] for c in corners] == pytest.approx([-1, 1], abs=1e-14)
-    assert {c.subtype for c in corners} == {"persistence"}
+    assert {c.type for c in corners} == {"persistence"}
     assert corners[1].clarke.determinants == pytest.approx((1, 4), abs=1e-14)
     for value, state in ((-7, -2.0), (0.5, 0.5), (5, 2.0)):
         assert diagram.at(w=value)[0]["x"] == pytest.approx(state, abs=1e-14)

@@ -22,7 +22,7 @@ def to_auto(
     region: str,
     *,
     values: Mapping[Any, float] | None = None,
-    start: Mapping[Any, float] | None = None,
+    state: Mapping[Any, float] | None = None,
 ) -> dict[str, str]:
     """Write AUTO-07p equations (.f90) with derivatives, and constants (c.), for one region.
 
@@ -35,7 +35,7 @@ def to_auto(
             f"AUTO-07p continues autonomous systems, but {', '.join(moving)} depend on time; "
             "export(model.frozen(), 'auto')"
         )
-    smooth, parameters, initial = region_values(model, region, values, start)
+    smooth, parameters, initial = region_values(model, region, values, state)
     parameters = {**{n: parameters[n] for n in model.free}, **parameters}
     places = [k for k in range(1, 37) if k not in AUTO_RESERVED][: len(parameters)]
     if len(places) < len(parameters):

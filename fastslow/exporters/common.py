@@ -33,12 +33,12 @@ def region_values(
     model: Model,
     region: str,
     values: Mapping[Any, float] | None,
-    start: Mapping[Any, float] | None,
+    state: Mapping[Any, float] | None,
 ) -> tuple[Region, dict[str, float], dict[str, float]]:
     """Return the region, all parameter values and the initial state."""
     parameters = dict.fromkeys(model.free, 0.0) | dict(model.parameters)
     initial = dict.fromkeys((*model.states, *model.slow_states), 0.0)
-    for given, known, kind in ((values, parameters, "parameter"), (start, initial, "state")):
+    for given, known, kind in ((values, parameters, "parameter"), (state, initial, "state")):
         for name, value in (given or {}).items():
             if str(name) not in known:
                 raise unknown_name(kind, name, known)

@@ -18,7 +18,7 @@ from fastslow.results.base.named_mapping import NamedMapping
 
 
 @validated(
-    model=instance(Model), format=text, path=path, region=text, values=mapping, start=mapping
+    model=instance(Model), format=text, path=path, region=text, values=mapping, state=mapping
 )
 def export(
     model: Model,
@@ -27,7 +27,7 @@ def export(
     *,
     region: str | None = None,
     values: Mapping[Any, float] | None = None,
-    start: Mapping[Any, float] | None = None,
+    state: Mapping[Any, float] | None = None,
 ) -> NamedMapping[str]:
     """Export the smooth vector field of each region as source code for another program.
 
@@ -44,7 +44,7 @@ def export(
         A single region; all regions by default.
     values : mapping, optional
         Values of frozen slow quantities, 0 by default.
-    start : mapping, optional
+    state : mapping, optional
         Initial state, 0 by default; for AUTO-07p it must be an equilibrium.
 
     Returns
@@ -83,7 +83,7 @@ def export(
     names = [region] if region is not None else list(model.regions)
     files: dict[str, str] = {}
     for name in names:
-        files.update(writers[format](model, name, values=values, start=start))
+        files.update(writers[format](model, name, values=values, state=state))
     if path is not None:
         folder = Path(path)
         try:

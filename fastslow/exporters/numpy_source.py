@@ -20,7 +20,7 @@ def to_numpy(
     region: str,
     *,
     values: Mapping[Any, float] | None = None,
-    start: Mapping[Any, float] | None = None,
+    state: Mapping[Any, float] | None = None,
 ) -> dict[str, str]:
     """Write a Python module with rates, Jacobian and interface functions of one region.
 
@@ -29,7 +29,7 @@ def to_numpy(
     ``jacobian`` of shape (n, n) and ``interfaces`` of shape (m,), whose signs
     in the region are ``SIGNS``.
     """
-    smooth, parameters, initial = region_values(model, region, values, start)
+    smooth, parameters, initial = region_values(model, region, values, state)
     names = [*model.states, *model.slow_states]
     inside = identifiers([*names, *parameters, *smooth.forcing], keyword.iskeyword, lambda n: n)
     place = {real(n): sp.Symbol(safe, real=True) for n, safe in inside.items()}

@@ -47,10 +47,10 @@ def to_xpp(
     region: str,
     *,
     values: Mapping[Any, float] | None = None,
-    start: Mapping[Any, float] | None = None,
+    state: Mapping[Any, float] | None = None,
 ) -> dict[str, str]:
     """Write an XPPAUT .ode file for one region. Parameters and errors as for `export`."""
-    smooth, parameters, initial = region_values(model, region, values, start)
+    smooth, parameters, initial = region_values(model, region, values, state)
     names = [*model.states, *model.slow_states]
     # XPPAUT ignores case, distinguishes nine characters and reserves some names
     inside = identifiers(

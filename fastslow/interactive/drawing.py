@@ -33,15 +33,15 @@ def draw_view(axes: Sequence[Axes], view: View) -> tuple[tuple[PickCurve, ...], 
         Legend entries.
     """
     series, portrait, main = axes
-    name, run, lay = view.setup.state, view.run, view.overlay
+    name, run, overlay = view.setup.y, view.run, view.overlay
     values: Mapping[str, Any] = {} if view.diagram is None else view.diagram.interface_values
     curves: list[PickCurve] = []
     handles: list[Any] = []
     below: DiagramDrawing | None = None
-    if lay is not None:
-        laid = draw_passage(main, lay, (Quantity(lay.parameter), Quantity(name)))
+    if overlay is not None:
+        laid = draw_passage(main, overlay, (Quantity(overlay.parameter), Quantity(name)))
         handles, below = laid.handles, laid.diagram
-        curves += curves_of(laid, lay)
+        curves += curves_of(laid, overlay)
     elif view.diagram is not None:
         shown = Quantity(view.diagram.parameter), Quantity(name)
         below = draw_branches(main, view.diagram, shown, label=True, virtual=True, interfaces=True)
@@ -56,7 +56,7 @@ def draw_view(axes: Sequence[Axes], view: View) -> tuple[tuple[PickCurve, ...], 
     else:
         _empty(main, "no diagram")
     if run is not None:
-        phases = () if lay is None else lay.phases
+        phases = () if overlay is None else overlay.phases
         over_time = time_series(
             run, name, ax=series, interfaces=values, phases=phases, legend=False
         )

@@ -27,7 +27,7 @@ from fastslow.simulation.settings import DEFAULT, Integration, integration_setti
     parameter=formula,
     over=interval,
     integration=integration_settings,
-    state=formula,
+    y=formula,
     sliders=mapping,
     figure=instance(Figure),
 )
@@ -36,11 +36,11 @@ def explore(
     *,
     parameter: object = None,
     over: Sequence[float] | None = None,
-    start: Any = None,
+    state: Any = None,
     t: Sequence[float] | None = None,
     periods: float | None = None,
     integration: Integration = DEFAULT,
-    state: object = None,
+    y: object = None,
     sliders: Mapping[Any, Sequence[float]] | None = None,
     figure: Figure | None = None,
 ) -> Explorer:
@@ -59,14 +59,14 @@ def explore(
     over : (float, float), optional
         Its range; by default that of the run with a margin, for a parameter from zero to
         twice its value.
-    start : sequence of float or mapping, optional
+    state : sequence of float or mapping, optional
         Initial states, then slow states; by default zeros.
     t, periods
         Length of the run, as in `fastslow.simulate`; by default two periods, and
         t = (0, 100) where there is no period.
     integration : Integration
         Error control of the run.
-    state : str or Symbol, optional
+    y : str or Symbol, optional
         State drawn over time and over the parameter, by default the first.
     sliders : mapping, optional
         Parameter, or state for its initial value, to the range of its slider; by
@@ -83,7 +83,7 @@ def explore(
     UnknownNameError
         For a name that does not occur in the model.
     ArgumentError
-        For an invalid range, start or time span.
+        For an invalid range, initial state or time span.
 
     Examples
     --------
@@ -96,14 +96,14 @@ def explore(
         model,
         parameter=parameter,
         over=over,
-        start=start,
+        state=state,
         t=t,
         periods=periods,
         integration=integration,
-        state=state,
+        y=y,
     )
     names = (*model.states, *model.slow_states)
-    made = sliders_of(model, dict(zip(names, setup.start, strict=True)), sliders)
+    made = sliders_of(model, dict(zip(names, setup.state, strict=True)), sliders)
     return Explorer(model, setup, made, own_figure() if figure is None else figure)
 
 
@@ -194,7 +194,7 @@ class Explorer:
     @property
     def values(self) -> dict[str, float]:
         """Current values of parameters and initial states."""
-        begin = zip(self._states, self.view.setup.start, strict=True)
+        begin = zip(self._states, self.view.setup.state, strict=True)
         return {**self.view.model.parameters, **dict(begin)}
 
     @property

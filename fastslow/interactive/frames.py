@@ -112,9 +112,9 @@ def frame_of(view: View, store: Store) -> dict[str, Any]:
     """
     tables: list[dict[str, Any]] = []
     panels: list[dict[str, Any]] = []
-    run, diagram, lay = view.run, view.diagram, view.overlay
+    run, diagram, overlay = view.run, view.diagram, view.overlay
     names = [] if run is None else list(run.columns)
-    state = view.setup.state
+    state = view.setup.y
     if run is not None:
         rows = kept_rows(run)
         columns = np.column_stack([run.t, *(run[name] for name in names)])[rows]
@@ -140,7 +140,7 @@ def frame_of(view: View, store: Store) -> dict[str, Any]:
                     _line(kind, len(tables) - 1, 0, index, rows.start, rows.stop)
                     for kind, rows in runs(branch)
                 ]
-        if lay is not None and run is not None:
+        if overlay is not None and run is not None:
             last = _last_period(run, columns[:, 0])
             main["lines"] += _motion_lines(names, diagram.parameter, state, last, len(columns))
             met = at_crossings(run, Quantity(diagram.parameter), Quantity(state))
@@ -191,13 +191,13 @@ def _run_table(run: Trajectory, columns: Array, store: Store) -> dict[str, Any]:
 def _branch_table(branch: Branch, store: Store) -> dict[str, Any]:
     n = len(branch.states)
     values = branch.eigenvalues
-    table = np.column_stack([branch.parameter, branch.state, values.real, values.imag])
+    table = np.column_stack([branch.values, branch.state, values.real, values.imag])
     kinds = zip(branch.region, branch.stability, map(type_of, values), strict=True)
     words = [
         f"{region}, {type_ if type_ == 'non-hyperbolic' else f'{stability} {type_}'}"
         for region, stability, type_ in kinds
     ]
-    names = [branch.parameter_name, *branch.states]
+    names = [branch.parameter, *branch.states]
     return {
         "kind": "branch",
         "array": store.add(table),
@@ -289,7 +289,7 @@ def _special_marks(view: View) -> list[dict[str, Any]]:
             found.setdefault(point.code, []).append(
                 [
                     point[diagram.parameter],
-                    point[view.setup.state],
+                    point[view.setup.y],
                     text_of(point, diagram.parameter),
                     f"diagram.special[{k}]",
                     "" if name in named else point.label,
@@ -301,13 +301,13 @@ def _special_marks(view: View) -> list[dict[str, Any]]:
 
 def _transition_marks(view: View) -> list[dict[str, Any]]:
     assert view.overlay is not None
-    lay = view.overlay
+    overlay = view.overlay
     found: dict[str, list[list[Any]]] = {}
-    place = lay.diagram.states.index(view.setup.state)
-    for k, change in enumerate(lay.transitions):
+    place = overlay.diagram.states.index(view.setup.y)
+    for k, change in enumerate(overlay.transitions):
         at = [change.value, float(change.state[place])]
-        found.setdefault(change.kind, []).append(
-            [*at, text_of(change, lay.parameter), f"lay.transitions[{k}]"]
+        found.setdefault(change.type, []).append(
+            [*at, text_of(change, overlay.parameter), f"overlay.transitions[{k}]"]
         )
     return [{"look": kind, "points": points} for kind, points in found.items()]
 

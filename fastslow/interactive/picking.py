@@ -59,7 +59,7 @@ class Pick:
     text : str
         Description, one property per line.
     call : str
-        Python source that returns it, given results named diagram, run and lay.
+        Python source that returns it, given results named diagram, run and overlay.
     """
 
     point: Any
@@ -235,21 +235,21 @@ def _motion_curves(drawing: MotionDrawing, run: Trajectory) -> Iterable[PickCurv
         yield _at_crossings(drawing.ax, np.column_stack(at), run)
 
 
-def _overlay_curves(drawing: OverlayDrawing, lay: Overlay) -> Iterable[PickCurve]:
-    shown, run = drawing.shown, lay.run
-    yield PickCurve(drawing.ax, np.column_stack(along_overlay(lay, *shown)), True, _on_run(run))
+def _overlay_curves(drawing: OverlayDrawing, overlay: Overlay) -> Iterable[PickCurve]:
+    shown, run = drawing.shown, overlay.run
+    yield PickCurve(drawing.ax, np.column_stack(along_overlay(overlay, *shown)), True, _on_run(run))
     if drawing.crossings is not None:
         times = np.array([c.time for c in run.crossings])
         state = np.array([c.state for c in run.crossings])
-        at = at_times(lay, times, run.states, state, *shown)
+        at = at_times(overlay, times, run.states, state, *shown)
         yield _at_crossings(drawing.ax, np.column_stack(at), run)
-    if lay.transitions:
+    if overlay.transitions:
         yield PickCurve(
             drawing.ax,
-            np.column_stack(at_states(lay, shown, lay.transitions)),
+            np.column_stack(at_states(overlay, shown, overlay.transitions)),
             False,
-            lambda row, _: (lay.transitions[row], f"lay.transitions[{row}]"),
-            lay.parameter,
+            lambda row, _: (overlay.transitions[row], f"overlay.transitions[{row}]"),
+            overlay.parameter,
         )
 
 

@@ -48,7 +48,7 @@ def text_of(point: Any, parameter: str = "") -> str:
     elif isinstance(point, SpecialPoint):
         on = f" on {point.interface}" if point.interface else ""
         lines = [
-            f"{point.label}, {point.kind}{on}",
+            f"{point.label}, {point.words}{on}",
             numbers([parameter], [point[parameter]]),
             numbers(point.states, point.state),
             spectrum(point.eigenvalues),
@@ -64,7 +64,7 @@ def text_of(point: Any, parameter: str = "") -> str:
         ]
     elif isinstance(point, Transition):
         lines = [
-            point.kind if point.special is None else f"{point.kind} at {point.special.label}",
+            point.type if point.special is None else f"{point.type} at {point.special.label}",
             numbers(["t", parameter], [point.time, point.value]),
             f"{point.from_branch} → {point.to_branch or 'end of run'}",
         ]

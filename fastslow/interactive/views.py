@@ -13,7 +13,7 @@ from fastslow.arguments import interval
 from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import ArgumentError, FastSlowError, unknown_name
 from fastslow.model.model import Model
-from fastslow.passage.overlay.overlays import overlay
+from fastslow.passage.overlay.overlays import overlay as overlay_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import Overlay
@@ -43,14 +43,14 @@ class Setup:
         parameters.
     over : tuple of float or None
         Range of the diagram; None for that of the run with a margin.
-    start : tuple of float
+    state : tuple of float
         Initial states, then slow states.
     t : tuple of float or None
     periods : float or None
         Length of the run; one of the two.
     integration : Integration
         Error control of the run.
-    state : str
+    y : str
         State drawn over time and over the parameter.
     otherwise : tuple of float, optional
         Range of the diagram if there is no run.
@@ -58,11 +58,11 @@ class Setup:
 
     parameter: str | None
     over: Range | None
-    start: tuple[float, ...]
+    state: tuple[float, ...]
     t: Range | None
     periods: float | None
     integration: Integration
-    state: str
+    y: str
     otherwise: Range | None = None
 
 
@@ -109,8 +109,8 @@ class View:
         model = model.with_parameters({'D': 0.3})
         run = fs.simulate(model, {'x': 0.0, 'v': 0.0}, periods=2.0)
         diagram = fs.continue_equilibria(model.frozen(), 'w', over=(-2.0, 6.0))
-        lay = fs.overlay(diagram, run)
-        fs.plot.panel(lay, 'x')
+        overlay = fs.overlay(diagram, run)
+        fs.plot.panel(overlay, 'x')
         """
         setup, names = self.setup, (*self.model.states, *self.model.slow_states)
         lines = []
@@ -118,7 +118,7 @@ class View:
             lines.append(f"model = model.with_parameters({dict(self.changes)!r})")
         length = f"t={setup.t!r}" if setup.t is not None else f"periods={setup.periods!r}"
         if self.run is not None:
-            start = dict(zip(names, setup.start, strict=True))
+            start = dict(zip(names, setup.state, strict=True))
             given = (
                 "" if setup.integration == DEFAULT else f", integration=fs.{setup.integration!r}"
             )
@@ -132,12 +132,12 @@ class View:
                 f"over={self.diagram.over!r})"
             )
         if self.overlay is not None:
-            lines += ["lay = fs.overlay(diagram, run)", f"fs.plot.panel(lay, {setup.state!r})"]
+            lines += ["overlay = fs.overlay(diagram, run)", f"fs.plot.panel(overlay, {setup.y!r})"]
         else:
             if self.diagram is not None:
-                lines.append(f"fs.plot.diagram(diagram, {setup.state!r})")
+                lines.append(f"fs.plot.diagram(diagram, {setup.y!r})")
             if self.run is not None:
-                lines.append(f"fs.plot.time_series(run, {setup.state!r})")
+                lines.append(f"fs.plot.time_series(run, {setup.y!r})")
         lines += [f"# {' '.join(str(outcome).split())}" for outcome in self.outcomes]
         return "\n".join(lines)
 
@@ -147,11 +147,11 @@ def setup_of(
     *,
     parameter: object = None,
     over: Sequence[float] | None = None,
-    start: Any = None,
+    state: Any = None,
     t: Sequence[float] | None = None,
     periods: float | None = None,
     integration: Integration = DEFAULT,
-    state: object = None,
+    y: object = None,
 ) -> Setup:
     """Validate the settings of views, and fill in defaults.
 
@@ -162,7 +162,7 @@ def setup_of(
     UnknownNameError
         For a parameter or state that is not in the model.
     ArgumentError
-        For an invalid range, start or time span.
+        For an invalid range, initial state or time span.
 
     Examples
     --------
@@ -175,11 +175,11 @@ def setup_of(
     name = str(parameter) if parameter is not None else next(iter(known), None)
     if name is not None and name not in known:
         raise unknown_name("slow quantity or parameter", name, known)
-    shown = model.states[0] if state is None else str(state)
+    shown = model.states[0] if y is None else str(y)
     if shown not in model.states:
         raise unknown_name("state", shown, model.states)
     names = (*model.states, *model.slow_states)
-    begin = initial_state(model, np.zeros(len(names)) if start is None else start)
+    begin = initial_state(model, np.zeros(len(names)) if state is None else state)
     if t is None and periods is None:
         t, periods = ((0.0, LONG), None) if model.period() is None else (None, 2.0)
     time_span(t, periods, 0.0, None, model.period)
@@ -235,7 +235,7 @@ def view_of(
         "trajectory",
         lambda: simulate(
             here,
-            setup.start,
+            setup.state,
             t=setup.t,
             periods=setup.periods,
             integration=setup.integration,
@@ -244,18 +244,18 @@ def view_of(
     diagram, held = None, _held(here, setup, run)
     if setup.parameter is not None:
         diagram = _attempted(failures, "diagram", lambda: _diagram(here, setup, run, held))
-    lay = None
+    overlay = None
     slow = diagram is not None and diagram.parameter in _slow(here)
     if measured and slow and run is not None and diagram is not None:
-        lay = _attempted(failures, "overlay", lambda: overlay(diagram, run))
-    reached = [result.outcome for result in (run, diagram, lay) if result is not None]
+        overlay = _attempted(failures, "overlay", lambda: overlay_of(diagram, run))
+    reached = [result.outcome for result in (run, diagram, overlay) if result is not None]
     return View(
         here,
         setup,
         {name: float(value) for name, value in changes.items()},
         diagram,
         run,
-        lay,
+        overlay,
         held,
         (*failures, *(outcome for outcome in reached if not outcome)),
     )
@@ -277,8 +277,8 @@ def around(value: float) -> Range:
 def at_start(setup: Setup, model: Model, states: Mapping[str, float]) -> Setup:
     """Return the setup with other initial values of some states."""
     names = (*model.states, *model.slow_states)
-    begin = {**dict(zip(names, setup.start, strict=True)), **states}
-    return replace(setup, start=tuple(initial_state(model, begin).tolist()))
+    begin = {**dict(zip(names, setup.state, strict=True)), **states}
+    return replace(setup, state=tuple(initial_state(model, begin).tolist()))
 
 
 def _attempted(failures: list[Outcome], what: str, compute: Callable[[], R]) -> R | None:

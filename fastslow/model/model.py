@@ -297,8 +297,8 @@ class Model:
         return self._from(*self.structure.frozen(path, self.parameters))
 
     @validated(name=formula)
-    def with_ramp(self, name: object, rate: float, start: float = 0.0) -> Model:
-        """Return the model with one parameter ramped at a constant rate, start + rate·t.
+    def with_ramp(self, name: object, rate: float, from_value: float = 0.0) -> Model:
+        """Return the model with one parameter ramped at a constant rate, from_value + rate·t.
 
         Both numbers become parameters named after it, so that the rate can be changed
         without new equations: ``ramp.with_parameters(w_rate=1e-4)``.
@@ -309,7 +309,7 @@ class Model:
             A parameter, or a slow quantity of a frozen model.
         rate : float
             In units of the parameter per time.
-        start : float
+        from_value : float
             Value at t = 0.
 
         Raises
@@ -324,7 +324,7 @@ class Model:
         --------
         >>> x, w, t = sp.symbols("x w t")
         >>> fast = Model({x: w - x}, forcing={w: sp.sin(t)}).frozen()
-        >>> print(fast.with_ramp(w, 0.5, start=-1).forcing["w"])
+        >>> print(fast.with_ramp(w, 0.5, from_value=-1).forcing["w"])
         t*w_rate + w_start
         """
         key = normalised(str(name))
@@ -333,7 +333,7 @@ class Model:
         freed = self.with_free(key)
         first, speed = f"{key}_start", f"{key}_rate"
         numbers = {
-            first: finite_number(f"parameter {first}", start),
+            first: finite_number(f"parameter {first}", from_value),
             speed: finite_number(f"parameter {speed}", rate),
         }
         taken = [

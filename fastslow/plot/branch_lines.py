@@ -62,7 +62,7 @@ def _words(point: SpecialPoint) -> str:
     if 0 < len(point.note) <= LONGEST_NOTE:
         return point.note
     # the reason for an early end
-    return point.subtype or point.label
+    return point.type or point.label
 
 
 def marked_points(branches: Sequence[Branch]) -> list[SpecialPoint]:

@@ -115,14 +115,14 @@ def eigenvalue_path(
     """
     parts = [(source, slice(0, len(source)))] if isinstance(source, Branch) else _followed(source)
     own, ax = ax is None, axes_for(ax, width, height=78.0)
-    values = np.concatenate([branch.parameter[rows] for branch, rows in parts])
+    values = np.concatenate([branch.values[rows] for branch, rows in parts])
     scale = Normalize(float(values.min()), float(values.max()))
     paths: list[LineCollection] = []
     jumps: list[Line2D] = []
     met: list[SpecialPoint] = []
     for branch, rows in parts:
         path = _matched(branch.eigenvalues[rows])
-        region, parameter = branch.region[rows], branch.parameter[rows]
+        region, parameter = branch.region[rows], branch.values[rows]
         edges = np.flatnonzero(region[1:] != region[:-1]) + 1
         for start, stop in zip([0, *edges], [*edges, len(path)], strict=True):
             paths.append(_coloured(ax, path[start:stop], parameter[start:stop], scale, style))
@@ -143,7 +143,7 @@ def eigenvalue_path(
             if point.code != "EP" and rows.start <= row < rows.stop
         ]
     markers, labels = _marks(ax, met, label)
-    name = parts[0][0].parameter_name
+    name = parts[0][0].parameter
     bar = _framed(ax, paths, typeset(name))
     handles: list[Artist] = [*markers, *jumps[:1]]
     shown = add_legend(ax, handles, own, label, legend)
@@ -221,25 +221,25 @@ def clarke_path(
             markers += _dots(ax, on, marker, VERMILION, "black", f"{text}, q = {found:.4g}")
     bar = _framed(ax, paths, typeset("q"))
     if label:
-        ax.set_title(plain(f"{point.label}: {point.subtype}"), fontsize=TEXT)
+        ax.set_title(plain(f"{point.label}: {point.type}"), fontsize=TEXT)
     shown = add_legend(ax, markers, own, label, legend)
     return EigenvalueDrawing(ax, paths, (), tuple(markers), (), bar, shown)
 
 
-def _followed(lay: Overlay) -> list[tuple[Branch, slice]]:
+def _followed(overlay: Overlay) -> list[tuple[Branch, slice]]:
     """Return the rows of each branch from the first to the last row that is followed."""
-    used = [lay.stable_branches[k] for k in np.unique(lay.followed) if k >= 0]
+    used = [overlay.stable_branches[k] for k in np.unique(overlay.followed) if k >= 0]
     if not used:
         raise ArgumentError(
             "this trajectory follows no stable branch: there are no eigenvalues to draw"
         )
-    low, high = float(lay.slow.min()), float(lay.slow.max())
+    low, high = float(overlay.slow.min()), float(overlay.slow.max())
     parts = []
     for number in dict.fromkeys(s.branch for s in used):
-        branch = lay.diagram.branches[number]
+        branch = overlay.diagram.branches[number]
         own = [s for s in used if s.branch == number]
         start, stop = min(s.start for s in own), max(s.stop for s in own)
-        inside = (branch.parameter >= low) & (branch.parameter <= high)
+        inside = (branch.values >= low) & (branch.values <= high)
         rows = start + np.flatnonzero(inside[start:stop])
         if len(rows) > 1:
             parts.append((branch, slice(int(rows[0]), int(rows[-1]) + 1)))

@@ -138,7 +138,7 @@ def time_series(
         Interface to (state, value), such as ``diagram.interface_values``, to be drawn with
         the regions between them.
     phases : sequence of Phase
-        Phases of an overlay, ``lay.phases``, drawn as a strip and named where the names fit.
+        Phases of an overlay, ``overlay.phases``, drawn as a strip and named where the names fit.
     color : str
         Colour of the trajectory.
     **style

@@ -51,8 +51,8 @@ class PanelDrawing(Drawing):
 
 
 @validated(
-    lay=instance(Overlay),
-    state=formula,
+    overlay=instance(Overlay),
+    y=formula,
     ax=items(instance(Axes)),
     title=text,
     width=figure_width,
@@ -61,8 +61,8 @@ class PanelDrawing(Drawing):
     style=line_style,
 )
 def panel(
-    lay: Overlay,
-    state: object = None,
+    overlay: Overlay,
+    y: object = None,
     *,
     ax: Sequence[Axes] | None = None,
     title: str = "",
@@ -78,8 +78,8 @@ def panel(
 
     Parameters
     ----------
-    lay : Overlay
-    state : str or Symbol, optional
+    overlay : Overlay
+    y : str or Symbol, optional
         State drawn over time and over the slow quantity, by default the first.
     ax : sequence of three Axes, optional
         Axes of the three plots; a new figure otherwise.
@@ -101,7 +101,7 @@ def panel(
     Raises
     ------
     UnknownNameError
-        If ``state`` is no state of the diagram.
+        If ``y`` is no state of the diagram.
     ArgumentError
         If ``ax`` is not three axes.
 
@@ -110,27 +110,30 @@ def panel(
     >>> import fastslow as fs
     >>> gear = fs.systems.harmonic_gear()
     >>> diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6))
-    >>> lay = fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=2))
-    >>> drawn = fs.plot.panel(lay, width="column", linewidth=0.6)
+    >>> overlay = fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=2))
+    >>> drawn = fs.plot.panel(overlay, width="column", linewidth=0.6)
     >>> [round(25.4 * length) for length in drawn.figure.get_size_inches()]
     [85, 168]
     """
-    name = lay.diagram.states[0] if state is None else str(state)
-    if name not in lay.diagram.states:
-        raise unknown_name("state", name, lay.diagram.states)
+    name = overlay.diagram.states[0] if y is None else str(y)
+    if name not in overlay.diagram.states:
+        raise unknown_name("state", name, overlay.diagram.states)
     axes = _new_axes(inches(width), title) if ax is None else list(ax)
     if len(axes) != 3:
         raise ArgumentError(f"panel: expected three axes, received {len(axes)}")
     if label:
         for one, letter in zip(axes, "abc", strict=True):
             one.set_title(f"({letter})", loc="left", fontsize=TEXT)
-    values = lay.diagram.interface_values
+    values = overlay.diagram.interface_values
     look: dict[str, Any] = {"interfaces": values, "label": label, "legend": False, **style}
-    series = time_series(lay.run, name, ax=axes[0], phases=lay.phases, **look)
-    portrait = phase_portrait(lay.run, ax=axes[1], **look)
-    shown = of_diagram(lay.diagram, None, lay.parameter), of_diagram(lay.diagram, name, name)
-    laid = draw_passage(axes[2], lay, shown, label=label, **style)
-    kinds = {phase.kind for phase in lay.phases}
+    series = time_series(overlay.run, name, ax=axes[0], phases=overlay.phases, **look)
+    portrait = phase_portrait(overlay.run, ax=axes[1], **look)
+    shown = (
+        of_diagram(overlay.diagram, None, overlay.parameter),
+        of_diagram(overlay.diagram, name, name),
+    )
+    laid = draw_passage(axes[2], overlay, shown, label=label, **style)
+    kinds = {phase.type for phase in overlay.phases}
     strips = [Patch(label=f"{kind} phase", **PHASES[kind]) for kind in PHASES if kind in kinds]
     key = None
     if label if legend is None else legend:

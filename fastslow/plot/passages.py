@@ -87,7 +87,7 @@ class OverlayDrawing(Drawing):
 
 
 @validated(
-    lay=instance(Overlay),
+    overlay=instance(Overlay),
     y=axis_quantity,
     z=axis_quantity,
     x=axis_quantity,
@@ -103,7 +103,7 @@ class OverlayDrawing(Drawing):
     style=line_style,
 )
 def overlay(
-    lay: Overlay,
+    overlay: Overlay,
     y: object = None,
     z: object = None,
     *,
@@ -126,7 +126,7 @@ def overlay(
 
     Parameters
     ----------
-    lay : Overlay
+    overlay : Overlay
     y : str, Symbol, Expr or callable, optional
         Quantity on the vertical axis: a state, by default the first, the slow quantity, an
         expression in states and parameters such as ``"x**2 + v"``, or a function of the
@@ -174,12 +174,12 @@ def overlay(
     >>> import fastslow as fs
     >>> gear = fs.systems.harmonic_gear()
     >>> diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6))
-    >>> lay = fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=2))
-    >>> drawn = fs.plot.overlay(lay, "v", linewidth=0.5)
-    >>> drawn.x, drawn.state, len(drawn.crossings.get_xdata()) == len(lay.run.crossings)
+    >>> overlay = fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=2))
+    >>> drawn = fs.plot.overlay(overlay, "v", linewidth=0.5)
+    >>> drawn.x, drawn.state, len(drawn.crossings.get_xdata()) == len(overlay.run.crossings)
     ('w', 'v', True)
     """
-    diagram = lay.diagram
+    diagram = overlay.diagram
     across, up = (
         of_diagram(diagram, x, diagram.parameter),
         of_diagram(diagram, y, diagram.states[0]),
@@ -195,7 +195,7 @@ def overlay(
             label,
             legend,
             virtual=virtual,
-            lay=lay,
+            overlay=overlay,
             crossings=crossings,
             turning=turning,
             color=color,
@@ -204,7 +204,7 @@ def overlay(
     own, ax = ax is None, axes_for(ax, width, height=78.0)
     drawn = draw_passage(
         ax,
-        lay,
+        overlay,
         (across, up),
         label=label,
         crossings=crossings,
@@ -221,7 +221,7 @@ def overlay(
 
 def draw_passage(
     ax: Axes,
-    lay: Overlay,
+    overlay: Overlay,
     shown: tuple[Quantity, Quantity],
     *,
     label: bool = True,
@@ -233,49 +233,48 @@ def draw_passage(
     **style: Any,
 ) -> OverlayDrawing:
     """Draw an overlay without legend and without placing its labels; arguments as for `overlay`."""
-    across, up = along_overlay(lay, *shown)
-    lines = draw_motion(ax, lay.time, (across, up), shown, lay.run, color, style)
-    dots = draw_crossings(ax, lay, shown) if crossings else None
-    changes = draw_transitions(ax, lay, shown)
-    note(ax, _caveat(lay))
-    turns = draw_turning(ax, lay, shown) if turning else None
+    across, up = along_overlay(overlay, *shown)
+    lines = draw_motion(ax, overlay.t, (across, up), shown, overlay.run, color, style)
+    dots = draw_crossings(ax, overlay, shown) if crossings else None
+    changes = draw_transitions(ax, overlay, shown)
+    note(ax, _caveat(overlay))
+    turns = draw_turning(ax, overlay, shown) if turning else None
     # after the trajectory, so that the bands extend to its limits
     below = draw_branches(
-        ax, lay.diagram, shown, label=label, virtual=virtual, interfaces=interfaces
+        ax, overlay.diagram, shown, label=label, virtual=virtual, interfaces=interfaces
     )
     for line in below.lines:
         if line.get_label() == "stable":
             # wide enough to remain visible under a trajectory that follows it
             line.set_linewidth(2.2)
-        elif any(phase.kind == "oscillating" for phase in lay.phases):
+        elif any(phase.type == "oscillating" for phase in overlay.phases):
             # otherwise hidden by oscillations
             line.set_zorder(3.5)
     drawn = len(points(lines[-1]))
     # a line broken at a period has more points than the samples
-    round_ = any(q.column in lay.run.periods for q in shown)
-    heads = (
-        () if round_ else draw_heads(lines[-1], _arrow_rows(lay, up, lay.slow[len(lay) - drawn :]))
-    )
+    round_ = any(q.column in overlay.run.periods for q in shown)
+    rows = () if round_ else _arrow_rows(overlay, up, overlay.slow[len(overlay) - drawn :])
+    heads = draw_heads(lines[-1], rows) if len(rows) else ()
     text = shown[1].text
     return OverlayDrawing(
         ax, text, below, lines, dots, changes, turns, heads, None, shown[0].text, shown
     )
 
 
-def _caveat(lay: Overlay) -> str:
+def _caveat(overlay: Overlay) -> str:
     """Return the note of an incomplete overlay, or an empty text."""
-    ended = early_end(lay.run)
+    ended = early_end(overlay.run)
     if ended:
         return f"run ended early: {ended}"
-    return "" if lay.outcome else CAVEATS.get(lay.outcome.code, lay.outcome.code)
+    return "" if overlay.outcome else CAVEATS.get(overlay.outcome.code, overlay.outcome.code)
 
 
-def _arrow_rows(lay: Overlay, values: Array, drawn: Array) -> list[int]:
+def _arrow_rows(overlay: Overlay, values: Array, drawn: Array) -> list[int]:
     """Return rows of arrow heads in the last period: along branches, and midway in jumps.
 
     Parameters
     ----------
-    lay : Overlay
+    overlay : Overlay
     values : ndarray, shape (N,)
         Quantity on the vertical axis.
     drawn : ndarray, shape (M,)
@@ -283,11 +282,11 @@ def _arrow_rows(lay: Overlay, values: Array, drawn: Array) -> list[int]:
     """
     travel = np.r_[0.0, np.cumsum(np.abs(np.diff(drawn)))]
     rows = np.searchsorted(travel, np.array(ARROWS) * travel[-1]).tolist() if travel[-1] else []
-    earlier = len(lay.time) - len(drawn)
-    for t in lay.transitions:
-        if t.land is None or t.kind in ("crossing", "end of oscillation"):
+    earlier = len(overlay.t) - len(drawn)
+    for t in overlay.transitions:
+        if t.land is None or t.type in ("crossing", "end of oscillation"):
             continue
-        start, stop = np.searchsorted(lay.time, (t.leave.time, t.land.time)) - earlier
+        start, stop = np.searchsorted(overlay.t, (t.leave.time, t.land.time)) - earlier
         inside = values[earlier:][max(start, 0) : max(stop, 0)]
         if start >= 0 and len(inside) > 2:
             middle = 0.5 * (inside[0] + inside[-1])

@@ -51,7 +51,7 @@ def draw_phases(
             transform=frame,
             zorder=4.8,
             linewidth=0.0,
-            **PHASES[phase.kind],
+            **PHASES[phase.type],
         )
         ax.add_patch(box)
         boxes.append(box)
@@ -66,7 +66,7 @@ def draw_phases(
                 ha="center",
                 va="center",
                 fontsize=WORDS,
-                color="white" if phase.kind in WHITE_WORDS else BLACK,
+                color="white" if phase.type in WHITE_WORDS else BLACK,
                 zorder=4.9,
                 clip_on=True,
             )
@@ -91,10 +91,10 @@ def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text], renderer: Rende
 
 
 def _text(phase: Phase) -> str:
-    if phase.kind == "quasi-static":
+    if phase.type == "quasi-static":
         # along the edge of a band of equilibria
         names = ("edge" if name.startswith("edge of ") else name for name in phase.stable_branches)
         return plain(" ".join(names))
-    if phase.kind == "oscillating":
+    if phase.type == "oscillating":
         return f"{phase.oscillations} oscillations"
-    return phase.kind if phase.kind in ("outside", "sticking") else ""
+    return phase.type if phase.type in ("outside", "sticking") else ""

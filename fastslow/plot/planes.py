@@ -240,7 +240,7 @@ def _special_points(
     markers: list[Line2D] = []
     labels: list[Annotation] = []
     names = curves[0].parameter_names
-    spans = np.ptp(np.concatenate([c.parameter for c in curves]), axis=0) + 1e-300
+    spans = np.ptp(np.concatenate([c.values for c in curves]), axis=0) + 1e-300
     for code in POINT_TYPES:
         met: list[SpecialPoint] = []
         seen: list[NDArray[np.float64]] = []

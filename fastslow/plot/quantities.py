@@ -202,23 +202,23 @@ def at_crossings(run: Trajectory, *shown: Quantity) -> list[Array]:
     return [_wrapped(q.of(known, len(met)), q, run.periods) for q in shown]
 
 
-def along_overlay(lay: Overlay, *shown: Quantity) -> list[Array]:
+def along_overlay(overlay: Overlay, *shown: Quantity) -> list[Array]:
     """Quantities at the times of an overlay, each of shape (N,)."""
-    columns = {name: lay.run[name] for name in lay.run.columns}
-    known = {**_fixed(lay), **columns, lay.parameter: lay.slow}
-    return [_wrapped(q.of(known, len(lay)), q, lay.run.periods) for q in shown]
+    columns = {name: overlay.run[name] for name in overlay.run.columns}
+    known = {**_fixed(overlay), **columns, overlay.parameter: overlay.slow}
+    return [_wrapped(q.of(known, len(overlay)), q, overlay.run.periods) for q in shown]
 
 
 def at_times(
-    lay: Overlay, times: Array, names: Sequence[str], state: Array, *shown: Quantity
+    overlay: Overlay, times: Array, names: Sequence[str], state: Array, *shown: Quantity
 ) -> list[Array]:
     """Quantities at times between samples, given some states, shape (K, states)."""
-    columns = {n: np.interp(times, lay.time, lay.run[n]) for n in lay.run.columns}
-    columns[lay.parameter] = np.interp(times, lay.time, lay.slow)
+    columns = {n: np.interp(times, overlay.t, overlay.run[n]) for n in overlay.run.columns}
+    columns[overlay.parameter] = np.interp(times, overlay.t, overlay.slow)
     columns |= dict(zip(names, state.reshape(len(times), -1).T, strict=True))
-    known = {**_fixed(lay), **columns}
-    return [_wrapped(q.of(known, len(times)), q, lay.run.periods) for q in shown]
+    known = {**_fixed(overlay), **columns}
+    return [_wrapped(q.of(known, len(times)), q, overlay.run.periods) for q in shown]
 
 
-def _fixed(lay: Overlay) -> dict[str, Any]:
-    return {**lay.run.parameters, **lay.diagram.parameters}
+def _fixed(overlay: Overlay) -> dict[str, Any]:
+    return {**overlay.run.parameters, **overlay.diagram.parameters}

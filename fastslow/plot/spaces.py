@@ -88,7 +88,7 @@ def draw_space(
     legend: bool | None,
     *,
     virtual: bool,
-    lay: Overlay | None = None,
+    overlay: Overlay | None = None,
     crossings: bool = True,
     turning: bool = True,
     color: str = BRANCH,
@@ -100,20 +100,20 @@ def draw_space(
     ----------
     shown : tuple of Quantity
         Quantities on the three axes.
-    lay : Overlay, optional
+    overlay : Overlay, optional
         Overlay with the trajectory.
     color, style
         Of the trajectory if there is one, otherwise of the branches.
     """
     own, space = ax is None, axes_for(ax, width, HEIGHT, space=True)
-    of_branches = {"color": color, **style} if lay is None else {"color": BRANCH}
+    of_branches = {"color": color, **style} if overlay is None else {"color": BRANCH}
     branches: list[Line2D] = []
     drawn = [b for b in diagram.branches if b.admissible or virtual]
     for branch in drawn:
         places = along_branch(diagram, branch, *shown)
         for kind, rows in runs(branch):
             look = {**LINES[kind], "label": kind, **of_branches}
-            if lay is not None and kind == "stable":
+            if overlay is not None and kind == "stable":
                 # wide enough to remain visible under a trajectory that follows it
                 look["linewidth"] = 2.0
             line_places = joined([p[rows] for p in places], shown, branch.periods)
@@ -123,12 +123,14 @@ def draw_space(
     turns: Line2D | None = None
     changes: tuple[Line2D, ...] = ()
     heads: tuple[Annotation, ...] = ()
-    if lay is not None:
+    if overlay is not None:
         look = {"linewidth": 0.7, "color": color, "label": "trajectory", **style}
-        (line,) = space.plot(*joined(along_overlay(lay, *shown), shown, lay.run.periods), **look)
-        dots = draw_crossings(space, lay, shown) if crossings else None
-        changes = draw_transitions(space, lay, shown)
-        turns = draw_turning(space, lay, shown) if turning else None
+        (line,) = space.plot(
+            *joined(along_overlay(overlay, *shown), shown, overlay.run.periods), **look
+        )
+        dots = draw_crossings(space, overlay, shown) if crossings else None
+        changes = draw_transitions(space, overlay, shown)
+        turns = draw_turning(space, overlay, shown) if turning else None
     markers, labels = draw_points(space, marked_points(drawn), shown, label)
     style_space(space, [q.label for q in shown])
     seen: dict[str, Artist] = {str(h.get_label()): h for h in [*branches, *markers]}

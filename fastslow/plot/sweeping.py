@@ -128,12 +128,12 @@ def sweep(
     widen_limits(ax)
     margin = 0.02 * (sweep.values[-1] - sweep.values[0]) or 0.5
     ax.set_xlim(sweep.values[0] - margin, sweep.values[-1] + margin)
-    ax.set_xlabel(typeset(sweep.parameter_name))
+    ax.set_xlabel(typeset(sweep.parameter))
     ax.set_ylabel(f"{typeset(sweep.name)} ({sweep.what})")
     drawn = [line for line in (up, down, crosses) if line is not None]
     samples = [_sample(line) for line in drawn]
     words = add_legend(ax, samples, own, label, legend) if len(samples) > 1 else None
-    return SweepDrawing(ax, sweep.parameter_name, sweep.name, up, down, crosses, words)
+    return SweepDrawing(ax, sweep.parameter, sweep.name, up, down, crosses, words)
 
 
 def _points(
@@ -143,7 +143,7 @@ def _points(
         return None
     look = {"color": BLACK, "markeredgewidth": 0.0} if alone else LOOKS[one.direction]
     look = {"linestyle": "none", "marker": "o", "markersize": size, **look, **style}
-    (line,) = ax.plot(one.parameter, one.x, rasterized=len(one.x) > MANY, **look)
+    (line,) = ax.plot(one.swept, one.x, rasterized=len(one.x) > MANY, **look)
     return line
 
 

@@ -293,7 +293,7 @@ class SpecialPoint(_Point):
         Whether the defining equations were solved to rounding.
     interface : str, optional
         The interface of a boundary equilibrium.
-    subtype : str, optional
+    type : str, optional
         For a boundary equilibrium ``"persistence"``, ``"non-smooth fold"`` or
         ``"degenerate"``; for ZH and HH the case of the normal form; for an end point
         the code of an unsuccessful outcome of the branch.
@@ -339,7 +339,7 @@ class SpecialPoint(_Point):
     residual: float
     converged: bool
     interface: str | None = None
-    subtype: str | None = None
+    type: str | None = None
     clarke: ClarkePath | None = field(default=None, repr=False)
     coefficient: float | None = None
     frequency: float | None = None
@@ -362,11 +362,11 @@ class SpecialPoint(_Point):
         return "supercritical" if self.lyapunov < 0 else "subcritical"
 
     @property
-    def kind(self) -> str:
+    def words(self) -> str:
         """The type of the point as text."""
         kind = point_name(self.code)
-        if self.subtype or self.criticality:
-            kind += f", {self.subtype or self.criticality}"
+        if self.type or self.criticality:
+            kind += f", {self.type or self.criticality}"
         if self.clarke is not None and self.clarke.q_hopf is not None:
             kind += " with Clarke-Hopf"
         if not self.converged:
@@ -378,7 +378,7 @@ class SpecialPoint(_Point):
         """The type and the coordinates of the point as text."""
         on = f" on {self.interface}" if self.interface else ""
         degenerate = f"; degenerate: {self.degeneracy}" if self.degeneracy else ""
-        return f"{self.kind}{on}; {self._values()}{degenerate}"
+        return f"{self.words}{on}; {self._values()}{degenerate}"
 
     def __repr__(self) -> str:
         return f"SpecialPoint({self.label}: {self.description})"

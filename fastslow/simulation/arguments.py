@@ -40,13 +40,13 @@ def simulated(name: str, value: Any) -> Simulated:
     raise ArgumentError(f"{name}: expected a Model, received {received}")
 
 
-def initial_state(model: Simulated, start: Any) -> NDArray[np.float64]:
+def initial_state(model: Simulated, state: Any) -> NDArray[np.float64]:
     """Validate the initial state; return an array in the order states, slow states.
 
     Parameters
     ----------
     model : Model
-    start : sequence of float or mapping
+    state : sequence of float or mapping
         Values in order, or by name.
 
     Raises
@@ -57,8 +57,8 @@ def initial_state(model: Simulated, start: Any) -> NDArray[np.float64]:
         For an unknown state.
     """
     names = (*model.states, *model.slow_states)
-    if isinstance(start, Mapping):
-        given = {str(k): v for k, v in start.items()}
+    if isinstance(state, Mapping):
+        given = {str(k): v for k, v in state.items()}
         for key in given:
             if key not in names:
                 raise unknown_name("state", key, names)
@@ -68,8 +68,8 @@ def initial_state(model: Simulated, start: Any) -> NDArray[np.float64]:
                 f"the initial state has no value for {', '.join(missing)}; expected one for each "
                 f"of {', '.join(names)}"
             )
-        start = [given[n] for n in names]
-    values = numbers("the initial state", start)
+        state = [given[n] for n in names]
+    values = numbers("the initial state", state)
     if values.shape != (len(names),):
         raise ArgumentError(
             f"the initial state has shape {values.shape}; expected {len(names)} values, for "
@@ -86,7 +86,7 @@ INSTANTS = 1e5
 
 
 def time_span(
-    t: Any, periods: Any, start: float, period: float | None, own_period: Callable[[], float | None]
+    t: Any, periods: Any, t0: float, period: float | None, own_period: Callable[[], float | None]
 ) -> tuple[tuple[float, float], float | None]:
     """Validate the time span; return it with the period, by default that of the model.
 
@@ -100,8 +100,8 @@ def time_span(
         received = "both" if t is not None else "neither"
         raise ArgumentError(f"expected t=(start, end) or periods=, received {received}")
     if t is not None:
-        if start != 0:
-            raise ArgumentError("start= goes with periods=; with t=(start, end) it is in t")
+        if t0 != 0:
+            raise ArgumentError("t0= goes with periods=; with t=(start, end) it is in t")
         values = numbers("t", t)
         if values.shape != (2,):
             raise ArgumentError(f"t = {t!r}; expected a pair (start, end)")
@@ -118,8 +118,8 @@ def time_span(
             f"periods={periods!r}, but nothing in this model has a common period; give "
             "t=(start, end), or the period as period="
         )
-    _check_resolution(start, start + count * period)
-    return (start, start + count * period), period
+    _check_resolution(t0, t0 + count * period)
+    return (t0, t0 + count * period), period
 
 
 def _check_resolution(first: float, last: float) -> None:

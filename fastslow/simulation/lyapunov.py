@@ -59,7 +59,7 @@ RANGING = 256
 
 @validated(
     model=instance(Model),
-    start=finite,
+    t0=finite,
     period=positive,
     discard=finite,
     integration=integration_settings,
@@ -71,7 +71,7 @@ def lyapunov_exponent(
     *,
     t: tuple[float, float] | None = None,
     periods: float | None = None,
-    start: float = 0.0,
+    t0: float = 0.0,
     period: float | None = None,
     discard: float | None = None,
     integration: Integration = FINE,
@@ -97,7 +97,7 @@ def lyapunov_exponent(
         Start and end of time.
     periods : float
         Instead of ``t``: length of the run in periods of the forcing.
-    start : float
+    t0 : float
         Start of time with ``periods``.
     period : float, optional
         Period, by default that of the forcing.
@@ -132,7 +132,7 @@ def lyapunov_exponent(
     """
     require_values(model)
     begin = initial_state(model, state)
-    span, period = time_span(t, periods, start, period, model.period)
+    span, period = time_span(t, periods, t0, period, model.period)
     unit = period if periods is not None and period is not None else 1.0
     whole_length = span[1] - span[0]
     left_out = 0.2 * whole_length if discard is None else discard * unit

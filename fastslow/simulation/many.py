@@ -65,7 +65,7 @@ _CHUNK = 512
 @validated(
     model=instance(Model),
     parameters=mapping,
-    start=finite,
+    t0=finite,
     settle=finite,
     integration=integration_settings,
     gap=text,
@@ -79,7 +79,7 @@ def simulate_many(
     parameters: Mapping[Any, ArrayLike] | None = None,
     t: tuple[float, float] | None = None,
     periods: float | None = None,
-    start: float = 0.0,
+    t0: float = 0.0,
     period: ArrayLike | None = None,
     settle: float = 0.0,
     integration: Integration = DEFAULT,
@@ -109,7 +109,7 @@ def simulate_many(
         Start and end of time, for all.
     periods : float
         Instead of ``t``: length in periods of the forcing of each trajectory.
-    start : float
+    t0 : float
         Start of time with ``periods``.
     period : float or array_like, shape (m,), optional
         Period, by default that of the forcing.
@@ -159,7 +159,7 @@ def simulate_many(
     resolved = resolve(integration, model, implicit=False)
     threads = threads_of(threads)
     own = periods_of(model, period, count, swept)
-    spans, since = spans_of(t, periods, start, settle, own)
+    spans, since = spans_of(t, periods, t0, settle, own)
     times = times_of(samples, spans, since)
     groups = [
         (one, chosen, compile_series(one, resolved.order), compile_steps(one, resolved.order))

@@ -113,9 +113,7 @@ def periods_of(model: Model, period: Any, count: int, swept: Mapping[str, Floats
     return common_periods(laws, TIME, values)
 
 
-def spans_of(
-    t: Any, periods: Any, start: float, settle: float, own: Floats
-) -> tuple[Floats, Floats]:
+def spans_of(t: Any, periods: Any, t0: float, settle: float, own: Floats) -> tuple[Floats, Floats]:
     """Validate time spans (m, 2), and the times from which each trajectory counts (m,).
 
     Raises
@@ -130,8 +128,8 @@ def spans_of(
     if settle < 0:
         raise ArgumentError(f"settle = {settle:g}; expected a number from 0")
     if t is not None:
-        if start != 0:
-            raise ArgumentError("start= goes with periods=; with t=(start, end) it is in t")
+        if t0 != 0:
+            raise ArgumentError("t0= goes with periods=; with t=(start, end) it is in t")
         values = numbers("t", t)
         if values.shape != (2,):
             raise ArgumentError(f"t = {t!r}; expected a pair (start, end)")
@@ -150,7 +148,7 @@ def spans_of(
                 "period; give t=(start, end), or the period as period="
             )
         unit = own
-        spans = np.stack([np.full(len(own), start), start + length * own], axis=1)
+        spans = np.stack([np.full(len(own), t0), t0 + length * own], axis=1)
     if settle >= length:
         raise ArgumentError(
             f"settle = {settle:g}; expected less than the length of the run, {length:g}"

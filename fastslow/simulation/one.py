@@ -59,7 +59,7 @@ _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
 
 @validated(
     model=simulated,
-    start=finite,
+    t0=finite,
     period=positive,
     integration=integration_settings,
     dense=flag,
@@ -71,7 +71,7 @@ def simulate(
     *,
     t: tuple[float, float] | None = None,
     periods: float | None = None,
-    start: float = 0.0,
+    t0: float = 0.0,
     period: float | None = None,
     integration: Integration = DEFAULT,
     samples: int | Sequence[float] | NDArray[np.float64] | None = None,
@@ -96,7 +96,7 @@ def simulate(
         Start and end of time.
     periods : float
         Instead of ``t``: length of the run in periods of the forcing.
-    start : float
+    t0 : float
         Start of time with ``periods``.
     period : float, optional
         Period, by default that of the forcing.
@@ -140,7 +140,7 @@ def simulate(
     prepared = prepared_run(model, integration, gap)
     compiled, problem, names = prepared.compiled, prepared.problem, prepared.names
     begin = initial_state(model, state)
-    span, period = time_span(t, periods, start, period, lambda: prepared.period)
+    span, period = time_span(t, periods, t0, period, lambda: prepared.period)
     times = sample_times(samples, span)
     kept = compiled.n_states + compiled.n_forcing
     rows = compiled.n_states if dense else kept

@@ -293,7 +293,7 @@ def _at_value(
             here,
             begin,
             periods=settings.keep,
-            start=first,
+            t0=first,
             period=settings.period,
             integration=settings.integration,
         )

@@ -156,10 +156,10 @@ def derive(model: Model, assume: Any = None, *, parameter: Any = None) -> Deriva
     >>> x, w, k = sp.symbols("x w k")
     >>> found = derive(Model({x: w - k * x**3}, forcing={w: sp.sin(sp.Symbol("t"))},
     ...     parameters={k: 2}).frozen())
-    >>> found["S1"].equilibria[0].parameter["w"], found.assumptions
+    >>> found["S1"].equilibria[0].parameters["w"], found.assumptions
     (k*x**3, (k > 0,))
     >>> cubic = Model({x: w - k * x**3}, forcing={w: sp.sin(sp.Symbol("t"))}, parameters={k: 2})
-    >>> derive(cubic.frozen(), parameter="k")["S1"].equilibria[0].parameter
+    >>> derive(cubic.frozen(), parameter="k")["S1"].equilibria[0].parameters
     {k: w/x**3}
     """
     slow = (*model.forcing, *model.slow_states)
@@ -222,8 +222,8 @@ def _with_edges(region: RegionForms, sets: Sequence[EquilibriumSetForm]) -> Regi
     """Return a region whose equilibria are marked as edges of equilibrium sets."""
     forms = []
     for form in region.equilibria:
-        closed = form.kind != "implicit" and not form.conditions
-        one = _edge(sets, form.state, form.parameter) if closed else None
+        closed = form.type != "implicit" and not form.conditions
+        one = _edge(sets, form.state, form.parameters) if closed else None
         note = f"{EDGE} {one.region}" if one is not None else form.note
         forms.append(replace(form, note=note))
     return replace(region, equilibria=tuple(forms))

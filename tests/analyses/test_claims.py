@@ -537,7 +537,7 @@ def test_relaxation_begins_nearer_to_the_fold_beyond_the_range_scanned():
 
 def test_the_overlay_in_physical_units_is_the_dimensionless_one_in_its_scales():
     lay, scales = physical_route.overlay(), gear_scales()
-    assert [t.kind for t in lay.transitions] == ["gap crossing"] * 6
+    assert [t.type for t in lay.transitions] == ["gap crossing"] * 6
     p = fs.systems.harmonic_gear_from_physical(omega=1.0).parameters
     torque = 10 / p["B"]
     slope = p["omega"] * math.sqrt(p["C"] ** 2 - p["B"] ** 2)

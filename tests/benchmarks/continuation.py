@@ -121,7 +121,7 @@ def auto() -> Iterator[Row]:
         return
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        fs.export(engaged(), "auto", folder, values={"w": 0.0}, start={"x": D})
+        fs.export(engaged(), "auto", folder, values={"w": 0.0}, state={"x": D})
         (equations,) = folder.glob("*.f90")
         stem = equations.stem
         (folder / f"c.{stem}").write_text(auto_constants(0.01, 0.1, 10))

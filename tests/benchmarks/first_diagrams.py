@@ -30,7 +30,7 @@ def jacobians(branch: fs.Branch) -> np.ndarray:
     cells = n // 2
     x, y = branch.state[:, :cells], branch.state[:, cells:]
     spread = np.eye(cells, k=1) + np.eye(cells, k=-1) - 2 * np.eye(cells)
-    scale = ((cells + 1) / branch.parameter[:, None, None]) ** 2 * spread
+    scale = ((cells + 1) / branch.values[:, None, None]) ** 2 * spread
     found = np.empty((rows, n, n))
     found[:, :cells, :cells] = 0.008 * scale
     found[:, cells:, cells:] = 0.004 * scale

@@ -92,7 +92,7 @@ def lines() -> Iterator[Line]:
             return fs.overlay(d, next(runs))
 
         found = lay()
-        note = f"{len(found.time)} samples, {len(found.transitions)} transitions"
+        note = f"{len(found.t)} samples, {len(found.transitions)} transitions"
         alone, laid = median(run), median(lay)
         yield Line(f"overlay: {name}", "fastslow", laid, "ms", None, note)
         yield Line(f"overlay: {name}", "fastslow, the run alone", alone, "ms")

@@ -127,7 +127,7 @@ def active(case, time, states):
 def named(lay):
     """Intervals between stable branches, as the overlay has them."""
     calm = ("quasi-static", "sticking", "outside")
-    return [(q.start, q.end) for q in lay.phases if q.kind not in calm]
+    return [(q.start, q.end) for q in lay.phases if q.type not in calm]
 
 
 def check(report, case):
@@ -161,7 +161,7 @@ def check(report, case):
         worst = max(worst, float((away / extent[rows]).max()))
         if (away > STATE * extent[rows]).any():
             fail(f"{case.name}: at t = {t.time:.6g} the state is {here}, not {t.state}")
-    kinds = [t.kind for t in lay.transitions]
+    kinds = [t.type for t in lay.transitions]
     if set(kinds) != case.kinds:
         fail(f"{case.name}: kinds {sorted(set(kinds))}, not {sorted(case.kinds)}")
     rhythm = "" if lay.bursting is None else str(lay.bursting)
@@ -172,7 +172,7 @@ def check(report, case):
         error = getattr(t.law, "error", np.nan)
         if t.law is None or not np.isfinite([t.predicted, error]).all():
             continue
-        measured = t.width if t.kind == "gap crossing" else t.delay
+        measured = t.width if t.type == "gap crossing" else t.delay
         if not np.isfinite(measured):
             continue
         stated += 1
@@ -180,7 +180,7 @@ def check(report, case):
         within += ok
         if not ok:
             fail(
-                f"{case.name}: t = {t.time:.6g}, {t.kind} delay {measured:.6g}, predicted "
+                f"{case.name}: t = {t.time:.6g}, {t.type} delay {measured:.6g}, predicted "
                 f"{t.predicted:.6g} ± {error:.2g}"
             )
     counts = ", ".join(f"{kinds.count(k)} × {k}" for k in dict.fromkeys(kinds))

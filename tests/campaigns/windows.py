@@ -92,7 +92,7 @@ def _units(diagram: fs.Diagram, system: System) -> Array:
 
 def _explained(diagram: fs.Diagram, branch: fs.Branch, outcome: fs.Outcome, end: int) -> bool:
     """Whether an end is where its outcome says it is."""
-    value, state = branch.parameter[end], branch.points[end, :-1]
+    value, state = branch.values[end], branch.points[end, :-1]
     if outcome.code == "end of range":
         return bool(np.isclose(value, OVER, rtol=0, atol=1e-12).any())
     if outcome.code == "left the window":

@@ -297,7 +297,7 @@ def test_a_section_at_an_angle(rotating):
     assert len(section) == turns
     np.testing.assert_allclose(np.mod(section["theta"], 2 * np.pi), 0.3, atol=1e-9)
     assert (section.directions == 1).all()
-    assert (np.diff(section.times) > 0).all()
+    assert (np.diff(section.t) > 0).all()
 
 
 def test_a_rotation_repeats(rotating):
@@ -305,7 +305,7 @@ def test_a_rotation_repeats(rotating):
     steady = rotating.periodicity()
     assert steady.outcome.code == "periodic"
     assert steady.multiple == 1
-    times = rotating.section("theta", level=0.0).times
+    times = rotating.section("theta", level=0.0).t
     assert steady.period == pytest.approx(times[-1] - times[-2], rel=1e-6)
 
 
@@ -327,10 +327,10 @@ def test_an_overlay_modulo_the_period():
     first, second = (fs.overlay(diagram, run) for run in runs)
     for lay in (first, second):
         assert lay.transitions[0].special.code == "LP"
-        assert lay.phases[0].kind == "quasi-static"
-        assert lay.phases[-1].kind == "oscillating"
+        assert lay.phases[0].type == "quasi-static"
+        assert lay.phases[-1].type == "oscillating"
     assert second.transitions[0].time == pytest.approx(first.transitions[0].time, rel=1e-6)
-    inside = first.time < 90
+    inside = first.t < 90
     assert first.distance[inside].max() < 0.05
 
 

@@ -217,5 +217,5 @@ def test_a_hopf_pitchfork_point_says_what_is_undefined():
     (hopf,) = fs.continue_equilibria(model, "q", (-1, 1)).special("HB")
     (point,) = fs.continue_points(hopf, ("q", "p"), over={"q": (-1, 1), "p": (-1, 1)}).special("ZH")
     assert (point["p"], point["q"]) == pytest.approx((0, 0), abs=1e-12)
-    assert point.subtype == "resonant or degenerate"
+    assert point.type == "resonant or degenerate"
     assert "degenerate: s, theta and E undefined because a = 0" in repr(point)

@@ -134,10 +134,10 @@ def test_non_smooth_fold_turns_the_branch_back():
     diagram = fs.continue_equilibria(model, "p", (-2, 2))
     (branch,) = diagram.branches
     (corner,) = diagram.boundary_equilibria
-    assert corner.subtype == "non-smooth fold"
+    assert corner.type == "non-smooth fold"
     assert corner.clarke.determinants in ((1.0, -1.0), (-1.0, 1.0))
     assert corner.clarke.q_zero == pytest.approx(0.5, abs=1e-15)
-    assert branch.parameter.max() == pytest.approx(0, abs=1e-15)
+    assert branch.values.max() == pytest.approx(0, abs=1e-15)
     assert diagram.at(p=1.0) == []
     assert sorted(e["x"] for e in diagram.at(p=-1.0)) == pytest.approx([-1, 1], abs=1e-15)
 
@@ -147,7 +147,7 @@ def test_persistence_and_planar_clarke_hopf():
     field = sp.Piecewise((x / 2, x > 0), (-x, True))
     planar = fs.Model({x: y + field, y: p - x}, parameters={p: 0})
     (corner,) = fs.continue_equilibria(planar, "p", (-1, 1)).boundary_equilibria
-    assert corner.subtype == "persistence"
+    assert corner.type == "persistence"
     traces = [np.trace(j) for j in corner.clarke.jacobians]
     assert corner.clarke.q_hopf == pytest.approx(traces[1] / (traces[1] - traces[0]), abs=1e-15)
 
@@ -158,7 +158,7 @@ def test_filippov_branches_go_on_as_pseudo_equilibria(sign, kind):
     model = fs.Model({x: p - x - sign * sp.sign(x)}, parameters={p: 0})
     assert not model.continuous["x"]
     diagram = fs.continue_equilibria(model, "p", (-2, 2))
-    assert {b.subtype for b in diagram.boundary_equilibria} == {kind}
+    assert {b.type for b in diagram.boundary_equilibria} == {kind}
     assert sorted(b["p"] for b in diagram.boundary_equilibria) == pytest.approx([-1, 1], abs=1e-14)
     (branch,) = diagram.branches
     mode = "S1|S2" if sign > 0 else "S1|S2 (escaping)"
@@ -184,7 +184,7 @@ def test_two_interfaces_with_different_slopes():
     model = fs.Model({x: w - x - pull}, forcing={w: 5 * sp.sin(t / 50)}).frozen()
     diagram = fs.continue_equilibria(model, "w", (-4, 5))
     assert [b["w"] for b in diagram.boundary_equilibria] == pytest.approx([-1, 1], abs=1e-14)
-    assert {b.subtype for b in diagram.boundary_equilibria} == {"persistence"}
+    assert {b.type for b in diagram.boundary_equilibria} == {"persistence"}
     values = {-4.0: -2.0, 0.5: 0.5, 5.0: 2.0}
     for load, state in values.items():
         assert [e["x"] for e in diagram.at(w=load)] == pytest.approx([state], abs=1e-14)
@@ -257,9 +257,7 @@ def test_twenty_states():
     uniform = [f["p"] for f in diagram.folds if np.ptp(f.state) < 1e-9]
     assert sorted(uniform) == pytest.approx([-bound, bound], rel=1e-12)
     for branch in diagram.branches:
-        values = np.array(
-            [field_of(branch.state[k], branch.parameter[k]) for k in range(len(branch))]
-        )
+        values = np.array([field_of(branch.state[k], branch.values[k]) for k in range(len(branch))])
         assert np.abs(values).max() < 1e-11
 
 

@@ -160,7 +160,7 @@ def test_units_of_time_and_states_do_not_matter(circulation, factors, rate):
         assert all(c.converged for c in again.special)
         for one in curve.special("HH"):
             other_point = next(c for c in again.special("HH") if c.label == one.label)
-            assert one.subtype == other_point.subtype
+            assert one.type == other_point.type
             for name in ("theta", "delta"):
                 value = one.normal_form[name]
                 assert other_point.normal_form[name] == pytest.approx(value, rel=1e-6)

@@ -153,7 +153,7 @@ def test_the_two_fold_of_welanders_ocean_box():
         assert [point["T"], point["S"]] == pytest.approx([0.75, 0.6], abs=1e-12)
         assert point["e"] == pytest.approx(0, abs=1e-13)
         assert point.residual < 1e-13
-        assert point.kind == "two-fold"
+        assert point.words == "two-fold"
         assert point.interface in diagram.interfaces
     assert "TF1" in repr(diagram)
 

@@ -59,7 +59,7 @@ def test_where_the_rates_end_the_branch_says_so():
     diagram = fs.continue_equilibria(fs.Model({x: x * (1 - x / q)}, parameters={q: 1}), "q", (0, 5))
     assert len(diagram.branches) == 2
     for branch in diagram.branches:
-        assert branch.parameter.min() < 1e-7
+        assert branch.values.min() < 1e-7
         assert branch.outcomes[0].code == "edge of domain"
         assert not branch.outcomes[0].success
         assert "may not be defined" in branch.outcomes[0].message
@@ -95,7 +95,7 @@ def test_a_vertical_branch_is_reached_from_a_branch_point():
     )
     line, vertical = diagram.branches
     assert np.abs(line["x"] - 1).max() < 1e-14
-    assert np.abs(vertical.parameter).max() < 1e-14
+    assert np.abs(vertical.values).max() < 1e-14
     assert np.ptp(vertical["x"]) > 1
     assert vertical.outcome.code == "too many points"
     assert diagram.completeness == "found"
@@ -112,7 +112,7 @@ def test_virtual_folds_are_called_virtual():
     assert {(f["x"], f.admissible) for f in diagram.folds} == {(-2.0, False), (2.0, False)}
     assert all("virtual" in f.description for f in diagram.folds)
     (corner,) = [c for c in diagram.boundary_equilibria if c.admissible]
-    assert corner.subtype == "non-smooth fold"
+    assert corner.type == "non-smooth fold"
 
 
 def test_curves_end_exactly_on_interfaces():
@@ -139,7 +139,7 @@ def test_interfaces_that_coincide_are_crossed_together():
     height = 0.4 * np.sqrt(0.2)
     assert sorted(f["w"] for f in diagram.folds) == pytest.approx([-height, height], abs=1e-15)
     (corner,) = diagram.boundary_equilibria
-    assert (corner.subtype, corner.state.tolist()) == ("persistence", [0.0, 0.0])
+    assert (corner.type, corner.state.tolist()) == ("persistence", [0.0, 0.0])
     assert sorted(e["x"] for e in diagram.at(w=0.0)) == pytest.approx(
         [-np.sqrt(0.6), 0.0, np.sqrt(0.6)], abs=1e-15
     )

@@ -186,7 +186,7 @@ def test_an_overlay_knows_when_the_block_sticks_and_when_it_slips_along_the_edge
     assert shares["S1|S2 (sticking)"] == pytest.approx(sticking, abs=2e-3)
     assert shares["edge of S1|S2"] > 0.5
     assert shares[""] < 0.01
-    rests = [p for p in overlay.phases if p.kind == "sticking"]
+    rests = [p for p in overlay.phases if p.type == "sticking"]
     assert len(rests) == 3
     ends_at = [c.time for c in run.crossings if c.from_region == "S1|S2"]
     assert [p.end for p in rests] == pytest.approx(ends_at, abs=1e-9)

@@ -57,8 +57,8 @@ def regions(branch):
 def turns(branch, point):
     """Whether the parameter turns back at a boundary equilibrium of the branch."""
     row = branch.special_rows[list(branch.special).index(point)]
-    before = branch.parameter[row] - branch.parameter[row - 1]
-    after = branch.parameter[row + 2] - branch.parameter[row + 1]
+    before = branch.values[row] - branch.values[row - 1]
+    after = branch.values[row + 2] - branch.values[row + 1]
     return before * after < 0
 
 
@@ -78,7 +78,7 @@ def test_normal_form_of_boundary_equilibria(t, d, c, e):
     (branch,) = diagram.branches
     (point,) = diagram.boundary_equilibria
     assert np.abs([point["x"], point["y"], point["p"]]).max() < 1e-14
-    assert point.subtype == ("persistence" if e / d > 0 else "non-smooth fold")
+    assert point.type == ("persistence" if e / d > 0 else "non-smooth fold")
     assert turns(branch, point) == (e / d < 0)
     mode = "S1|S2" if c > 0 else "S1|S2 (escaping)"
     assert set(point.regions) == {"S1", mode}
@@ -118,7 +118,7 @@ def test_pseudo_equilibria_end_at_the_region_whose_field_vanishes(folded):
     """At y = 2, p = −4, where α = 0, the branch goes on as the saddle x = y − 2, y² = −p."""
     (point,) = folded.boundary_equilibria
     assert (point["x"], point["y"], point["p"]) == pytest.approx((0, 2, -4), abs=1e-13)
-    assert point.subtype == "persistence"
+    assert point.type == "persistence"
     (branch,) = [b for b in folded.branches if point in b.special]
     assert not turns(branch, point)
     outside = branch.region == "S1"
@@ -190,7 +190,7 @@ def test_a_corner_of_the_sliding_field():
         diagram = fs.continue_equilibria(model, p, (-1, 1))
         (branch,) = diagram.branches
         (corner,) = diagram.boundary_equilibria
-        assert corner.subtype == kind
+        assert corner.type == kind
         assert corner.regions == ("S2|S4", "S1|S3")
         assert abs(corner["p"]) < 1e-14
         assert turns(branch, corner) == (kind == "non-smooth fold")
@@ -221,7 +221,7 @@ def test_symmetry(c, m, d, stiffness):
         assert np.abs(branch["y"] * (c * d + m) - c * branch["p"])[rows].max(initial=0) < 1e-12
         assert np.abs(branch["y"])[rows].max(initial=0) <= c * (1 + 1e-12)
         for point in branch.special("BE"):
-            assert turns(branch, point) == (point.subtype == "non-smooth fold")
+            assert turns(branch, point) == (point.type == "non-smooth fold")
     for point in diagram.special:
         apart = [
             np.abs([q["x"] + point["x"], q["y"] + point["y"], q["p"] + point["p"]]).max()
@@ -319,7 +319,7 @@ def test_a_circle_as_interface():
     assert corners
     for branch in diagram.branches:
         for point in branch.special("BE"):
-            assert turns(branch, point) == (point.subtype == "non-smooth fold")
+            assert turns(branch, point) == (point.type == "non-smooth fold")
             assert point.residual < 1e-13
         on = np.array(["|" in r for r in branch.region.tolist()])
         assert np.abs(branch["x"] ** 2 + branch["y"] ** 2 - 1)[on].max(initial=0) < 1e-13

@@ -47,7 +47,7 @@ def test_a_line_that_escapes_from_its_switch():
     diagram = fs.continue_equilibria(model, p, (-2, 2))
     (branch,) = diagram.branches
     assert regions(branch) == ["S2", "S1|S2 (escaping)", "S1"]
-    assert {b.subtype for b in branch.special("BE")} == {"non-smooth fold"}
+    assert {b.type for b in branch.special("BE")} == {"non-smooth fold"}
     assert [b["p"] for b in branch.special("BE")] == pytest.approx([1, -1], abs=1e-15)
     found = diagram.at(p=0.25)
     assert [e["x"] for e in found] == [-0.75, 0, 1.25]
@@ -68,7 +68,7 @@ def test_virtual_pseudo_equilibria_are_listed_once():
     ]
     diagram = fs.continue_equilibria(model, p, (-2, 2), virtual=True)
     virtual = [b for b in diagram.branches if not b.admissible and regions(b) == ["S1|S2"]]
-    ends = sorted((b.parameter.min(), b.parameter.max()) for b in virtual)
+    ends = sorted((b.values.min(), b.values.max()) for b in virtual)
     assert ends == [(-2, pytest.approx(-1, abs=1e-15)), (pytest.approx(1, abs=1e-15), 2)]
 
 
@@ -93,7 +93,7 @@ def test_a_staircase_of_two_discontinuities():
     (branch,) = diagram.branches
     assert regions(branch) == ["S3", "S2|S3", "S2", "S1|S2", "S1"]
     assert [b["p"] for b in branch.special("BE")] == pytest.approx([-3, -1, 1, 3], abs=1e-14)
-    assert {b.subtype for b in branch.special("BE")} == {"persistence"}
+    assert {b.type for b in branch.special("BE")} == {"persistence"}
     assert diagram.completeness == "complete"
 
 
@@ -130,7 +130,7 @@ def test_a_closed_branch_of_an_arc_and_a_sliding_segment():
     assert sorted(b["p"] for b in branch.special("BE")) == pytest.approx(
         [-np.sqrt(3), np.sqrt(3)], rel=1e-14
     )
-    assert {b.subtype for b in branch.special("BE")} == {"persistence"}
+    assert {b.type for b in branch.special("BE")} == {"persistence"}
     assert sorted(f["p"] for f in branch.special("LP")) == pytest.approx([-2, 2], rel=1e-14)
     outside = branch.region == "S1"
     left = branch["p"] ** 2 + (branch["x"] - 1) ** 2 - 4

@@ -69,7 +69,7 @@ def test_both_corners_are_degenerate_boundary_equilibria(diagram, gear):
     assert (lower.label, upper.label) == ("BE1", "BE2")
     stiffness = gear.parameters["A"] + gear.parameters["D"] ** 2
     for point, x, interface in ((lower, -0.25, "x + D"), (upper, 0.25, "x - D")):
-        assert point.subtype == "degenerate"
+        assert point.type == "degenerate"
         assert point.interface == interface
         assert point.state == pytest.approx([x, 0], abs=1e-15)
         assert abs(point["w"]) < 1e-15

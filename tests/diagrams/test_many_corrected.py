@@ -26,7 +26,7 @@ def test_many_equilibria_are_those_of_each_bit_by_bit(model, name, over):
         # off the branch, and as far off as nothing is found
         states = branch.state[rows] + np.linspace(-1e-3, 1e-3, len(rows))[:, None]
         states[-1] = 1e200
-        values = branch.parameter[rows]
+        values = branch.values[rows]
         solved, spectra = diagram.corrector.many(str(region), states, values)
         for k in range(len(rows)):
             alone = diagram.corrector(str(region), states[k], float(values[k]))

@@ -42,7 +42,7 @@ def test_reactor_folds_meet_bogdanov_takens_and_cusp(reactor):
     assert np.abs(curve["p2"] * hot - 3 * curve["u2"]).max() < 1e-12
     assert np.abs(np.prod(curve.eigenvalues, axis=1)).max() < 1e-11
     assert [o.code for o in curve.outcomes] == ["end of range"] * 2
-    assert curve.parameter[[0, -1], 1].tolist() == [20, 20]
+    assert curve.values[[0, -1], 1].tolist() == [20, 20]
 
 
 def test_reactor_hopf_curve_ends_in_neutral_saddles_at_the_same_point(reactor):
@@ -129,7 +129,7 @@ def test_boundary_equilibria_change_type_where_a_determinant_vanishes():
     """x' = p + q x + |x|: at x = 0 the slopes are q ± 1, a non-smooth fold for |q| < 1."""
     model = fs.Model({x: p + q * x + sp.Abs(x)}, parameters={p: 0, q: 0})
     (corner,) = fs.continue_equilibria(model, "p", (-1, 1)).boundary_equilibria
-    assert corner.subtype == "non-smooth fold"
+    assert corner.type == "non-smooth fold"
     curve = fs.continue_points(corner, ("p", "q"), over={"p": (-1, 1), "q": (-2, 2)})
     found = {f.regions[0]: f["q"] for f in curve.special("BF")}
     assert found == pytest.approx({"S1": -1, "S2": 1}, abs=1e-14)
@@ -252,7 +252,7 @@ def test_double_hopf():
     assert point.frequency == pytest.approx(3, rel=1e-12)
     # frequencies 1 and 3 are in resonance
     assert point.normal_form == {}
-    assert point.subtype == "resonant or degenerate"
+    assert point.type == "resonant or degenerate"
     # from there the other pair is followed
     other = fs.continue_points(point, ("p", "q"), over=over)
     assert np.abs(other["q"]).max() < 1e-12

@@ -58,9 +58,9 @@ def test_the_edge_of_a_logarithm():
     """log p = x: the branch runs off to −∞ as p → 0."""
     diagram = fs.continue_equilibria(fs.Model({x: sp.log(p) - x}, parameters={p: 1}), p, (-1, 2))
     (branch,) = diagram.branches
-    assert branch.parameter.min() > 0
-    sure = branch.parameter > 1e-2
-    assert np.abs(np.log(branch.parameter) - branch["x"])[sure].max() < 1e-12
+    assert branch.values.min() > 0
+    sure = branch.values > 1e-2
+    assert np.abs(np.log(branch.values) - branch["x"])[sure].max() < 1e-12
     assert not branch.outcome.success
     assert branch.outcome.code in ("left the window", "step too small", "too many points")
     assert (

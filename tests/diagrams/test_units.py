@@ -44,7 +44,7 @@ def read(system, units):
     for branch in diagram.branches:
         words.append([o.code for o in branch.outcomes])
         for p in branch.special:
-            words.append((p.label, p.regions, p.subtype, p.criticality, p.converged))
+            words.append((p.label, p.regions, p.type, p.criticality, p.converged))
             numbers.append(place(p))
     return words, np.array(numbers)
 

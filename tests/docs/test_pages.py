@@ -125,13 +125,13 @@ def test_the_tutorial(tmp_path, monkeypatch, capsys):
     assert bistable == pytest.approx([-0.0894402097712473, 0.0894402097712473], abs=1e-12)
     assert names["run"].regime == "bilateral"
     assert names["overlay"].bursting.name.startswith("relaxation oscillation")
-    assert {t.kind for t in names["overlay"].transitions} == {"jump"}
+    assert {t.type for t in names["overlay"].transitions} == {"jump"}
     assert names["overlay"].delays == pytest.approx(0.024, abs=5e-5)
     assert "delay 0.024 (predicted 0.0249 ± 0.0011)" in printed
     assert names["again"].delays == pytest.approx(names["overlay"].delays, rel=1e-12)
     assert names["stiff_diagram"].folds == ()
-    assert [p.subtype for p in names["stiff_diagram"].boundary_equilibria] == ["degenerate"] * 2
-    assert {t.kind for t in names["stiff_overlay"].transitions} == {"gap crossing"}
+    assert [p.type for p in names["stiff_diagram"].boundary_equilibria] == ["degenerate"] * 2
+    assert {t.type for t in names["stiff_overlay"].transitions} == {"gap crossing"}
     assert len(names["stiff_run"].crossings) == 41
 
     box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+)", (tmp_path / "overlay.pdf").read_bytes())

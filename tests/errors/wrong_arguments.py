@@ -145,7 +145,7 @@ BY_FUNCTION = {
         ({}, BadModel, "rate of x: unknown symbol 'k'"),
     ],
     "Model.with_ramp.rate": [(NAN, BadModel, "parameter C_rate: expected a finite number")],
-    "Model.with_ramp.start": [("0", BadModel, "parameter C_start: expected a finite number")],
+    "Model.with_ramp.from_value": [("0", BadModel, "parameter C_start: expected a finite number")],
     "Model.rates": [
         *MAPPING,
         ({}, BadModel, "at least one state"),
@@ -165,9 +165,9 @@ BY_FUNCTION = {
         ({"p": 0.0, "x": 0.0}, Wrong, "a value of one of p, x, t, received p, x"),
     ],
     "Overlay.nearest.values": NEAR,
-    "Overlay.select.kind": [
+    "Overlay.select.type": [
         *TEXT,
-        ("jmp", Unknown, "unknown kind of phase 'jmp'; did you mean 'jump'?"),
+        ("jmp", Unknown, "unknown type of phase 'jmp'; did you mean 'jump'?"),
     ],
     "Trajectory.at.value": [
         ({"q": 0.0}, Unknown, "unknown column 'q'"),
@@ -263,7 +263,7 @@ BY_FUNCTION = {
         ([1e-3, -1e-3], Wrong, "expected at least two positive speeds"),
         ("12", Wrong, "rates: expected numbers, received '12'"),
     ],
-    "delay_scaling.start": [*NUMBER, (5, Wrong, "start = 5; expected a value")],
+    "delay_scaling.from_value": [*NUMBER, (5, Wrong, "from_value = 5; expected a value")],
     "compare_scalings.one": [*MAPPING, ({"B": 1}, Unknown, "unknown entry 'B'")],
     "compare_scalings.other": MAPPING,
     "equilibria.named": [
@@ -272,7 +272,7 @@ BY_FUNCTION = {
         ({}, BadModel, "'p'"),
     ],
     "export.path": [(3, Wrong, "path = 3; expected the path of a file")],
-    "export.start": [*MAPPING, ({"y": 0.0}, Unknown, "unknown state 'y'")],
+    "export.state": [*MAPPING, ({"y": 0.0}, Unknown, "unknown state 'y'")],
     "lyapunov_exponent.discard": [
         *NUMBER,
         (2.0, Wrong, "discard = 2; expected a number from 0 below the length of the run, 1"),
@@ -284,7 +284,7 @@ BY_FUNCTION = {
         ("omga", Wrong, "ax = 'omga'; expected a sequence"),
         ([], Wrong, "panel: expected three axes, received 0"),
     ],
-    "plot.panel.state": [*SYMBOL, ("y", Unknown, "unknown state 'y'")],
+    "plot.panel.y": [*SYMBOL, ("y", Unknown, "unknown state 'y'")],
     "plot.phase_portrait.interfaces": SIDES,
     "plot.regime_map.curves": [
         *MAPPING,
@@ -350,7 +350,7 @@ BY_FUNCTION = {
 #: Periods stand beside the t of the good call.
 for _name in ("simulate", "simulate_many", "lyapunov_exponent"):
     BY_FUNCTION[f"{_name}.periods"] = [(3, Wrong, "or periods=, received both")]
-    BY_FUNCTION[f"{_name}.start"] = [*NUMBER, (2, Wrong, "start= goes with periods=")]
+    BY_FUNCTION[f"{_name}.t0"] = [*NUMBER, (2, Wrong, "t0= goes with periods=")]
 
 #: The parameters of ready-made models are numbers, unless said otherwise above.
 OF_SYSTEMS = [
@@ -372,8 +372,14 @@ BY_FUNCTION["explore.parameter"] = [
 BY_FUNCTION["explore.periods"] = [(2, Wrong, "expected t=(start, end) or periods=, received both")]
 # without it there are two periods
 BY_FUNCTION["explore.t"] = [row for row in BY_PARAMETER["t"] if row[0] is not None]
-BY_FUNCTION["explore.start"] = BY_PARAMETER["state"]
-BY_FUNCTION["explore.state"] = [*SYMBOL, ("u", Unknown, "unknown state 'u'")]
+for _name in ("__call__", "dense_columns"):
+    BY_FUNCTION[f"Trajectory.{_name}.t"] = [
+        (-1, Wrong, "time -1 is outside the run, which is [0,"),
+        (NAN, Wrong, "time nan is outside the run"),
+        ("5", Wrong, "t: expected numbers, received '5'"),
+    ]
+BY_FUNCTION["explore.state"] = BY_PARAMETER["state"]
+BY_FUNCTION["explore.y"] = [*SYMBOL, ("u", Unknown, "unknown state 'u'")]
 BY_FUNCTION["pick.result"] = [
     (None, Wrong, "cannot pick in a DiagramDrawing of a NoneType; expected the drawing")
 ]

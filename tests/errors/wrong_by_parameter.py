@@ -98,7 +98,6 @@ BY_PARAMETER = {
     "label": FLAG,
     "largest_step": POSITIVE,
     "largest_turn": POSITIVE,
-    "lay": a("Overlay"),
     "min_amplitude": [
         (-1, Wrong, "min_amplitude = -1; expected a number from 0"),
         (NAN, Wrong, "min_amplitude = nan"),
@@ -122,6 +121,7 @@ BY_PARAMETER = {
         ([("x", "x**7")], Wrong, "the rate of x has no term x**7"),
     ],
     "on_click": [(3, Wrong, "on_click = 3; expected a function")],
+    "overlay": a("Overlay"),
     "order": [*COUNT, (2, Wrong, "order = 2; expected an integer from 4 to 40")],
     "over": RANGE,
     "parameter": [*SYMBOL, ("omga", Unknown, "unknown parameter 'omga'")],
@@ -200,11 +200,6 @@ BY_PARAMETER = {
         (None, Wrong, "expected t=(start, end) or periods=, received neither"),
     ],
     "threads": [*COUNT, (0, Wrong, "threads = 0; expected an integer from 1")],
-    "times": [
-        (-1, Wrong, "time -1 is outside the run, which is [0,"),
-        (NAN, Wrong, "time nan is outside the run"),
-        ("5", Wrong, "times: expected numbers, received '5'"),
-    ],
     "title": TEXT,
     "tolerance": POSITIVE,
     "turning": FLAG,

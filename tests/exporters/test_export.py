@@ -72,7 +72,7 @@ def test_xpp_names_are_apart_without_case():
 
 
 def test_auto_files():
-    files = export(gear().frozen(), "auto", region="S1", start={"x": 0.26})
+    files = export(gear().frozen(), "auto", region="S1", state={"x": 0.26})
     assert set(files) == {"S1.f90", "c.S1"}
     source = files["S1.f90"]
     assert source.count("END SUBROUTINE") == 6
@@ -113,7 +113,7 @@ def test_bad_requests():
     with pytest.raises(UnknownNameError):
         export(gear(), "numpy", region="S9")
     with pytest.raises(UnknownNameError):
-        export(gear(), "numpy", start={"y": 1})
+        export(gear(), "numpy", state={"y": 1})
     with pytest.raises(ArgumentError, match="frozen"):
         export(gear(), "auto")
     x = sp.Symbol("x")

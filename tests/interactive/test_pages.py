@@ -129,7 +129,7 @@ def test_a_slider_draws_the_run_of_its_value(folded, page_file, open_page):
     np.testing.assert_allclose(x, columns[0], atol=np.ptp(columns[0]) / 250)
     branch = diagram.branches[0]
     table = opened.columns(1)
-    np.testing.assert_allclose(table[0], branch.parameter, rtol=DIGITS, atol=DIGITS)
+    np.testing.assert_allclose(table[0], branch.values, rtol=DIGITS, atol=DIGITS)
     np.testing.assert_allclose(table[1], branch["x"], rtol=DIGITS, atol=DIGITS)
     np.testing.assert_allclose(table[3:5].T, branch.eigenvalues.real, rtol=DIGITS, atol=DIGITS)
     np.testing.assert_allclose(table[5:7].T, branch.eigenvalues.imag, rtol=DIGITS, atol=DIGITS)
@@ -148,7 +148,7 @@ def test_hover_says_what_is_there_and_a_click_how_to_get_it(folded, page_file, o
     branch = next(b for b in diagram if fold in b.special)
     unstable = np.flatnonzero(branch.stability == "unstable")
     row = int(unstable[len(unstable) // 3])
-    place = opened.place(2, branch.parameter[row], branch["x"][row])
+    place = opened.place(2, branch.values[row], branch["x"][row])
     opened.page.mouse.move(*place)
     # six digits of parameter, states and eigenvalues, region, stability and type
     assert opened.text("tip") == text_of(branch[row], "w")
@@ -159,7 +159,7 @@ def test_hover_says_what_is_there_and_a_click_how_to_get_it(folded, page_file, o
     assert names["model"].parameters["D"] == 0.4
     np.testing.assert_array_equal(names["run"].end, run.end)
     np.testing.assert_allclose(names["point"].state, branch[row].state, atol=DIGITS)
-    assert names["point"]["w"] == pytest.approx(branch.parameter[row], abs=DIGITS)
+    assert names["point"]["w"] == pytest.approx(branch.values[row], abs=DIGITS)
 
     opened.page.mouse.click(*opened.place(2, fold["w"], fold["x"]))
     exec(opened.text("call"), names)
@@ -273,7 +273,7 @@ def test_a_folder_that_is_not_there(explorer, tmp_path):
 def test_branches_that_cross_name_their_branch_point_once():
     x, w, t = sp.symbols("x w t")
     model = fs.Model({x: x * (w - x)}, forcing={w: sp.sin(t / 10)})
-    data = page_data(fs.explore(model, over=(-1, 1.3), start=[1]), {})
+    data = page_data(fs.explore(model, over=(-1, 1.3), state=[1]), {})
     for frame in data["frames"]:
         for panel in frame["panels"]:
             names = [p[4] for mark in panel["marks"] for p in mark["points"] if len(p) > 4]

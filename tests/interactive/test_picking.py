@@ -129,7 +129,7 @@ def test_every_part_of_a_panel_answers(lay, panel, mouse):
     mouse("button_press_event", panel.overlay.ax, change.value, change.state[0])
     assert pointer.selected.point is change
     assert given(lay, pointer.selected.call) is change
-    assert pointer.selected.text.startswith(change.kind)
+    assert pointer.selected.text.startswith(change.type)
 
 
 def test_crossings_are_given_back(lay, panel, mouse):

@@ -22,7 +22,7 @@ def test_the_call_reproduces_the_view(folded):
     assert view.outcomes == ()
     names = executed(view, folded)
     np.testing.assert_array_equal(names["run"].end, view.run.end)
-    np.testing.assert_array_equal(names["lay"].delays, view.overlay.delays)
+    np.testing.assert_array_equal(names["overlay"].delays, view.overlay.delays)
     for ours, theirs in zip(view.diagram, names["diagram"], strict=True):
         np.testing.assert_array_equal(ours.points, theirs.points)
     # folds of x³ − D x² − 0.6 x + 0.6 D, from the derivative 3 x² − 2 D x − 0.6
@@ -42,16 +42,16 @@ def test_the_diagram_goes_beyond_what_the_load_covers(folded):
 
 def test_a_slow_state_is_what_the_diagram_is_over():
     model = fs.systems.van_der_pol_relaxation()
-    view = view_of(model, setup_of(model, t=(0, 300), start={"x": 2, "y": 0}))
+    view = view_of(model, setup_of(model, t=(0, 300), state={"x": 2, "y": 0}))
     assert view.diagram.parameter == "y"
-    assert {t.kind for t in view.overlay.transitions} == {"jump"}
+    assert {t.type for t in view.overlay.transitions} == {"jump"}
     names = executed(view, model)
-    np.testing.assert_array_equal(names["lay"].delays, view.overlay.delays)
+    np.testing.assert_array_equal(names["overlay"].delays, view.overlay.delays)
 
 
 def test_a_model_without_slow_quantity_has_a_diagram_over_a_parameter():
     model = fs.systems.stick_slip()
-    setup = setup_of(model, parameter="v_b", t=(0, 20), start=[0.5, 0])
+    setup = setup_of(model, parameter="v_b", t=(0, 20), state=[0.5, 0])
     view = view_of(model, setup, {"v_b": 0.1})
     assert view.overlay is None
     assert view.outcomes == ()
@@ -66,7 +66,7 @@ def test_a_model_without_slow_quantity_has_a_diagram_over_a_parameter():
 def test_without_slow_quantity_and_parameter_there_is_a_run_alone():
     x = sp.Symbol("x")
     model = fs.Model({x: -x})
-    view = view_of(model, setup_of(model, start=[1], t=(0, 1)))
+    view = view_of(model, setup_of(model, state=[1], t=(0, 1)))
     assert view.diagram is None
     assert view.run.end[1] == pytest.approx(np.exp(-1), abs=1e-9)
     assert "diagram" not in executed(view, model)
@@ -98,7 +98,7 @@ def test_time_in_a_rate_leaves_the_trajectory():
 def test_a_run_that_grows_without_bound_says_so():
     x, k = sp.symbols("x k")
     model = fs.Model({x: k * x**2}, parameters={k: 1.0})
-    view = view_of(model, setup_of(model, t=(0, 5), start=[1]))
+    view = view_of(model, setup_of(model, t=(0, 5), state=[1]))
     assert view.run is not None
     assert not view.outcomes[0]
 
@@ -119,10 +119,10 @@ def test_a_second_slow_quantity_is_held():
     ("settings", "message"),
     [
         ({"parameter": "w2"}, "unknown slow quantity or parameter 'w2'; did you mean 'w'?"),
-        ({"state": "z"}, "unknown state 'z'"),
+        ({"y": "z"}, "unknown state 'z'"),
         ({"over": (1, 0)}, "did you mean .0, 1."),
         ({"over": 3}, "over = 3; expected two finite numbers"),
-        ({"start": [0]}, "expected 2 values"),
+        ({"state": [0]}, "expected 2 values"),
         ({"t": (0, 1), "periods": 2}, "received both"),
         ({"periods": -1}, "positive"),
     ],

@@ -108,7 +108,7 @@ def test_a_model_cannot_be_changed():
         with pytest.raises(TypeError):
             mapping["k"] = 3
         with pytest.raises(AttributeError):
-            mapping.kind = "other"
+            mapping.type = "other"
 
 
 def test_a_model_is_no_record_to_replace_fields_of():

@@ -10,7 +10,7 @@ x, y, w, D, t = sp.symbols("x y w D t")
 
 def test_a_frozen_slow_quantity_drifts():
     fast = fs.Model({x: w - D * x}, forcing={w: sp.sin(t)}, parameters={D: 2}).frozen()
-    ramp = fast.with_ramp(w, 0.5, start=-1)
+    ramp = fast.with_ramp(w, 0.5, from_value=-1)
     assert ramp.free == ()
     assert dict(ramp.parameters) == {"D": 2.0, "w_start": -1.0, "w_rate": 0.5}
     # x = (w − rate/D)/D is the motion that stays bounded backwards in time
@@ -23,7 +23,7 @@ def test_a_frozen_slow_quantity_drifts():
 
 def test_a_parameter_with_a_value_drifts_and_may_rest():
     model = fs.Model({x: -sp.Max(x - D, 0)}, parameters={D: 1})
-    ramp = model.with_ramp("D", 0.0, start=3)
+    ramp = model.with_ramp("D", 0.0, from_value=3)
     assert list(ramp.interfaces) == list(model.interfaces)
     assert fs.simulate(ramp, [2], t=(0, 5))["x"][-1] == 2.0
 

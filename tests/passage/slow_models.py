@@ -181,7 +181,7 @@ def _fold(side):
 
 def _corner(code_subtype, key=lambda b: 0.0):
     def pick(diagram):
-        found = [b for b in diagram.boundary_equilibria if b.subtype == code_subtype]
+        found = [b for b in diagram.boundary_equilibria if b.type == code_subtype]
         return min(found, key=key)
 
     return pick

@@ -114,7 +114,7 @@ def test_where_the_diagram_holds_another_slow_quantity_no_delay_is_given():
     diagram = fs.continue_equilibria(model.frozen().with_parameters(q=0), "w", over=(-1.1, 1.1))
     lay = fs.overlay(diagram, run)
     assert "q = 0 in the diagram" in lay.summary()
-    assert [t_.kind for t_ in lay.transitions] == ["jump"]
+    assert [t_.type for t_ in lay.transitions] == ["jump"]
     assert np.isnan(lay.delays).all()
     assert lay.transitions[0].law is None
 

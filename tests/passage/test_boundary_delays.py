@@ -46,7 +46,7 @@ def test_any_corner_in_one_dimension(corner, k, u, b, eps, level):
     rate = math.copysign(eps, b)
     law = boundary_delay(point, rate, level={"x": level})
     start = abs(b) * eps / u * (1 / abs(k) + 1 / u)
-    t = law.time
+    t = law.delay_time
 
     def state(time):
         grown = start * mpmath.exp(u * (time - 1 / abs(k)))
@@ -60,7 +60,7 @@ def test_any_corner_in_one_dimension(corner, k, u, b, eps, level):
 def test_persistence_is_a_lag(corner):
     both = corner.with_parameters(k=-1, u=-3)
     law = boundary_delay(corner_point(both), 0.01)
-    assert law.subtype == "persistence"
+    assert law.type == "persistence"
     assert law.delay == law.lag == pytest.approx(0.01, rel=1e-13)
     back = boundary_delay(corner_point(both), -0.01)
     assert back.delay == pytest.approx(0.01 / 3, rel=1e-13)
@@ -73,7 +73,7 @@ def test_two_states_against_scipy():
     x, y, p = sp.symbols("x y p")
     model = fs.Model({x: p + sp.Abs(x) + y, y: x / 2 - 2 * y}, parameters={p: -1})
     point = corner_point(model)
-    assert point.subtype == "non-smooth fold"
+    assert point.type == "non-smooth fold"
     law = boundary_delay(point, 0.003, level={"y": 0.2})
     before = np.array([[-1.0, 1.0], [0.5, -2.0]])
     first = -np.linalg.solve(before, [1.0, 0.0])
@@ -146,7 +146,7 @@ def test_a_flat_corner_is_no_gap(corner):
     """x' = p + k x below, p above: a continuum at p = 0 that has no other end."""
     flat = corner.with_parameters(u=0)
     diagram = fs.continue_equilibria(flat, "p", over=(-1, 1))
-    point = next(p for p in diagram.boundary_equilibria if p.subtype == "degenerate")
+    point = next(p for p in diagram.boundary_equilibria if p.type == "degenerate")
     with pytest.raises(fs.ArgumentError, match="ends at no other interface"):
         gap_crossing(point, 0.01)
 
@@ -184,12 +184,12 @@ def gap_state(t, s, c, k, width):
 def test_the_gap_in_closed_form(gap, c, k, width, s):
     law = gap_crossing(gap_point(gap.with_parameters(c=c, k=k, D=width), 1), -s)
     assert law.lag == pytest.approx(s * c / k, rel=1e-12)
-    end = mpmath.findroot(lambda t: gap_state(t, s, c, k, width) + width, law.time)
-    assert law.time == pytest.approx(float(end), rel=1e-12)
+    end = mpmath.findroot(lambda t: gap_state(t, s, c, k, width) + width, law.delay_time)
+    assert law.delay_time == pytest.approx(float(end), rel=1e-12)
     assert law.asymptotic == pytest.approx(2 * math.sqrt(c * width * s) + s / c, rel=1e-12)
     assert (law.length, law.relaxation) == pytest.approx((2 * width, 1 / c), rel=1e-12)
     assert law.interfaces == ("x - D", "x + D")
-    assert law.duration == pytest.approx(law.time - c / k, rel=1e-12)
+    assert law.duration == pytest.approx(law.delay_time - c / k, rel=1e-12)
 
 
 def test_a_gap_that_moves_with_the_load():

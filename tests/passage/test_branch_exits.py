@@ -68,7 +68,7 @@ def test_a_predator_that_its_prey_lets_in():
 
     assert abs(lacking(law.value)) < 1e-10
     assert law.value < 2
-    ramp = model.with_ramp("p", -1e-3, start=3.0)
+    ramp = model.with_ramp("p", -1e-3, from_value=3.0)
     run = fs.simulate(ramp, [1 / 3, 1e-2], t=(0, 2000))
     out = run.section("y", level=1e-2, direction=1)
     assert out["p"][-1] == pytest.approx(law.value, abs=5e-3)

@@ -35,7 +35,7 @@ def test_hindmarsh_rose_is_quasi_static_up_to_the_fold(hindmarsh_rose, r):
     starts = [t for t in lay.transitions if t.to_branch == "oscillating"][1:]
     assert len(starts) >= 2
     for start in starts:
-        assert (start.kind, start.from_branch, start.special.code) == ("jump", "S1", "LP")
+        assert (start.type, start.from_branch, start.special.code) == ("jump", "S1", "LP")
         assert start.special["z"] == pytest.approx(FOLD_HR, abs=1e-12)
         # past the fold, which is passed with z falling
         assert start.delay > 0
@@ -46,12 +46,12 @@ def test_hindmarsh_rose_is_quasi_static_up_to_the_fold(hindmarsh_rose, r):
 def test_hindmarsh_rose_spikes(hindmarsh_rose, r, spikes):
     """Counted again as the upward passages of x = 1, one for each spike."""
     lay = hindmarsh_rose[r]
-    bursts = [p for p in lay.phases if p.kind == "oscillating"][1:-1]
+    bursts = [p for p in lay.phases if p.type == "oscillating"][1:-1]
     assert {p.attractor for p in bursts} == {"cycle"}
     for phase in bursts:
         section = lay.run.section("x", level=1.0, direction=1, since=phase.start, until=phase.end)
-        assert len(section.times) == phase.oscillations == spikes
-        on = (lay.time > phase.start) & (lay.time < phase.end)
+        assert len(section.t) == phase.oscillations == spikes
+        on = (lay.t > phase.start) & (lay.t < phase.end)
         assert np.all(lay.followed[on] == -1)
         assert np.isnan(lay.lag[on]).all()
 
@@ -62,12 +62,12 @@ def test_the_end_of_a_burst_is_no_bifurcation_of_equilibria(hindmarsh_rose):
     evidence = " ".join(lay.bursting.evidence)
     assert "a bifurcation of the cycle, not of equilibria" in evidence
     assert "passes a saddle within" in evidence
-    for phase in [p for p in lay.phases if p.kind == "oscillating"][1:-1]:
+    for phase in [p for p in lay.phases if p.type == "oscillating"][1:-1]:
         # towards a saddle the period grows, the amplitude does not
         assert np.all(np.diff(phase.intervals) > 0)
         assert phase.intervals[-1] > 1.5 * np.median(phase.intervals)
         assert min(phase.sizes) > 0.7 * max(phase.sizes)
-    ends = [t for t in lay.transitions if t.kind == "end of oscillation"]
+    ends = [t for t in lay.transitions if t.type == "end of oscillation"]
     assert all(t.special is None for t in ends)
     assert all(t.value > FOLD_HR + 0.2 for t in ends)
     assert all(t.land.time > t.time for t in ends)
@@ -155,7 +155,7 @@ def _from_curve(lay, rows):
     """Distance of samples from the branch in the space of the states and the load."""
     (branch,) = lay.diagram.branches
     unit = np.append(lay.extent, np.ptp(lay.slow))
-    curve = np.column_stack([branch.state, branch.parameter]) / unit
+    curve = np.column_stack([branch.state, branch.values]) / unit
     points = np.column_stack([lay.state, lay.slow])[rows] / unit
     found = np.full(len(points), np.inf)
     for start, chord in zip(curve[:-1], np.diff(curve, axis=0), strict=True):
@@ -169,13 +169,13 @@ def test_van_der_pol_under_a_slow_load():
     """Hopf points at w = ±1: entered late, left where the cycle shrinks to the focus."""
     lay = laid(fs.systems.van_der_pol(C=1.5, omega=0.005), "w", (-2, 2), [0.1, 0], periods=2)
     assert str(lay.bursting) == "symmetric Hopf/Hopf bursting"
-    leavings = [t for t in lay.transitions if t.kind == "Hopf"]
+    leavings = [t for t in lay.transitions if t.type == "Hopf"]
     assert len(leavings) == 4
     for t in leavings:
         assert t.delay > 0.5
         assert abs(t.special["w"]) == pytest.approx(1, abs=1e-12)
         assert t.value == pytest.approx(t.special["w"] * (1 - t.delay), abs=1e-12)
-    for t in (t for t in lay.transitions if t.kind == "end of oscillation"):
+    for t in (t for t in lay.transitions if t.type == "end of oscillation"):
         assert t.special.code == "HB"
         assert abs(abs(t.value) - 1) < 0.05
     # the branch is followed along its unstable part as well: there the lag has a meaning still
@@ -194,12 +194,12 @@ def test_fitzhugh_nagumo_passes_its_hopf_points_slowly():
     first, second = sorted(p["I"] for p in lay.diagram.special("HB"))
     v = -np.sqrt(1 - 0.064)
     assert first == pytest.approx((v + 0.7) / 0.8 - v + v**3 / 3, abs=1e-12)
-    leavings = [t for t in lay.transitions if t.kind == "Hopf"]
+    leavings = [t for t in lay.transitions if t.type == "Hopf"]
     assert {t.special["I"] for t in leavings} == {first, second}
     for t in leavings:
         assert t.special.criticality == "subcritical"
         assert 0.1 < t.delay < 0.2
-    ends = [t for t in lay.transitions if t.kind == "end of oscillation"]
+    ends = [t for t in lay.transitions if t.type == "end of oscillation"]
     assert all("not of equilibria" in t.note for t in ends)
     # two stable branches, one the image of the other
     assert lay.bursting.name == "symmetric subHopf/fold cycle (candidate) bursting"
@@ -212,11 +212,11 @@ def test_fitzhugh_nagumo_under_a_ramp():
     model = fs.Model(parts, forcing={i: sp.Rational(1, 4) + t / 5000})
     lay = laid(model, "I", (0.2, 0.7), [-1.03, -0.41], t=(0, 1500))
     (leaving, *_) = lay.transitions
-    assert leaving.kind == "Hopf"
+    assert leaving.type == "Hopf"
     assert leaving.special["I"] == pytest.approx(0.33128, abs=1e-5)
     assert leaving.slope == pytest.approx(1 / 5000, rel=1e-9)
     assert 0 < leaving.delay < 0.15
-    assert lay.phases[-1].kind == "oscillating"
+    assert lay.phases[-1].type == "oscillating"
     assert lay.transitions[-1].to_branch == "oscillating"
 
 
@@ -230,7 +230,7 @@ def test_relaxation_is_no_bursting():
         t=(0, 2000),
     )
     assert str(lay.bursting) == "relaxation oscillation (symmetric fold/fold)"
-    assert {p.kind for p in lay.phases} == {"quasi-static", "jump"}
+    assert {p.type for p in lay.phases} == {"quasi-static", "jump"}
     assert lay.summary().count("jump at LP") == len(lay.transitions)
 
 
@@ -240,12 +240,12 @@ def test_settling_by_oscillations_is_point_point_bursting():
     model = fs.Model({x: v, v: w + x - x**3 - v / 5}, forcing={w: sp.sin(t / 200)})
     lay = laid(model, "w", (-1.2, 1.2), [-1, 0.0], periods=2)
     assert str(lay.bursting) == "symmetric fold/fold bursting (point-point)"
-    settling = [p for p in lay.phases if p.kind == "oscillating"]
+    settling = [p for p in lay.phases if p.type == "oscillating"]
     assert {p.attractor for p in settling} == {"equilibrium"}
-    assert {t_.kind for t_ in lay.transitions} == {"jump"}
+    assert {t_.type for t_ in lay.transitions} == {"jump"}
     # what settles follows the branch that it settles on
     for phase in settling:
-        late = (lay.time > phase.start + 0.8 * phase.duration) & (lay.time < phase.end)
+        late = (lay.t > phase.start + 0.8 * phase.duration) & (lay.t < phase.end)
         assert {lay.stable_branches[k].label for k in lay.followed[late]} == set(
             phase.stable_branches
         )
@@ -263,6 +263,6 @@ def test_a_cycle_that_reaches_an_interface():
     lay = laid(model, "w", (-0.6, 1.6), [0.3, 0], periods=1)
     # the motion stays where it lands: one burst is no rhythm
     assert lay.bursting is None
-    end = next(t_ for t_ in lay.transitions if t_.kind == "end of oscillation")
+    end = next(t_ for t_ in lay.transitions if t_.type == "end of oscillation")
     assert end.value == pytest.approx(1.0, abs=0.02)
     assert "x - 1 is reached for the first time" in end.note

@@ -27,13 +27,13 @@ def lay(cusp, diagram):
 def covers(lay):
     """The phases follow each other from the start of the run to its end."""
     ends = [phase.end for phase in lay.phases]
-    assert [phase.start for phase in lay.phases] == [lay.time[0], *ends[:-1]]
-    assert ends[-1] == lay.time[-1]
+    assert [phase.start for phase in lay.phases] == [lay.t[0], *ends[:-1]]
+    assert ends[-1] == lay.t[-1]
 
 
 def test_phases_cover_the_run(lay):
     covers(lay)
-    assert [p.kind for p in lay.phases] == ["quasi-static", "jump"] * 4 + ["quasi-static"]
+    assert [p.type for p in lay.phases] == ["quasi-static", "jump"] * 4 + ["quasi-static"]
 
 
 def test_one_stable_sheet(gear):
@@ -55,7 +55,7 @@ def test_no_stable_sheet_on_a_cycle():
     assert np.all(lay.followed == -1)
     assert np.isinf(lay.distance).all()
     (phase,) = lay.phases
-    assert (phase.kind, phase.attractor) == ("oscillating", "cycle")
+    assert (phase.type, phase.attractor) == ("oscillating", "cycle")
     # the period of the cycle at μ = 1 is 6.663 for w = 0
     assert np.median(phase.intervals) == pytest.approx(6.66, rel=0.03)
     assert "the diagram has no stable branch" in lay.summary()
@@ -65,7 +65,7 @@ def test_no_stable_sheet_and_no_cycle():
     model = fs.Model({x: x - w}, forcing={w: sp.sin(t / 100) / 2})
     none = fs.continue_equilibria(model.frozen(), "w", over=(-0.6, 0.6))
     lay = fs.overlay(none, fs.simulate(model, [0.0], t=(0, 3)))
-    assert [p.kind for p in lay.phases] == ["transient"]
+    assert [p.type for p in lay.phases] == ["transient"]
 
 
 def test_a_run_that_leaves_the_range_of_the_diagram(cusp, lay):
@@ -80,13 +80,13 @@ def test_a_run_that_leaves_the_range_of_the_diagram(cusp, lay):
     assert np.isnan(cut.lag[outside]).all()
     # what lies inside is as it was
     assert [t_.time for t_ in cut.transitions] == pytest.approx([t_.time for t_ in lay.transitions])
-    assert [p.kind for p in cut.phases].count("outside") == 2
+    assert [p.type for p in cut.phases].count("outside") == 2
     covers(cut)
 
 
 def test_a_run_that_is_nowhere_in_the_diagram(cusp, lay):
     far = fs.overlay(fs.continue_equilibria(cusp.frozen(), "p", over=(3, 4)), lay.run)
-    assert [p.kind for p in far.phases] == ["outside"]
+    assert [p.type for p in far.phases] == ["outside"]
     assert far.transitions == ()
     assert np.all(far.followed == -1)
 
@@ -94,7 +94,7 @@ def test_a_run_that_is_nowhere_in_the_diagram(cusp, lay):
 def test_without_dense_output(cusp, diagram, lay):
     run = fs.simulate(cusp, [-1.0], periods=2, dense=False, samples=6000)
     light = fs.overlay(diagram, run)
-    assert [t_.kind for t_ in light.transitions] == ["jump"] * 4
+    assert [t_.type for t_ in light.transitions] == ["jump"] * 4
     for one, other in zip(light.transitions, lay.transitions, strict=True):
         assert one.time == pytest.approx(other.time, abs=1.1 * 6284 / 6000)
     covers(light)
@@ -122,9 +122,9 @@ def reversed_rows(b):
     last = len(b) - 1
     return fs.Branch(
         b.states,
-        b.parameter_name,
+        b.parameter,
         b.state[::-1],
-        b.parameter[::-1],
+        b.values[::-1],
         -b.tangent[::-1],
         b.eigenvalues[::-1],
         b.region[::-1],
@@ -137,11 +137,11 @@ def reversed_rows(b):
 def test_no_forcing_at_rest_and_on_the_way(cusp, diagram):
     still = cusp.with_parameters(a=0)
     rest = fs.overlay(diagram, fs.simulate(still, [-1.0], t=(0, 50)))
-    assert [p.kind for p in rest.phases] == ["quasi-static"]
+    assert [p.type for p in rest.phases] == ["quasi-static"]
     assert np.isnan(rest.lag).all()
     assert rest.turning == ()
     way = fs.overlay(diagram, fs.simulate(still, [-2.0], t=(0, 50)))
-    assert [p.kind for p in way.phases] == ["transient", "quasi-static"]
+    assert [p.type for p in way.phases] == ["transient", "quasi-static"]
     assert way.transitions == ()
     assert way.distance[-1] == pytest.approx(0, abs=1e-6)
 
@@ -158,7 +158,7 @@ def test_a_forcing_that_turns_at_the_fold(cusp, diagram, amplitude):
         assert lay.transitions == ()
     else:
         # the fold was passed, the jump takes place on the way back
-        assert [t_.kind for t_ in lay.transitions] == ["jump"] * 4
+        assert [t_.type for t_ in lay.transitions] == ["jump"] * 4
         for jump, turn in zip(lay.transitions, lay.turning, strict=True):
             assert jump.time > turn.time
             assert abs(jump.value) < amplitude
@@ -224,7 +224,7 @@ def test_a_run_that_grows_without_bound():
     assert not run.outcome
     lay = fs.overlay(fs.continue_equilibria(model.frozen(), "w", over=(-1.2, 1.2)), run)
     (leaving,) = lay.transitions
-    assert (leaving.kind, leaving.to_branch, leaving.land) == ("jump", "", None)
+    assert (leaving.type, leaving.to_branch, leaving.land) == ("jump", "", None)
     assert 0 < leaving.delay < 2.338 * (1 / 50) ** (2 / 3)
     assert np.isfinite(lay.lag[lay.slow < -0.1]).all()
     covers(lay)

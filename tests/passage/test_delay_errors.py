@@ -58,7 +58,7 @@ def test_feedback_is_a_part_of_the_cubic_term():
     assert law.coefficients[:2] == pytest.approx((OMEGA_0, 2 / 9), rel=1e-12)
     assert law.feedback == pytest.approx(-1e-4, rel=1e-12)
     assert (law.level, law.drift) == ("turn", drift)
-    assert law.time > law.delay / 1e-4
+    assert law.delay_time > law.delay / 1e-4
 
 
 def test_a_change_of_the_rate_moves_the_delay():

@@ -71,7 +71,7 @@ def test_tracking_lost_to_a_fast_drift_is_named():
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(-1, 6))
     lost = fs.overlay(diagram, fs.simulate(model, [1.0], t=(-20, 20)))
     (tipping,) = lost.transitions
-    assert tipping.kind == "rate-induced"
+    assert tipping.type == "rate-induced"
     assert tipping.special is None
     assert np.isnan(tipping.delay)
     assert tipping.leave.time <= tipping.time <= tipping.land.time
@@ -88,7 +88,7 @@ def test_a_blow_up_that_the_drift_causes_is_named():
     run = fs.simulate(model, [-1.0], t=(-10, 20))
     lay = fs.overlay(diagram, run)
     (tipping,) = lay.transitions
-    assert tipping.kind == "rate-induced"
+    assert tipping.type == "rate-induced"
     assert tipping.to_branch == ""
     assert not lay.outcome
     assert "the run ended early" in lay.summary()
@@ -103,7 +103,7 @@ def test_a_landing_that_overshoots_is_one_transition():
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(0.3, 2))
     start = diagram.at(w=1.0)[0].state
     lay = fs.overlay(diagram, fs.simulate(model, start, t=(0, 4000)))
-    assert [t_.kind for t_ in lay.transitions] == ["jump"] * 3
+    assert [t_.type for t_ in lay.transitions] == ["jump"] * 3
     assert {t_.to_branch for t_ in lay.transitions} == {"S1", "S2"}
 
 
@@ -125,10 +125,10 @@ def test_no_lag_is_given_in_a_jump_or_an_oscillation():
     diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
     lay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=2))
     for jump in lay.transitions("jump"):
-        inside = (lay.time > jump.leave.time) & (lay.time < jump.land.time)
+        inside = (lay.t > jump.leave.time) & (lay.t < jump.land.time)
         assert np.isnan(lay.lag[inside]).all()
     # to first order the lag is the relaxation time of the frozen state
-    known = np.isfinite(lay.lag) & (lay.relaxation < 1) & (lay.time > 10)
+    known = np.isfinite(lay.lag) & (lay.relaxation < 1) & (lay.t > 10)
     assert known.mean() > 0.6
     near = np.abs(lay.lag[known] / lay.relaxation[known] - 1) < 0.2
     assert near.mean() > 0.99

@@ -78,7 +78,7 @@ def test_the_quadratic_fold_is_the_airy_solution():
             s = airy_passage(level / eps ** (1 / 3))
             assert law.delay == pytest.approx(eps ** (2 / 3) * s, rel=1e-9)
             assert law.value == law.delay
-            assert law.time == pytest.approx(law.delay / eps, rel=1e-15)
+            assert law.delay_time == pytest.approx(law.delay / eps, rel=1e-15)
     free = fold_delay(fold, 1e-3)
     assert free.delay == free.leading == pytest.approx(OMEGA_0 * 1e-2, rel=1e-14)
     assert math.isnan(free.coefficients[2])

@@ -27,7 +27,7 @@ def turned(turning):
 @pytest.fixture(scope="module")
 def ramped(turning):
     """Entered at p = −1 with |z| = 0.001; the smallest amplitude is 4.5e-8."""
-    ramp = turning.with_ramp("p", EPS, start=-1.0)
+    ramp = turning.with_ramp("p", EPS, from_value=-1.0)
     return fs.simulate(
         ramp, [RADIUS, 0.0], t=(0, 2.6 / EPS), integration=fs.Integration(rtol=1e-16)
     )
@@ -135,7 +135,7 @@ def part_at(fast, diagram, law):
     start = rest.state - np.linalg.solve(slopes, np.linalg.solve(slopes, [1, 0])) * rate
     span = (0, (law.value - entry) / rate)
     times = np.linspace(*span, 20_001)
-    ramp = fast.with_ramp("I", rate, start=entry)
+    ramp = fast.with_ramp("I", rate, from_value=entry)
     push = np.array([1e-6, 0])
     one, other = (
         fs.simulate(ramp, start + s * push, t=span, integration=fs.Integration(rtol=1e-16))(times)
@@ -222,7 +222,7 @@ def test_runs_leave_at_the_buffer_point(moving):
     """From p = −2 and −2.5 they grow by the same factor from p = 1 on, not from 2 and 2.5."""
     grown = []
     for entry in (-2.0, -2.5):
-        ramp = moving.with_ramp("p", 0.05, start=entry)
+        ramp = moving.with_ramp("p", 0.05, from_value=entry)
         run = fs.simulate(
             ramp, [entry, 0.0], t=(0, (1.9 - entry) / 0.05), integration=fs.Integration(rtol=1e-15)
         )

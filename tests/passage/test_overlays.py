@@ -31,7 +31,7 @@ def test_the_gear_changes_sides_at_the_gap(lay):
         ("S1", "S3"),
         ("S3", "S1"),
     ] * 3
-    assert {t.kind for t in lay.transitions} == {"gap crossing"}
+    assert {t.type for t in lay.transitions} == {"gap crossing"}
     assert {t.special.code for t in lay.transitions} == {"BE"}
 
 
@@ -61,9 +61,7 @@ def test_distance_is_that_to_the_closed_form(lay, gear):
     """On S1, x solves (x² + A)(x − D) = w; rows in between are interpolated to six digits."""
     a = gear.parameters["A"]
     extent = lay.extent
-    on = [
-        k for k in range(0, len(lay.time), 40) if lay.stable_branches[lay.followed[k]].label == "S1"
-    ]
+    on = [k for k in range(0, len(lay.t), 40) if lay.stable_branches[lay.followed[k]].label == "S1"]
     on = [k for k in on if 0 < lay.slow[k] < 6]
     assert len(on) > 20
     for k in on:
@@ -71,7 +69,7 @@ def test_distance_is_that_to_the_closed_form(lay, gear):
         (x,) = roots[np.abs(roots.imag) < 1e-9].real
         expected = np.hypot(*((lay.state[k] - [x, 0]) / extent))
         assert lay.distance[k] == pytest.approx(expected, abs=1e-6)
-    assert lay.distance.shape == lay.time.shape == lay.followed.shape
+    assert lay.distance.shape == lay.t.shape == lay.followed.shape
 
 
 def test_summary_tells_the_story(lay):
@@ -85,7 +83,7 @@ def test_jumps_at_both_folds():
     model = fs.Model(**folded_gear_parts(), parameters={"A": -0.6, "D": 0.25, "omega": 0.001})
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(-0.4, 0.4))
     lay = fs.overlay(diagram, fs.simulate(model, [0.9, 0], periods=2))
-    assert {t.kind for t in lay.transitions} == {"jump"}
+    assert {t.type for t in lay.transitions} == {"jump"}
     assert len(lay.transitions) == 3
     for transition in lay.transitions:
         assert abs(transition.special["w"]) == pytest.approx(FOLD_W, abs=1e-14)
@@ -109,7 +107,7 @@ def test_a_van_der_pol_relaxation_with_a_slow_state():
     assert sorted(f["y"] for f in diagram.folds) == pytest.approx([-2 / 3, 2 / 3], abs=1e-14)
     lay = fs.overlay(diagram, fs.simulate(model, [2, 0], t=(0, 4000)))
     assert len(lay.transitions) >= 4
-    assert {t.kind for t in lay.transitions} == {"jump"}
+    assert {t.type for t in lay.transitions} == {"jump"}
     # x' = β + ξ² beside the fold, β drifting with ε: reached infinity at 2.338 ε^(2/3)
     delays = lay.delays
     assert np.ptp(delays) < 1e-6

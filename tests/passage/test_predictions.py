@@ -29,7 +29,7 @@ def gear():
 def test_the_gap_is_crossed_as_its_law_says(gear):
     """To 1e-4: the law has the load's rate and its change over the gap."""
     lay = laid(gear, "w", (-2, 6), [0, 0], periods=1)
-    transits = [t_ for t_ in lay.transitions if t_.kind == "gap crossing"]
+    transits = [t_ for t_ in lay.transitions if t_.type == "gap crossing"]
     assert len(transits) == 2
     for t_ in transits:
         assert t_.predicted == t_.law.width
@@ -44,7 +44,7 @@ def test_jumps_are_as_late_as_the_law_of_the_fold_says(gear):
     """Within 3 % at the very state at which the measured delay is taken."""
     folded = gear.with_parameters(A=-0.6, B=0, C=0.4, omega=0.001)
     lay = laid(folded, "w", (-1, 1), [0.9, 0], periods=2)
-    jumps = [t_ for t_ in lay.transitions if t_.kind == "jump"]
+    jumps = [t_ for t_ in lay.transitions if t_.type == "jump"]
     assert len(jumps) == 3
     for t_ in jumps:
         assert t_.delay == pytest.approx(t_.predicted, rel=0.03)
@@ -64,7 +64,7 @@ def test_jumps_are_as_late_as_the_law_of_the_fold_says(gear):
 def test_jumps_are_within_the_error_of_their_law(case, state, end):
     """With a slow state that is fed back, and a load that speeds up."""
     lay = laid(case.model, case.slow, case.over, state, t=(0, end))
-    jumps = [t_ for t_ in lay.transitions if t_.kind == "jump"]
+    jumps = [t_ for t_ in lay.transitions if t_.type == "jump"]
     assert jumps
     for jump in jumps:
         assert abs(jump.delay - jump.law.delay) <= jump.law.error + 1e-9
@@ -91,7 +91,7 @@ def test_what_has_not_settled_before_the_fold_is_in_the_error(start):
     """From 0.025 before a fold: the law cannot know the start, its error does."""
     model = fs.Model({x: p + x - x**3}, forcing={p: 0.36 + t / 100})
     lay = laid(model, "p", (-1, 1), [start], t=(0, 30))
-    (jump,) = [t_ for t_ in lay.transitions if t_.kind == "jump"]
+    (jump,) = [t_ for t_ in lay.transitions if t_.type == "jump"]
     assert abs(jump.delay - jump.law.delay) <= jump.law.error
     told = "the branch was reached so shortly before" in jump.law.validity
     # the law itself is right to 2 % where the start is near the branch
@@ -112,7 +112,7 @@ def test_a_slow_hopf_point_is_left_where_growth_makes_up_for_decay():
     rates = {x: p * x - 8 * y - x * (x**2 + y**2), y: 8 * x + p * y - y * (x**2 + y**2)}
     model = fs.Model(rates, forcing={p: t / 20 - 1})
     lay = laid(model, "p", (-2, 2), [0.3, 0], t=(0, 60))
-    (leave,) = [t_ for t_ in lay.transitions if t_.kind == "Hopf"]
+    (leave,) = [t_ for t_ in lay.transitions if t_.type == "Hopf"]
     # entry at p = -1, decay exp(-10): the same way beyond, less what the amplitude needs not grow
     assert leave.predicted == pytest.approx(1, abs=0.1)
     assert 0.6 < leave.delay < leave.predicted + 0.05
@@ -122,6 +122,6 @@ def test_without_a_model_there_is_no_law(gear, tmp_path):
     diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6))
     diagram.save(tmp_path / "gear.npz")
     lay = fs.overlay(fs.load(tmp_path / "gear.npz"), fs.simulate(gear, [0, 0], periods=1))
-    assert [t_.kind for t_ in lay.transitions] == ["gap crossing", "gap crossing"]
+    assert [t_.type for t_ in lay.transitions] == ["gap crossing", "gap crossing"]
     assert all(t_.law is None and np.isnan(t_.predicted) for t_ in lay.transitions)
     assert "law" not in lay.summary()

@@ -111,13 +111,13 @@ def test_a_load_that_turns_back_is_integrated_from_the_entry():
         return -0.5 * (slope + 0.05)
 
     start = (math.asin((law.entry - 1.2) / 0.9)) / 0.005
-    assert start < 314 < left.time - law.time
+    assert start < 314 < left.time - law.delay_time
     passed = brentq(lambda s: growth(s), 400, 800)
     decay, _ = quad(growth, start, passed, epsabs=1e-12, limit=200)
     assert law.decay == pytest.approx(-decay, rel=1e-6)
-    gone, _ = quad(growth, start, passed + law.time, epsabs=1e-12, limit=200)
+    gone, _ = quad(growth, start, passed + law.delay_time, epsabs=1e-12, limit=200)
     assert gone == pytest.approx(math.log(law.gain), abs=1e-4)
-    value = 1.2 + 0.9 * math.sin(0.005 * (passed + law.time))
+    value = 1.2 + 0.9 * math.sin(0.005 * (passed + law.delay_time))
     assert law.value == pytest.approx(value, abs=1e-6)
     # with constant drift from the turning point it is off by a third
     restarted = fs.predict_delay(
@@ -145,7 +145,7 @@ def test_beyond_the_run_the_forcing_goes_on():
     loose = fs.Integration(rtol=1e-5)
     diagram = fs.continue_equilibria(model.frozen(), name, over=over)
     lay = fs.overlay(diagram, fs.simulate(model, start, t=(0, 560), integration=loose))
-    (left, *_) = [q for q in lay.transitions if q.kind == "Hopf"]
+    (left, *_) = [q for q in lay.transitions if q.type == "Hopf"]
     assert left.law.forgotten
     assert "limited by the tolerance (rtol = 1e-05)" in left.law.validity
     assert math.isnan(left.law.error)

@@ -74,7 +74,7 @@ def test_runs_agree_with_the_independent_passages(folded):
         1e-4: (-0.094100921486102, -0.094657783243077),
     }
     for eps, loads in known.items():
-        ramp = fast.with_ramp("w", -eps, start=0.2)
+        ramp = fast.with_ramp("w", -eps, from_value=0.2)
         run = fs.simulate(
             ramp, [0.9427182380145632, 0], t=(0, 0.42 / eps), integration=fs.Integration(rtol=1e-13)
         )
@@ -130,10 +130,10 @@ def test_the_gap_of_the_gear(gear):
 
 
 def test_a_start_that_is_given(cusp, cusp_fold, cusp_scaling):
-    given = fs.delay_scaling(cusp, cusp_fold, [1e-5, 1e-6], level={"x": 0.5}, start=-0.5)
+    given = fs.delay_scaling(cusp, cusp_fold, [1e-5, 1e-6], level={"x": 0.5}, from_value=-0.5)
     assert given.delay == pytest.approx(cusp_scaling.delay[[0, 2]], rel=1e-8)
     with pytest.raises(fs.ArgumentError, match=r"start = 0.5; expected a value below p = 0.3849"):
-        fs.delay_scaling(cusp, cusp_fold, [1e-5, 1e-6], level={"x": 0.5}, start=0.5)
+        fs.delay_scaling(cusp, cusp_fold, [1e-5, 1e-6], level={"x": 0.5}, from_value=0.5)
 
 
 def test_a_sheet_that_is_too_short(corner):

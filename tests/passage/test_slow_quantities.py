@@ -40,7 +40,7 @@ def test_the_diagram_carries_its_path(polynomial):
 def test_the_parameter_is_found_from_the_forcing(polynomial, run):
     lay = fs.overlay(polynomial, run)
     assert lay.parameter == "g"
-    assert lay.slow == pytest.approx(np.cos(0.002 * lay.time), abs=1e-13)
+    assert lay.slow == pytest.approx(np.cos(0.002 * lay.t), abs=1e-13)
     assert lay.outcome
     for t_ in lay.transitions:
         assert t_.value == pytest.approx(np.cos(0.002 * t_.time), abs=1e-12)
@@ -60,8 +60,8 @@ def test_another_parameter_of_the_same_path_gives_the_same_jumps(two_forcings, p
     one = [t_.time for t_ in fs.overlay(polynomial, run).transitions]
     assert len(one) == 4
     assert [t_.time for t_ in lay.transitions] == pytest.approx(one, abs=0.01)
-    middle = (lay.time > 100) & (lay.time < 1400)
-    assert lay.slow[middle] == pytest.approx(0.002 * lay.time[middle], abs=1e-9)
+    middle = (lay.t > 100) & (lay.t < 1400)
+    assert lay.slow[middle] == pytest.approx(0.002 * lay.t[middle], abs=1e-9)
     assert lay.slow.min() == pytest.approx(0, abs=1e-4)
     # the nearest sample is up to half a step of the samples away
     assert lay.slow.max() == pytest.approx(np.pi, abs=5e-3)

@@ -61,7 +61,7 @@ def test_phases_are_cut_where_the_run_sticks_and_slips(kind):
     band[5:7] = 0
     phases = (Phase(0.0, 2.0, kind, ("S1",)), Phase(2.0, 5.5, kind, ("S2",)))
     found = with_sticking(phases, DIAGRAM, run, rests, band)
-    assert [(p.start, p.end, p.kind, p.stable_branches) for p in found] == [
+    assert [(p.start, p.end, p.type, p.stable_branches) for p in found] == [
         (0.0, 1.0, kind, ("S1",)),
         (1.0, 2.5, "sticking", ("band A",)),
         (2.5, 3.5, "quasi-static", ("edge of A",)),

@@ -23,8 +23,8 @@ def test_lag_of_a_linear_model():
     model = fs.Model({x: w - x}, forcing={w: t / 100})
     lay = laid(model, "w", (-1, 5), [-0.01], t=(0, 400), samples=200)
     assert lay.lag == pytest.approx(np.ones(200), abs=1e-6)
-    assert lay.relaxation == pytest.approx(np.ones(len(lay.time)), abs=1e-12)
-    assert lay.distance * lay.extent[0] == pytest.approx(np.full(len(lay.time), 0.01), abs=1e-8)
+    assert lay.relaxation == pytest.approx(np.ones(len(lay.t)), abs=1e-12)
+    assert lay.distance * lay.extent[0] == pytest.approx(np.full(len(lay.t), 0.01), abs=1e-8)
     assert lay.shares() == {"S1": pytest.approx(1.0)}
     assert "median lag 1" in lay.summary()
 
@@ -43,7 +43,7 @@ def steep():
 def test_a_steep_slope_is_no_bifurcation(steep):
     model, diagram = steep
     lay = fs.overlay(diagram, fs.simulate(model, [0.0], periods=2))
-    assert {t_.kind for t_ in lay.transitions} == {"steep"}
+    assert {t_.type for t_ in lay.transitions} == {"steep"}
     assert len(lay.transitions) == 3
     assert lay.bursting is None
     for t_ in lay.transitions:
@@ -62,7 +62,7 @@ def test_the_same_slope_taken_slowly_is_followed(steep):
     slow = model.with_parameters(omega=0.01)
     lay = fs.overlay(diagram, fs.simulate(slow, [0.0], periods=1))
     assert lay.transitions == ()
-    assert [p.kind for p in lay.phases] == ["quasi-static"]
+    assert [p.type for p in lay.phases] == ["quasi-static"]
 
 
 def test_the_gap_is_crossed_as_the_crossings_say(gear):
@@ -86,7 +86,7 @@ def test_the_gap_is_crossed_as_the_crossings_say(gear):
     assert "the diagram has no fold" in text
     assert "no bifurcation: duration 7.112 (predicted 7.112), Δw = 0.1813 (predicted" in text
     assert lay.bursting.name == "fast-slow oscillation across the gap, without bifurcation"
-    assert {q.kind for q in lay.phases} == {"transient", "quasi-static", "gap crossing"}
+    assert {q.type for q in lay.phases} == {"transient", "quasi-static", "gap crossing"}
 
 
 def test_a_gap_entered_and_left_on_the_same_side(gear):
@@ -95,13 +95,13 @@ def test_a_gap_entered_and_left_on_the_same_side(gear):
     lay = laid(light, "w", (-2, 2), [0.51, 0], periods=2)
     assert lay.run.regime == "unilateral upper"
     for t_ in lay.transitions:
-        assert (t_.kind, t_.from_branch, t_.to_branch) == ("excursion", "S1", "S1")
+        assert (t_.type, t_.from_branch, t_.to_branch) == ("excursion", "S1", "S1")
         assert t_.special.code == "BE"
         assert t_.note == "past the end of the branch and back"
         assert 0 < t_.delay < 0.1
         inside = lay.run(np.linspace(t_.leave.time, t_.time + 1, 9))[0]
         assert np.all(np.abs(inside) < 0.5)
-    assert [p.kind for p in lay.phases[:3]] == ["quasi-static", "excursion", "quasi-static"]
+    assert [p.type for p in lay.phases[:3]] == ["quasi-static", "excursion", "quasi-static"]
     assert lay.bursting is None
 
 
@@ -114,7 +114,7 @@ def test_negative_stiffness_jumps_late_at_its_folds(folded_gear):
         diagram = diagram or fs.continue_equilibria(model.frozen(), "w", over=(-0.5, 0.5))
         lay = fs.overlay(diagram, fs.simulate(model, [0.9, 0], periods=1))
         (jump,) = lay.transitions
-        assert jump.kind == "jump"
+        assert jump.type == "jump"
         assert abs(jump.special["w"]) == pytest.approx(0.0894402097712473, abs=1e-13)
         expected = 0.3 * speed * np.sqrt(1 - (0.0894402097712473 / 0.3) ** 2)
         assert jump.slope == pytest.approx(expected, rel=1e-6)
@@ -127,7 +127,7 @@ def test_a_persistent_boundary_equilibrium_is_passed_on():
     model = fs.Model({x: w - x - sp.Max(x, 0)}, forcing={w: sp.sin(t / 50)})
     # a little less than a period, whose end would be at w = 0 again
     lay = laid(model, "w", (-1.2, 1.2), [-0.02], periods=0.99)
-    assert [(t_.kind, t_.from_branch, t_.to_branch) for t_ in lay.transitions] == [
+    assert [(t_.type, t_.from_branch, t_.to_branch) for t_ in lay.transitions] == [
         ("crossing", "S2", "S1"),
         ("crossing", "S1", "S2"),
     ]
@@ -135,7 +135,7 @@ def test_a_persistent_boundary_equilibrium_is_passed_on():
         assert t_.time == crossing.time
         assert t_.delay == pytest.approx(abs(np.sin(crossing.time / 50)), abs=1e-12)
         assert 0 < t_.delay < 0.03
-    assert [p.kind for p in lay.phases] == ["quasi-static"]
+    assert [p.type for p in lay.phases] == ["quasi-static"]
     assert lay.phases[0].stable_branches == ("S2", "S1")
 
 
@@ -145,7 +145,7 @@ def test_a_non_smooth_fold():
     model = fs.Model({x: w + sp.Abs(x) - x**2 / 10}, forcing={w: law})
     lay = laid(model, "w", (-1.2, 1.2), [-0.3], periods=1)
     (jump,) = lay.transitions
-    assert (jump.kind, jump.special.subtype) == ("jump", "non-smooth fold")
+    assert (jump.type, jump.special.type) == ("jump", "non-smooth fold")
     assert 0 < jump.delay == pytest.approx(jump.value, abs=1e-12)
     assert jump.leave.time < jump.time < jump.land.time
 
@@ -156,13 +156,13 @@ def test_pseudo_equilibria_are_sheets():
     lay = laid(model, "w", (-3.2, 3.2), [0.5], periods=2)
     order = ["S1|S2", "S1", "S1|S2", "S2", "S1|S2", "S1", "S1|S2", "S2", "S1|S2"]
     assert [lay.transitions[0].from_branch, *(t_.to_branch for t_ in lay.transitions)] == order
-    assert {t_.kind for t_ in lay.transitions} == {"crossing"}
+    assert {t_.type for t_ in lay.transitions} == {"crossing"}
     off = [t_ for t_ in lay.transitions if t_.from_branch == "S1|S2"]
     assert all(t_.delay == 0.0 for t_ in off)
     sliding = lay.followed == next(
         k for k, s in enumerate(lay.stable_branches) if s.label == "S1|S2"
     )
-    assert np.abs(lay.state[sliding & (lay.time > 2)]).max() < 1e-12
+    assert np.abs(lay.state[sliding & (lay.t > 2)]).max() < 1e-12
 
 
 def test_a_pitchfork_is_left_late():
@@ -181,11 +181,11 @@ def test_a_short_unstable_stretch_is_followed_all_along():
     model = fs.Model(law, forcing={w: t / 20 - 2})
     lay = laid(model, "w", (-2.1, 2.1), [-2, 0.05], t=(0, 80))
     (passage,) = lay.transitions
-    assert (passage.kind, passage.special.code) == ("Hopf", "HB")
+    assert (passage.type, passage.special.code) == ("Hopf", "HB")
     assert "along its entire unstable part" in passage.note
     assert passage.special["w"] == pytest.approx(-1, abs=1e-9)
     assert passage.delay == pytest.approx(2, abs=1e-6)
-    assert [p.kind for p in lay.phases] == ["quasi-static"]
+    assert [p.type for p in lay.phases] == ["quasi-static"]
 
 
 def test_a_transition_is_where_two_thirds_of_the_way_are_done_even_after_landing():
@@ -193,7 +193,7 @@ def test_a_transition_is_where_two_thirds_of_the_way_are_done_even_after_landing
     gear = fs.systems.harmonic_gear(A=13.8889, B=2.372, C=3.5455, D=0.1, omega=0.01)
     diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6))
     lay = fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=1))
-    down, up = (t for t in lay.transitions if t.kind == "gap crossing")
+    down, up = (t for t in lay.transitions if t.type == "gap crossing")
     for width, corner in ((down, 0.1), (up, -0.1)):
         (new,) = diagram.at(w=width.value, stable=True)
         way = (width.state[0] - corner) / (new["x"] - corner)
@@ -224,7 +224,7 @@ def test_two_clearances_are_crossed_each_by_its_law():
         ("S3", "S1"),
     ]
     for t_ in lay.transitions:
-        assert t_.kind == "gap crossing"
+        assert t_.type == "gap crossing"
         half = 0.5 if "S1" in (t_.from_branch, t_.to_branch) else 0.25
         speed = 3 / 200 * np.sqrt(1 - (t_.special["w"] / 3) ** 2)
         assert t_.slope == pytest.approx(speed, rel=1e-6)

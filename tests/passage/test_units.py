@@ -25,7 +25,7 @@ def passage(system, units):
     span = (0, (high - low) / rate / time)
     run = fs.simulate(ramp, start.state, t=span, integration=fine)
     overlay = fs.overlay(diagram, run)
-    words = [(t.kind, t.from_branch, t.to_branch) for t in overlay.transitions]
+    words = [(t.type, t.from_branch, t.to_branch) for t in overlay.transitions]
     delays = [t.delay * factor for t in overlay.transitions if np.isfinite(t.delay)]
     delays += [t.law.delay * factor for t in overlay.transitions if t.law is not None]
     return (run.itinerary, words), [*delays, *overlay.shares().values()]
@@ -54,7 +54,7 @@ def test_a_state_that_is_constant_along_the_branch_has_its_extent_from_the_run()
     overlay = fs.overlay(diagram, fs.simulate(model, [1, 1.2], t=(0, 200)))
     assert min(overlay.extent) > 1
     (hopf,) = overlay.transitions
-    assert hopf.kind == "Hopf"
+    assert hopf.type == "Hopf"
     assert hopf.delay > 0
 
 

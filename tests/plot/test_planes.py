@@ -62,7 +62,7 @@ def test_curves_over_different_planes_are_refused(curves):
         fs.plot.parameter_plane(curves[0], curve)
     with pytest.raises(fs.FastSlowError, match="received none"):
         fs.plot.parameter_plane()
-    assert np.isfinite(curve.parameter).all()
+    assert np.isfinite(curve.values).all()
 
 
 def test_sub_and_supercritical_parts_of_a_hopf_curve_differ():

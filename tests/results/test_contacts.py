@@ -20,7 +20,7 @@ def regime(model, state, **keywords):
     many = fs.simulate_many(model, state, **keywords)
     assert many.regime[0] == (run.regime or "")
     if run.regime is not None:
-        kinds = run.regimes().kinds
+        kinds = run.regimes().types
         assert tuple(REGIMES[bits] for bits in many.touched[0]) == kinds
         shares = {name: share[0] for name, share in many.fractions.items()}
         assert shares == pytest.approx(run.regimes().fractions)
@@ -30,7 +30,7 @@ def regime(model, state, **keywords):
 def last(model, state, **keywords):
     """The regime of the last period of a trajectory."""
     regime(model, state, **keywords)
-    return fs.simulate(model, state, **keywords).regimes().kinds[-1]
+    return fs.simulate(model, state, **keywords).regimes().types[-1]
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ def folded(folded_gear):
 def test_columns(gear_diagram):
     (branch,) = gear_diagram.branches
     assert len(branch) == len(branch["x"]) == len(branch["w"]) == len(branch.stability)
-    assert np.array_equal(branch["w"], branch.parameter)
+    assert np.array_equal(branch["w"], branch.values)
     with pytest.raises(fs.UnknownNameError, match=r"unknown column 'y'.*known: x, v, w"):
         branch["y"]
 
@@ -39,7 +39,7 @@ def test_monotone_pieces(gear_diagram, folded):
     monotone_pieces = list(branch.monotone_pieces())
     assert [s.region for s in monotone_pieces] == ["S3", "S3", "S1", "S1"]
     for piece in monotone_pieces:
-        steps = np.diff(branch.parameter[piece.start : piece.stop])
+        steps = np.diff(branch.values[piece.start : piece.stop])
         assert np.all(steps > 0) or np.all(steps < 0)
 
 

@@ -150,7 +150,7 @@ def test_what_is_in_a_file(results, tmp_path):
     results["diagram"].save(tmp_path / "gear.nc")
     with h5netcdf.File(tmp_path / "gear.nc") as file:
         group = file["branches/0"]
-        assert np.array_equal(group["parameter"][...], results["diagram"][0].parameter)
+        assert np.array_equal(group["values"][...], results["diagram"][0].values)
         assert np.array_equal(
             group["eigenvalues_imag"][...], results["diagram"][0].eigenvalues.imag
         )

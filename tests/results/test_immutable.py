@@ -69,7 +69,7 @@ def parts(value, kept):
             except fs.ArgumentError:
                 # an ensemble without samples has no times
                 assert isinstance(value, fs.Ensemble)
-    for name in (*getattr(value, "states", ()), getattr(value, "parameter_name", "")):
+    for name in (*getattr(value, "states", ()), getattr(value, "parameter", "")):
         for asked in (name, f"{name}**2"):
             try:
                 yield f"[{asked!r}]", value[asked], False
@@ -230,11 +230,11 @@ def test_what_was_given_stays_with_who_gave_it():
     over = np.array([-1.0, 1.0])
     diagram = fs.continue_equilibria(model.frozen(), "w", over)
     given = (start, times, asked, states, rates, over)
-    kept = [np.array(x) for x in (run.t, run["x"], values, many.start, many.t, swept.values)]
+    kept = [np.array(x) for x in (run.t, run["x"], values, many.initial, many.t, swept.values)]
     for array in given:
         assert array.flags.writeable
         array[...] = 77.0
-    now = (run.t, run["x"], values, many.start, many.t, swept.values)
+    now = (run.t, run["x"], values, many.initial, many.t, swept.values)
     for before, after in zip(kept, now, strict=True):
         np.testing.assert_array_equal(before, after)
     assert np.array_equal(many.parameters["k"], [1.0, 2.0])

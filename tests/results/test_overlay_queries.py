@@ -52,7 +52,7 @@ def test_the_slow_quantity_is_passed_at_known_times(lay):
 
 def test_a_state_carries_the_stable_branch_followed(lay):
     (point,) = lay.at(t=100.0)
-    row = int(np.argmin(np.abs(lay.time - 100)))
+    row = int(np.argmin(np.abs(lay.t - 100)))
     stable_branch = lay.stable_branches[lay.followed[row]]
     assert (point.stable_branch, point.branch) == (
         stable_branch.label,
@@ -71,7 +71,7 @@ def test_a_moment_of_the_overlay_is_that_of_the_run(lay, part):
     when = part * lay.run.span[1]
     (point,) = lay.at(t=when)
     assert np.array_equal(point.state, lay.run(when))
-    row = np.searchsorted(lay.time, when, side="right") - 1
+    row = np.searchsorted(lay.t, when, side="right") - 1
     number = lay.followed[row]
     assert point.stable_branch == ("" if number < 0 else lay.stable_branches[number].label)
 
@@ -81,7 +81,7 @@ def test_samples_by_number(lay):
     assert len(points) == len(lay)
     assert [m.distance for m in points] == lay.distance.tolist()
     assert [m.value for m in points] == pytest.approx(lay.slow, abs=1e-15)
-    assert lay[-1].time == lay.time[-1]
+    assert lay[-1].time == lay.t[-1]
     with pytest.raises(fs.OutOfRangeError, match="no sample"):
         lay[len(lay)]
     with pytest.raises(fs.ArgumentError, match="an overlay is sliced with a step of 1"):
@@ -97,9 +97,9 @@ def test_slices_joined_are_the_whole(lay, data):
         assert np.array_equal(np.concatenate([p[name] for p in parts]), lay[name])
     for part in parts:
         assert len(part.run) == len(part)
-        assert part.phases[0].start >= part.time[0] if part.phases else len(part) == 1
+        assert part.phases[0].start >= part.t[0] if part.phases else len(part) == 1
     # what happens between the two samples is in neither
-    between = [q for q in lay.transitions if lay.time[middle - 1] < q.time < lay.time[middle]]
+    between = [q for q in lay.transitions if lay.t[middle - 1] < q.time < lay.t[middle]]
     assert sum(len(p.transitions) for p in parts) + len(between) == len(lay.transitions)
 
 
@@ -115,23 +115,23 @@ def test_selections_on_a_stable_branch(lay):
 
 
 def test_phases_of_a_kind(lay):
-    jumps = lay.select(kind="jump")
+    jumps = lay.select(type="jump")
     assert len(jumps) == len(lay.transitions("jump")) == 4
     for part, transition in zip(jumps, lay.transitions("jump"), strict=True):
         assert part.transitions == (transition,)
-        assert transition.leave.time <= part.time[0] < part.time[-1] <= transition.land.time
-        assert [phase.kind for phase in part.phases] == ["jump"]
+        assert transition.leave.time <= part.t[0] < part.t[-1] <= transition.land.time
+        assert [phase.type for phase in part.phases] == ["jump"]
         assert part.bursting is None
-    assert lay.select(kind="oscillating") == ()
+    assert lay.select(type="oscillating") == ()
 
 
 def test_one_sample(lay):
     one = lay[7:8]
     assert (len(one), one.phases, one.transitions) == (1, (), ())
-    assert one.select(kind="jump") == ()
+    assert one.select(type="jump") == ()
     assert one.select(stable_branch=lay[7].stable_branch) == (one,)
     assert (
-        one.at(t=lay.time[7])[0].stable_branch
+        one.at(t=lay.t[7])[0].stable_branch
         == one.nearest(x=3).stable_branch
         == lay[7].stable_branch
     )
@@ -139,18 +139,18 @@ def test_one_sample(lay):
 
 def test_between_times(lay):
     (part,) = lay.select(between=(1000, 2000), region="S1")
-    assert 1000 <= part.time[0] < part.time[-1] <= 2000
+    assert 1000 <= part.t[0] < part.t[-1] <= 2000
     for one, other in pairwise(part.phases):
         assert one.end == other.start
     assert lay.select(between=(1e6, 2e6)) == ()
 
 
 def test_a_part_is_kept_in_a_file(lay, tmp_path, same):
-    part = lay.select(kind="jump")[0]
+    part = lay.select(type="jump")[0]
     part.save(tmp_path / "part.npz")
     again = fs.load(tmp_path / "part.npz")
     assert same(again, part)
-    assert again.at(t=part.time[1])[0].stable_branch == part.at(t=part.time[1])[0].stable_branch
+    assert again.at(t=part.t[1])[0].stable_branch == part.at(t=part.t[1])[0].stable_branch
 
 
 def test_transitions_of_a_kind(lay):

@@ -58,7 +58,7 @@ def test_shares_and_summary(lay):
     time = np.linspace(0, 10, 11)
     made = replace(
         lay,
-        time=time,
+        t=time,
         slow=time / 10,
         stable_branches=stable_branches,
         followed=np.array([0] * 3 + [1] * 6 + [-1] * 2),
@@ -84,7 +84,7 @@ def test_expressions(lay):
     assert lay["x"] == pytest.approx(lay.state[:, 0], abs=0)
     expected = lay.state[:, 0] ** 2 + lay.state[:, 1] - 41.67 * lay.slow
     assert lay["x**2 + v - A*w"] == pytest.approx(expected, abs=1e-12)
-    assert lay["1"].shape == lay.time.shape
+    assert lay["1"].shape == lay.t.shape
     with pytest.raises(fs.UnknownNameError, match="unknown name in an expression 'y'"):
         lay["y"]
 

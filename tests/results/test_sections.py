@@ -51,10 +51,10 @@ def test_stroboscopic_points_of_a_linear_oscillator(meshed):
     late = 90 * meshed.period
     for phase in (0.0, 1.234):
         points = meshed.stroboscopic(phase=phase, since=late)
-        assert points.times == pytest.approx(
+        assert points.t == pytest.approx(
             phase + meshed.period * np.arange(90, 121 - (phase > 0)), abs=1e-9
         )
-        expected = response(points.times)
+        expected = response(points.t)
         assert np.abs(np.array([points["x"], points["v"]]) - expected).max() < 1e-12
         assert points["w"] == pytest.approx(np.full(len(points), points["w"][0]), abs=1e-12)
     every_second = meshed.stroboscopic(2 * meshed.period)
@@ -63,7 +63,7 @@ def test_stroboscopic_points_of_a_linear_oscillator(meshed):
 
 def test_section_of_the_van_der_pol_oscillator(cycle):
     up = cycle.section("x", level=0.0, direction=1)
-    assert np.diff(up.times)[5:] == pytest.approx(VAN_DER_POL, abs=1e-11)
+    assert np.diff(up.t)[5:] == pytest.approx(VAN_DER_POL, abs=1e-11)
     assert np.abs(up["x"]).max() < 1e-13
     event = solve_ivp(
         lambda t, u: [u[1], (1 - u[0] ** 2) * u[1] - u[0]],
@@ -75,10 +75,10 @@ def test_section_of_the_van_der_pol_oscillator(cycle):
         events=[lambda t, u: u[0], lambda t, u: u[1] - 0.5],
     )
     both = cycle.section("x")
-    assert both.times == pytest.approx(event.t_events[0], abs=1e-9)
+    assert both.t == pytest.approx(event.t_events[0], abs=1e-9)
     assert both["v"] == pytest.approx(event.y_events[0][:, 1], abs=1e-9)
     assert both.directions.tolist() == np.sign(both["v"]).tolist()
-    assert cycle.section("v", level=0.5).times == pytest.approx(event.t_events[1], abs=1e-9)
+    assert cycle.section("v", level=0.5).t == pytest.approx(event.t_events[1], abs=1e-9)
     assert len(up) + len(cycle.section("x", direction=-1)) == len(both)
 
 
@@ -98,7 +98,7 @@ def test_a_section_may_be_a_polynomial(cycle):
     assert len(circle)
     assert circle["x"] ** 2 + circle["v"] ** 2 / 4 - 1 == pytest.approx(2.0, abs=1e-12)
     minute = cycle.section("t/60 - 1")
-    assert minute.times == pytest.approx([60.0], abs=1e-12)
+    assert minute.t == pytest.approx([60.0], abs=1e-12)
 
 
 def test_a_section_on_an_interface_is_its_crossings(rattling):
@@ -106,11 +106,11 @@ def test_a_section_on_an_interface_is_its_crossings(rattling):
     lifted = rattling.section(interface="x - D", direction=-1, since=late)
     wanted = [c for c in rattling.crossings if c.direction < 0 and c.time >= late]
     assert len(lifted) == len(wanted) == 20
-    assert lifted.times.tolist() == [c.time for c in wanted]
+    assert lifted.t.tolist() == [c.time for c in wanted]
     assert set(lifted["x"]) == {1.0}
     # the same from the series, where steps end on the interface
     again = rattling.section("x - D", direction=-1, since=late)
-    assert again.times == pytest.approx(lifted.times, abs=1e-12)
+    assert again.t == pytest.approx(lifted.t, abs=1e-12)
     assert again["w"] == pytest.approx(lifted["w"], abs=1e-12)
 
 
@@ -122,8 +122,8 @@ def test_contacts_period_by_period(rattling):
     assert (contacts.per_period[:, 0] == 1).all()
     assert sum(contacts.time_fractions.values()) == pytest.approx(1.0, abs=1e-12)
     apart = rattling.section(interface="x - D", since=end - 10 * length)
-    first = apart.times[apart.directions < 0][:9]
-    last = apart.times[apart.directions > 0][-9:]
+    first = apart.t[apart.directions < 0][:9]
+    last = apart.t[apart.directions > 0][-9:]
     share = (last - first).mean() / length
     assert 0 < share < 1
     assert contacts.time_fractions["S2"] == pytest.approx(share, abs=1e-6)

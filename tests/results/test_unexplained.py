@@ -25,7 +25,7 @@ def test_a_branch_whose_folds_were_lost_says_where_its_stability_changes(cubic):
         assert change.rows == (row - 1, row + 1)
         assert (change.before, change.after) == numbers
         assert change.parameter == "p"
-        assert change.interval == pytest.approx(whole.parameter[[row - 1, row + 1]])
+        assert change.interval == pytest.approx(whole.values[[row - 1, row + 1]])
     assert str(one).startswith("branch 3: unstable eigenvalues change from 0 to 1 between p = 0.38")
 
 

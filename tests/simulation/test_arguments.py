@@ -44,10 +44,10 @@ def test_initial_state_by_unknown_name(gear):
         ({"t": (0, 0)}, "start < end"),
         ({"t": (0, math.inf)}, "finite times"),
         ({"t": 5}, r"expected a pair \(start, end\)"),
-        ({"t": (0, 1), "start": 2}, "start= goes with periods="),
+        ({"t": (0, 1), "t0": 2}, "t0= goes with periods="),
         ({"periods": 0}, "periods = 0; expected a positive number"),
         ({"periods": 1, "period": -1}, "period = -1; expected a positive"),
-        ({"periods": 1, "start": math.nan}, "start = nan"),
+        ({"periods": 1, "t0": math.nan}, "t0 = nan"),
         ({"t": (0, 1), "integration": 1e-9}, "integration: expected an Integration"),
         ({"t": (0, 1), "samples": 1}, "samples = 1"),
         ({"t": (0, 1), "samples": [0.5, 0.2]}, "increasing"),
@@ -122,7 +122,7 @@ def test_no_common_period():
     model = Model({x: w - x}, forcing={w: sp.sin(t) + sp.sin(sp.sqrt(2) * t)})
     with pytest.raises(ArgumentError, match=r"give t=\(start, end\), or the period as period="):
         simulate(model, [0], periods=2)
-    run = simulate(model, [0], periods=2, period=3.0, start=1.0)
+    run = simulate(model, [0], periods=2, period=3.0, t0=1.0)
     assert run.span == (1.0, 7.0)
 
 
@@ -138,7 +138,7 @@ def test_symbols_and_arrays_are_welcome(gear):
     assert np.array_equal(one.end, other.end)
 
 
-@pytest.mark.parametrize("span", [{"t": (1e17, 1e17 + 100)}, {"periods": 1, "start": 1e16}])
+@pytest.mark.parametrize("span", [{"t": (1e17, 1e17 + 100)}, {"periods": 1, "t0": 1e16}])
 def test_a_span_in_which_times_cannot_be_told_apart(span):
     x, v, t = sp.symbols("x v t")
     model = Model({x: v, v: sp.sin(t) - x})

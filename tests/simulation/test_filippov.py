@@ -40,7 +40,7 @@ def test_a_section_counts_sticking_once_where_it_begins(friction):
     follows = zip(run.segments[:-1], run.segments[1:], strict=True)
     passed = [s.start for before, s in follows if "|" not in before.region]
     section = run.section("v")
-    assert section.times == pytest.approx(passed, abs=1e-12)
+    assert section.t == pytest.approx(passed, abs=1e-12)
     assert np.abs(section["v"]).max() < 1e-12
 
 

@@ -218,7 +218,7 @@ def test_a_stiff_van_der_pol_oscillator():
     finer = simulate(model, [2, 0], t=(0, 9000), integration=Integration(rtol=1e-9))
     assert run.outcome
     assert finer.outcome
-    (jump,), (exact,) = (r.section("x", level=0.0, direction=-1).times for r in (run, finer))
+    (jump,), (exact,) = (r.section("x", level=0.0, direction=-1).t for r in (run, finer))
     # (3/2 − ln 2) mu from the first fold to the other one, and half of it more from x = 2
     assert exact == pytest.approx(8070, rel=2e-3)
     assert jump == pytest.approx(exact, rel=1e-6)

@@ -35,7 +35,7 @@ def test_what_is_left_implicit_is_counted_and_said():
     left = []
     for name, region in world().regions.items():
         for form in region.equilibria:
-            if form.kind == "implicit":
+            if form.type == "implicit":
                 left.append((name, {n for n, e in form.state.items() if e == 0}))
                 assert form.check == "exact"
                 assert form.note.startswith(OPEN)

@@ -198,7 +198,7 @@ def test_four_states():
     values = {"a": 1, "b": 2, "c": 1, "d": 0.5}
     form = region.equilibria[0]
     at = values | {"x1": 0.7}
-    load = evaluated(form.parameter, at)["w"]
+    load = evaluated(form.parameters, at)["w"]
     state = evaluated(form.state, at | {"w": load})
     matrix = numeric_jacobian(region, values | state)
     coefficients = [

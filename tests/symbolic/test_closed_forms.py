@@ -73,7 +73,7 @@ def test_closed_forms(name, sizes):
         for region in derivation.regions.values():
             rates = list(region.rates.values())
             for form in region.equilibria:
-                assert_zero(rates, full(values, form.parameter, form.state))
+                assert_zero(rates, full(values, form.parameters, form.state))
             for continuum in region.continua:
                 assert_zero(rates, full(values, continuum.parameters, continuum.state))
             for point in (*region.folds, *region.branch_points, *region.cusps, *region.hopf):

@@ -20,14 +20,14 @@ def number(expression, **values):
 
 def test_outer_curve_is_the_cubic_load():
     form = law("gear")["S1"].equilibria[0]
-    assert form.kind == "curve"
-    assert sp.expand(form.parameter["w"] - (x**2 + A) * (x - D)) == 0
+    assert form.type == "curve"
+    assert sp.expand(form.parameters["w"] - (x**2 + A) * (x - D)) == 0
     assert dict(form.state) == {"x": x, "v": 0}
     assert form.parameter_range == (w > 0)
     assert form.stability.verdict == "stable"
     assert form.verified
-    mirror = law("gear")["S3"].equilibria[0].parameter["w"]
-    assert sp.expand(mirror + form.parameter["w"].subs(x, -x)) == 0
+    mirror = law("gear")["S3"].equilibria[0].parameters["w"]
+    assert sp.expand(mirror + form.parameters["w"].subs(x, -x)) == 0
 
 
 @pytest.mark.parametrize("load", [0.1, 1.0, 5.0])
@@ -35,7 +35,7 @@ def test_curve_agrees_with_numerical_roots(load):
     # (x² + A)(x − D) = w, solved by numpy's companion matrix: 13 digits
     found = np.roots([1, -0.25, 41.67, -41.67 * 0.25 - load])
     (root,) = found[np.abs(found.imag) < 1e-9].real
-    curve = law("gear")["S1"].equilibria[0].parameter["w"]
+    curve = law("gear")["S1"].equilibria[0].parameters["w"]
     assert number(curve, A=41.67, D=0.25, x=root) == pytest.approx(load, rel=1e-13, abs=1e-13)
 
 
@@ -168,5 +168,5 @@ def test_past_the_budget_the_form_is_implicit_and_says_so():
         parameters={"a": 2},
     )
     (form,) = derive(long)["S1"].equilibria
-    assert form.kind == "implicit"
+    assert form.type == "implicit"
     assert "past the budget" in form.note

@@ -159,7 +159,7 @@ def test_the_frozen_quantity_is_solved_for_first():
     speed = law("wheelset")["S2"].hopf[0].parameters["V"]
     assert sp.simplify(speed**2 - ky * r0 / conicity) == 0
     for form in law("toggle_switch")["S1"].equilibria:
-        assert list(form.parameter) == ["I"]
+        assert list(form.parameters) == ["I"]
         assert form.verified
 
 
@@ -169,7 +169,7 @@ def test_another_parameter_on_request():
     expected = real("V") ** 2 * real("lambda") / real("r_0")
     assert sp.simplify(point.parameters["k_y"] - expected) == 0
     form = fs.derive(model("toggle_switch"), parameter=sp.Symbol("alpha_1"))["S1"].equilibria[0]
-    assert list(form.parameter) == ["alpha_1"]
+    assert list(form.parameters) == ["alpha_1"]
     with pytest.raises(UnknownNameError, match="did you mean 'alpha_1'"):
         fs.derive(model("toggle_switch"), parameter="alpha1")
 

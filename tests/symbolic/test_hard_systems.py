@@ -43,7 +43,7 @@ def test_a_special_point_found_by_dividing_by_zero_is_left_out():
 
 def test_implicit_forms_say_so():
     region = law("quadratic")["S1"]
-    assert [e.kind for e in region.equilibria] == ["implicit"]
+    assert [e.type for e in region.equilibria] == ["implicit"]
     assert any("equations remain" in note for note in region.notes)
 
 
@@ -57,7 +57,7 @@ def test_conditions_past_the_budget_say_so():
 def test_gates_are_divided_by_their_rates():
     # steady gates alpha/(alpha + beta) and the steady current, written out by hand in mpmath
     (form,) = law("hodgkin_huxley")["S1"].equilibria
-    assert form.kind == "curve"
+    assert form.type == "curve"
     values = {real("g_Na"): 120, real("g_K"): 36, real("g_L"): sp.Rational(3, 10)}
     for volts in (-65, -52, 7):
         v, one = mpmath.mpf(volts), mpmath.mpf(1)
@@ -69,7 +69,7 @@ def test_gates_are_divided_by_their_rates():
         h = up_h / (up_h + down_h)
         ionic = 120 * m**3 * h * (v - 50) + 36 * n**4 * (v + 77) + mpmath.mpf(3) / 10 * (v + 54)
         place = {**values, real("v"): volts}
-        assert float(form.parameter["I"].subs(place)) == pytest.approx(float(ionic), rel=1e-13)
+        assert float(form.parameters["I"].subs(place)) == pytest.approx(float(ionic), rel=1e-13)
         mine = [float(form.state[s].subs(place)) for s in "mhn"]
         assert mine == pytest.approx([float(m), float(h), float(n)], rel=1e-13)
 
@@ -86,7 +86,7 @@ def test_sign_of_a_gate_rate():
 def test_dense_linear_system_against_numpy():
     values = {real(n): v for n, v in dense_linear().parameters.items()} | {real("w"): 0.5}
     (form,) = law("dense_linear")["S1"].equilibria
-    assert form.kind == "explicit"
+    assert form.type == "explicit"
     mine = [float(e.subs(values)) for e in form.state.values()]
     region = law("dense_linear")["S1"]
     matrix = np.array(region.jacobian.subs(values), dtype=float)

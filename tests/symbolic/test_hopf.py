@@ -85,7 +85,7 @@ def test_a_chain_of_ten_decays_is_stable_and_a_ring_of_ten_comes_back():
     assert region.no_hopf == "all eigenvalues are real"
     derivation = fs.derive(chain(w / (1 + xs[9] ** 4)))
     (ring,) = derivation["S1"].equilibria
-    assert ring.kind == "curve"
+    assert ring.type == "curve"
     assert ring.verified
     printed = repr(derivation)
     assert "long conditions" in printed

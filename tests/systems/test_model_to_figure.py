@@ -42,14 +42,14 @@ def test_a_piecewise_linear_gear_pair():
     assert list(law) == ["S1", "S2", "S3"]
     corners = diagram.boundary_equilibria
     assert sorted(p["x"] for p in corners) == pytest.approx([-1, 1], abs=1e-12)
-    assert [p.subtype for p in corners] == ["degenerate", "degenerate"]
+    assert [p.type for p in corners] == ["degenerate", "degenerate"]
     (point,) = diagram.at(w=0.3)
     assert point["x"] == pytest.approx(1.3, abs=1e-12)
     assert np.sort_complex(point.eigenvalues) == pytest.approx(
         [-0.5 - 1j * math.sqrt(0.75), -0.5 + 1j * math.sqrt(0.75)], abs=1e-10
     )
     assert run.regime == "bilateral"
-    assert [t.kind for t in lay.transitions] == ["gap crossing"] * 4
+    assert [t.type for t in lay.transitions] == ["gap crossing"] * 4
     # far from the gap the trajectory lies on the branch, x = w + 1
     late = (run["w"] > 0.3) & (run.t > 100)
     assert np.abs(run["x"] - run["w"] - 1)[late].max() < 0.01
@@ -61,7 +61,7 @@ def test_a_model_with_a_slow_state():
     folds = sorted((p["y"], p["x"]) for p in diagram.folds)
     assert np.array(folds) == pytest.approx(np.array([[-2 / 3, 1], [2 / 3, -1]]), abs=1e-12)
     assert len(lay.transitions) >= 2
-    assert {t.kind for t in lay.transitions} == {"jump"}
+    assert {t.type for t in lay.transitions} == {"jump"}
     assert all(0 < t.delay < 0.2 for t in lay.transitions)
     # the period tends to (3 − 2 ln 2)/ε as ε → 0, from above
     times = [t.time for t in lay.transitions]
@@ -73,4 +73,4 @@ def test_a_model_with_one_state_and_a_fold():
     _, diagram, _, lay = whole_path(model, "p", (-1.2, 1.2), [-1.0], periods=2)
     edge = 2 / (3 * math.sqrt(3))
     assert sorted(p["p"] for p in diagram.folds) == pytest.approx([-edge, edge], abs=1e-13)
-    assert {t.kind for t in lay.transitions} == {"jump"}
+    assert {t.type for t in lay.transitions} == {"jump"}

@@ -526,7 +526,7 @@ def coefficients(system: DefiningSystem, found: Candidate) -> dict[str, Any]:
         other = float(others[0])
         listed = ("p11", "p12", "p21", "p22", "theta", "delta")
         form = _form(listed, double_hopf, field, region, u, (own, other), system.unit)
-        return {"frequency": other, "subtype": double_hopf_case(form["normal_form"]), **form}
+        return {"frequency": other, "type": double_hopf_case(form["normal_form"]), **form}
     if code == "BT":
         return _form(("a", "b"), bogdanov_takens, field, region, u, system.unit)
     turning = values[values.imag > 0]
@@ -536,7 +536,7 @@ def coefficients(system: DefiningSystem, found: Candidate) -> dict[str, Any]:
         return {"frequency": frequency}
     names = ("s", "theta", "E")
     form = _form(names, zero_hopf, field, region, u, frequency, system.unit)
-    return {"frequency": frequency, "subtype": zero_hopf_case(form["normal_form"]), **form}
+    return {"frequency": frequency, "type": zero_hopf_case(form["normal_form"]), **form}
 
 
 def _form(

@@ -146,7 +146,7 @@ class Starts:
             if (now := edges_left(self.window, branches)) != left:
                 left = now
                 yield from self._beside_edges(left)[1]
-            special = {p[b.parameter_name] for b in branches for p in b.special}
+            special = {p[b.parameter] for b in branches for p in b.special}
             levels = sorted({*self._over, *special})
             gap = 1e-6 * (self._over[1] - self._over[0])
             middles = {0.5 * (a + b) for a, b in pairwise(levels) if b - a > gap}
@@ -221,7 +221,7 @@ class Starts:
 def _upright(branch: Branch, value: float, near: float, scale: Array) -> bool:
     """Return whether a branch has a vertical segment at a parameter value."""
     step = np.abs(np.diff(branch.state, axis=0) / scale[:-1]).max(axis=1)
-    there = np.abs(branch.parameter - value) < near
+    there = np.abs(branch.values - value) < near
     return bool(np.any(there[1:] & there[:-1] & (step > 1e-6)))
 
 

@@ -232,14 +232,14 @@ def _boundary_equilibrium(field: FrozenField, curve: EquilibriumCurve, number: i
     clarke = None
     if sliding[0] != sliding[1]:
         active = after.region if sliding[0] else before.region
-        subtype = _filippov(field, active, interface, u)
+        type_ = _filippov(field, active, interface, u)
     else:
         active = before.region
         jacobians = np.array(
             [field.residual_and_jacobian(p.region, u)[1][:, : field.n] for p in (before, after)]
         )
         first, second = (_determinant_sign(j) for j in jacobians)
-        subtype = KINDS[first * second]
+        type_ = KINDS[first * second]
         clarke = None if sliding[0] else ClarkePath(names, jacobians)
     rates, _, h, _ = field.evaluate(active, u)
     return _special(
@@ -251,7 +251,7 @@ def _boundary_equilibrium(field: FrozenField, curve: EquilibriumCurve, number: i
         regions=names,
         residual=float(max(np.abs(rates).max(), abs(h[interface]))),
         interface=field.interfaces[interface],
-        subtype=subtype,
+        type=type_,
         clarke=clarke,
     )
 
@@ -304,7 +304,7 @@ def _with_ends(
         if interface is None:
             outcome = curve.outcomes[side]
             reason = None if outcome.success else outcome.code
-            point = _special(field, "EP", segment.region, u, tangent, note=note, subtype=reason)
+            point = _special(field, "EP", segment.region, u, tangent, note=note, type=reason)
             sides = field.modes[segment.region].sides
             if curve.outcomes[side].code == "two-fold" and sides is not None:
                 point = replace(point, residual=two_fold_residual(field, segment.region, u))
@@ -325,7 +325,7 @@ def _with_ends(
             tangent,
             regions=names,
             interface=field.interfaces[interface],
-            subtype=_filippov(field, segment.region, interface, u),
+            type=_filippov(field, segment.region, interface, u),
             note=note,
         )
         ends.append([point, _special(field, "EP", segment.region, u, tangent, note=note)])

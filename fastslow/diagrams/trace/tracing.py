@@ -482,7 +482,7 @@ def _contains_equilibrium(
     """Return whether a branch contains an equilibrium."""
     if branch.admissible != start.admissible:
         return False
-    rows = np.column_stack([branch.state, branch.parameter])
+    rows = np.column_stack([branch.state, branch.values])
     if not field.periods.any():
         return _contains(field, branch, rows, np.append(start.state, value), window)
     low, high = branch.state.min(axis=0), branch.state.max(axis=0)

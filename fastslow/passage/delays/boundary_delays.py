@@ -151,9 +151,9 @@ def boundary_delay(
     0.0497000894
     """
     require_code(point, "BE", "the delay at a boundary equilibrium")
-    if point.clarke is None or point.subtype not in ("persistence", "non-smooth fold"):
-        kind = "a degenerate one" if point.subtype == "degenerate" else "one of a Filippov field"
-        hint = "; see gap_crossing" if point.subtype == "degenerate" else ""
+    if point.clarke is None or point.type not in ("persistence", "non-smooth fold"):
+        kind = "a degenerate one" if point.type == "degenerate" else "one of a Filippov field"
+        hint = "; see gap_crossing" if point.type == "degenerate" else ""
         raise ArgumentError(
             f"expected a boundary equilibrium of a continuous field with persistence or a "
             f"non-smooth fold, received {point.label}, {kind}{hint}"
@@ -166,7 +166,7 @@ def boundary_delay(
     unstable = float(np.linalg.eigvals(jacobian).real.max())
     stop = Event(interface=way.interface)
     sense, delay, time, words, error = drift.way, drift.way * way.mu, way.time, "", math.nan
-    if point.subtype == "persistence":
+    if point.type == "persistence":
         words, error = _judged(local, drift, way, stop, delay, linear=local.affine(way.before))
         words = f"no delay but a lag, {words}"
         if unstable >= 0:
@@ -194,7 +194,7 @@ def boundary_delay(
         validity=words,
         error=error,
         drift=None if drift.constant else drift,
-        time=time,
+        delay_time=time,
         lag=sense * way.mu,
         stable=way.stable,
         unstable=unstable,
@@ -352,8 +352,8 @@ def gap_crossing(
     (0.001, 32.58)
     """
     require_code(point, "BE", "a gap crossing")
-    if point.clarke is None or point.subtype != "degenerate":
-        kind = point.subtype or "one of a Filippov field"
+    if point.clarke is None or point.type != "degenerate":
+        kind = point.type or "one of a Filippov field"
         raise ArgumentError(
             f"expected a degenerate boundary equilibrium of a continuous field, the end of a "
             f"continuum; received {point.label}, {kind}"
@@ -397,7 +397,7 @@ def gap_crossing(
         validity=words,
         error=error,
         drift=None if drift.constant else drift,
-        time=time,
+        delay_time=time,
         lag=drift.way * way.mu,
         length=length,
         slope=drifts,

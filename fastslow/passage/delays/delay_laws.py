@@ -109,7 +109,7 @@ def predict_delay(
         )
     if law == "fold":
         return fold_delay(point, rate, level=level, parameter=parameter, model=model)
-    if law == "boundary" and point.subtype == "degenerate":
+    if law == "boundary" and point.type == "degenerate":
         return gap_crossing(point, rate, parameter=parameter, model=model)
     if law == "boundary":
         return boundary_delay(point, rate, level=level, parameter=parameter, model=model)

@@ -211,7 +211,7 @@ def fold_delay(
         validity=words + more,
         error=error,
         drift=None if drift.constant else drift,
-        time=time if not drift.constant else math.nan,
+        delay_time=time if not drift.constant else math.nan,
         quadratic=form.a,
         slope=form.b,
         cubic=form.c,
@@ -334,7 +334,7 @@ def _done(run: Trajectory, local: LocalField, speed: LocalDrift, level: Level) -
         return _turned(run, speed)
     name, height = local.field.model.states[level[0]], float(local.u[level[0]])
     hits = run.section(name, level=height + level[1])
-    return float(hits.times[0]) if len(hits) else math.nan
+    return float(hits.t[0]) if len(hits) else math.nan
 
 
 def _turned(run: Trajectory, speed: LocalDrift) -> float:

@@ -106,7 +106,7 @@ class BranchSide:
     pieces: list[GrowthPiece] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        values = self.branch.parameter
+        values = self.branch.values
         step = self._direction(values)
         self.rows = [self.row]
         following = self.row + step
@@ -138,12 +138,12 @@ class BranchSide:
     @property
     def here(self) -> float:
         """Parameter at the special point."""
-        return float(self.branch.parameter[self.row])
+        return float(self.branch.values[self.row])
 
     @property
     def end(self) -> float:
         """Parameter at the end of the side."""
-        return float(self.branch.parameter[self.rows[-1]])
+        return float(self.branch.values[self.rows[-1]])
 
     @property
     def length(self) -> float:
@@ -272,7 +272,7 @@ class BranchSide:
         """Regions, equilibria and eigenvalues at values of the parameter."""
         branch, rows = self.branch, self._rows_below(values)
         regions, states = branch.region[rows], hermite(branch, rows, values)
-        low, high = branch.parameter[rows], branch.parameter[rows + 1]
+        low, high = branch.values[rows], branch.values[rows + 1]
         one, other = (np.sort_complex(branch.eigenvalues[rows + k]) for k in (0, 1))
         with np.errstate(invalid="ignore"):
             part = ((values - low) / (high - low))[:, None]

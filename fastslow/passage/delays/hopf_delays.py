@@ -90,7 +90,7 @@ def with_buffer(mode: CriticalMode, law: HopfExit) -> HopfExit:
     return replace(
         law,
         delay=abs(at - mode.behind.here),
-        time=abs(at - mode.behind.here) / speed,
+        delay_time=abs(at - mode.behind.here) / speed,
         error=math.nan,
         validity=buffer.words,
         buffer=at,

@@ -85,11 +85,11 @@ def _entry(p: Passage, t: Transition, left: StableBranch) -> float:
     number = p.stable_branches.index(left)
     arc = next(c for c in p.m.arcs if number in c.stable_branches)
     on = np.isin(p.followed, arc.stable_branches)
-    away = np.flatnonzero(~on[: np.searchsorted(p.m.time, t.leave.time)])
+    away = np.flatnonzero(~on[: np.searchsorted(p.m.t, t.leave.time)])
     if not len(away):
-        return float(p.m.time[0])
-    first = min(int(away[-1]) + 1, len(p.m.time) - 1)
-    return float(p.m.time[first])
+        return float(p.m.t[0])
+    first = min(int(away[-1]) + 1, len(p.m.t) - 1)
+    return float(p.m.t[first])
 
 
 def _law(
@@ -117,7 +117,7 @@ def _law(
         delay=abs(found.exit - mode.point[name]),
         validity=words,
         error=error,
-        time=found.time - found.passed,
+        delay_time=found.time - found.passed,
         entry=found.entry,
         decay=found.decay,
         gain=found.gain,
@@ -139,7 +139,7 @@ def _constant(p: Passage) -> bool:
 
 
 def _rate(p: Passage, time: float) -> float:
-    begin, end = float(p.m.time[0]), float(p.m.time[-1])
+    begin, end = float(p.m.t[0]), float(p.m.t[-1])
     step = 1e-5 * (end - begin)
     pair = np.clip([time - step, time + step], begin, end)
     first, second = p.slow.at(pair)[0]

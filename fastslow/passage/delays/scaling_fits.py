@@ -75,7 +75,7 @@ def _terms(law: Delay, eps: Array) -> tuple[Terms, float, float]:
         terms = {"eps^(1/2)": (np.sqrt(eps), first), "eps": (eps, law.relaxation)}
         return terms, 0.5, law.relaxation
     assert isinstance(law, BoundaryDelay)
-    if law.subtype == "persistence":
+    if law.type == "persistence":
         return {"eps": (eps, law.lag / abs(law.rate))}, 1.0, 0.0
     terms = {"eps ln(1/eps)": (-eps * log, 1.0 / law.unstable), "eps": (eps, math.nan)}
     return terms, math.nan, 0.0

@@ -59,7 +59,7 @@ REACH = 4.0
     model=instance(Model),
     point=instance(SpecialPoint),
     level=mapping,
-    start=finite,
+    from_value=finite,
     parameter=formula,
     integration=integration_settings,
     progress=flag,
@@ -70,7 +70,7 @@ def delay_scaling(
     rates: ArrayLike,
     *,
     level: Mapping[Any, float] | None = None,
-    start: float | None = None,
+    from_value: float | None = None,
     parameter: object = None,
     integration: Integration = PRECISE,
     progress: bool = False,
@@ -95,7 +95,7 @@ def delay_scaling(
         One state and its value that marks the end of a jump, e.g. ``{"x": 1}``, at a fold
         or a non-smooth fold. Persistence is measured at the interface, a gap crossing at
         the far interface.
-    start : float, optional
+    from_value : float, optional
         Value of the parameter at which every run starts.
     parameter : str or Symbol, optional
         The drifting parameter, by default that of the point's diagram.
@@ -113,7 +113,7 @@ def delay_scaling(
     ------
     ArgumentError
         For a point without a law of delay (see `predict_delay`), rates that are not positive
-        and distinct, a missing level, or a start that is not on the stable branch.
+        and distinct, a missing level, or a ``from_value`` that is not on the stable branch.
 
     Examples
     --------
@@ -135,7 +135,7 @@ def delay_scaling(
     laws = [first]
     laws += [_law(local, direction * e, level) for e in eps[1:]]
     ramp = local.field.model.with_ramp(name, direction * eps[0])
-    before = _starts(local, laws, start)
+    before = _starts(local, laws, from_value)
     delays, outcomes = [], []
     for law, (value, state) in zip(
         tqdm(laws, unit="rate", disable=not progress), before, strict=True
@@ -181,23 +181,27 @@ def _event(law: Law) -> str:
     """Description of the event that ends the delay."""
     if isinstance(law, GapCrossing):
         return f"{law.interfaces[1]} = 0"
-    if law.level is None or (isinstance(law, BoundaryDelay) and law.subtype == "persistence"):
+    if law.level is None or (isinstance(law, BoundaryDelay) and law.type == "persistence"):
         return f"{law.point.interface} = 0"
     assert isinstance(law.level, Mapping)
     ((state, value),) = law.level.items()
     return f"{state} = {value:g}"
 
 
-def _starts(local: LocalField, laws: list[Law], start: float | None) -> list[tuple[float, Array]]:
+def _starts(
+    local: LocalField, laws: list[Law], from_value: float | None
+) -> list[tuple[float, Array]]:
     """Parameter value and quasi-static state at the start of each run."""
     name, here = local.field.parameter, float(local.u[-1])
     way = 1.0 if laws[0].rate > 0 else -1.0
     far = [_distance(local, law) for law in laws]
-    if start is not None:
-        if not (way * (here - start) > 0):
+    if from_value is not None:
+        if not (way * (here - from_value) > 0):
             side = "below" if way > 0 else "above"
-            raise ArgumentError(f"start = {start:g}; expected a value {side} {name} = {here:g}")
-        far = [abs(here - start)] * len(laws)
+            raise ArgumentError(
+                f"from_value = {from_value:g}; expected a value {side} {name} = {here:g}"
+            )
+        far = [abs(here - from_value)] * len(laws)
     ends = sorted((here - 1.02 * way * max(far), here + 0.05 * way * max(far)))
     model = local.field.model
     diagram = continue_equilibria(model, name, (ends[0], ends[1]))
@@ -205,16 +209,16 @@ def _starts(local: LocalField, laws: list[Law], start: float | None) -> list[tup
     found = []
     for law, distance in zip(laws, far, strict=True):
         value = here - way * distance
-        low, high = sorted((float(branch.parameter[rows[0]]), float(branch.parameter[rows[-1]])))
+        low, high = sorted((float(branch.values[rows[0]]), float(branch.values[rows[-1]])))
         if not low <= value <= high:
             raise ArgumentError(
                 f"at rate {abs(law.rate):.3g} a run would start at {name} = {value:.6g}, but the "
                 f"stable branch before {local.point.label} extends from {low:.6g} to {high:.6g}; "
-                "give smaller rates, or start="
+                "give smaller rates, or from_value="
             )
         region = str(branch.region[rows[len(rows) // 2]])
-        order = np.argsort(branch.parameter[rows])
-        across, states = branch.parameter[rows][order], branch.state[rows][order]
+        order = np.argsort(branch.values[rows])
+        across, states = branch.values[rows][order], branch.state[rows][order]
         guess = np.array([np.interp(value, across, states[:, k]) for k in range(local.n)])
         corrected = _corrected(local, diagram, region, guess, value)
         _, slopes, _, _ = local.field.evaluate(local.region(region), np.append(corrected, value))
@@ -271,7 +275,7 @@ def _stable_rows(
 
 def _monotone(branch: Branch, row: int, step: int, way: float) -> NDArray[np.intp]:
     """Successive stable rows of one region, in the direction away from the point."""
-    rows, stable, values = [row], branch.stable, branch.parameter
+    rows, stable, values = [row], branch.stable, branch.values
     following = row + step
     while 0 <= following < len(values):
         back = way * (values[rows[-1]] - values[following]) > 0
@@ -301,7 +305,7 @@ def _measured(
             str(run.outcome) if not run.outcome else f"not reached by {name} = {run[name][-1]:.6g}."
         )
         return math.nan, Outcome("not reached", f"{_event(law)}: {reason}", False)
-    delay = speed * (float(times.times[0]) - ahead / speed)
+    delay = speed * (float(times.t[0]) - ahead / speed)
     return delay, Outcome("reached", f"{_event(law)} was reached.", True)
 
 
@@ -309,7 +313,7 @@ def _hits(run: Trajectory, law: Law, passed: float) -> Section:
     """Section of a run at the event that ends the delay."""
     if isinstance(law, GapCrossing):
         found = run.section(interface=law.interfaces[1])
-    elif law.level is None or (isinstance(law, BoundaryDelay) and law.subtype == "persistence"):
+    elif law.level is None or (isinstance(law, BoundaryDelay) and law.type == "persistence"):
         found = run.section(interface=law.point.interface)
     else:
         assert isinstance(law.level, Mapping)

@@ -46,7 +46,7 @@ def with_memory(
     if not isinstance(law, FoldDelay | BoundaryDelay | GapCrossing) or math.isnan(law.error):
         return law
     landed = [o.land.time for o in earlier if o.land is not None and o.land.time < passed]
-    start = max(landed, default=float(p.m.time[0]))
+    start = max(landed, default=float(p.m.t[0]))
     if start >= passed or _decay(p, t, start, passed) > SETTLED:
         return law
     drift = drift_at(p.slow, law.point, passed)
@@ -78,12 +78,12 @@ def _decay(p: Passage, t: Transition, start: float, stop: float) -> float:
     """∫ |Re λ| dt of the slowest eigenvalue along the old branch."""
     number = next(k for k, s in enumerate(p.stable_branches) if s.label == t.from_branch)
     arc = next(c for c in p.m.arcs if number in c.stable_branches)
-    first = np.searchsorted(p.m.time, start)
-    rows = slice(first, np.searchsorted(p.m.time, stop, side="right"))
+    first = np.searchsorted(p.m.t, start)
+    rows = slice(first, np.searchsorted(p.m.t, stop, side="right"))
     if rows.stop - first < 2:
         return 0.0
     rate = np.maximum(-arc.relaxation(p.m.slow[rows]), 0.0)
-    steps = np.diff(p.m.time[rows])
+    steps = np.diff(p.m.t[rows])
     return float((steps * (rate[1:] + rate[:-1]) / 2.0).sum())
 
 
@@ -92,6 +92,6 @@ def _event(local: LocalField, law: FoldDelay | BoundaryDelay | GapCrossing, drif
     interfaces = local.field.interfaces
     if isinstance(law, GapCrossing):
         return Event(interface=interfaces.index(law.interfaces[1]))
-    if isinstance(law, BoundaryDelay) and law.subtype == "persistence":
+    if isinstance(law, BoundaryDelay) and law.type == "persistence":
         return Event(interface=interfaces.index(str(law.point.interface)))
     return Event(level_of(local, law.level, drift))

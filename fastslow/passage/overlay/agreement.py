@@ -86,7 +86,7 @@ def _agrees(model: Model, branch: Branch, diagram: Diagram) -> bool | None:
     if not branch.admissible or not regular:
         return None
     rows = np.array(regular)[np.linspace(0, len(regular) - 1, ROWS).astype(int)]
-    value = branch.parameter[rows]
+    value = branch.values[rows]
     known = {**model.parameters, **diagram.parameters, diagram.parameter: value}
     along = {name: evaluated(law, known) for name, law in diagram.path.items()}
     known = {**known, **along, **{n: branch.state[rows, k] for k, n in enumerate(branch.states)}}

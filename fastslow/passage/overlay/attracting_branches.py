@@ -42,12 +42,12 @@ class Arc:
     def _rows(self) -> NDArray[np.intp]:
         """Rows in ascending order of the parameter; a joint has two rows."""
         rows = np.concatenate([np.arange(p.start, p.stop) for p in self.pieces])
-        values = self.branch.parameter
+        values = self.branch.values
         return rows if values[rows[-1]] >= values[rows[0]] else rows[::-1]
 
     @cached_property
     def _ordered(self) -> Array:
-        return self.branch.parameter[self._rows]
+        return self.branch.values[self._rows]
 
     @cached_property
     def _leading(self) -> Array:
@@ -172,7 +172,7 @@ def arcs_of(diagram: Diagram) -> tuple[tuple[StableBranch, ...], tuple[Arc, ...]
     arcs = []
     for branch, pieces, inside in members:
         ends = [
-            sorted(branch.parameter[[stable_branches[k].start, stable_branches[k].stop - 1]])
+            sorted(branch.values[[stable_branches[k].start, stable_branches[k].stop - 1]])
             for k in inside
         ]
         arcs.append(Arc(branch, tuple(pieces), tuple(inside), np.array(ends)))
@@ -184,10 +184,10 @@ def _monotone(branch: Branch) -> list[list[MonotonePiece]]:
     joined: list[list[MonotonePiece]] = []
     sense = 0.0
     for piece in branch.monotone_pieces():
-        values = branch.parameter[[piece.start, piece.stop - 1]]
+        values = branch.values[[piece.start, piece.stop - 1]]
         now = float(np.sign(values[1] - values[0]))
         touching = joined and joined[-1][-1].stop == piece.start
-        if touching and now == sense and branch.parameter[piece.start - 1] == values[0]:
+        if touching and now == sense and branch.values[piece.start - 1] == values[0]:
             joined[-1].append(piece)
         else:
             joined.append([piece])
@@ -198,7 +198,7 @@ def _monotone(branch: Branch) -> list[list[MonotonePiece]]:
 def ends_of(diagram: Diagram, stable_branch: StableBranch) -> list[SpecialPoint]:
     """Special points at which a stable branch ends."""
     branch = diagram.branches[stable_branch.branch]
-    low, high = sorted(branch.parameter[[stable_branch.start, stable_branch.stop - 1]])
+    low, high = sorted(branch.values[[stable_branch.start, stable_branch.stop - 1]])
     near = 1e-9 * max(abs(low), abs(high), high - low)
     return [
         point
@@ -214,6 +214,6 @@ def over_a_gap(diagram: Diagram, one: StableBranch, other: StableBranch) -> bool
     if one.branch != other.branch:
         return False
     first, second = sorted((one, other), key=lambda s: s.start)
-    values = diagram.branches[one.branch].parameter[first.stop - 1 : second.start + 1]
+    values = diagram.branches[one.branch].values[first.stop - 1 : second.start + 1]
     size = max(float(np.abs(diagram.over).max()), np.finfo(float).tiny)
     return len(values) > 2 and bool(np.ptp(values) <= 1e-9 * size)

@@ -57,7 +57,7 @@ def bursting_of(bursts: Sequence[Burst], transitions: Sequence[Transition]) -> B
     cycles = [b for b in bursts if b.end is not None]
     if cycles:
         return _on_cycles(cycles) if len(cycles) >= TWICE else None
-    between = [t for t in transitions if t.kind in DEPARTURES]
+    between = [t for t in transitions if t.type in DEPARTURES]
     between = [t for t in between if t.from_branch != t.to_branch and t.to_branch]
     if len({t.from_branch for t in between}) < 2:
         return None
@@ -68,7 +68,7 @@ def bursting_of(bursts: Sequence[Burst], transitions: Sequence[Transition]) -> B
     mirrored = _mirrored(specials[0], specials[1])
     symmetric = "symmetric " if mirrored else ""
     evidence = [f"{_at(t)}, from {t.from_branch} to {t.to_branch}" for t in between[-2:]]
-    gaps = all(t.kind == "gap crossing" for t in between)
+    gaps = all(t.type == "gap crossing" for t in between)
     if mirrored and not gaps:
         evidence.append("both points have the same eigenvalues and normal form: a symmetric pair")
     if gaps:
@@ -123,22 +123,22 @@ def _named(start: str, end: str) -> str:
 def _start(t: Transition) -> str:
     """Name of a departure in a class of bursting."""
     point = t.special
-    if t.kind == "gap crossing":
+    if t.type == "gap crossing":
         return "gap crossing"
     if point is None:
-        return "grazing" if t.kind == "grazing" else UNKNOWN
+        return "grazing" if t.type == "grazing" else UNKNOWN
     if point.code == "LP":
         return "fold"
     if point.code == "HB":
         return "subHopf" if point.criticality == "subcritical" else "Hopf"
     if point.code == "BP":
         return "branch point"
-    return UNKNOWN if t.kind == UNKNOWN else point.subtype or "boundary equilibrium"
+    return UNKNOWN if t.type == UNKNOWN else point.type or "boundary equilibrium"
 
 
 def _at(t: Transition) -> str:
     if t.special is None:
-        return f"{t.kind} at {t.value:.4g}"
+        return f"{t.type} at {t.value:.4g}"
     words = f"departure at {t.special.label}"
     return words + (f" with delay {t.delay:.3g}" if np.isfinite(t.delay) else "")
 

@@ -139,7 +139,7 @@ def slowly(p: Passage, e: Excursion) -> bool:
 def _first_reached(p: Passage, e: Excursion) -> Crossing | None:
     """Crossing in the last oscillation of an interface that no earlier oscillation reaches."""
     start, _ = e.rows(p.m)
-    crossings = [c for c in p.slow.run.crossings if p.m.time[start] <= c.time]
+    crossings = [c for c in p.slow.run.crossings if p.m.t[start] <= c.time]
     before = {c.interface for c in crossings if c.time < e.turns[-2]}
     # crossings after the last maximum belong to the last oscillation
     end = 2.0 * e.turns[-1] - e.turns[-2]
@@ -159,7 +159,7 @@ def _saddle(p: Passage, e: Excursion, value: float) -> float | None:
         return None
     since = e.turns[-2] if len(e.turns) > 1 else e.turns[-1]
     _, stop = e.rows(p.m)
-    rows = slice(int(np.searchsorted(p.m.time, since)), stop)
+    rows = slice(int(np.searchsorted(p.m.t, since)), stop)
     states, periods = p.m.scaled[rows], p.m.periods
     away = [np.linalg.norm(apart(states, s / p.m.extent, periods), axis=1).min() for s in saddles]
     return float(min(away))

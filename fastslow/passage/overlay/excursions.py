@@ -50,7 +50,7 @@ class Excursion:
         """First sample of the excursion, and the first after it."""
         return (
             0 if self.old is None else self.old.stop,
-            len(m.time) if self.new is None else self.new.start,
+            len(m.t) if self.new is None else self.new.start,
         )
 
 
@@ -66,7 +66,7 @@ class Oscillation:
         Whether it is a maximum.
     """
 
-    times: Array
+    t: Array
     sizes: Array
     upper: NDArray[np.bool_]
 
@@ -85,7 +85,7 @@ def oscillation_of(m: Measured, observed: int) -> Oscillation:
     first = values[: turns.rows[0] + 1]
     before = first.min() if turns.upper[0] else first.max()
     sizes = np.abs(np.diff(np.r_[before, values[turns.rows]]))
-    return Oscillation(refined(m.time, values, turns.rows), sizes, turns.upper)
+    return Oscillation(refined(m.t, values, turns.rows), sizes, turns.upper)
 
 
 def excursions_of(m: Measured, episodes: list[Episode], swing: Oscillation) -> list[Excursion]:
@@ -105,13 +105,13 @@ def _excursion(
     m: Measured, old: Episode | None, new: Episode | None, swing: Oscillation
 ) -> Excursion:
     start = 0 if old is None else old.stop
-    stop = len(m.time) if new is None else new.start
-    since, until = m.time[min(start, len(m.time) - 1)], m.time[min(stop, len(m.time) - 1)]
-    inside = (swing.times >= since) & (swing.times <= until)
+    stop = len(m.t) if new is None else new.start
+    since, until = m.t[min(start, len(m.t) - 1)], m.t[min(stop, len(m.t) - 1)]
+    inside = (swing.t >= since) & (swing.t <= until)
     upper, lower = inside & swing.upper, inside & ~swing.upper
     if new is not None and upper.sum() + lower.sum() >= 2:
         rows = slice(start, stop)
-        weight = np.diff(m.time[start : stop + 1])
+        weight = np.diff(m.t[start : stop + 1])
         there = float(weight @ m.present[rows, new.arc]) > 0.5 * float(weight.sum())
         sizes = swing.sizes[inside]
         settling = there and sizes[-1] < DECAYED * sizes.max()
@@ -123,7 +123,7 @@ def _excursion(
     return Excursion(
         old,
         new,
-        tuple(swing.times[counted].tolist()),
+        tuple(swing.t[counted].tolist()),
         tuple(swing.sizes[counted].tolist()),
         bool(oscillating and not settling),
     )
@@ -146,7 +146,7 @@ def phase_of(
         Kind of phase if it does not oscillate.
     """
     first, _ = e.rows(m)
-    if first < len(m.time) and not m.within[first]:
+    if first < len(m.t) and not m.within[first]:
         return Phase(start, end, "outside")
     if e.oscillating and (e.cycle or e.old is not None):
         return Phase(

@@ -158,7 +158,7 @@ def _modes(slow: SlowQuantity, arc: Arc) -> NDArray[np.complex128]:
         if name not in field.regions:
             continue
         on = rows[branch.region[rows] == name]
-        points = np.column_stack([branch.state[on], branch.parameter[on]])
+        points = np.column_stack([branch.state[on], branch.values[on]])
         jacobians = field.evaluate(field.regions.index(name), points)[1][:, :, : field.n]
         jacobians = jacobians[np.isfinite(jacobians).all(axis=(1, 2))]
         found.append(np.linalg.eig(jacobians)[1].astype(complex))

@@ -61,7 +61,7 @@ class Measured:
         Whether a state is the time derivative of another, up to a factor.
     """
 
-    time: Array
+    t: Array
     slow: Array
     scaled: Array
     extent: Array
@@ -231,7 +231,7 @@ def episodes_of(m: Measured) -> list[Episode]:
         arc = tied[0] if len(tied) == 1 else _nearest(m, first, tied)
         here = _left(m, arc, first, beside[arc])
         episodes.append(Episode(arc, first, here))
-        if here >= len(m.time):
+        if here >= len(m.t):
             return _landed(m, episodes)
 
 
@@ -256,7 +256,7 @@ def _relaxed(m: Measured, episode: Episode) -> float:
     """Duration of an episode in relaxation times of its arc."""
     rows = slice(episode.start, episode.stop)
     rate = -m.arcs[episode.arc].relaxation(m.slow[rows])
-    steps = np.minimum(0.5 * (rate[1:] + rate[:-1]) * np.diff(m.time[rows]), 1e12)
+    steps = np.minimum(0.5 * (rate[1:] + rate[:-1]) * np.diff(m.t[rows]), 1e12)
     return float(steps.sum())
 
 
@@ -269,7 +269,7 @@ def _settles(m: Measured, arc: int, start: int, stop: int) -> bool:
     """Whether a visit is long enough for an episode, in relaxation times."""
     if stop - start < 2:
         return False
-    if stop == len(m.time) and len(m.time) > 2:
+    if stop == len(m.t) and len(m.t) > 2:
         return True
     return _relaxed(m, Episode(arc, start, stop)) >= SETTLED
 

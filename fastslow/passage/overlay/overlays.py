@@ -111,7 +111,7 @@ def overlay(
     >>> model = fs.systems.cusp(omega=0.002)
     >>> diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
     >>> overlay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=2))
-    >>> [(t.kind, t.from_branch, t.to_branch) for t in overlay.transitions[:2]]
+    >>> [(t.type, t.from_branch, t.to_branch) for t in overlay.transitions[:2]]
     [('jump', 'S1.1', 'S1.2'), ('jump', 'S1.2', 'S1.1')]
     >>> print(overlay.bursting)
     relaxation oscillation (symmetric fold/fold)
@@ -136,13 +136,13 @@ def overlay(
         transitions += sorted(
             [*passages_within(p, episode), *steep_parts(p, episode)], key=lambda t: t.time
         )
-        start = phases[-1].end if phases else float(m.time[0])
+        start = phases[-1].end if phases else float(m.t[0])
         after = excursions.get(id(episode))
         before = len(transitions)
         nxt = None if after is None else _between(p, after, transitions, bursts, ends)
         numbers, rows = np.unique(p.followed[episode.start : episode.stop], return_index=True)
         labels = [stable_branches[k].label for k in numbers[np.argsort(rows)]]
-        end = float(m.time[-1]) if nxt is None else nxt.start
+        end = float(m.t[-1]) if nxt is None else nxt.start
         phases.append(Phase(start, end, "quasi-static", tuple(dict.fromkeys(labels))))
         if nxt is not None:
             phases.append(nxt)
@@ -157,7 +157,7 @@ def overlay(
     return Overlay(
         diagram,
         run,
-        m.time,
+        m.t,
         m.slow,
         np.column_stack([run[name] for name in diagram.states]),
         m.extent,
@@ -201,16 +201,16 @@ def _checked(diagram: Diagram, run: Trajectory, radius: float, observed: object)
 def _drift(m: Measured) -> Array:
     """Rate of the slow quantity, zero if it varies by rounding only."""
     # where a state grows without bound, samples may share their time
-    apart = np.r_[True, np.diff(m.time) > 0]
-    time, slow = m.time[apart], m.slow[apart]
+    apart = np.r_[True, np.diff(m.t) > 0]
+    time, slow = m.t[apart], m.slow[apart]
     if len(time) < 2 or np.ptp(slow) <= 1e-9 * float(np.abs(slow).max()):
-        return np.zeros(len(m.time))
-    return np.interp(m.time, time, np.gradient(slow, time))
+        return np.zeros(len(m.t))
+    return np.interp(m.t, time, np.gradient(slow, time))
 
 
 def _followed(m: Measured, episodes: list[Episode]) -> NDArray[np.intp]:
     """Stable branch followed at every sample, the last one past its end; −1 for none."""
-    followed = np.full(len(m.time), -1, dtype=np.intp)
+    followed = np.full(len(m.t), -1, dtype=np.intp)
     for episode in episodes:
         rows = slice(episode.start, episode.stop)
         arc, inside = m.arcs[episode.arc], m.present[rows, episode.arc]
@@ -227,7 +227,7 @@ def _between(
     ends: dict[tuple[str, str], FrozenEnd | None],
 ) -> Phase:
     """Return the phase of an excursion; append its transitions and bursts to the lists."""
-    time = p.m.time
+    time = p.m.t
     stable_branch = "" if e.new is None else p.stable_branches[p.followed[e.new.start]].label
     start, _ = e.rows(p.m)
     outside = start < len(time) and not p.m.within[start]
@@ -242,7 +242,7 @@ def _between(
     if e.new is not None:
         end = p.landed(e.new, begin).time
     away = "jump"
-    if first is not None and first.kind == "gap crossing":
+    if first is not None and first.type == "gap crossing":
         away = "gap crossing"
     elif first is not None and first.from_branch == first.to_branch:
         away = "excursion"
@@ -251,7 +251,7 @@ def _between(
     if e.cycle and e.new is not None and not outside:
         closing = cycle_end(p, e, ends)
         transitions.append(ending(p, e, closing))
-    complete = first is not None and e.new is not None and phase.kind == "oscillating"
+    complete = first is not None and e.new is not None and phase.type == "oscillating"
     if complete and slowly(p, e):
         assert first is not None
         bursts.append(Burst(phase, first, closing))
@@ -266,7 +266,7 @@ def _divide_jump(
         return
     start, stop = e.rows(p.m)
     rows = np.arange(start, stop)
-    old = p.m.time[rows] < found[-1].time
+    old = p.m.t[rows] < found[-1].time
     followed[rows] = np.where(old, p.followed[start - 1], p.followed[e.new.start])
 
 
@@ -277,10 +277,10 @@ def _elsewhere(t: Transition) -> Transition:
 
 def _jumping(p: Passage, phases: list[Phase]) -> NDArray[np.bool_]:
     """Samples outside all quasi-static phases, shape (N,)."""
-    away = np.zeros(len(p.m.time), dtype=bool)
+    away = np.zeros(len(p.m.t), dtype=bool)
     for phase in phases:
-        if phase.kind != "quasi-static":
-            away |= (p.m.time > phase.start) & (p.m.time < phase.end)
+        if phase.type != "quasi-static":
+            away |= (p.m.t > phase.start) & (p.m.t < phase.end)
     return away
 
 
@@ -294,11 +294,11 @@ def _distances(
     extremum), and after a jump until the state has relaxed, where the drift is not the cause.
     """
     m = p.m
-    apart = np.array([m.apart(k) for k in range(len(m.arcs))]).reshape(-1, len(m.time))
+    apart = np.array([m.apart(k) for k in range(len(m.arcs))]).reshape(-1, len(m.t))
     nearest = np.where(m.present.T, apart, np.inf)
     distance = nearest.min(axis=0, initial=np.inf)
-    lag, relaxation = np.full((2, len(m.time)), np.nan)
-    mean = float(np.abs(np.diff(m.slow)).sum()) / (float(m.time[-1] - m.time[0]) or 1.0)
+    lag, relaxation = np.full((2, len(m.t)), np.nan)
+    mean = float(np.abs(np.diff(m.slow)).sum()) / (float(m.t[-1] - m.t[0]) or 1.0)
     for number, arc in enumerate(m.arcs):
         on = np.flatnonzero(
             np.isin(np.arange(-1, len(p.stable_branches)), arc.stable_branches)[followed + 1]
@@ -317,10 +317,10 @@ def _distances(
             relaxation[on] = np.where(rate > 0, 1.0 / rate, np.nan)
         exists = (np.abs(p.drift[on]) > STILL * mean) & (np.sqrt(steep) * m.span > FLAT)
         exists &= (np.abs(behind) * rate < LONG) & ~away[on]
-        earlier = m.time[on] - np.where(exists, behind, 0.0)
+        earlier = m.t[on] - np.where(exists, behind, 0.0)
         step = p.drift[on] * np.where(exists, behind, 0.0)
-        inside = (earlier >= m.time[0]) & (earlier <= m.time[-1])
-        before = np.where(inside, np.interp(earlier, m.time, m.slow), slow - step)
+        inside = (earlier >= m.t[0]) & (earlier <= m.t[-1])
+        before = np.where(inside, np.interp(earlier, m.t, m.slow), slow - step)
         exists &= np.abs(before - slow + step) <= REST * np.abs(step)
         rest = moves * apart_of(rows_of(m.scaled, on), arc.state(before) / m.extent, m.periods)
         left, whole = (np.sqrt(products(v, v)) for v in (rest, deviation))
@@ -330,7 +330,7 @@ def _distances(
 
 
 def _turning(p: Passage) -> tuple[StatePoint, ...]:
-    slow, time = p.m.slow, p.m.time
+    slow, time = p.m.slow, p.m.t
     reach = float(np.ptp(slow))
     if len(slow) < 3 or reach <= 1e-9 * float(np.abs(slow).max()):
         return ()

@@ -32,7 +32,7 @@ def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
     for t in transitions:
         point = t.special
         exits = point is not None and point.code in ("HB", "BP") and t.from_branch != OSCILLATING
-        if not (t.kind in PREDICTABLE or exits) or point is None or not t.slope > 0:
+        if not (t.type in PREDICTABLE or exits) or point is None or not t.slope > 0:
             found.append(t)
             continue
         if exits:
@@ -41,9 +41,9 @@ def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
         passed = p.passing(point, t.time)
         drift = None if passed is None else drift_at(p.slow, point, passed, with_law=False)
         where: str | dict[str, float] | None = None
-        if t.kind == "jump":
+        if t.type == "jump":
             where = TURN if t.turned else _level(p, t)
-        key = (point.label, t.kind, _rounded(drift), _rounded(where))
+        key = (point.label, t.type, _rounded(drift), _rounded(where))
         if key not in known:
             known[key] = None if passed is None else _law(p, point, passed, where)
         law = known[key]

@@ -114,7 +114,7 @@ class Passage:
 
     def left(self, episode: Episode, rival: int | None) -> StatePoint:
         """State at the end of an episode."""
-        time, arc = self.m.time, self.m.arcs[episode.arc]
+        time, arc = self.m.t, self.m.arcs[episode.arc]
         if episode.stop >= len(time):
             return self.state_at(float(time[-1]))
         other = None if rival is None else self.m.arcs[rival]
@@ -135,7 +135,7 @@ class Passage:
 
     def landed(self, episode: Episode, not_before: float) -> StatePoint:
         """State at the beginning of an episode."""
-        time, arc = self.m.time, self.m.arcs[episode.arc]
+        time, arc = self.m.t, self.m.arcs[episode.arc]
 
         def near(slow: Array, state: Array) -> Array:
             beside = self.m.nearness(episode.arc, slow, state / self.m.extent)
@@ -155,7 +155,7 @@ class Passage:
 
     def passing(self, point: SpecialPoint, until: float) -> float | None:
         """Time of the last passage of a special point before the sample after a time."""
-        value, time = point[self.diagram.parameter], self.m.time
+        value, time = point[self.diagram.parameter], self.m.t
         stop = int(np.searchsorted(time, until, side="right"))
         passed = np.flatnonzero(np.diff(self.m.slow[:stop] > value))
         if not len(passed):
@@ -188,12 +188,12 @@ class Passage:
             way = way_done(state / unit, *places, self.m.periods)
             return np.where(other.present(slow), way - WAY, -1.0)
 
-        return self.state_at(self.first(float(self.m.time[row - 1]), float(self.m.time[row]), done))
+        return self.state_at(self.first(float(self.m.t[row - 1]), float(self.m.t[row]), done))
 
     def outward(self, stable_branch: StableBranch, point: SpecialPoint) -> float:
         """+1 for a special point at the upper end of a stable branch, −1 at the lower."""
         branch = self.diagram.branches[stable_branch.branch]
-        ends = branch.parameter[[stable_branch.start, stable_branch.stop - 1]]
+        ends = branch.values[[stable_branch.start, stable_branch.stop - 1]]
         return 1.0 if point[self.diagram.parameter] >= ends.mean() else -1.0
 
     def passed(self, stable_branch: StableBranch, rows: slice) -> SpecialPoint | None:
@@ -211,7 +211,7 @@ class Passage:
     ) -> StatePoint | None:
         """Extremum of the slow quantity past the end of a stable branch, if before a time."""
         where, outward = point[self.diagram.parameter], self.outward(stable_branch, point)
-        stop = int(np.searchsorted(self.m.time, until, side="right"))
+        stop = int(np.searchsorted(self.m.t, until, side="right"))
         past = outward * (self.m.slow[:stop] - where)
         within = np.flatnonzero(past <= 0.0)
         # after the last passage of the end, or after one that is reversed before landing
@@ -232,7 +232,7 @@ class Passage:
 
     def _turn(self, row: int, outward: float) -> float:
         """Time of the extremum of the slow quantity near the extreme sample."""
-        times = self.m.time[[row - 1, row, row + 1]]
+        times = self.m.t[[row - 1, row, row + 1]]
         value = self.slow.at(times)[0]
         for _ in range(CLOSER if self.slow.dense else 0):
             times = np.linspace(times[0], times[-1], 33)
@@ -249,7 +249,7 @@ class Passage:
 
     def slope(self, point: SpecialPoint | None, until: float) -> float:
         """|dw/dt| at the last passage of a special point before a time, else at that time."""
-        time = self.m.time
+        time = self.m.t
         passed = None if point is None else self.passing(point, until)
         until = until if passed is None else passed
         step = 1e-5 * float(time[-1] - time[0])
@@ -299,7 +299,7 @@ def passages_within(p: Passage, episode: Episode) -> list[Transition]:
         def entering(slow: Array, state: Array, low: float = low, high: float = high) -> Array:
             return np.minimum(slow - low, high - slow)
 
-        here = p.state_at(p.first(float(p.m.time[row - 1]), float(p.m.time[row]), entering))
+        here = p.state_at(p.first(float(p.m.t[row - 1]), float(p.m.t[row]), entering))
         kind, note = "crossing", ""
         if special is not None and special.code == "BE":
             crossing = _crossing(p, special, left, entered, here.time)
@@ -310,7 +310,7 @@ def passages_within(p: Passage, episode: Episode) -> list[Transition]:
             Transition(
                 here.time, here.value, here.state, left.label, entered.label, special,
                 p.delay(left, special, here.value), kind, here, here,
-                p.slope(special, float(p.m.time[row])), note=note,
+                p.slope(special, float(p.m.t[row])), note=note,
             )
         )  # fmt: skip
     return found
@@ -333,12 +333,12 @@ def steep_parts(p: Passage, episode: Episode) -> list[Transition]:
         inside = slice(episode.start + int(start), episode.start + int(stop) + 2)
         steepness = _steepness(p, arc, episode, inside)
         stable_branches = p.followed[inside]
-        time = p.m.time[inside]
+        time = p.m.t[inside]
         worst = inside.start + int(np.argmax(p.m.apart(episode.arc)[inside]))
         lags = steepness >= 0.5 * p.m.radius and _behind(p, episode.arc, worst)
         if not lags or np.ptp(stable_branches):
             continue
-        here = p.state_at(float(p.m.time[worst]))
+        here = p.state_at(float(p.m.t[worst]))
         label = p.stable_branches[stable_branches[0]].label
         found.append(
             Transition(
@@ -370,10 +370,10 @@ def _crossing(
     if not matching.any():
         return None
     nearest = float(times[matching][np.argmin(np.abs(times[matching] - time))])
-    if not p.m.time[0] <= nearest <= p.m.time[-1]:
+    if not p.m.t[0] <= nearest <= p.m.t[-1]:
         return None
     # a crossing of this passage precedes the reversal of the slow quantity
-    slow = p.m.slow[slice(*np.searchsorted(p.m.time, sorted((time, nearest))))]
+    slow = p.m.slow[slice(*np.searchsorted(p.m.t, sorted((time, nearest))))]
     turned = len(slow) > 2 and len(np.unique(np.sign(np.diff(slow)))) > 1
     return None if turned else nearest
 
@@ -387,7 +387,7 @@ def leaving(p: Passage, excursion: Excursion) -> Transition:
     last = old.start + int(np.flatnonzero(p.m.present[rows, old.arc])[-1])
     left = p.stable_branches[p.followed[old.stop - 1]]
     leave = p.left(old, None if new is None else new.arc)
-    stop = len(p.m.time) if new is None else new.start + 1
+    stop = len(p.m.t) if new is None else new.start + 1
     special = p.passed(left, slice(last, stop)) or _passed_before(p, left, old)
     land = None if new is None else p.landed(new, leave.time)
     entered = None if new is None else p.stable_branches[p.followed[new.start]]
@@ -484,7 +484,7 @@ def _kind(
     """Kind of a departure, and a note."""
     back = entered is not None and entered.label == left.label and not excursion.cycle
     if special is not None:
-        if special.code == "LP" or special.subtype == "non-smooth fold":
+        if special.code == "LP" or special.type == "non-smooth fold":
             return "jump", ""
         if special.code in ("HB", "BP"):
             return ("Hopf" if special.code == "HB" else "branch point"), ""
@@ -516,13 +516,13 @@ def _rate_induced(p: Passage, excursion: Excursion) -> bool:
     assert old is not None
     if excursion.cycle or (excursion.new is None and p.slow.run.outcome):
         return False
-    rows = slice(old.stop - 1, min(stop + 1, len(p.m.time)))
+    rows = slice(old.stop - 1, min(stop + 1, len(p.m.t)))
     return bool(p.m.present[rows, old.arc].all()) and _behind(p, old.arc, old.stop - 1)
 
 
 def _still_stable(p: Passage, excursion: Excursion) -> str:
     start, stop = excursion.rows(p.m)
-    rows = slice(max(start - 1, 0), min(stop + 1, len(p.m.time)))
+    rows = slice(max(start - 1, 0), min(stop + 1, len(p.m.t)))
     low, high = float(p.m.slow[rows].min()), float(p.m.slow[rows].max())
     return (
         f"the equilibrium remains stable from {p.diagram.parameter} = {low:.6g} to {high:.6g}, "
@@ -533,8 +533,8 @@ def _still_stable(p: Passage, excursion: Excursion) -> str:
 def _touch(p: Passage, excursion: Excursion) -> Crossing | None:
     """First tangency with an interface, from one fast oscillation before a departure on."""
     start, stop = excursion.rows(p.m)
-    since = p.m.time[max(start - (stop - start), 0)]
-    until = p.m.time[min(stop, len(p.m.time) - 1)]
+    since = p.m.t[max(start - (stop - start), 0)]
+    until = p.m.t[min(stop, len(p.m.t) - 1)]
     times, tangential = p.crossed[0], p.slow.run.crossing_table[:, 5] != 0.0
     found = np.flatnonzero((since <= times) & (times <= until) & tangential)
     return p.slow.run.crossings[int(found[0])] if len(found) else None

@@ -32,29 +32,31 @@ def draw_dots(ax: Any, places: Sequence[Array]) -> Line2D | None:
     return dots
 
 
-def draw_crossings(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> Line2D | None:
+def draw_crossings(ax: Any, overlay: Overlay, shown: Sequence[Quantity]) -> Line2D | None:
     """Draw the crossings of interfaces by the trajectory of an overlay."""
-    met = lay.run.crossings
+    met = overlay.run.crossings
     times, state = np.array([c.time for c in met]), np.array([c.state for c in met])
-    return draw_dots(ax, at_times(lay, times, lay.run.states, state, *shown)) if met else None
+    return (
+        draw_dots(ax, at_times(overlay, times, overlay.run.states, state, *shown)) if met else None
+    )
 
 
-def at_states(lay: Overlay, shown: Sequence[Quantity], states: Any) -> list[Array]:
+def at_states(overlay: Overlay, shown: Sequence[Quantity], states: Any) -> list[Array]:
     """Quantities at instants with known fast states and slow quantity."""
     state = np.array([[*s.state, s.value] for s in states])
-    names = (*lay.diagram.states, lay.parameter)
-    return at_times(lay, np.array([s.time for s in states]), names, state, *shown)
+    names = (*overlay.diagram.states, overlay.parameter)
+    return at_times(overlay, np.array([s.time for s in states]), names, state, *shown)
 
 
-def draw_transitions(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> tuple[Line2D, ...]:
+def draw_transitions(ax: Any, overlay: Overlay, shown: Sequence[Quantity]) -> tuple[Line2D, ...]:
     """Draw the transitions, each kind with its own marker."""
     drawn: list[Line2D] = []
     for kind, (marker, colour, text) in TRANSITIONS.items():
-        met = [t for t in lay.transitions if t.kind == kind]
+        met = [t for t in overlay.transitions if t.type == kind]
         if met:
             filled = marker in "*PX"
             drawn += ax.plot(
-                *at_states(lay, shown, met),
+                *at_states(overlay, shown, met),
                 linestyle="none",
                 marker=marker,
                 markersize=7.0 if marker == "*" else 5.5,
@@ -67,18 +69,18 @@ def draw_transitions(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> tuple[
     return tuple(drawn)
 
 
-def draw_turning(ax: Any, lay: Overlay, shown: Sequence[Quantity]) -> Line2D | None:
+def draw_turning(ax: Any, overlay: Overlay, shown: Sequence[Quantity]) -> Line2D | None:
     """Draw a bar at each turning point of the slow quantity."""
-    if not lay.turning:
+    if not overlay.turning:
         return None
     (line,) = ax.plot(
-        *at_states(lay, shown, lay.turning),
+        *at_states(overlay, shown, overlay.turning),
         linestyle="none",
         marker="|",
         markersize=9.0,
         markeredgewidth=1.4,
         color=MOTION,
         zorder=4.6,
-        label=f"turning point of {typeset(lay.parameter)}",
+        label=f"turning point of {typeset(overlay.parameter)}",
     )
     return line

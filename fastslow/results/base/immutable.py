@@ -54,7 +54,7 @@ def fixed(name: str, value: Any) -> Any:
     if kind is NamedMapping:
         kept = {k: v if type(v) in PLAIN else fixed(k, v) for k, v in value.items()}
         same = all(kept[key] is item for key, item in value.items())
-        return value if same else NamedMapping(value.kind, kept)
+        return value if same else NamedMapping(value.type, kept)
     if isinstance(value, Mapping):
         kept = {k: v if type(v) in PLAIN else fixed(str(k), v) for k, v in value.items()}
         return NamedMapping(name.replace("_", " ").removesuffix("s"), kept)

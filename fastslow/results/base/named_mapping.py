@@ -20,7 +20,7 @@ class NamedMapping(Mapping[str, V], Generic[V]):
 
     Parameters
     ----------
-    kind : str
+    type : str
         The kind of the entries, used in error messages.
     items : mapping or iterable of (name, value)
         The entries.
@@ -36,14 +36,14 @@ class NamedMapping(Mapping[str, V], Generic[V]):
     fastslow.errors.UnknownNameError: unknown parameter 'omga'; did you mean 'omega'? ...
     """
 
-    __slots__ = ("_items", "kind")
+    __slots__ = ("_items", "type")
 
-    kind: str
+    type: str
     _items: dict[str, V]
 
-    def __init__(self, kind: str, items: Mapping[str, V] | Iterable[tuple[str, V]] = ()) -> None:
+    def __init__(self, type: str, items: Mapping[str, V] | Iterable[tuple[str, V]] = ()) -> None:
         pairs = items.items() if isinstance(items, Mapping) else items
-        _set_kind(self, kind)
+        _set_type(self, type)
         _set_items(self, {normalised(str(key)): value for key, value in pairs})
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -56,13 +56,13 @@ class NamedMapping(Mapping[str, V], Generic[V]):
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return NamedMapping, (self.kind, self._items)
+        return NamedMapping, (self.type, self._items)
 
     def __getitem__(self, key: object) -> V:
         try:
             return self._items[normalised(str(key))]
         except KeyError:
-            raise unknown_name(self.kind, key, self._items) from None
+            raise unknown_name(self.type, key, self._items) from None
 
     def items(self) -> ItemsView[str, V]:
         """Return names and values in order."""
@@ -104,4 +104,4 @@ class NamedMapping(Mapping[str, V], Generic[V]):
 
 
 # the descriptors of the slots, which bypass __setattr__
-_set_kind, _set_items = (vars(NamedMapping)[name].__set__ for name in ("kind", "_items"))
+_set_type, _set_items = (vars(NamedMapping)[name].__set__ for name in ("type", "_items"))

@@ -66,11 +66,11 @@ class Branch(Table, Result):
     ----------
     states : tuple of str
         State names.
-    parameter_name : str
+    parameter : str
         The continuation parameter.
     state : ndarray, shape (N, n)
         The states of each row.
-    parameter : ndarray, shape (N,)
+    values : ndarray, shape (N,)
         Parameter values.
     tangent : ndarray, shape (N, n + 1)
         Unit tangents (states, parameter), in the direction of tracing.
@@ -113,9 +113,9 @@ class Branch(Table, Result):
     """
 
     states: tuple[str, ...]
-    parameter_name: str
+    parameter: str
     state: NDArray[np.float64]
-    parameter: NDArray[np.float64]
+    values: NDArray[np.float64]
     tangent: NDArray[np.float64]
     eigenvalues: NDArray[np.complex128]
     region: NDArray[np.str_]
@@ -152,7 +152,7 @@ class Branch(Table, Result):
         return unexplained_changes(self)
 
     def __len__(self) -> int:
-        return len(self.parameter)
+        return len(self.values)
 
     def __iter__(self) -> Iterator[Equilibrium]:
         return (stored(self, row, self.parameters) for row in range(len(self)))
@@ -180,8 +180,8 @@ class Branch(Table, Result):
         if isinstance(key, int | np.integer) and not isinstance(key, bool):
             return stored(self, position(key, len(self), "row"), self.parameters)
         columns = {n: self._state(k) for k, n in enumerate(self.states)}
-        columns[self.parameter_name] = lambda: self.parameter
-        return column(key, columns, self.parameters, len(self), by_value(self.parameter_name, key))
+        columns[self.parameter] = lambda: self.values
+        return column(key, columns, self.parameters, len(self), by_value(self.parameter, key))
 
     def _state(self, k: int) -> Callable[[], NDArray[np.float64]]:
         return lambda: self.state[:, k]
@@ -189,7 +189,7 @@ class Branch(Table, Result):
     @cached_property
     def monotone_runs(self) -> MonotoneRuns:
         """Ranges of rows with monotone parameter."""
-        return monotone_runs(self.parameter)
+        return monotone_runs(self.values)
 
     @cached_property
     def regions(self) -> tuple[str, ...]:
@@ -228,7 +228,7 @@ class Branch(Table, Result):
         ArgumentError
             If the value is outside the range of the branch.
         """
-        where = validate_value(self.parameter_name, self.range, "branch", value)
+        where = validate_value(self.parameter, self.range, "branch", value)
         found = passages(self, where, self.parameters, self.corrector)
         return filter_equilibria(found, stable, region, self.regions)
 
@@ -337,17 +337,17 @@ class Branch(Table, Result):
     @property
     def points(self) -> NDArray[np.float64]:
         """States and parameter, shape (N, n + 1)."""
-        return np.column_stack([self.state, self.parameter])
+        return np.column_stack([self.state, self.values])
 
     @property
     def point_names(self) -> tuple[str, ...]:
         """The names of the columns of `points`."""
-        return (*self.states, self.parameter_name)
+        return (*self.states, self.parameter)
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return parameter, states, region, stability, eigenvalues and labels of special points."""
         return {
-            self.parameter_name: self.parameter,
+            self.parameter: self.values,
             **{name: self.state[:, k] for k, name in enumerate(self.states)},
             "region": self.region,
             "stability": self.stability,
@@ -360,9 +360,9 @@ class Branch(Table, Result):
 
         Vertical segments, where the parameter is constant, are omitted.
         """
-        change = np.diff(self.parameter)
+        change = np.diff(self.values)
         step = np.sign(change)
-        span = max(float(np.ptp(self.parameter)), np.finfo(float).tiny)
+        span = max(float(np.ptp(self.values)), np.finfo(float).tiny)
         step[np.abs(change) <= 1e-13 * span] = 0
         step[self.region[1:] != self.region[:-1]] = 0
         edges = np.flatnonzero(step[1:] != step[:-1]) + 1
@@ -377,12 +377,12 @@ class Branch(Table, Result):
         low, high = self.range
         codes = "".join(f" {p.label}" for p in self.special)
         failed = [
-            f"{outcome.code} at {self.parameter_name} = {self.parameter[row]:.6g}"
+            f"{outcome.code} at {self.parameter} = {self.values[row]:.6g}"
             for outcome, row in zip(self.outcomes, (0, -1), strict=True)
             if not outcome.success
         ]
         return (
-            f"Branch({len(self)} points, {self.parameter_name} from {low:.6g} to {high:.6g}, "
+            f"Branch({len(self)} points, {self.parameter} from {low:.6g} to {high:.6g}, "
             f"regions {' → '.join(self.regions)}"
             + (f";{codes}" if codes else "")
             + "".join(f"; {words}" for words in dict.fromkeys(failed))

@@ -44,7 +44,7 @@ def cubics(branch: Branch, rows: NDArray[np.intp]) -> Cubics:
     They are cubic Hermite polynomials in the parameter if both end slopes are finite
     and bounded by the chord, and linear otherwise (near a fold dx/dp is unbounded).
     """
-    p0, p1 = branch.parameter[rows], branch.parameter[rows + 1]
+    p0, p1 = branch.values[rows], branch.values[rows + 1]
     x0, x1 = branch.state[rows], branch.state[rows + 1]
     width = p1 - p0
     chord = x1 - x0

@@ -108,7 +108,7 @@ def passages(
     branch: Branch, where: float, constants: Mapping[str, float], corrector: Corrector | None
 ) -> list[Equilibrium]:
     """Return the equilibria of a branch at a parameter value, in order along it."""
-    near = AT * float(np.abs(branch.parameter).max(initial=0.0))
+    near = AT * float(np.abs(branch.values).max(initial=0.0))
     level, passed = branch.monotone_runs.around(where, near)
     runs = [(begin, begin, end) for begin, end in level]
     if branch.closed and len(runs) > 1 and runs[0][1] == 0 and runs[-1][2] == len(branch) - 1:
@@ -146,7 +146,7 @@ def stored(
     return Equilibrium(
         branch.states,
         wrapped(branch, branch.state[row]),
-        {**constants, branch.parameter_name: float(branch.parameter[row])},
+        {**constants, branch.parameter: float(branch.values[row])},
         str(branch.region[row]),
         branch.admissible,
         branch.eigenvalues[row].copy(),
@@ -173,9 +173,9 @@ def between(
         solved = corrector(region, state, where)
         if solved is not None:
             return solved
-    low, high = branch.parameter[row], branch.parameter[row + 1]
+    low, high = branch.values[row], branch.values[row + 1]
     part = (where - low) / (high - low)
-    return read_off(branch, row, part, state, {**constants, branch.parameter_name: where})
+    return read_off(branch, row, part, state, {**constants, branch.parameter: where})
 
 
 def read_off(

@@ -31,7 +31,7 @@ def nearest_of(
     """Return the nearest point of several branches; see `Branch.nearest`."""
     if not branches:
         raise ArgumentError("this diagram has no branches")
-    valid = (*branches[0].states, branches[0].parameter_name)
+    valid = (*branches[0].states, branches[0].parameter)
     if not values:
         raise ArgumentError(f"expected values of some of {', '.join(valid)}, received none")
     for name, value in values.items():
@@ -82,9 +82,9 @@ def _point(
 ) -> Equilibrium:
     if part in (0.0, 1.0):
         return stored(branch, row + int(part), constants)
-    low, high = branch.parameter[row : row + 2]
+    low, high = branch.values[row : row + 2]
     where = float(low + part * (high - low))
     if min(low, high) < where < max(low, high):
         return between(branch, row, where, constants, corrector)
     state = (1 - part) * branch.state[row] + part * branch.state[row + 1]
-    return read_off(branch, row, part, state, {**constants, branch.parameter_name: where})
+    return read_off(branch, row, part, state, {**constants, branch.parameter: where})

@@ -45,7 +45,7 @@ class PointBranch(Table, Result):
         The code of each row: a curve of Hopf points continues as one of neutral
         saddles (NSD) beyond a Bogdanov-Takens point.
     state : ndarray, shape (N, n)
-    parameter : ndarray, shape (N, 2)
+    values : ndarray, shape (N, 2)
     tangent : ndarray, shape (N, n + 2)
         Unit tangents (states, parameters), in the direction of tracing.
     eigenvalues : ndarray of complex, shape (N, n)
@@ -78,7 +78,7 @@ class PointBranch(Table, Result):
     code: str
     codes: NDArray[np.str_]
     state: NDArray[np.float64]
-    parameter: NDArray[np.float64]
+    values: NDArray[np.float64]
     tangent: NDArray[np.float64]
     eigenvalues: NDArray[np.complex128]
     region: str
@@ -111,7 +111,7 @@ class PointBranch(Table, Result):
 
     def _column(self, k: int) -> NDArray[np.float64]:
         n = len(self.states)
-        return self.state[:, k] if k < n else self.parameter[:, k - n]
+        return self.state[:, k] if k < n else self.values[:, k - n]
 
     @property
     def criticality(self) -> NDArray[np.str_]:
@@ -124,7 +124,7 @@ class PointBranch(Table, Result):
     @property
     def points(self) -> NDArray[np.float64]:
         """States and parameters, shape (N, n + 2)."""
-        return np.column_stack([self.state, self.parameter])
+        return np.column_stack([self.state, self.values])
 
     @property
     def point_names(self) -> tuple[str, ...]:

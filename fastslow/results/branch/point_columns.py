@@ -19,7 +19,7 @@ def columns_of_points(points: Sequence[SpecialPoint]) -> dict[str, NDArray[Any]]
     columns: dict[str, NDArray[Any]] = {
         "label": np.array([p.label for p in points], dtype=str),
         "code": np.array([p.code for p in points], dtype=str),
-        "subtype": np.array([p.subtype or p.criticality or "" for p in points], dtype=str),
+        "type": np.array([p.type or p.criticality or "" for p in points], dtype=str),
         "interface": np.array([p.interface or "" for p in points], dtype=str),
         "regions": np.array(["|".join(p.regions) for p in points], dtype=str),
     }

@@ -24,8 +24,8 @@ BEYOND = 1e-9
 
 def points_at(curve: PointBranch, name: str, value: float) -> SpecialPoints:
     """Return the points of a curve at one value of a parameter; see `PointBranch.at`."""
-    column = curve.parameter[:, curve.parameter_names.index(name)] - value
-    extent = float(np.abs(curve.parameter[:, curve.parameter_names.index(name)]).max())
+    column = curve.values[:, curve.parameter_names.index(name)] - value
+    extent = float(np.abs(curve.values[:, curve.parameter_names.index(name)]).max())
     near = np.abs(column) <= AT * max(extent, abs(value))
     places = [float(row) for row in _rows(near, curve.closed)]
     places += _between(curve, column, name, near)

@@ -41,7 +41,7 @@ def rows_of(branch: Branch, wanted: slice) -> Branch:
     return replace(
         branch,
         state=branch.state[start:stop],
-        parameter=branch.parameter[start:stop],
+        values=branch.values[start:stop],
         tangent=branch.tangent[start:stop],
         eigenvalues=branch.eigenvalues[start:stop],
         region=branch.region[start:stop],
@@ -77,7 +77,7 @@ def parts_of(
         wanted &= branch.region == region
     if between is not None:
         low, high = limits_of(between)
-        wanted &= (branch.parameter >= low) & (branch.parameter <= high)
+        wanted &= (branch.values >= low) & (branch.values <= high)
     parts = (rows_of(branch, slice(start, stop)) for start, stop in runs_of(wanted))
     return tuple(part for part in parts if code is None or part.special(code))
 

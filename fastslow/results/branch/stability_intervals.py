@@ -32,14 +32,14 @@ def stable_rows(branch: Branch) -> list[tuple[int, int]]:
 
 def stable_intervals(branch: Branch) -> Array:
     """Compute the stable intervals of a branch; see `Branch.stable_intervals`."""
-    spans = [branch.parameter[first : last + 1] for first, last in stable_rows(branch)]
+    spans = [branch.values[first : last + 1] for first, last in stable_rows(branch)]
     return np.array([(s.min(), s.max()) for s in spans], dtype=float).reshape(-1, 2)
 
 
 def multistable(branches: Sequence[Branch], at_least: int) -> Array:
     """Return intervals with several stable equilibria; see `Diagram.bistable`."""
     ends = [
-        sorted((branch.parameter[first], branch.parameter[last]))
+        sorted((branch.values[first], branch.values[last]))
         for branch in branches
         if branch.admissible
         for run in stable_rows(branch)

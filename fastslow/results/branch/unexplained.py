@@ -94,8 +94,8 @@ def unexplained_changes(branch: Branch, number: int = 0) -> tuple[UnexplainedCha
         UnexplainedChange(
             number,
             (since, row),
-            branch.parameter_name,
-            (float(branch.parameter[since]), float(branch.parameter[row])),
+            branch.parameter,
+            (float(branch.values[since]), float(branch.values[row])),
             int(low[since]),
             int(low[row]),
         )

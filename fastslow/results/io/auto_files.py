@@ -124,7 +124,7 @@ def read_auto(
     text = f"read {count} of equilibria from {source.name}, a file of AUTO-07p"
     if reasons:
         text += f"; omitted: {', '.join(dict.fromkeys(reasons))}"
-    values = np.concatenate([b.parameter for b in branches])
+    values = np.concatenate([b.values for b in branches])
     return Diagram(
         branches[0].states,
         chosen,

@@ -161,7 +161,7 @@ def _mapping(value: Mapping[Any, Any], path: str, arrays: dict[str, Array]) -> A
             raise ArgumentError(f"{path} has the key {key!r}; files keep names only")
     entries = [[key, encoded(v, f"{path}/{_safe(key)}", arrays)] for key, v in value.items()]
     if isinstance(value, NamedMapping):
-        return {"named": value.kind, "entries": entries}
+        return {"named": value.type, "entries": entries}
     return {"mapping": entries}
 
 

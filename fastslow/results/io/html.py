@@ -63,7 +63,7 @@ def points_html(
     rows = [
         [
             p.label,
-            p.kind,
+            p.words,
             *(_number(p.parameters.get(n)) for n in varied),
             *(_number(p[n]) if n in p.states else "" for n in states),
             " | ".join(p.regions),
@@ -76,7 +76,7 @@ def points_html(
 
 def branch_html(branch: Branch) -> str:
     """Return the table of a branch with its special points."""
-    return _with_points([("", branch)], repr(branch).split(";")[0], branch.parameter_name)
+    return _with_points([("", branch)], repr(branch).split(";")[0], branch.parameter)
 
 
 def diagram_html(diagram: Diagram) -> str:
@@ -96,7 +96,7 @@ def _with_points(branches: Sequence[tuple[str, Branch]], title: str, name: str) 
     rows = []
     for number, branch in branches:
         for p in branch.special:
-            row = [p.label, p.kind, _number(p.parameters[name])]
+            row = [p.label, p.words, _number(p.parameters[name])]
             row += [_number(p[n]) for n in states]
             row += [" | ".join(p.regions), p.interface or ""]
             rows.append([number, *row] if number else row)

@@ -33,7 +33,7 @@ class Delay(Result, ABC):
         drift, in units of the parameter; nan if no bound is available.
     drift : Drift, optional
         Drift of the parameter, unless it is constant.
-    time : float
+    delay_time : float
         Time since the passage of the special point; by default ``delay`` / |``rate``|.
     """
 
@@ -44,12 +44,12 @@ class Delay(Result, ABC):
     validity: str
     error: float = math.nan
     drift: Drift | None = None
-    time: float = math.nan
+    delay_time: float = math.nan
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if math.isnan(self.time) and (self.drift is None or self.drift.constant):
-            object.__setattr__(self, "time", self.delay / abs(self.rate))
+        if math.isnan(self.delay_time) and (self.drift is None or self.drift.constant):
+            object.__setattr__(self, "delay_time", self.delay / abs(self.rate))
 
     @property
     def value(self) -> float:
@@ -71,7 +71,7 @@ class Delay(Result, ABC):
         return (
             f"{type(self).__name__}: {self.law}, {name} at {self.point.label} drifting by "
             f"{self.rate:.3g}\n  delay {self.delay:.6g}{self.bound}, to {name} = "
-            f"{self.value:.6g}, in t = {self.time:.6g}\n  {self.validity}"
+            f"{self.value:.6g}, in t = {self.delay_time:.6g}\n  {self.validity}"
         )
 
 
@@ -135,13 +135,13 @@ class BoundaryDelay(Delay):
     level: Mapping[str, float] | str | None = None
 
     @property
-    def subtype(self) -> str:
+    def type(self) -> str:
         """``"persistence"`` or ``"non-smooth fold"``."""
-        return str(self.point.subtype)
+        return str(self.point.type)
 
     @property
     def law(self) -> str:
-        if self.subtype == "persistence":
+        if self.type == "persistence":
             return "persistence, a lag of the order of the rate, no delay"
         return "non-smooth fold, of the order of rate ln(1/rate)"
 
@@ -190,7 +190,7 @@ class GapCrossing(Delay):
     @property
     def duration(self) -> float:
         """Time from the near to the far interface."""
-        return self.time - self.lag_time
+        return self.delay_time - self.lag_time
 
     @property
     def asymptotic(self) -> float:

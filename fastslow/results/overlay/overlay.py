@@ -81,7 +81,7 @@ class Overlay(Table, Result):
         All phases of the run, in order of time.
     transitions : Transitions
         Departures from a stable branch and ends of oscillations, in order of time;
-        ``overlay.transitions("jump")`` are those of one kind.
+        ``overlay.transitions("jump")`` are those of one type.
     bursting : Bursting or None
         Classification of the recurrent pattern; None if there is none.
     turning : tuple of StatePoint
@@ -95,7 +95,7 @@ class Overlay(Table, Result):
 
     diagram: Diagram
     run: Trajectory
-    time: NDArray[np.float64]
+    t: NDArray[np.float64]
     slow: NDArray[np.float64]
     state: NDArray[np.float64]
     extent: NDArray[np.float64]
@@ -116,7 +116,7 @@ class Overlay(Table, Result):
     _places = ("t",)
 
     def __len__(self) -> int:
-        return len(self.time)
+        return len(self.t)
 
     def __iter__(self) -> Iterator[StatePoint]:
         return chain.from_iterable(queries.measured(self, block) for block in in_blocks(self.run))
@@ -124,7 +124,7 @@ class Overlay(Table, Result):
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Columns: time t, slow quantity, states, distance, lag and stable branch followed."""
         return {
-            "t": self.time,
+            "t": self.t,
             self.parameter: self.slow,
             **{name: self.state[:, k] for k, name in enumerate(self.diagram.states)},
             "distance": self.distance,
@@ -150,7 +150,7 @@ class Overlay(Table, Result):
         names = np.array([band.name for band in self.diagram.bands])
         edges = np.array([band.edge for band in self.diagram.bands])
         regions = np.array([band.region for band in self.diagram.bands])
-        rests = regions_at(self.run, self.time) == regions[self.band]
+        rests = regions_at(self.run, self.t) == regions[self.band]
         kept = np.where(rests, names[self.band], edges[self.band])
         return np.where(self.band >= 0, kept, labels)
 
@@ -186,7 +186,7 @@ class Overlay(Table, Result):
             row = position(key, len(self), "sample")
             return queries.measured(self, [sample(self.run, row)])[0]
         known = {
-            "t": self.time,
+            "t": self.t,
             "distance": self.distance,
             "lag": self.lag,
             **self.run.parameters,
@@ -194,7 +194,7 @@ class Overlay(Table, Result):
             **{name: self.run[name] for name in self.run.columns},
             self.parameter: self.slow,
         }
-        return np.broadcast_to(evaluated(key, known, by_value("t", key)), self.time.shape)
+        return np.broadcast_to(evaluated(key, known, by_value("t", key)), self.t.shape)
 
     @validated(region=text, stable_branch=text, direction=among(-1, 0, 1, None))
     def at(
@@ -240,18 +240,18 @@ class Overlay(Table, Result):
         >>> overlay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=1))
         >>> [(point.stable_branch, round(point["x"], 3)) for point in overlay.at(p=0)]
         [('S1.1', -1.0), ('S1.2', 1.0), ('S1.1', -1.0)]
-        >>> [part.transitions("jump")[0].to_branch for part in overlay.select(kind="jump")]
+        >>> [part.transitions("jump")[0].to_branch for part in overlay.select(type="jump")]
         ['S1.2', 'S1.1']
         """
         return queries.states_at(self, value, direction, stable_branch, region)
 
-    @validated(region=text, stable_branch=text, kind=text)
+    @validated(region=text, stable_branch=text, type=text)
     def select(
         self,
         *,
         region: str | None = None,
         stable_branch: str | None = None,
-        kind: str | None = None,
+        type: str | None = None,
         between: tuple[float, float] | None = None,
     ) -> tuple[Overlay, ...]:
         """Return the intervals of the overlay on which all conditions hold, in order.
@@ -262,8 +262,8 @@ class Overlay(Table, Result):
             Samples in one region.
         stable_branch : str, optional
             Samples on the stable branch with this label; ``""`` for none.
-        kind : str, optional
-            Samples in a phase of this kind; see `fastslow.results.overlay.transitions.Phase`.
+        type : str, optional
+            Samples in a phase of this type; see `fastslow.results.overlay.transitions.Phase`.
         between : (float, float), optional
             Samples between two times, ends included.
 
@@ -275,11 +275,11 @@ class Overlay(Table, Result):
         Raises
         ------
         UnknownNameError
-            For an unknown region, stable branch or kind of phase.
+            For an unknown region, stable branch or type of phase.
         ArgumentError
             For an invalid range.
         """
-        return queries.intervals_of(self, stable_branch, region, kind, between)
+        return queries.intervals_of(self, stable_branch, region, type, between)
 
     def nearest(self, **values: float) -> StatePoint:
         """Return the state nearest to given values of columns, with the stable branch followed.
@@ -306,7 +306,7 @@ class Overlay(Table, Result):
 
     def shares(self) -> dict[str, float]:
         """Return the fraction of time on each stable branch and in each band; ``""`` for none."""
-        weight = np.diff(self.time)
+        weight = np.diff(self.t)
         total = float(weight.sum()) or 1.0
         labels = self.labels[:-1]
         known = [s.label for s in self.stable_branches]
@@ -322,7 +322,7 @@ class Overlay(Table, Result):
         name, count = self.parameter, len(self.transitions)
         yield (
             f"{count} transition{'' if count == 1 else 's'} over "
-            f"t = {self.time[0]:g} to {self.time[-1]:g}, "
+            f"t = {self.t[0]:g} to {self.t[-1]:g}, "
             f"{name} from {self.slow.min():.6g} to {self.slow.max():.6g}"
         )
         if not self.outcome:
@@ -362,7 +362,7 @@ class Overlay(Table, Result):
 
     def _sticking(self) -> Iterator[str]:
         """Number and durations of the sticking phases in each band."""
-        sticking = [phase for phase in self.phases if phase.kind == "sticking"]
+        sticking = [phase for phase in self.phases if phase.type == "sticking"]
         for name in dict.fromkeys(phase.stable_branches[0] for phase in sticking):
             lengths = [phase.duration for phase in sticking if phase.stable_branches[0] == name]
             count = len(lengths)
@@ -373,7 +373,7 @@ class Overlay(Table, Result):
         """Oscillating phases, one line for each attractor."""
         groups: dict[tuple[str, tuple[str, ...]], list[Phase]] = {}
         for phase in self.phases:
-            if phase.kind == "oscillating":
+            if phase.type == "oscillating":
                 groups.setdefault((phase.attractor, phase.stable_branches), []).append(phase)
         for (attractor, stable_branches), met in groups.items():
             counts, lengths = [p.oscillations for p in met], [p.duration for p in met]

@@ -39,10 +39,10 @@ Array = NDArray[np.float64]
 def measured(overlay: Overlay, points: list[StatePoint]) -> list[StatePoint]:
     """Add the stable branch followed and the distance from it to states of the run."""
     times = np.array([point.time for point in points])
-    row = np.clip(np.searchsorted(overlay.time, times, side="right") - 1, 0, len(overlay) - 1)
+    row = np.clip(np.searchsorted(overlay.t, times, side="right") - 1, 0, len(overlay) - 1)
     after = np.minimum(row + 1, len(overlay) - 1)
-    step = overlay.time[after] - overlay.time[row]
-    part = np.where(step > 0, (times - overlay.time[row]) / np.where(step > 0, step, 1.0), 0.0)
+    step = overlay.t[after] - overlay.t[row]
+    part = np.where(step > 0, (times - overlay.t[row]) / np.where(step > 0, step, 1.0), 0.0)
     near, far = overlay.distance[row], overlay.distance[after]
     together = (
         (overlay.followed[row] == overlay.followed[after]) & np.isfinite(near) & np.isfinite(far)
@@ -116,9 +116,9 @@ def nearest_on(overlay: Overlay, values: Mapping[str, float]) -> StatePoint:
     table = np.column_stack([overlay[name] for name in values])
     scale = units_of(table)
     target = np.array([float(value) for value in values.values()])
-    time, _ = nearest_time(overlay.time, table / scale, target / scale)
+    time, _ = nearest_time(overlay.t, table / scale, target / scale)
     point = replace(
-        state_points_at(overlay.run, np.array([time]))[0], interpolated=time not in overlay.time
+        state_points_at(overlay.run, np.array([time]))[0], interpolated=time not in overlay.t
     )
     return measured(overlay, [point])[0]
 
@@ -129,11 +129,11 @@ def rows_of(overlay: Overlay, wanted: slice) -> Overlay:
     if stop - start == len(overlay):
         return overlay
     rows = slice(start, stop)
-    begin, end = float(overlay.time[start]), float(overlay.time[stop - 1])
+    begin, end = float(overlay.t[start]), float(overlay.t[stop - 1])
     return replace(
         overlay,
         run=samples_of(overlay.run, rows),
-        time=overlay.time[rows],
+        t=overlay.t[rows],
         slow=overlay.slow[rows],
         state=overlay.state[rows],
         followed=overlay.followed[rows],
@@ -162,7 +162,7 @@ def intervals_of(
     overlay: Overlay,
     stable_branch: str | None,
     region: str | None,
-    kind: str | None,
+    type: str | None,
     between: tuple[float, float] | None,
 ) -> tuple[Overlay, ...]:
     """Return the intervals on which conditions hold; see `Overlay.select`."""
@@ -172,14 +172,14 @@ def intervals_of(
         wanted &= overlay.labels == stable_branch
     if region is not None:
         known_region(overlay.run, region)
-        wanted &= regions_at(overlay.run, overlay.time) == region
-    if kind is not None:
-        word("kind of phase", PHASES)("kind", kind)
+        wanted &= regions_at(overlay.run, overlay.t) == region
+    if type is not None:
+        word("type of phase", PHASES)("type", type)
         starts = np.array([phase.start for phase in overlay.phases])
         # the last entry is for samples in no phase
-        right = np.array([*(phase.kind == kind for phase in overlay.phases), False])
-        wanted &= right[np.searchsorted(starts, overlay.time, side="right") - 1]
+        right = np.array([*(phase.type == type for phase in overlay.phases), False])
+        wanted &= right[np.searchsorted(starts, overlay.t, side="right") - 1]
     if between is not None:
         low, high = limits_of(between)
-        wanted &= (overlay.time >= low) & (overlay.time <= high)
+        wanted &= (overlay.t >= low) & (overlay.t <= high)
     return tuple(rows_of(overlay, slice(start, stop)) for start, stop in runs_of(wanted))

@@ -17,7 +17,7 @@ from fastslow.results.trajectory.state_at import StatePoint
 OSCILLATING = "oscillating"
 
 #: Kinds of transition with a description.
-KINDS = {
+TYPES = {
     "jump": "departure at a smooth or non-smooth fold",
     "Hopf": "delayed departure past a Hopf point",
     "branch point": "delayed departure past a branch point",
@@ -90,7 +90,7 @@ class Transition(Immutable):
     delay : float
         Distance of ``value`` past the special point, away from the old branch, in units of
         the slow quantity; nan without a special point.
-    kind : str
+    type : str
         ``"jump"``, ``"Hopf"``, ``"branch point"``, ``"crossing"``, ``"gap crossing"``, ``"steep"``,
         ``"rate-induced"``, ``"grazing"``, ``"end of oscillation"``, ``"excursion"``,
         ``"loss of tracking"`` or ``"unclassified"``.
@@ -122,7 +122,7 @@ class Transition(Immutable):
     to_branch: str
     special: SpecialPoint | None
     delay: float
-    kind: str
+    type: str
     leave: StatePoint
     land: StatePoint | None = None
     slope: float = float("nan")
@@ -151,14 +151,14 @@ class Transition(Immutable):
     def describe(self, name: str) -> str:
         """Describe the transition in one line; ``name`` is the slow quantity."""
         head = f"t = {self.time:.6g}, {name} = {self.value:.6g}: "
-        if self.to_branch == self.from_branch and self.kind == "excursion":
+        if self.to_branch == self.from_branch and self.type == "excursion":
             parts = [f"excursion from {self.from_branch}"]
         elif self.to_branch == self.from_branch:
-            parts = [f"{self.kind} on {self.from_branch}"]
+            parts = [f"{self.type} on {self.from_branch}"]
         else:
-            parts = [f"{self.from_branch} → {self.to_branch or 'end of run'}, {self.kind}"]
+            parts = [f"{self.from_branch} → {self.to_branch or 'end of run'}, {self.type}"]
         if self.special is not None:
-            words = self.special.subtype or self.special.criticality
+            words = self.special.type or self.special.criticality
             label = self.special.label + (f" ({words})" if words else "")
             parts[0] += f" at {label}, {name} = {self.special[name]:.6g}"
             if np.isfinite(self.delay):
@@ -167,14 +167,14 @@ class Transition(Immutable):
                 if self.law is not None and self._compared():
                     law = f" (predicted {self.predicted:.3g}{self.law.bound})"
                 parts.append(f"delay {self.delay:.3g}{turned}{law}")
-        elif self.kind not in ("steep", "end of oscillation"):
+        elif self.type not in ("steep", "end of oscillation"):
             parts.append("no bifurcation nearby")
-        if self.kind == "steep":
+        if self.type == "steep":
             parts.append(
                 f"no bifurcation: the predicted lag |dX/d{name}| |d{name}/dt| / |λ| reaches "
                 f"{self.steepness:.2g} of the state's extent"
             )
-        if self.kind == "gap crossing" and self.land is not None:
+        if self.type == "gap crossing" and self.land is not None:
             time = width = ""
             if isinstance(self.law, GapCrossing):
                 time = f" (predicted {self.law.duration:.4g})"
@@ -185,7 +185,7 @@ class Transition(Immutable):
             )
         elif self.land is not None and self.land.time > self.time:
             parts.append(f"lands at {name} = {self.land.value:.6g}, t = {self.land.time:.6g}")
-        if self.note and self.kind != "end of oscillation":
+        if self.note and self.type != "end of oscillation":
             parts.append(self.note)
         return head + "; ".join(parts)
 
@@ -195,7 +195,7 @@ class Transition(Immutable):
 
 
 class Transitions(ImmutableSequence, tuple[Transition, ...]):
-    """Transitions in order of time; a call with a kind selects those of that kind.
+    """Transitions in order of time; a call with a type selects those of that type.
 
     Examples
     --------
@@ -203,10 +203,10 @@ class Transitions(ImmutableSequence, tuple[Transition, ...]):
     ()
     """
 
-    def __call__(self, kind: str) -> Transitions:
-        """Select one kind; raise UnknownNameError for an unknown one."""
-        word("kind of transition", KINDS)("kind", kind)
-        return Transitions(t for t in self if t.kind == kind)
+    def __call__(self, type: str) -> Transitions:
+        """Select one type; raise UnknownNameError for an unknown one."""
+        word("type of transition", TYPES)("type", type)
+        return Transitions(t for t in self if t.type == type)
 
 
 @dataclass(frozen=True)
@@ -216,7 +216,7 @@ class Phase:
     Parameters
     ----------
     start, end : float
-    kind : str
+    type : str
         ``"quasi-static"`` (follows a stable branch), ``"oscillating"`` (at least two oscillations
         away from the stable branches), ``"jump"`` (from one stable branch to the next),
         ``"gap crossing"`` (a jump across a gap), ``"excursion"`` (from a stable branch and back),
@@ -240,7 +240,7 @@ class Phase:
 
     start: float
     end: float
-    kind: str
+    type: str
     stable_branches: tuple[str, ...] = ()
     oscillations: int = 0
     attractor: str = ""

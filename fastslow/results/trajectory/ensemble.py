@@ -28,14 +28,14 @@ class Ensemble(Table, Result):
     Parameters
     ----------
     states : tuple of str
-        States, then slow states: the columns of ``start``, ``final``, ``minimum``, ``maximum``.
+        States, then slow states: the columns of ``initial``, ``final``, ``minimum``, ``maximum``.
     forcing, interfaces : tuple of str
         Names in the model's order.
     modes : tuple of str
         Regions, then sliding motions, of all parameter sets.
     parameters : mapping
         The varied parameters, each an array of shape (m,).
-    start : ndarray, shape (m, n)
+    initial : ndarray, shape (m, n)
     span : ndarray, shape (m, 2)
         Requested first and last time.
     since : ndarray, shape (m,)
@@ -100,7 +100,7 @@ class Ensemble(Table, Result):
     interfaces: tuple[str, ...]
     modes: tuple[str, ...]
     parameters: Mapping[str, NDArray[np.float64]]
-    start: NDArray[np.float64]
+    initial: NDArray[np.float64]
     span: NDArray[np.float64]
     since: NDArray[np.float64]
     minimum: NDArray[np.float64]
@@ -157,7 +157,7 @@ class Ensemble(Table, Result):
                 int(self.last_mode[i]),
                 ends[i],
                 int(self.n_steps[i]),
-                self.start[i],
+                self.initial[i],
                 self.modes,
                 self.limits,
                 self.undecided,
@@ -200,7 +200,7 @@ class Ensemble(Table, Result):
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return the summaries with one row for each trajectory, without samples."""
         columns: dict[str, NDArray[Any]] = dict(self.parameters)
-        for name in ("start", "final", "minimum", "maximum"):
+        for name in ("initial", "final", "minimum", "maximum"):
             values = getattr(self, name)
             columns |= {f"{name} {key}": values[:, k] for k, key in enumerate(self.states)}
         for k, interface in enumerate(self.interfaces):

@@ -108,7 +108,7 @@ class LongTime:
         >>> x, v = sp.symbols("x v")
         >>> fine = fs.Integration(rtol=1e-13)
         >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 10), integration=fine)
-        >>> (run.section("x", direction=-1).times / sp.pi.evalf()).astype(float).round(9)
+        >>> (run.section("x", direction=-1).t / sp.pi.evalf()).astype(float).round(9)
         array([0.5, 2.5])
         """
         window = window_of(self._run, since, until)

@@ -133,27 +133,27 @@ def periodicity_of(
         smallest = min(smallest, float(change[-max(multiple, 2) :].max()))
         # at least as many repeats as points of the orbit
         if len(agreeing) >= max(multiple, 2):
-            length = float(section.times[-1] - section.times[-1 - multiple])
+            length = float(section.t[-1] - section.t[-1 - multiple])
             left, moved = _left(states[:, first:], periods / scale, multiple, noise)
             if left > NEARLY * tol:
                 text = (
                     f"the changes over {_some(multiple, unit)}, up to {agreeing.max():.2g} of the "
                     f"range, hardly shrink: they add up to {moved:.2g} since "
-                    f"t = {section.times[first]:.6g}; a slow passage, as near a fold of periodic "
+                    f"t = {section.t[first]:.6g}; a slow passage, as near a fold of periodic "
                     "solutions, or not yet settled: simulate for longer."
                 )
                 drifting = Outcome("drifting", text, False)
                 worst = float(agreeing.max())
                 return Periodicity(None, None, None, worst, section, drifting, left)
             text = f"repeats after {_some(multiple, unit)}"
-            text += f", {length:.9g}, from t = {section.times[first]:.6g} on."
+            text += f", {length:.9g}, from t = {section.t[first]:.6g} on."
             if left > tol:
                 text = f"{text[:-1]}; the changes shrink, {left:.2g} of the range is left."
             text += stopped_early(run)
             return Periodicity(
                 multiple,
                 length,
-                float(section.times[first]),
+                float(section.t[first]),
                 float(agreeing.max()),
                 section,
                 Outcome("periodic", text, True),

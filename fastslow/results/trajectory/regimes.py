@@ -63,7 +63,7 @@ class Regimes(Result):
         The regime of the motion: the sides in contact in all periods or, if the motion
         repeats after several periods, in these together; ``"chaotic"`` for a positive
         Lyapunov exponent; else ``"not settled"``.
-    kinds : tuple of str
+    types : tuple of str
         The regime of each period, in order of time: ``"bilateral"``, ``"unilateral
         upper"``, ``"unilateral lower"``, ``"meshed upper"``, ``"meshed lower"`` or
         ``"free"``.
@@ -86,12 +86,12 @@ class Regimes(Result):
     >>> import fastslow as fs
     >>> run = fs.simulate(fs.systems.harmonic_gear(D=0.5, omega=1.3), [0, 0], periods=60)
     >>> regimes = run.regimes()
-    >>> regimes.label, len(regimes.kinds), sorted(regimes.fractions)
+    >>> regimes.label, len(regimes.types), sorted(regimes.fractions)
     ('not settled', 30, ['bilateral', 'unilateral upper'])
     """
 
     label: str
-    kinds: tuple[str, ...]
+    types: tuple[str, ...]
     period: float
     span: tuple[float, float]
     multiple: int | None
@@ -102,7 +102,7 @@ class Regimes(Result):
     @property
     def fractions(self) -> dict[str, float]:
         """The fraction of periods of each kind, most frequent first."""
-        return fractions_of(self.kinds)
+        return fractions_of(self.types)
 
     @property
     def settled(self) -> bool:
@@ -115,7 +115,7 @@ class Regimes(Result):
     @property
     def words(self) -> str:
         """The label and the fractions of the periods as text."""
-        return in_words(self.label, self.kinds)
+        return in_words(self.label, self.types)
 
 
 def fractions_of(kinds: Sequence[str]) -> dict[str, float]:
@@ -321,7 +321,7 @@ class RegimeSet(Result):
     ----------
     motions : tuple of Regimes
         The distinct motions, in the order of detection.
-    starts : ndarray, shape (m, n)
+    initial : ndarray, shape (m, n)
         The initial states.
     index : ndarray of int, shape (m,)
         Index of the motion reached from each initial state.
@@ -331,7 +331,7 @@ class RegimeSet(Result):
     """
 
     motions: tuple[Regimes, ...]
-    starts: Floats
+    initial: Floats
     index: NDArray[np.int64]
     parameters: Mapping[str, float]
     equations: str = ""
@@ -344,11 +344,11 @@ class RegimeSet(Result):
     @property
     def fractions(self) -> dict[str, float]:
         """The fraction of periods of each kind, over all initial states."""
-        return fractions_of([kind for k in self.index for kind in self.motions[k].kinds])
+        return fractions_of([kind for k in self.index for kind in self.motions[k].types])
 
     def __repr__(self) -> str:
-        lines = [f"RegimeSet from {len(self.starts)} initial states: {self.label}"]
+        lines = [f"RegimeSet from {len(self.initial)} initial states: {self.label}"]
         for k, motion in enumerate(self.motions):
             count = int(np.count_nonzero(self.index == k))
-            lines.append(f"  {count} of {len(self.starts)}: {motion.words}. {motion.outcome}")
+            lines.append(f"  {count} of {len(self.initial)}: {motion.words}. {motion.outcome}")
         return "\n".join(lines)

@@ -33,7 +33,7 @@ class Section(Table, Result):
         The condition of the section, e.g. ``"v = 0 downwards"``.
     names : tuple of str
         Columns: states, slow states and, if known, slow quantities.
-    times : ndarray, shape (K,)
+    t : ndarray, shape (K,)
     table : ndarray, shape (len(names), K)
         Every column at those times.
     directions : ndarray of int, shape (K,)
@@ -44,7 +44,7 @@ class Section(Table, Result):
 
     rule: str
     names: tuple[str, ...]
-    times: NDArray[np.float64]
+    t: NDArray[np.float64]
     table: NDArray[np.float64]
     directions: NDArray[np.int64]
     ended: str = ""
@@ -58,18 +58,18 @@ class Section(Table, Result):
     def __getitem__(self, name: object) -> NDArray[np.float64]:
         """Return a column, or an expression in columns, at the points, shape (K,)."""
         columns = {key: partial(self.table.__getitem__, k) for k, key in enumerate(self.names)}
-        return column(name, {**columns, "t": lambda: self.times}, {}, len(self))
+        return column(name, {**columns, "t": lambda: self.t}, {}, len(self))
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return time t, every column, and the direction."""
         columns = dict(zip(self.names, self.table, strict=True))
-        return {"t": self.times, **columns, "direction": self.directions}
+        return {"t": self.t, **columns, "direction": self.directions}
 
     def __len__(self) -> int:
-        return len(self.times)
+        return len(self.t)
 
     def __repr__(self) -> str:
-        when = f", t from {self.times[0]:.6g} to {self.times[-1]:.6g}" if len(self) else ""
+        when = f", t from {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self) else ""
         early = f"; the run ended early: {self.ended}" if self.ended else ""
         return f"Section {self.rule}: {len(self)} points of {', '.join(self.names)}{when}{early}"
 
@@ -148,13 +148,13 @@ def poincare_section(
         found = _on_interface(run, interface)
         rule = f"{interface} = 0"
     rule += {1: " upwards", -1: " downwards", 0: " touching", None: ""}[direction]
-    kept = (found.times >= window[0]) & (found.times <= window[1])
+    kept = (found.t >= window[0]) & (found.t <= window[1])
     if direction is not None:
         kept &= found.directions == direction
     return Section(
         rule,
         found.names,
-        found.times[kept],
+        found.t[kept],
         found.table[:, kept],
         found.directions[kept],
         early_end(run),

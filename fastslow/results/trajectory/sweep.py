@@ -30,7 +30,7 @@ class SweepPass(Result):
         In the order of the pass.
     counts : ndarray of int, shape (m,)
         Number of points recorded at each value.
-    parameter, x : ndarray, shape (N,)
+    swept, x : ndarray, shape (N,)
         The points, value by value.
     ends : ndarray, shape (m, n)
         Final states of the runs; NaN for those that failed.
@@ -41,7 +41,7 @@ class SweepPass(Result):
     direction: int
     values: Array
     counts: NDArray[np.intp]
-    parameter: Array
+    swept: Array
     x: Array
     ends: Array
     outcomes: tuple[Outcome, ...]
@@ -69,7 +69,7 @@ class BifurcationSweep(Table, Result):
 
     Parameters
     ----------
-    parameter_name, name : str
+    parameter, name : str
         The swept parameter and the recorded column.
     what : str
         ``"stroboscopic"``, ``"extremes"`` or ``"section"``.
@@ -85,7 +85,7 @@ class BifurcationSweep(Table, Result):
         The settings of the integration.
     """
 
-    parameter_name: str
+    parameter: str
     name: str
     what: str
     rule: str
@@ -99,7 +99,7 @@ class BifurcationSweep(Table, Result):
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return parameter, recorded column and direction of the pass, for each point."""
         return {
-            self.parameter_name: self.parameter,
+            self.parameter: self.swept,
             self.name: self.x,
             "direction": self.direction,
         }
@@ -120,9 +120,9 @@ class BifurcationSweep(Table, Result):
         return np.sort(self.passes[0].values)
 
     @property
-    def parameter(self) -> Array:
+    def swept(self) -> Array:
         """The parameter value of every point, shape (N,)."""
-        return np.concatenate([p.parameter for p in self.passes])
+        return np.concatenate([p.swept for p in self.passes])
 
     @property
     def x(self) -> Array:
@@ -192,5 +192,5 @@ class BifurcationSweep(Table, Result):
 
     def __repr__(self) -> str:
         low, high = self.values[[0, -1]]
-        first = f"Sweep of {self.parameter_name} from {low:.6g} to {high:.6g}: {self.rule}"
+        first = f"Sweep of {self.parameter} from {low:.6g} to {high:.6g}: {self.rule}"
         return "\n".join([first, *(f"  {p!r}" for p in self.passes)])

@@ -186,8 +186,8 @@ class Trajectory(Queries, LongTime, Table, Result):
         values = self._table[1]
         return values[row] if row < len(values) else self._all_sampled[row]
 
-    @validated(times=numbers)
-    def __call__(self, times: ArrayLike) -> NDArray[np.float64]:
+    @validated(t=numbers)
+    def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
         """Return the states at any times of the run, shape (n, N); (n,) for a scalar time.
 
         Raises
@@ -195,10 +195,10 @@ class Trajectory(Queries, LongTime, Table, Result):
         ArgumentError
             For a time outside the run, or without dense output.
         """
-        return columns_at(self, times, slice(len(self.states)))
+        return columns_at(self, t, slice(len(self.states)))
 
-    @validated(times=numbers)
-    def dense_columns(self, times: ArrayLike) -> NDArray[np.float64]:
+    @validated(t=numbers)
+    def dense_columns(self, t: ArrayLike) -> NDArray[np.float64]:
         """Return all columns at any times of the run, shape (n + n_forcing, N).
 
         Raises
@@ -206,7 +206,7 @@ class Trajectory(Queries, LongTime, Table, Result):
         ArgumentError
             For a time outside the run, or without dense output.
         """
-        return columns_at(self, times)
+        return columns_at(self, t)
 
     @cached_property
     def _table(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

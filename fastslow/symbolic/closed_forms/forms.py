@@ -18,7 +18,7 @@ class EquilibriumForm:
     Parameters
     ----------
     region : str
-    kind : str
+    type : str
         ``"explicit"``: the state in parameters; ``"curve"``: a parameter in
         terms of one unknown state; ``"implicit"``: equations are left.
     state : NamedMapping of sympy.Expr
@@ -27,7 +27,7 @@ class EquilibriumForm:
         Unknown states in which the other quantities are expressed.
     equations : tuple of sympy.Expr
         Equations for the unknowns, = 0.
-    parameter : NamedMapping of sympy.Expr
+    parameters : NamedMapping of sympy.Expr
         The parameter solved for and its value along the family; may be empty.
     exists, admissible : Boolean
         Conditions for it to be real, and to be real and inside its region.
@@ -47,11 +47,11 @@ class EquilibriumForm:
     """
 
     region: str
-    kind: str
+    type: str
     state: NamedMapping[sp.Expr]
     unknowns: tuple[sp.Symbol, ...]
     equations: tuple[sp.Expr, ...]
-    parameter: NamedMapping[sp.Expr]
+    parameters: NamedMapping[sp.Expr]
     exists: Boolean
     admissible: Boolean
     possible: bool | None

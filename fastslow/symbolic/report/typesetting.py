@@ -91,9 +91,9 @@ def _region(region: RegionForms, taken: set[str]) -> list[str]:
 
 
 def _equilibrium(form: EquilibriumForm, taken: set[str]) -> list[str]:
-    given = () if form.kind == "implicit" else form.parameter.items()
+    given = () if form.type == "implicit" else form.parameters.items()
     items = _values([*given, *form.state.items()])
-    items += _zeros((*(form.equations if form.kind == "implicit" else ()), *form.conditions))
+    items += _zeros((*(form.equations if form.type == "implicit" else ()), *form.conditions))
     edge = form.note.startswith(EDGE)
     when = (sp.true, sp.true) if edge else (form.exists, form.admissible)
     lines = _set(r"\text{equilibrium: } ", items, taken, *when)

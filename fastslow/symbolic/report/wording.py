@@ -87,7 +87,7 @@ def _formulas(law: Derivation) -> Iterator[sp.Basic]:
         points = (*region.folds, *region.branch_points, *region.cusps, *region.hopf)
         for form in region.equilibria:
             yield from (*form.state.values(), *form.equations, form.admissible)
-            yield from (*form.parameter.values(), *form.conditions)
+            yield from (*form.parameters.values(), *form.conditions)
         for point in points:
             yield from (*point.state.values(), *point.equations, point.admissible)
             yield from point.parameters.values()
@@ -215,9 +215,9 @@ def _zeros(equations: Sequence[sp.Expr]) -> list[Fragment]:
 
 
 def _equilibrium(form: EquilibriumForm) -> list[Fragment]:
-    given = () if form.kind == "implicit" else form.parameter.items()
+    given = () if form.type == "implicit" else form.parameters.items()
     fragments = _values("equilibrium: ", [*given, *form.state.items()])
-    if form.kind == "implicit":
+    if form.type == "implicit":
         fragments += _zeros(form.equations)
     fragments += _zeros(form.conditions)
     verdict = form.stability.verdict

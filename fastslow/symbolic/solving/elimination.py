@@ -93,7 +93,7 @@ class Elimination:
         return Elimination(
             tuple(e for e in remaining if e != 0),
             self.unknowns,
-            NamedMapping(self.solved.kind, solved),
+            NamedMapping(self.solved.type, solved),
             tuple(d.subs(values) for d in self.divisors if d.free_symbols - set(values)),
         )
 
