@@ -31,7 +31,7 @@ def drawn(result, *names):
 
 
 def given(lay, call):
-    return eval(call, {"np": np, "lay": lay, "diagram": lay.diagram, "run": lay.run})
+    return eval(call, {"np": np, "overlay": lay, "diagram": lay.diagram, "run": lay.run})
 
 
 def test_a_click_beside_a_branch_gives_the_equilibrium_there(lay, mouse):

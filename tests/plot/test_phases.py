@@ -14,7 +14,7 @@ def test_a_figure_of_its_own_names_what_has_room(folded_lay):
     drawn = fs.plot.time_series(run, phases=phases)
     assert len(drawn.phases) == len(drawn.words) == len(phases)
     for word, box, phase in zip(drawn.words, drawn.phases, phases, strict=True):
-        if phase.kind == "quasi-static":
+        if phase.type == "quasi-static":
             assert word.get_text() == phase.stable_branches[0]
         room = box.get_window_extent().width
         assert word.get_visible() == (word.get_window_extent().width <= room)
