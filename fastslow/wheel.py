@@ -17,12 +17,14 @@ from fastslow.kernels.loops import Entry
 def entries() -> Iterator[Entry]:
     """Everything that is compiled once for all models."""
     from fastslow.continuation import loops as continuation
+    from fastslow.orbits import loops as orbits
     from fastslow.passage import loops as passage
     from fastslow.simulation import loops as simulation
 
     # those that take longest to compile come first
     yield from simulation.LOOPS
     yield from passage.LOOPS
+    yield from orbits.LOOPS
     yield from continuation.LOOPS.values()
 
 

@@ -1,0 +1,226 @@
+"""The flow of several segments with its derivatives by states, time and parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation.loops import loop
+from fastslow.kernels.loops import load_loop
+from fastslow.kernels.records import zeros
+from fastslow.orbits.loops import FLOW
+from fastslow.orbits.stepping import (
+    FACTORS,
+    FINISHED,
+    TABLE_FULL,
+    WORK,
+    Factors,
+    Problem,
+    Segments,
+    Space,
+)
+from fastslow.orbits.variations import Variations
+from fastslow.simulation.stepper.scales import FORGETTING, rules_of
+
+#: Error of a step relative to the size of each state and of each derivative.
+TOLERANCE = 1e-16
+
+#: Steps of one segment after which it is given up.
+MAX_STEPS = 10**6
+
+#: Work between two pauses, in multiplications: some hundredths of a second.
+_WORK = 2**24
+
+#: Initial size of the table of factors, per segment.
+_FACTORS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Flows:
+    """Ends of K segments with their derivatives.
+
+    Parameters
+    ----------
+    ends : ndarray, shape (K, n)
+    slopes : ndarray, shape (K, n, n + 1 + P)
+        Derivatives of the ends by the states at the beginning, the time at the beginning
+        (with the duration fixed) and the chosen parameters. The derivative by the duration is
+        the rate at the end.
+    traces : ndarray, shape (K,)
+        Integrals of the trace of f_z: log det of the derivatives by the states (Liouville).
+    reached : ndarray, shape (K,)
+        Completed durations; less than those requested where the rates are not finite or the
+        steps too many or too small.
+    factors : ndarray, shape (m, n, n)
+        Matrices in order of time. Their product over a segment is its derivative by the states;
+        none of them underflows or has a large condition, unless one step has.
+    owners : ndarray of int64, shape (m,)
+        Segment of each factor.
+    """
+
+    ends: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+    traces: NDArray[np.float64]
+    reached: NDArray[np.float64]
+    factors: NDArray[np.float64]
+    owners: NDArray[np.int64]
+
+    def factors_of(self, segment: int) -> NDArray[np.float64]:
+        """The factors of one segment, in order of time."""
+        return self.factors[self.owners == segment]
+
+
+def flow(
+    variations: Variations,
+    modes: NDArray[np.int64],
+    states: NDArray[np.float64],
+    times: NDArray[np.float64],
+    durations: NDArray[np.float64],
+    parameters: NDArray[np.float64],
+    *,
+    tol: float = TOLERANCE,
+    max_steps: int = MAX_STEPS,
+) -> Flows:
+    """Integrate segments, each in one smooth motion, whose rates are continued past its borders.
+
+    Parameters
+    ----------
+    variations : Variations
+    modes : ndarray of int64, shape (K,)
+        Motion of each segment.
+    states : ndarray, shape (K, n)
+    times, durations : ndarray, shape (K,)
+        Time at the beginning, and duration: positive, zero or negative.
+    parameters : ndarray
+        From `Variations.parameter_array`.
+    tol : float
+        Error of a step relative to each state and to each derivative.
+    max_steps : int
+        Limit of each segment.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> from fastslow.orbits.variations import variations_of
+    >>> x, k = sp.symbols("x k")
+    >>> decay = fs.Model({x: -k * x}, parameters={k: 2})
+    >>> variations = variations_of(decay, ("k",))
+    >>> some = np.zeros(1, dtype=int), np.ones((1, 1)), np.zeros(1), np.array([0.5])
+    >>> flows = flow(variations, *some, variations.parameter_array(decay))
+    >>> (flows.slopes[0, 0] * np.e).round(14).tolist()
+    [1.0, 0.0, -0.5]
+    >>> flows.traces.round(14).tolist()
+    [-1.0]
+    """
+    n, unknowns, order = variations.n, variations.n_unknowns, variations.order
+    ends = np.array(states, dtype=float, order="C")
+    K = len(ends)
+    slopes = np.zeros((K, n, unknowns))
+    slopes[:, range(n), range(n)] = 1.0
+    progress = np.zeros(4, dtype=np.int64)
+    rules = rules_of(np.zeros(n), np.full(n, FORGETTING), 0, 0)
+    problem = Problem(
+        *(variations.series, n, unknowns, order, max_steps, tol),
+        *(variations.starts, variations.entries, np.array(parameters, dtype=float), rules),
+    )
+    segments = Segments(
+        np.array(modes, dtype=np.int64),
+        np.array(times, dtype=float),
+        np.array(durations, dtype=float),
+        ends,
+        slopes,
+        np.zeros(K),
+        np.zeros(K),
+        progress,
+    )
+    space = zeros(
+        Space,
+        variations.n_rows * (order + 1),
+        (order + 1, n, unknowns),
+        (2, n),
+        1 + n,
+        (n, unknowns),
+        (n, n),
+        (n, n + 1),
+        n,
+        n,
+    )
+    factors = zeros(Factors, _FACTORS * K, (_FACTORS * K, n, n))
+    steps = 1 + _WORK // (order**2 * (len(variations.entries) * unknowns + variations.n_rows))
+    run, code = load_loop(FLOW), TABLE_FULL
+    while code != FINISHED:
+        progress[WORK] = steps
+        code = run(problem, segments, factors, space)
+        if code == TABLE_FULL:
+            factors = Factors(*(np.concatenate([a, np.zeros_like(a)]) for a in factors))
+    used = progress[FACTORS]
+    return Flows(
+        ends,
+        slopes,
+        segments.traces,
+        segments.reached,
+        factors.matrices[:used].copy(),
+        factors.owners[:used].copy(),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """Rates and switching functions at K points, with derivatives by u = (z, t, parameters).
+
+    Parameters
+    ----------
+    f : ndarray, shape (K, n)
+    f_u : ndarray, shape (K, n, n + 1 + P)
+    g : ndarray, shape (K, m)
+        Interface functions, then the bounds of sliding (see `fastslow.model.motions.Motion`);
+        zero beyond those of the mode.
+    g_u : ndarray, shape (K, m, n + 1 + P)
+    """
+
+    f: NDArray[np.float64]
+    f_u: NDArray[np.float64]
+    g: NDArray[np.float64]
+    g_u: NDArray[np.float64]
+
+
+def fields(
+    variations: Variations,
+    modes: NDArray[np.int64],
+    states: NDArray[np.float64],
+    times: NDArray[np.float64],
+    parameters: NDArray[np.float64],
+) -> Fields:
+    """Evaluate rates and switching functions with their derivatives.
+
+    Parameters
+    ----------
+    variations : Variations
+    modes : ndarray of int64, shape (K,)
+    states : ndarray, shape (K, n)
+    times : ndarray, shape (K,)
+    parameters : ndarray
+        From `Variations.parameter_array`.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> from fastslow.orbits.variations import variations_of
+    >>> x, a, t = sp.symbols("x a t")
+    >>> relay = fs.Model({x: -sp.sign(x - a) + t}, parameters={a: 0.5})
+    >>> variations = variations_of(relay, ("a",))
+    >>> point = np.zeros(1, dtype=int), np.array([[2.0]]), np.array([3.0])
+    >>> found = fields(variations, *point, variations.parameter_array(relay))
+    >>> found.f.tolist(), found.f_u.tolist(), found.g[0, :1].tolist(), found.g_u[0, :1].tolist()
+    ([[2.0]], [[[0.0, 1.0, 0.0]]], [1.5], [[1.0, 0.0, -1.0]])
+    """
+    field, K = variations.field, len(states)
+    n, u, m = field.n, variations.n_unknowns, field.m
+    chosen = np.tile(parameters[variations.places], (K, 1))
+    points = np.column_stack([states, times, chosen])
+    out = np.zeros((K, field.size))
+    loop("evaluate")(field.address, np.array(modes, dtype=np.int64), points, parameters, out)
+    f, f_u, g, g_u = np.split(out, np.cumsum([n, n * u, m]), axis=1)
+    return Fields(f, f_u.reshape(K, n, u), g, g_u.reshape(K, m, u))

@@ -1,0 +1,246 @@
+"""Compiled rates of every smooth motion with their derivatives by states, time and parameters.
+
+The derivatives are compiled twice: as Taylor series along the motion, from which the flow
+computes its own derivatives, and as values at a point, for the conditions at interfaces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.errors import ModelError, unknown_name
+from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
+from fastslow.kernels.fields import operations_of
+from fastslow.kernels.model_code import load_function
+from fastslow.kernels.taylor.series import motion_source
+from fastslow.model.derived import cached_by, partition_of
+from fastslow.model.known_functions import without_recurrence
+from fastslow.model.model import Model
+from fastslow.model.motions import Motion, motions_of
+from fastslow.model.recurrences import Recurrences
+from fastslow.model.structure import TIME, real
+from fastslow.results.stored.operations import Operations, SeriesOperations
+
+#: Highest Taylor coefficient: for errors of rounding the cheapest order is about -ln(tol)/2 = 18
+#: (Jorba and Zou 2005) with a singularity, higher for entire functions, as in linear regions.
+ORDER = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Variations:
+    """Compiled derivatives of a model's motions by the unknowns u = (states, time, parameters).
+
+    Parameters
+    ----------
+    states : tuple of str
+        States and slow states.
+    parameters : tuple of str
+        Order of the parameter array.
+    chosen : tuple of str
+        Parameters by which derivatives are compiled.
+    modes : tuple of str
+        Names of the motions: regions, then sliding motions.
+    signs : ndarray of int64, shape (n_modes, n_interfaces)
+        Side of each interface in every mode, 0 for sliding interfaces.
+    order : int
+        Highest Taylor coefficient.
+    series : int
+        Address of the function that fills the series of the states, then those of the
+        derivatives that vary.
+    n_rows : int
+        Number of rows of the series.
+    starts : ndarray of int64, shape (n_modes + 1,)
+        First entry of every mode.
+    entries : ndarray of int64, shape (n_entries, 4)
+        Derivatives that are not identically zero: number of the rate, number of the unknown,
+        row of the series, and whether the entry is constant along the motion.
+    field : CompiledField
+        Rates, interface functions and bounds of sliding, with their derivatives by u.
+    """
+
+    states: tuple[str, ...]
+    parameters: tuple[str, ...]
+    chosen: tuple[str, ...]
+    modes: tuple[str, ...]
+    signs: NDArray[np.int64]
+    order: int
+    series: int
+    n_rows: int
+    starts: NDArray[np.int64]
+    entries: NDArray[np.int64]
+    field: CompiledField
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return len(self.states)
+
+    @property
+    def n_unknowns(self) -> int:
+        """Number of states, time and chosen parameters."""
+        return self.n + 1 + len(self.chosen)
+
+    @property
+    def places(self) -> list[int]:
+        """Indices of the chosen parameters in the parameter array."""
+        return [self.parameters.index(name) for name in self.chosen]
+
+    def parameter_array(self, model: Model) -> NDArray[np.float64]:
+        """Parameter values of a model in the order of `parameters`, never empty."""
+        values = parameter_array(model, self.field)
+        return values if len(values) else np.zeros(1)
+
+
+@cached_by(partition_of)
+def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER) -> Variations:
+    """Compile the derivatives of a model's motions by states, time and some parameters.
+
+    The slow quantities are replaced by their laws, so that a derivative by time or by a parameter
+    contains that of the forcing.
+
+    Parameters
+    ----------
+    model : Model
+    chosen : tuple of str, optional
+        Parameters for derivatives.
+    order : int
+        Highest Taylor coefficient.
+
+    Raises
+    ------
+    ModelError
+        For functions without a Taylor recurrence.
+    UnknownNameError
+        For an unknown parameter.
+
+    Examples
+    --------
+    >>> x, v, w, t = sp.symbols("x v w t")
+    >>> duffing = Model({x: v, v: -x**3 + sp.cos(w*t)}, parameters={w: 2})
+    >>> variations = variations_of(duffing, ("w",))
+    >>> variations.states, variations.chosen, variations.modes
+    (('x', 'v'), ('w',), ('S1',))
+    >>> variations.entries[:, :2].tolist()
+    [[0, 1], [1, 0], [1, 2], [1, 3]]
+    """
+    names = tuple(sorted({*model.parameters, *model.free}))
+    for name in chosen:
+        if name not in names:
+            raise unknown_name("parameter", name, names)
+    states = (*model.states, *model.slow_states)
+    motions = motions_of(model)
+    modes = (*motions.regions, *motions.sliding)
+    heights = tuple(i.function for i in model.interfaces.values())
+    rows = [_explicit(motion, model, heights) for motion in modes]
+    _require_recurrences(rows, states)
+    field = _field(rows, states, names, chosen)
+    renaming = {real(n): real(f"y{k}") for k, n in enumerate(states)}
+    renaming |= {real(n): real(f"p{k}") for k, n in enumerate(names)}
+    unknowns = (*map(real, states), TIME, *map(real, chosen))
+    tapes, starts, entries = [], [0], []
+    for motion, (rates, _) in zip(modes, rows, strict=True):
+        tape, found = _tape(motion, rates, unknowns, renaming, len(states))
+        tapes.append(tape)
+        entries += found
+        starts.append(len(entries))
+    operations = Operations((len(states), 0, 0), names, tuple(tapes), (), ())
+    source, n_rows = _source(operations, order)
+    return Variations(
+        states,
+        names,
+        chosen,
+        tuple(motion.name for motion in modes),
+        np.array([motion.signs for motion in modes], dtype=np.int64).reshape(len(modes), -1),
+        order,
+        load_function(source, "variations"),
+        n_rows,
+        np.array(starts, dtype=np.int64),
+        np.array(entries, dtype=np.int64).reshape(-1, 4),
+        field,
+    )
+
+
+Rows = tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]
+
+
+def _explicit(motion: Motion, model: Model, heights: Sequence[sp.Expr]) -> Rows:
+    """Rates and switching functions of a motion as functions of states and time."""
+    laws = {real(n): law for n, law in zip(model.forcing, motion.laws, strict=True)}
+    functions = (*heights, *motion.bounds)
+    return tuple(e.xreplace(laws) for e in motion.rates), tuple(e.xreplace(laws) for e in functions)
+
+
+def _require_recurrences(rows: Sequence[Rows], states: Sequence[str]) -> None:
+    moving = {*map(real, states), TIME}
+    missing = set().union(*(without_recurrence(e, moving) for rates, _ in rows for e in rates))
+    if missing:
+        names = " and ".join(sorted(missing))
+        raise ModelError(
+            f"derivatives of the flow need Taylor recurrences, and there is none for {names}; "
+            "write the model without it, or use simulate(), which falls back on collocation"
+        )
+
+
+def _field(
+    rows: Sequence[Rows], states: Sequence[str], names: Sequence[str], chosen: Sequence[str]
+) -> CompiledField:
+    """Values and derivatives at a point, with the functions of all motions padded by zeros."""
+    m = max(len(functions) for _, functions in rows)
+    padded = tuple((*rates, *f, *[sp.Integer(0)] * (m - len(f))) for rates, f in rows)
+    unknowns = (*map(real, states), TIME, *map(real, chosen))
+    rename = {s: sp.Symbol(f"u{k}") for k, s in enumerate(unknowns)}
+    rename |= {real(n): sp.Symbol(f"p{k}") for k, n in enumerate(names) if n not in chosen}
+    n = len(states)
+    bodies = operations_of(padded, n, tuple(rename.items()))
+    address = load_field(bodies, len(unknowns), len(names))
+    return CompiledField(address, tuple(names), n, m, len(unknowns) - n)
+
+
+def _tape(
+    motion: Motion,
+    rates: Sequence[sp.Expr],
+    unknowns: Sequence[sp.Symbol],
+    renaming: dict[sp.Symbol, sp.Symbol],
+    n: int,
+) -> tuple[SeriesOperations, list[tuple[int, int, int, int]]]:
+    """Operations on series of one motion, and the entries of its derivatives."""
+    slopes = {
+        (i, c): slope.xreplace(renaming)
+        for i, rate in enumerate(rates)
+        for c, u in enumerate(unknowns)
+        if u in rate.free_symbols and (slope := rate.diff(u)) != 0
+    }
+    symbols = {real(f"y{k}"): k for k in range(n)}
+    place = {e: row for row, e in enumerate(dict.fromkeys(slopes.values()), start=n)}
+    reserved = {e: row for e, row in place.items() if e not in symbols}
+    work = Recurrences(symbols, TIME, reserved, n + max(2, len(place)))
+    held = tuple(work.row(rate.xreplace(renaming)) for rate in rates)
+    outputs = tuple(work.row(e) for e in place)
+    tape = SeriesOperations(
+        motion.name, motion.signs, tuple(work.scalars), tuple(work.nodes), held, outputs
+    )
+    entries = [(i, c, place[e], int(work.is_scalar(e))) for (i, c), e in slopes.items()]
+    return tape, entries
+
+
+def _source(operations: Operations, order: int) -> tuple[str, int]:
+    """Source of the generated function, and its number of rows."""
+    lines = [
+        f'"""Taylor coefficients of order {order} with derivatives of the rates."""\n\n',
+        "def variations(mode, inputs, parameters, W):",
+        f"    n = {order}",
+        *(f"    p{i} = parameters[{i}]" for i in range(len(operations.parameters))),
+    ]
+    n_rows = 0
+    for number, motion in enumerate(operations.motions):
+        assert isinstance(motion, SeriesOperations)
+        body, rows = motion_source(operations, motion, order)
+        n_rows = max(n_rows, rows)
+        lines.append(f"    {'if' if number == 0 else 'elif'} mode == {number}:")
+        lines += [f"        {line}" for line in body]
+    return "\n".join(lines) + "\n", n_rows
