@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -74,7 +75,9 @@ or in SymPy, received 5.0
     )
 
 
-def read(expression: object, valid: Iterable[str], kind: str = KIND) -> tuple[Node, dict[str, str]]:
+def read(
+    expression: object, valid: Iterable[str], kind: str = KIND, condition: bool = False
+) -> tuple[Node, dict[str, str]]:
     """Parse an expression in given names; return its tree and the given form of each name.
 
     Parameters
@@ -84,6 +87,8 @@ def read(expression: object, valid: Iterable[str], kind: str = KIND) -> tuple[No
         The accepted names.
     kind : str
         Description of the names in errors.
+    condition : bool
+        True for a condition such as ``x > 0`` in place of a value.
 
     Raises
     ------
@@ -94,8 +99,11 @@ def read(expression: object, valid: Iterable[str], kind: str = KIND) -> tuple[No
     """
     text, names = written_formula(expression), list(valid)
     tree = parse(text, names)
-    if isinstance(tree, CONDITIONS):
-        reason = f"{quoted(text_of(tree))} is a condition; expected a value"
+    if isinstance(tree, CONDITIONS) is not condition:
+        received, expected = "condition", "value"
+        if condition:
+            received, expected = "value", "condition such as x > 0"
+        reason = f"{quoted(text_of(tree))} is a {received}; expected a {expected}"
         raise refused(text, reason, names)
     known = {normalised(name): name for name in names}
     for name in names_of(tree):
@@ -196,12 +204,60 @@ def column(
         return columns[text]()
     if text in constants:
         return np.full(n, constants[text])
-    tree, known = read(text, dict.fromkeys([*columns, *constants]), "column")
-    own = {
-        name: columns[mine]() if mine in columns else constants[mine]
-        for name, mine in known.items()
+    tree, values = _operands(text, columns, constants)
+    return np.array(np.broadcast_to(computed(tree, values), (n,)))
+
+
+def rows_where(
+    condition: object,
+    columns: Mapping[str, Callable[[], Array]],
+    constants: Mapping[str, float],
+    n: int,
+) -> NDArray[np.bool_]:
+    """Evaluate a condition in columns and constants, shape (n,).
+
+    Parameters
+    ----------
+    condition : str or Expr
+    columns, constants, n
+        As for `column`.
+
+    Raises
+    ------
+    UnknownNameError
+        For a name that is neither a column nor a constant.
+    ArgumentError
+        For text that is not a condition.
+
+    Examples
+    --------
+    >>> x = np.array([-1.0, 0.5, 2.0])
+    >>> rows_where("x > 0 and x**2 < D", {"x": lambda: x}, {"D": 1.0}, 3)
+    array([False,  True, False])
+    """
+    tree, values = _operands(written_formula(condition), columns, constants, condition=True)
+    with np.errstate(all="ignore"):
+        return np.array(np.broadcast_to(_holds(tree, values), (n,)), dtype=bool)
+
+
+def _operands(
+    text: str,
+    columns: Mapping[str, Callable[[], Array]],
+    constants: Mapping[str, float],
+    condition: bool = False,
+) -> tuple[Node, dict[str, Any]]:
+    """Parse an expression in columns and constants; return its tree and the values of its names."""
+    named = {}
+    for k, name in enumerate(sorted(columns, key=len, reverse=True)):
+        if not name.isidentifier() and name in text:
+            # such as max(x), the column of a table of orbits
+            named[f"column_{k}"] = name
+            text = re.sub(rf"(?<!\w){re.escape(name)}(?!\w)", f"column_{k}", text)
+    tree, known = read(text, dict.fromkeys([*columns, *constants, *named]), "column", condition)
+    known |= {name: named[name] for name in known.keys() & named.keys()}
+    return tree, {
+        name: columns[own]() if own in columns else constants[own] for name, own in known.items()
     }
-    return np.array(np.broadcast_to(computed(tree, own), (n,)))
 
 
 def names_in(expression: object, valid: Mapping[str, Any]) -> frozenset[str]:

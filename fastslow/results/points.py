@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import position, word
+from fastslow.arguments import word
 from fastslow.errors import unknown_name
 from fastslow.results.base.immutable import Immutable, ImmutableSequence
-from fastslow.results.base.result import LIVE, Result, Saved
-from fastslow.results.base.table import Table
+from fastslow.results.base.result import LIVE, Result
+from fastslow.results.base.table import ResultTable
 from fastslow.results.branch.point_columns import columns_of_points
 from fastslow.results.io.html import points_html
 from fastslow.results.point_types import POINT_TYPES, point_name
@@ -206,9 +206,6 @@ class Equilibria(ImmutableSequence, tuple[Equilibrium, ...]):
         made.sets = tuple(sets)
         return made
 
-    def __getnewargs__(self) -> tuple[Any, ...]:
-        return tuple(self), self.completeness, self.sets
-
 
 @dataclass(frozen=True, eq=False)
 class ClarkePath(Immutable):
@@ -384,11 +381,11 @@ class SpecialPoint(_Point):
         return f"SpecialPoint({self.label}: {self.description})"
 
 
-class SpecialPoints(Table, Saved, ImmutableSequence, tuple[SpecialPoint, ...]):
-    """Special points in order along a branch or diagram.
+class SpecialPoints(ResultTable[SpecialPoint]):
+    """Special points in order along a branch or diagram, as a table.
 
     ``points("LP")`` selects one code, ``points["w"]`` is the column of a state or
-    parameter, and ``points[0]`` a point.
+    parameter, ``points[0]`` a point, and ``points["LP1"]`` the point with this label.
 
     Examples
     --------
@@ -411,13 +408,11 @@ class SpecialPoints(Table, Saved, ImmutableSequence, tuple[SpecialPoint, ...]):
         word("special point code", POINT_TYPES)("code", code)
         return SpecialPoints(point for point in self if point.code == code)
 
-    def __getitem__(self, key: Any) -> Any:
-        """Return a point by index, several by a slice, or the column of a state or parameter."""
-        if isinstance(key, slice):
-            return SpecialPoints(tuple.__getitem__(self, key))
-        if isinstance(key, int | np.integer) and not isinstance(key, bool):
-            return tuple.__getitem__(self, position(key, len(self), "special point"))
-        return np.array([point[key] for point in self], dtype=float)
+    def _labelled(self) -> Mapping[str, SpecialPoint]:
+        return {point.label: point for point in reversed(self)}
+
+    def _words(self) -> Mapping[str, Collection[str]]:
+        return {"code": POINT_TYPES}
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return label, code, subtype, interface, regions, states, parameters and accuracy."""

@@ -224,6 +224,7 @@ def methods(r):
     """Object, and a good call of each public method that takes an argument."""
     save = {"path": "unused.npz"}
     look = {"stable": None}
+    rows = {"__getitem__": {"key": "x"}, "select": {}}
     return {
         "Model": (
             r["gear"],
@@ -258,7 +259,10 @@ def methods(r):
         ),
         "Derivation": (r["law"], {"__getitem__": {"region": "S1"}}),
         "DelayScaling": (r["scaling"], {"save": save}),
-        "Ensemble": (r["many"], {"__getitem__": {"name": "x"}, "save": save}),
+        "Ensemble": (
+            r["many"],
+            {**rows, "nearest": {"values": {"C": 2.0}}, "save": save},
+        ),
         "Equilibrium": (r["equilibrium"], {"__getitem__": {"name": "x"}, "save": save}),
         "SpecialPoint": (r["fold"], {"__getitem__": {"name": "x"}, "save": save}),
         "Overlay": (
@@ -283,20 +287,36 @@ def methods(r):
         "RefinedMap": (
             r["map"],
             {
+                "__getitem__": {"key": "a"},
                 "at": {"values": [0.5, 0.2]},
                 "boundary": {"one": True, "other": False},
                 "compare": {"predict": lambda a, b: a > b},
                 "save": save,
             },
         ),
-        "Section": (r["section"], {"__getitem__": {"name": "x"}, "save": save}),
+        "Section": (
+            r["section"],
+            {**rows, "nearest": {"values": {"x": 0.0}}, "save": save},
+        ),
         "systems.SlowLoad": (r["load"], {"save": save}),
-        "Spectrum": (r["spectrum"], {"peaks": {}, "save": save}),
+        "Spectrum": (
+            r["spectrum"],
+            {"__getitem__": {"key": "amplitude"}, "peaks": {}, "save": save},
+        ),
         "LyapunovExponent": (r["exponent"], {"save": save}),
         "RegimeSet": (r["motions"], {"save": save}),
         "Regimes": (r["regimes"], {"save": save}),
         "Periodicity": (r["steady"], {"save": save}),
-        "BifurcationSweep": (r["swept"], {"hysteresis": {}, "save": save}),
+        "BifurcationSweep": (
+            r["swept"],
+            {
+                **rows,
+                "at": {"value": {"C": 2.0}},
+                "hysteresis": {},
+                "nearest": {"values": {"C": 2.0}},
+                "save": save,
+            },
+        ),
         "Trajectory": (
             r["gap"],
             {

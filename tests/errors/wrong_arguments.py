@@ -178,7 +178,14 @@ BY_FUNCTION = {
     "Trajectory.at.region": REGION,
     "Trajectory.nearest.values": NEAR,
     "Trajectory.select.region": REGION,
-    "Ensemble.__getitem__.name": [("y", Unknown, "unknown column 'y'")],
+    "Ensemble.nearest.values": NEAR[:2],
+    "Section.nearest.values": NEAR,
+    "BifurcationSweep.nearest.values": NEAR,
+    "BifurcationSweep.at.value": [
+        ({"q": 0.0}, Unknown, "unknown sweep parameter 'q'"),
+        ({"C": 7.0}, Wrong, "C = 7 is outside this sweep's range [2, 2.5]"),
+        ({"C": [[2.0]]}, Wrong, "expected a number or an array of shape (m,)"),
+    ],
     "PointBranch.at.value": [
         ({}, Wrong, "at: expected one value of p or q, received none"),
         ({"p": 0.0, "q": 0.0}, Wrong, "at: expected one value of p or q, received p, q"),

@@ -342,7 +342,7 @@ def test_special_points_as_columns(folded):
     assert points["w"].tolist() == [p["w"] for p in points]
     assert isinstance(points[1:3], SpecialPoints)
     assert points[0].label == points[:1][0].label
-    with pytest.raises(fs.UnknownNameError, match="unknown state or parameter 'ww'"):
+    with pytest.raises(fs.UnknownNameError, match="unknown column 'ww'"):
         points["ww"]
 
 

@@ -55,7 +55,7 @@ def test_hysteresis_of_the_gear_pair(swept):
 
 
 def test_the_teeth_part_where_the_orbit_grazes(swept):
-    lowest = np.array([swept.up.at(value).min() for value in swept.up.values])
+    lowest = np.array([swept.up.points_at(value).min() for value in swept.up.values])
     assert (lowest[swept.up.values < GRAZING] > 1).all()
     assert (lowest[swept.up.values > GRAZING] < 1).all()
 
@@ -82,7 +82,7 @@ def test_stroboscopic_points_in_closed_form(pair):
         amplitude = 0.05 * value**2 / (1 - value**2 + 0.1j * value)
         # a quarter of a period after phase 0
         speed = (1j * value * amplitude * 1j).imag
-        assert drawn.up.at(value) == pytest.approx([speed, speed], abs=1e-11)
+        assert drawn.up.points_at(value) == pytest.approx([speed, speed], abs=1e-11)
     with pytest.raises(fs.ArgumentError, match="back=True"):
         drawn.hysteresis()
 
@@ -94,7 +94,7 @@ def test_period_doubling(roessler):
         roessler, c, values, [1, 1, 0], column=y, settle=300, keep=12, what="section",
         section=x + a * y, direction=-1, period=6.0, back=False,
     )  # fmt: skip
-    apart = np.array([np.ptp(drawn.up.at(value)) for value in values])
+    apart = np.array([np.ptp(drawn.up.points_at(value)) for value in values])
     assert (apart[values < DOUBLING - 0.02] < 1e-5).all()
     assert (apart[values > DOUBLING + 0.02] > 0.1).all()
     # the multiplier is −0.978 here, so it takes its time

@@ -175,6 +175,13 @@ class ImmutableSequence(ReadOnly):
     def __delattr__(self, name: str) -> None:
         raise AttributeError(f"cannot delete '{name}' of {type(self).__name__}")
 
+    def _attributes(self) -> dict[str, Any]:
+        """Return the attributes, which are the further arguments of ``__new__``, by name."""
+        return {name: getattr(self, name) for name in type(self).__annotations__}
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        return tuple(self), *self._attributes().values()  # type: ignore[arg-type]
+
     def __copy__(self) -> Self:
         return self
 

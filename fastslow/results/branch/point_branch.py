@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,9 +97,6 @@ class PointBranch(Table, Result):
     def outcome(self) -> Outcome:
         """The outcome of the tracing: the first unsuccessful one, else that at the last row."""
         return next((o for o in self.outcomes if not o.success), self.outcomes[-1])
-
-    #: Not iterable: rows are not points, and columns are accessed by name.
-    __iter__: ClassVar[None] = None
 
     def __len__(self) -> int:
         return len(self.state)
@@ -247,9 +244,6 @@ class PointCurves(ImmutableSequence, tuple[PointBranch, ...]):
         made.parameter_names = parameter_names
         made.isolated = SpecialPoints(isolated)
         return made
-
-    def __getnewargs__(self) -> tuple[Any, ...]:
-        return tuple(self), self.parameter_names, self.isolated
 
     @property
     def special(self) -> SpecialPoints:

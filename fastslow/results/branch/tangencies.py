@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +74,3 @@ class Tangencies(ImmutableSequence, tuple[Tangency, ...]):
         made = super().__new__(cls, items)
         made.completeness = completeness
         return made
-
-    def __getnewargs__(self) -> tuple[Any, ...]:
-        return tuple(self), self.completeness

@@ -21,11 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, raised_by_handler
+from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.branch.tangencies import Tangencies
 from fastslow.results.overlay.transitions import Transitions
 from fastslow.results.points import Equilibria, SpecialPoints
 from fastslow.results.stored.model import StoredModel
+from fastslow.results.trajectory.crossings import Crossings
 
 Array = NDArray[Any]
 
@@ -45,6 +47,7 @@ _SEQUENCES: dict[str, Callable[..., Any]] = {
     "Transitions": Transitions,
     "Equilibria": Equilibria,
     "Tangencies": Tangencies,
+    "Crossings": Crossings,
 }
 
 _NUMBERS = {"nan": math.nan, "-nan": -math.nan, "inf": math.inf, "-inf": -math.inf}
@@ -98,8 +101,10 @@ def encoded(value: Any, path: str, arrays: dict[str, Array]) -> Any:
     if isinstance(value, list | tuple):
         items = [encoded(v, f"{path}/{k}", arrays) for k, v in enumerate(value)]
         node = _sequence(value, items, path)
-        if isinstance(value, Equilibria) and value.sets:
-            node["sets"] = encoded(value.sets, f"{path}/sets", arrays)
+        attributes = value._attributes() if isinstance(value, ImmutableSequence) else {}
+        for name, part in attributes.items():
+            if part:
+                node[name] = encoded(part, f"{path}/{name}", arrays)
         return node
     if isinstance(value, Mapping):
         return _mapping(value, path, arrays)
@@ -150,8 +155,6 @@ def _sequence(value: Any, items: list[Any], path: str) -> Any:
     name = type(value).__name__
     if _SEQUENCES.get(name) is not type(value):
         raise ArgumentError(f"{path or 'this'} is a {name}, which no file can keep")
-    if isinstance(value, Equilibria | Tangencies):
-        return {name: items, "completeness": value.completeness}
     return {name: items}
 
 
@@ -253,10 +256,7 @@ def _built(node: dict[str, Any], arrays: Arrays) -> Any:
     for name, build in _SEQUENCES.items():
         if name in node:
             items = [decoded(value, arrays) for value in node[name]]
-            if "completeness" not in node:
-                return build(items)
-            sets = [decoded(node["sets"], arrays)] if "sets" in node else []
-            return build(items, node["completeness"], *sets)
+            return build(items, **{k: decoded(v, arrays) for k, v in node.items() if k != name})
     raise BrokenError(f"it holds something unknown ({', '.join(node)})")
 
 

@@ -14,6 +14,7 @@ from fastslow.arguments import function, items, numbers, shown, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
+from fastslow.results.base.table import Table
 from fastslow.results.maps.boundaries import MapBoundary, MapEdges, boundaries_of
 
 Floats = NDArray[np.float64]
@@ -25,7 +26,7 @@ FAILED = "failed"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RefinedMap(Result):
+class RefinedMap(Table, Result):
     """Labels over a plane of two parameters.
 
     Positions are in units of the finest cells; a cell of size s contains s × s of
@@ -75,6 +76,17 @@ class RefinedMap(Result):
     edges: MapEdges
     failures: tuple[tuple[tuple[float, float], str], ...]
     n_evaluations: int
+
+    _row = "point"
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Return both parameters and the label of every evaluated point."""
+        labels = self.point_labels
+        columns = dict(zip(self.names, self.points.T, strict=True))
+        return {**columns, "label": labels.astype(str) if labels.dtype == object else labels}
 
     @property
     def steps(self) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import among, validated
 from fastslow.errors import unknown_name
-from fastslow.results.base.immutable import Immutable, ImmutableSequence
+from fastslow.results.base.immutable import Immutable
+from fastslow.results.base.table import ResultTable
 
 if TYPE_CHECKING:
     from fastslow.results.trajectory.trajectory import Trajectory
@@ -53,27 +54,51 @@ class Crossing(Immutable):
         )
 
 
-class Crossings(ImmutableSequence, tuple[Crossing, ...]):
-    """Crossings in order of time.
+class Crossings(ResultTable[Crossing]):
+    """Crossings in order of time, as a table.
 
     ``crossings("x - D", direction=+1)`` selects the upward crossings of an interface.
 
     Parameters
     ----------
     items : iterable of Crossing
-    interfaces : tuple of str
-        The interfaces of the model.
+    interfaces, states : tuple of str
+        The interfaces of the model, and its states with slow states.
     """
 
     interfaces: tuple[str, ...]
+    states: tuple[str, ...]
 
-    def __new__(cls, items: Iterable[Crossing] = (), interfaces: tuple[str, ...] = ()) -> Crossings:
+    _row = "t"
+    _places = ("t",)
+
+    def __new__(
+        cls,
+        items: Iterable[Crossing] = (),
+        interfaces: tuple[str, ...] = (),
+        states: tuple[str, ...] = (),
+    ) -> Crossings:
         made = super().__new__(cls, items)
         made.interfaces = interfaces
+        made.states = states
         return made
 
-    def __getnewargs__(self) -> tuple[Any, ...]:
-        return tuple(self), self.interfaces
+    def _words(self) -> Mapping[str, Collection[Any]]:
+        return {"interface": self.interfaces, "direction": (-1, 0, 1)}
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Return time t, the states, interface, direction, regions and tangential."""
+        state = np.array([c.state for c in self], dtype=float).reshape(-1, len(self.states))
+        names = ("interface", "direction", "from_region", "to_region", "tangential")
+        types: tuple[type, ...] = (str, np.int64, str, str, bool)
+        return {
+            "t": np.array([c.time for c in self], dtype=float),
+            **dict(zip(self.states, state.T, strict=True)),
+            **{
+                name: np.array([getattr(c, name) for c in self], dtype=kind)
+                for name, kind in zip(names, types, strict=True)
+            },
+        }
 
     @validated(direction=among(-1, 0, 1, None))
     def __call__(self, interface: object = None, *, direction: int | None = None) -> Crossings:
@@ -92,7 +117,7 @@ class Crossings(ImmutableSequence, tuple[Crossing, ...]):
             if (interface is None or crossing.interface == str(interface))
             and (direction is None or crossing.direction == direction)
         )
-        return Crossings(kept, self.interfaces)
+        return Crossings(kept, **self._attributes())
 
 
 def crossings_of(run: Trajectory) -> Crossings:
@@ -109,7 +134,7 @@ def crossings_of(run: Trajectory) -> Crossings:
         )
         for entry in run.crossing_table
     )
-    return Crossings(found, run.interfaces)
+    return Crossings(found, run.interfaces, run.states)
 
 
 @dataclass(frozen=True)

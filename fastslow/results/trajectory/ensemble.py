@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import ArgumentError
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
-from fastslow.results.base.table import Table
+from fastslow.results.base.table import RowTable
 from fastslow.results.trajectory.endings import outcome_of
-from fastslow.results.trajectory.regimes import REGIMES
+from fastslow.results.trajectory.regimes import CHAOTIC, NO_GAP, NOT_SETTLED, REGIMES
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ensemble(Table, Result):
+class Ensemble(RowTable, Result):
     """Summaries of m trajectories: extremes, crossings and final states.
 
     A trajectory that ended early is summarised up to its end; its extremes are NaN if it
@@ -126,9 +126,6 @@ class Ensemble(Table, Result):
 
     _row = "trajectory"
 
-    #: Not iterable: columns are accessed by name.
-    __iter__: ClassVar[None] = None
-
     def __len__(self) -> int:
         return len(self.final)
 
@@ -175,8 +172,10 @@ class Ensemble(Table, Result):
         """Times of the samples, shape (N,), or (m, N) if they differ between trajectories."""
         return self._samples[0]
 
-    def __getitem__(self, name: object) -> NDArray[np.float64]:
+    def __getitem__(self, key: Any) -> Any:
         """Return a state, slow state or slow quantity at the times ``t``, shape (m, N).
+
+        Other names and expressions are those of the summaries in `to_dict`, shape (m,).
 
         Raises
         ------
@@ -185,11 +184,26 @@ class Ensemble(Table, Result):
         ArgumentError
             Without samples.
         """
-        if str(name) == "t":
-            return self.t
-        if str(name) not in self.columns:
-            raise unknown_name("column", name, self.columns)
-        return self._samples[1][:, self.columns.index(str(name))]
+        if str(key) in self.columns:
+            return self._samples[1][:, self.columns.index(str(key))]
+        return self.t if str(key) == "t" else super().__getitem__(key)
+
+    def _constants(self) -> Mapping[str, float]:
+        return self.constants
+
+    def _words(self) -> Mapping[str, Collection[str]]:
+        return {"regime": (*REGIMES, NOT_SETTLED, CHAOTIC, NO_GAP)}
+
+    def _rows(self, rows: slice | NDArray[np.intp]) -> Ensemble:
+        kept: dict[str, Any] = {
+            name: value[rows]
+            for name in self.__dataclass_fields__
+            if isinstance(value := getattr(self, name), np.ndarray) and len(value) == len(self)
+        }
+        if self.sampled is not None:
+            t, columns = self.sampled
+            kept["sampled"] = t if t.ndim == 1 else t[rows], columns[rows]
+        return replace(self, **kept, parameters={n: v[rows] for n, v in self.parameters.items()})
 
     @property
     def _samples(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.formulas.columns import column
 from fastslow.results.base.outcome import early_end
 from fastslow.results.base.result import Result
-from fastslow.results.base.table import Table
+from fastslow.results.base.table import RowTable
 from fastslow.results.trajectory.dense import evaluate
 from fastslow.results.trajectory.step_polynomials import StepPolynomials, along_steps
 from fastslow.results.trajectory.step_roots import StepRoots, find_roots
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Section(Table, Result):
+class Section(RowTable, Result):
     """Points of a trajectory on a section.
 
     Parameters
@@ -52,14 +51,6 @@ class Section(Table, Result):
     _row = "t"
     _places = ("t",)
 
-    #: Not iterable: columns are accessed by name.
-    __iter__: ClassVar[None] = None
-
-    def __getitem__(self, name: object) -> NDArray[np.float64]:
-        """Return a column, or an expression in columns, at the points, shape (K,)."""
-        columns = {key: partial(self.table.__getitem__, k) for k, key in enumerate(self.names)}
-        return column(name, {**columns, "t": lambda: self.t}, {}, len(self))
-
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return time t, every column, and the direction."""
         columns = dict(zip(self.names, self.table, strict=True))
@@ -67,6 +58,13 @@ class Section(Table, Result):
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def _words(self) -> Mapping[str, Collection[int]]:
+        return {"direction": (-1, 0, 1)}
+
+    def _rows(self, rows: slice | NDArray[np.intp]) -> Section:
+        table, directions = self.table[:, rows], self.directions[rows]
+        return replace(self, t=self.t[rows], table=table, directions=directions)
 
     def __repr__(self) -> str:
         when = f", t from {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self) else ""

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import validated, within
+from fastslow.arguments import among, validated, within
 from fastslow.errors import ArgumentError
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
-from fastslow.results.base.table import Table
+from fastslow.results.base.table import RowTable, at_values, inside, named_value
 
 Array = NDArray[np.float64]
 
@@ -46,11 +46,17 @@ class SweepPass(Result):
     ends: Array
     outcomes: tuple[Outcome, ...]
 
-    def at(self, value: float) -> Array:
+    def points_at(self, value: float) -> Array:
         """Return the points recorded at the nearest of the values."""
         row = int(np.argmin(np.abs(self.values - value)))
         first = int(self.counts[:row].sum())
         return self.x[first : first + int(self.counts[row])]
+
+    def some(self, kept: NDArray[np.bool_]) -> SweepPass:
+        """Return the pass with some of its points, given by a mask of shape (N,)."""
+        number = np.repeat(np.arange(len(self.values)), self.counts)
+        counts = np.bincount(number[kept], minlength=len(self.values))
+        return replace(self, counts=counts, parameter=self.parameter[kept], x=self.x[kept])
 
     def __repr__(self) -> str:
         way = "up" if self.direction > 0 else "down"
@@ -64,7 +70,7 @@ class SweepPass(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BifurcationSweep(Table, Result):
+class BifurcationSweep(RowTable, Result):
     """A brute-force bifurcation diagram, computed by simulation.
 
     Parameters
@@ -103,6 +109,47 @@ class BifurcationSweep(Table, Result):
             self.name: self.x,
             "direction": self.direction,
         }
+
+    def _words(self) -> Mapping[str, Collection[int]]:
+        return {"direction": (-1, 1)}
+
+    def _rows(self, rows: slice | NDArray[np.intp]) -> BifurcationSweep:
+        kept = np.zeros(len(self), dtype=bool)
+        kept[rows] = True
+        ends = np.cumsum([len(p.x) for p in self.passes])[:-1]
+        parts = zip(self.passes, np.split(kept, ends), strict=True)
+        return replace(self, passes=tuple(p.some(mine) for p, mine in parts))
+
+    @validated(direction=among(-1, 1, None))
+    def at(self, *, direction: int | None = None, **value: Any) -> Any:
+        """Return the points recorded at the nearest value of the parameter.
+
+        Parameters
+        ----------
+        direction : int, optional
+            Select the pass upwards (+1) or downwards (−1).
+        **value : float or array_like, shape (m,)
+            The parameter by name, e.g. ``C=3.45``.
+
+        Returns
+        -------
+        ndarray, shape (k,), or list of m such arrays
+
+        Raises
+        ------
+        UnknownNameError
+            If the name is not the parameter of the sweep.
+        ArgumentError
+            For a value outside the range of the sweep.
+        """
+        passes = [p for p in self.passes if direction in (None, p.direction)]
+        name, over = self.parameter_name, (self.values[0], self.values[-1])
+
+        def points(number: float) -> Array:
+            inside("sweep", name, number, over)
+            return np.concatenate([np.empty(0), *(p.points_at(number) for p in passes)])
+
+        return at_values(*named_value("sweep", [name], value), points)
 
     @property
     def up(self) -> SweepPass | None:
@@ -176,7 +223,7 @@ class BifurcationSweep(Table, Result):
         intervals: list[list[float]] = []
         inside = False
         for value in self.values:
-            one, other = up.at(value), down.at(value)
+            one, other = up.points_at(value), down.points_at(value)
             if not (len(one) and len(other)):
                 continue
             gaps = np.abs(one[:, None] - other)
