@@ -335,7 +335,8 @@ def at_values(name: str, given: Any, query: Callable[[float], Any]) -> Any:
     >>> at_values("w", 2, lambda w: [w]), at_values("w", [1, 2], lambda w: [w])
     ([2.0], [[1.0], [2.0]])
     """
-    if np.ndim(given) == 0:
+    several = isinstance(given, Iterable) and not isinstance(given, str | bytes)
+    if not several or getattr(given, "ndim", 1) == 0:
         return query(finite(name, given))
     values = finite_numbers(name, given)
     if values.ndim > 1:
