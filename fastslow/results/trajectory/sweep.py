@@ -56,7 +56,7 @@ class SweepPass(Result):
         """Return the pass with some of its points, given by a mask of shape (N,)."""
         number = np.repeat(np.arange(len(self.values)), self.counts)
         counts = np.bincount(number[kept], minlength=len(self.values))
-        return replace(self, counts=counts, parameter=self.parameter[kept], x=self.x[kept])
+        return replace(self, counts=counts, swept=self.swept[kept], x=self.x[kept])
 
     def __repr__(self) -> str:
         way = "up" if self.direction > 0 else "down"
@@ -143,7 +143,7 @@ class BifurcationSweep(RowTable, Result):
             For a value outside the range of the sweep.
         """
         passes = [p for p in self.passes if direction in (None, p.direction)]
-        name, over = self.parameter_name, (self.values[0], self.values[-1])
+        name, over = self.parameter, (self.values[0], self.values[-1])
 
         def points(number: float) -> Array:
             inside("sweep", name, number, over)
