@@ -65,7 +65,7 @@ def test_a_sweep_in_flat_arrays(swept):
     assert (up.direction, down.direction) == (1, -1)
     assert np.array_equal(up.values, down.values[::-1])
     assert (up.counts == 8).all()
-    assert len(swept.parameter) == len(swept.x) == len(swept.direction) == 2 * len(up.x)
+    assert len(swept.swept) == len(swept.x) == len(swept.direction) == 2 * len(up.x)
     assert np.array_equal(swept.x[swept.direction < 0], down.x)
     assert up.ends.shape == (len(up.values), 2)
     assert "pass down: 328 points at 41 values" in repr(swept)
