@@ -29,7 +29,6 @@ from fastslow.plot.quantities import Quantity, at_crossings
 from fastslow.results.branch.branch import Branch
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import type_of
-from fastslow.results.trajectory.crossings import regions_at
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -167,7 +166,7 @@ def kept_rows(run: Trajectory) -> NDArray[np.intp]:
     """Rows of a run kept in a page: equidistant ones, turning points, changes of region."""
     count = len(run.t)
     every = np.arange(0, count, max(count // SAMPLES, 1))
-    region = regions_at(run, run.t)
+    region = run.regions_at(run.t)
     kept = [every, np.array([count - 1]), np.flatnonzero(region[1:] != region[:-1]) + 1]
     for name in run.columns:
         step = np.sign(np.diff(run[name]))
@@ -184,7 +183,7 @@ def _run_table(run: Trajectory, columns: Array, store: Store) -> dict[str, Any]:
         "names": ["t", *run.columns],
         "lines": [group for group in ([0], states, slow) if group],
         "eigenvalues": 0,
-        "words": _changes(regions_at(run, columns[:, 0])),
+        "words": _changes(run.regions_at(columns[:, 0])),
     }
 
 
@@ -328,7 +327,7 @@ def _regions(view: View, state: str, levels: list[float]) -> list[str]:
     heights, regions = [], []
     if view.run is not None and state in view.run.columns:
         heights.append(view.run[state])
-        regions.append(regions_at(view.run, view.run.t))
+        regions.append(view.run.regions_at(view.run.t))
     for branch in () if view.diagram is None else view.diagram.branches:
         heights.append(branch[state])
         regions.append(branch.region)

@@ -178,7 +178,7 @@ def time_series(
     drawn = MotionDrawing(ax, "t", shown[1].text, lines, dots, (), bands, *strip, shown=shown)
     if phases:
         on_draw(ax, lambda renderer: fit_words(*strip, renderer))
-    note_early_end(ax, early_end(run))
+    note_early_end(ax, early_end(run.outcome))
     # the legend is below the strip
     top = 1.0 - strip_height(ax) if phases else 1.0
     return _explained(drawn, own, label, legend, top)
@@ -291,7 +291,7 @@ def phase_portrait(
         bands = _bands(ax, run, (shown[0], shown[1]), interfaces, label)
     fractions = (np.arange(arrows) + 0.5) / max(arrows, 1)
     heads = draw_arrows(lines[-1], length_along(lines[-1]), fractions.tolist())
-    note_early_end(ax, early_end(run))
+    note_early_end(ax, early_end(run.outcome))
     across, up, *more = (q.text for q in shown)
     drawn = MotionDrawing(
         ax, across, up, lines, dots, heads, bands, z="".join(more), shown=tuple(shown)

@@ -263,7 +263,7 @@ def draw_passage(
 
 def _caveat(overlay: Overlay) -> str:
     """Return the note of an incomplete overlay, or an empty text."""
-    ended = early_end(overlay.run)
+    ended = early_end(overlay.run.outcome)
     if ended:
         return f"run ended early: {ended}"
     return "" if overlay.outcome else CAVEATS.get(overlay.outcome.code, overlay.outcome.code)

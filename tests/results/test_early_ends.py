@@ -6,7 +6,6 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.results.trajectory import dense
 
 x, v, w, t = sp.symbols("x v w t")
 FORCED = fs.Model({x: v, v: sp.sin(t) - x - v})
@@ -93,6 +92,6 @@ def test_many_times_at_once_are_the_same_as_each_alone(gear, order):
         for power in range(run.series.shape[2] - 2, -1, -1):
             value = value * h + run.series[step, :, power]
         expected[:, k] = value
-    found = dense.evaluate(run, row, offset)
+    found = run.dense.evaluate(row, offset)
     assert np.array_equal(found, expected)
     assert np.array_equal(run(times), expected[: len(run.states)])

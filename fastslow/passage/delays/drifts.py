@@ -17,7 +17,6 @@ from fastslow.model.structure import TIME, read_expression, real
 from fastslow.passage.overlay.slow_quantities import SlowQuantity
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.points import SpecialPoint
-from fastslow.results.trajectory.dense import evaluate
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -74,11 +73,11 @@ def drift_at(
 
 def _derivatives(run: Trajectory, time: float) -> Array:
     """Value, first and second derivative of every column at a time, shape (3, columns)."""
-    assert run.series is not None
-    row = max(int(np.searchsorted(run.step_starts, time, side="right")) - 1, 0)
-    offset, series = time - float(run.steps[row, 0]), run.series[row]
+    dense = run.dense
+    row = max(int(np.searchsorted(dense.step_starts, time, side="right")) - 1, 0)
+    offset, series = time - float(dense.steps[row, 0]), dense.series[row]
     order = np.arange(series.shape[1])
-    value = evaluate(run, np.array([row]), np.array([offset]))[:, 0]
+    value = dense.evaluate(np.array([row]), np.array([offset]))[:, 0]
     powers = offset ** np.maximum(order[None, :] - np.array([[1], [2]]), 0)
     first = series @ (order * powers[0] * (order >= 1))
     second = series @ (order * (order - 1) * powers[1] * (order >= 2))

@@ -106,8 +106,7 @@ def _velocities(slow: SlowQuantity) -> list[tuple[int, int, float]]:
     """
     if not slow.dense:
         return []
-    series = slow.run.series
-    assert series is not None
+    series = slow.run.dense.series
     rows = [slow.run.columns.index(name) for name in slow.states]
     found = []
     for j, of in enumerate(rows):

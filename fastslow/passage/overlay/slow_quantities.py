@@ -14,7 +14,6 @@ from fastslow.formulas.columns import evaluated, names_in
 from fastslow.kernels.loops import load_loop
 from fastslow.passage.loops import STEP_VALUES
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.trajectory.dense import columns_at
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -79,7 +78,7 @@ class SlowQuantity:
         columns = np.empty((len(names), len(times)))
         if load_loop(STEP_VALUES)(run.series, run.step_starts, *run.span, times, columns):
             # raises for the times outside the run
-            columns = columns_at(run, times)
+            columns = run.dense_columns(times)
         state = columns[self._rows].T
         if not self.laws:
             return columns[names.index(self.name)], state

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.slicing import runs_of
 from fastslow.results.overlay.transitions import Phase
-from fastslow.results.trajectory.crossings import regions_at
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -38,7 +37,7 @@ def bands_at(diagram: Diagram, run: Trajectory, slow: Array, extent: Array) -> N
     found = np.full(len(slow), -1, dtype=np.intp)
     if not diagram.bands:
         return found
-    regions = regions_at(run, run.t)
+    regions = run.regions_at(run.t)
     state = np.column_stack([run[name] for name in diagram.states])
     for number, band in enumerate(diagram.bands):
         lower, upper = band.bounds(slow)

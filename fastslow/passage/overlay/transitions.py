@@ -18,7 +18,7 @@ from fastslow.passage.overlay.spikes import refined
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.transitions import OSCILLATING, StableBranch, Transition
 from fastslow.results.points import SpecialPoint
-from fastslow.results.trajectory.crossings import Crossing, regions_at
+from fastslow.results.trajectory.crossings import Crossing
 from fastslow.results.trajectory.state_at import StatePoint
 
 Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ class Passage:
             self.slow.states,
             state[0].copy(),
             {name: float(value[0])},
-            str(regions_at(run, np.array([time]))[0]),
+            str(run.regions_at(np.array([time]))[0]),
             run.parameters,
             parameter=name,
         )

@@ -5,10 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from fastslow.results.trajectory.trajectory import Trajectory
 
 #: Codes of ends at which the tracing stopped, though the branch continues.
 CUT_SHORT = ("too many points", "step too small")
@@ -65,14 +61,14 @@ def with_notes(outcome: Outcome, notes: Sequence[str]) -> Outcome:
     return replace(outcome, message=message, notes=(*outcome.notes, *new))
 
 
-def stopped_early(run: Trajectory) -> str:
+def stopped_early(outcome: Outcome) -> str:
     """Return a sentence for results of a run that ended early, else empty text."""
-    return "" if run.outcome.success else f" The run ended early: {run.outcome}"
+    return "" if outcome.success else f" The run ended early: {outcome}"
 
 
-def early_end(run: Trajectory) -> str:
+def early_end(outcome: Outcome) -> str:
     """Return the code of the outcome of a run that ended early, else empty text."""
-    return "" if run.outcome.success else run.outcome.code
+    return "" if outcome.success else outcome.code
 
 
 def with_ends(

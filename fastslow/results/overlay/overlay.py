@@ -24,8 +24,7 @@ from fastslow.results.overlay.transitions import (
     StableBranch,
     Transitions,
 )
-from fastslow.results.trajectory.crossings import regions_at
-from fastslow.results.trajectory.state_at import StatePoint, in_blocks, sample
+from fastslow.results.trajectory.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
 #: The usual outcome of an overlay.
@@ -119,7 +118,9 @@ class Overlay(Table, Result):
         return len(self.t)
 
     def __iter__(self) -> Iterator[StatePoint]:
-        return chain.from_iterable(queries.measured(self, block) for block in in_blocks(self.run))
+        return chain.from_iterable(
+            queries.measured(self, block) for block in self.run.points_in_blocks()
+        )
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Columns: time t, slow quantity, states, distance, lag and stable branch followed."""
@@ -150,7 +151,7 @@ class Overlay(Table, Result):
         names = np.array([band.name for band in self.diagram.bands])
         edges = np.array([band.edge for band in self.diagram.bands])
         regions = np.array([band.region for band in self.diagram.bands])
-        rests = regions_at(self.run, self.t) == regions[self.band]
+        rests = self.run.regions_at(self.t) == regions[self.band]
         kept = np.where(rests, names[self.band], edges[self.band])
         return np.where(self.band >= 0, kept, labels)
 
@@ -184,7 +185,7 @@ class Overlay(Table, Result):
             return queries.rows_of(self, key)
         if isinstance(key, int | np.integer) and not isinstance(key, bool):
             row = position(key, len(self), "sample")
-            return queries.measured(self, [sample(self.run, row)])[0]
+            return queries.measured(self, [self.run[row]])[0]
         known = {
             "t": self.t,
             "distance": self.distance,

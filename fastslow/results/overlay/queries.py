@@ -13,22 +13,10 @@ from fastslow.arguments import word
 from fastslow.errors import unknown_name
 from fastslow.results.branch.slicing import limits_of, runs_of
 from fastslow.results.overlay.transitions import PHASES, Phase, Transitions
-from fastslow.results.trajectory.crossings import regions_at
-from fastslow.results.trajectory.lookup import (
-    between_samples,
-    in_region,
-    known_region,
-    one_value,
-    states_at_level,
-)
-from fastslow.results.trajectory.nearest import (
-    checked_values,
-    nearest_state,
-    nearest_time,
-    units_of,
-)
-from fastslow.results.trajectory.slicing import samples_of, slice_bounds
-from fastslow.results.trajectory.state_at import StatePoint, state_points_at
+from fastslow.results.trajectory.lookup import one_value, states_between_samples
+from fastslow.results.trajectory.nearest import checked_values, nearest_on_line, units_of
+from fastslow.results.trajectory.slicing import slice_bounds
+from fastslow.results.trajectory.state_at import StatePoint
 
 if TYPE_CHECKING:
     from fastslow.results.overlay.overlay import Overlay
@@ -89,12 +77,16 @@ def states_at(
 ) -> list[StatePoint]:
     """See `Overlay.at`."""
     name, level = one_value(value, columns_of(overlay))
-    if name in (*overlay.run.columns, "t"):
-        found = states_at_level(overlay.run, name, level, direction)
+    run = overlay.run
+    if name in (*run.columns, "t"):
+        found = run.at(region=region, direction=direction, **{name: level})
     else:
-        found = between_samples(overlay.run, name, overlay.slow, level, direction)
+        run.check_region(region)
+        samples = run.t, overlay.slow
+        found = states_between_samples(run.points_at, samples, name, level, direction)
+        found = [point for point in found if region in (None, point.region)]
     known_branch(overlay, stable_branch)
-    points = measured(overlay, in_region(overlay.run, found, region))
+    points = measured(overlay, found)
     return [
         point for point in points if stable_branch is None or point.stable_branch == stable_branch
     ]
@@ -112,14 +104,12 @@ def nearest_on(overlay: Overlay, values: Mapping[str, float]) -> StatePoint:
     """See `Overlay.nearest`."""
     checked_values(values, columns_of(overlay))
     if set(values) <= {*overlay.run.columns, "t"}:
-        return measured(overlay, [nearest_state(overlay.run, values)])[0]
+        return measured(overlay, [overlay.run.nearest(**values)])[0]
     table = np.column_stack([overlay[name] for name in values])
     scale = units_of(table)
     target = np.array([float(value) for value in values.values()])
-    time, _ = nearest_time(overlay.t, table / scale, target / scale)
-    point = replace(
-        state_points_at(overlay.run, np.array([time]))[0], interpolated=time not in overlay.t
-    )
+    time, _ = nearest_on_line(overlay.t, table / scale, target / scale)
+    point = replace(overlay.run.points_at(np.array([time]))[0], interpolated=time not in overlay.t)
     return measured(overlay, [point])[0]
 
 
@@ -132,7 +122,7 @@ def rows_of(overlay: Overlay, wanted: slice) -> Overlay:
     begin, end = float(overlay.t[start]), float(overlay.t[stop - 1])
     return replace(
         overlay,
-        run=samples_of(overlay.run, rows),
+        run=overlay.run[rows],
         t=overlay.t[rows],
         slow=overlay.slow[rows],
         state=overlay.state[rows],
@@ -171,8 +161,8 @@ def intervals_of(
         known_branch(overlay, stable_branch)
         wanted &= overlay.labels == stable_branch
     if region is not None:
-        known_region(overlay.run, region)
-        wanted &= regions_at(overlay.run, overlay.t) == region
+        overlay.run.check_region(region)
+        wanted &= overlay.run.regions_at(overlay.t) == region
     if type is not None:
         word("type of phase", PHASES)("type", type)
         starts = np.array([phase.start for phase in overlay.phases])

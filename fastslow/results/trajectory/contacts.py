@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.errors import unknown_name
 from fastslow.results.base.result import Result
-from fastslow.results.trajectory.section import period_of, window_of
-
-if TYPE_CHECKING:
-    from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.results.trajectory.crossings import Segment
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,55 +52,50 @@ class Contacts(Result):
     per_period: NDArray[np.int64]
 
 
-def count_hits(
-    run: Trajectory, interface: object, direction: int | None, window: tuple[float, float]
-) -> int:
-    """Count the crossings of an interface; see `Trajectory.hits`."""
-    if str(interface) not in run.interfaces:
-        raise unknown_name("interface", interface, run.interfaces)
-    up, down = _counts(run, window)[run.interfaces.index(str(interface))]
-    return int({1: up, -1: down, None: up + down}[direction])
-
-
-def time_fractions_in(run: Trajectory, window: tuple[float, float]) -> dict[str, float]:
+def time_fractions_in(
+    segments: Sequence[Segment], regions: tuple[str, ...], window: tuple[float, float]
+) -> dict[str, float]:
     """Return the fraction of a time interval in each region and sliding motion."""
     begin, end = window
     total = end - begin
-    spent = dict.fromkeys(run.regions, 0.0)
-    for segment in run.segments:
+    spent = dict.fromkeys(regions, 0.0)
+    for segment in segments:
         inside = min(segment.end, end) - max(segment.start, begin)
         if inside > 0.0:
             spent[segment.region] = spent.get(segment.region, 0.0) + inside / total
     return spent
 
 
-def contacts_of(run: Trajectory, period: float | None, window: tuple[float, float]) -> Contacts:
+def contacts_of(
+    crossings: NDArray[np.float64],
+    interfaces: tuple[str, ...],
+    time_fractions: Mapping[str, float],
+    *,
+    window: tuple[float, float],
+    period: float | None,
+    last: float,
+) -> Contacts:
     """Return hits and time fractions, in total and by period; see `Trajectory.contacts`."""
-    length = period_of(run, period) if (period or run.period) is not None else None
     begin, end = window
-    per_period = np.zeros((0, len(run.interfaces), 2), dtype=np.int64)
-    if length is not None:
-        n = int((end - begin) / length + 1e-9)
-        edges = np.clip(end - length * np.arange(n, -1, -1.0), begin, end)
-        parts = [_counts(run, window_of(run, *pair)) for pair in pairwise(edges)]
-        per_period = np.array(parts, dtype=np.int64).reshape(n, len(run.interfaces), 2)
-    return Contacts(
-        run.interfaces,
-        begin,
-        end,
-        _counts(run, window),
-        time_fractions_in(run, window),
-        length,
-        per_period,
-    )
+    count = len(interfaces)
+    per_period = np.zeros((0, count, 2), dtype=np.int64)
+    if period is not None:
+        n = int((end - begin) / period + 1e-9)
+        edges = np.clip(end - period * np.arange(n, -1, -1.0), begin, end)
+        parts = [count_hits(crossings, count, pair, last) for pair in pairwise(edges)]
+        per_period = np.array(parts, dtype=np.int64).reshape(n, count, 2)
+    hits = count_hits(crossings, count, window, last)
+    return Contacts(interfaces, begin, end, hits, time_fractions, period, per_period)
 
 
-def _counts(run: Trajectory, window: tuple[float, float]) -> NDArray[np.int64]:
+def count_hits(
+    crossings: NDArray[np.float64], count: int, window: tuple[float, float], last: float
+) -> NDArray[np.int64]:
     """Count crossings in [since, until), closed at the end of the run, (n_interfaces, 2)."""
     begin, end = window
-    time, interface, direction = run.crossing_table[:, :3].T
-    inside = (time >= begin) & ((time < end) | (end == run.span[1]))
-    counts = np.zeros((len(run.interfaces), 2), dtype=np.int64)
+    time, interface, direction = crossings[:, :3].T
+    inside = (time >= begin) & ((time < end) | (end == last))
+    counts = np.zeros((count, 2), dtype=np.int64)
     for column, sign in enumerate((1, -1)):
         mine = interface[inside & (direction == sign)].astype(np.intp)
         np.add.at(counts[:, column], mine, 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,6 @@ from fastslow.arguments import among, validated
 from fastslow.errors import unknown_name
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.table import ResultTable
-
-if TYPE_CHECKING:
-    from fastslow.results.trajectory.trajectory import Trajectory
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,23 +117,6 @@ class Crossings(ResultTable[Crossing]):
         return Crossings(kept, **self._attributes())
 
 
-def crossings_of(run: Trajectory) -> Crossings:
-    """Return the crossings in order of time."""
-    found = (
-        Crossing(
-            float(entry[0]),
-            entry[6:].copy(),
-            run.interfaces[int(entry[1])],
-            int(entry[2]),
-            run.modes[int(entry[3])],
-            run.modes[int(entry[4])],
-            bool(entry[5]),
-        )
-        for entry in run.crossing_table
-    )
-    return Crossings(found, run.interfaces, run.states)
-
-
 @dataclass(frozen=True)
 class Segment:
     """A time interval in one region (or of sliding between two)."""
@@ -148,25 +128,3 @@ class Segment:
     @property
     def duration(self) -> float:
         return self.end - self.start
-
-
-def segments_of(run: Trajectory) -> tuple[Segment, ...]:
-    """Return the time intervals in one region, in order."""
-    if not len(run.steps):
-        return ()
-    mode = run.steps[:, 2].astype(int)
-    starts = np.flatnonzero(np.r_[True, mode[1:] != mode[:-1]])
-    times = np.append(run.steps[starts, 0], run.span[1])
-    return tuple(
-        Segment(float(times[i]), float(times[i + 1]), run.modes[mode[first]])
-        for i, first in enumerate(starts)
-    )
-
-
-def regions_at(run: Trajectory, times: NDArray[np.float64]) -> NDArray[np.str_]:
-    """Return the region at each time; at a crossing the one entered."""
-    if not len(run.steps):
-        return np.full(len(times), "")
-    row = np.searchsorted(run.step_starts, times, side="right") - 1
-    mode = run.steps[np.maximum(row, 0), 2].astype(int)
-    return np.array(run.modes)[mode]

@@ -1,17 +1,22 @@
-"""Evaluation of the dense output of a run, from the series of every step."""
+"""Dense output: a solution as polynomials in time, one for every step."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.errors import ArgumentError
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.formulas.columns import written_formula
+from fastslow.results.base.immutable import Immutable
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.trajectory.step_polynomials import Expansion, StepPolynomials
+from fastslow.results.trajectory.step_roots import StepRoots, find_roots, find_roots_modulo
 
-if TYPE_CHECKING:
-    from fastslow.results.trajectory.trajectory import Trajectory
+Array = NDArray[np.float64]
 
 #: Tolerated error of a plotted polyline, as a fraction of the range of each column.
 FLATNESS = 2e-4
@@ -21,46 +26,204 @@ FLATNESS = 2e-4
 MOST_POINTS, LEAST_POINTS = 48, 16
 
 
-def columns_at(
-    run: Trajectory, times: ArrayLike, wanted: Sequence[int] | slice = slice(None)
-) -> NDArray[np.float64]:
-    """Return columns at any times, by default all columns; see `Trajectory.dense_columns`."""
-    where = np.asarray(times, dtype=float)
-    if run.series is None:
-        raise ArgumentError(
-            "this run has no dense output; simulate with dense=True, or with samples="
-        )
-    low, high = run.span
-    if where.size and not (where.min() >= low and where.max() <= high):
-        worst = float(where[~((where >= low) & (where <= high))].flat[0])
-        raise ArgumentError(f"time {worst:g} is outside the run, which is [{low:g}, {high:g}]")
-    if not len(run.steps):
-        raise ArgumentError(f"the run made no step: {run.outcome}")
-    flat, starts = where.reshape(-1), run.step_starts
-    series = run.series[:, wanted]
-    if len(flat) > len(starts) and bool((flat[1:] >= flat[:-1]).all()):
-        # fewer steps than times: search for the steps among the times
-        first = np.searchsorted(flat, starts)
-        first[0] = 0
-        counts = np.diff(first, append=len(flat))
-        values = _spread(series.transpose(2, 1, 0), counts, flat - np.repeat(starts, counts))
-    else:
-        row = np.searchsorted(starts, flat, side="right") - 1
-        values = _at(series, row, flat - starts[row])
-    return values.reshape(len(values), *where.shape)
+@dataclass(frozen=True, eq=False, repr=False)
+class DenseOutput(Immutable):
+    """A solution as polynomials in time, one for every step.
+
+    ``dense(t)`` returns the states at any times of the span, shape (n, N).
+
+    Parameters
+    ----------
+    states, forcing : tuple of str
+        Names of the columns: states and slow states, then slow quantities.
+    parameters : mapping
+        Parameter values, for expressions.
+    periods : mapping
+        The period of each periodic state.
+    span : tuple of float
+        First and last time.
+    end : ndarray, shape (n,)
+        States at the last time.
+    steps : ndarray, shape (n_steps, 4)
+        Time, length, mode and method of every step, as in a `Trajectory`.
+    series : ndarray, shape (n_steps, n + n_forcing, order + 1)
+        Taylor coefficients of every step, about its start.
+    outcome : Outcome
+        The outcome at the last time.
+
+    Examples
+    --------
+    A parabola of one step, its root and its extremes:
+
+    >>> dense = DenseOutput(
+    ...     states=("x",), forcing=(), parameters={"a": 1.0}, periods={}, span=(0.0, 2.0),
+    ...     end=np.array([3.0]), steps=np.array([[0.0, 2.0, 0.0, 0.0]]),
+    ...     series=np.array([[[-1.0, 0.0, 1.0]]]), outcome=Outcome("end of time", "", True),
+    ... )
+    >>> dense([0.5, 2.0])
+    array([[-0.75,  3.  ]])
+    >>> 2.0 * dense.roots("x + a", 1.0).part
+    array([1.])
+    >>> dense.extremes("x", (0.0, 1.0))
+    (-1.0, 0.0)
+    """
+
+    states: tuple[str, ...]
+    forcing: tuple[str, ...]
+    parameters: Mapping[str, float]
+    periods: Mapping[str, float]
+    span: tuple[float, float]
+    end: Array
+    steps: Array
+    series: Array
+    outcome: Outcome
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns: states, slow states, slow quantities."""
+        return (*self.states, *self.forcing)
+
+    @cached_property
+    def step_starts(self) -> Array:
+        """Start times of the steps, contiguous in memory for a binary search."""
+        return np.ascontiguousarray(self.steps[:, 0])
+
+    @cached_property
+    def nodes(self) -> Array:
+        """States at the starts of all steps and at the last time, shape (n_steps + 1, n)."""
+        return np.vstack([self.series[:, : len(self.states), 0], self.end])
+
+    def __call__(self, times: ArrayLike) -> Array:
+        """Return the states at times of the span, shape (n, N)."""
+        return self.columns_at(times, slice(len(self.states)))
+
+    def columns_at(self, times: ArrayLike, wanted: Sequence[int] | slice = slice(None)) -> Array:
+        """Return columns at times of the span, by default all, shape (n + n_forcing, N).
+
+        Raises
+        ------
+        ArgumentError
+            For a time outside the span, or without any step.
+        """
+        where = np.asarray(times, dtype=float)
+        low, high = self.span
+        if where.size and not (where.min() >= low and where.max() <= high):
+            worst = float(where[~((where >= low) & (where <= high))].flat[0])
+            raise ArgumentError(f"time {worst:g} is outside the run, which is [{low:g}, {high:g}]")
+        if not len(self.steps):
+            raise ArgumentError(f"the run made no step: {self.outcome}")
+        flat, starts = where.reshape(-1), self.step_starts
+        series = self.series[:, wanted]
+        if len(flat) > len(starts) and bool((flat[1:] >= flat[:-1]).all()):
+            # fewer steps than times: search for the steps among the times
+            first = np.searchsorted(flat, starts)
+            first[0] = 0
+            counts = np.diff(first, append=len(flat))
+            values = _spread(series.transpose(2, 1, 0), counts, flat - np.repeat(starts, counts))
+        else:
+            row = np.searchsorted(starts, flat, side="right") - 1
+            values = _at(series, row, flat - starts[row])
+        return values.reshape(len(values), *where.shape)
+
+    def evaluate(self, row: NDArray[np.intp], offset: Array) -> Array:
+        """Return all columns at offsets into given steps, shape (n + n_forcing, N)."""
+        return _at(self.series, row, offset)
+
+    def modulo(self, times: ArrayLike) -> Array:
+        """Reduce times to the span, modulo its length: the times of one period of an orbit."""
+        low, high = self.span
+        reduced = low + np.mod(np.asarray(times, dtype=float) - low, high - low)
+        return np.asarray(np.minimum(reduced, high))
+
+    def polynomials(self, expression: object) -> StepPolynomials:
+        """Expand a column, or a polynomial in columns, parameters and time, along every step.
+
+        Parameters
+        ----------
+        expression : str or Expr
+            A polynomial in columns and t of total degree up to `DEGREE`, whose coefficients
+            are numbers, parameters and functions of these.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is neither a column nor a parameter.
+        ArgumentError
+            For an expression that is not a polynomial.
+        """
+        text = written_formula(expression)
+        if text in self.columns:
+            return self._column(self.columns.index(text))
+        columns = {name: partial(self._column, k) for k, name in enumerate(self.columns)}
+        return Expansion(text, columns, self.parameters, self.steps[:, :2]).polynomials()
+
+    def _column(self, row: int) -> StepPolynomials:
+        power = self.steps[:, 1:2] ** np.arange(self.series.shape[2])
+        return StepPolynomials.of(self.series[:, row] * power)
+
+    def roots(self, expression: object, level: float) -> StepRoots:
+        """Compute all roots of an expression at a level; that of a periodic state is modulo it."""
+        line, period = self.polynomials(expression), self.periods.get(str(expression))
+        if period is None:
+            return find_roots(line.minus(level))
+        return find_roots_modulo(line, level, period)
+
+    def extremes(self, name: object, window: tuple[float, float]) -> tuple[float, float]:
+        """Return minimum and maximum of a column in a time interval; see `Trajectory.extremes`."""
+        if str(name) not in self.columns:
+            raise unknown_name("column", name, self.columns)
+        row = self.columns.index(str(name))
+        begin, end = window
+        ends = self.columns_at([begin, end])[row]
+        start, length = self.steps[:, 0], self.steps[:, 1]
+        used = np.flatnonzero((start + length > begin) & (start < end))
+        start, length = start[used], length[used]
+        scaled = self.series[used, row] * length[:, None] ** np.arange(self.series.shape[2])
+        after = np.maximum(begin - start, 0.0) / length
+        before = np.minimum((end - start) / length, 1.0)
+        inside = scaled[after == 0, 0]
+        low, high = float(np.append(ends, inside).min()), float(np.append(ends, inside).max())
+        reach = np.abs(scaled[:, 1:]).sum(axis=1)
+        for i in np.flatnonzero((scaled[:, 0] + reach > high) | (scaled[:, 0] - reach < low)):
+            roots = np.polynomial.polynomial.polyroots(np.polynomial.polynomial.polyder(scaled[i]))
+            critical = roots.real[np.abs(roots.imag) < 1e-6]
+            critical = critical[(critical >= after[i]) & (critical <= before[i])]
+            values = np.polynomial.polynomial.polyval(critical, scaled[i])
+            low, high = float(np.append(values, low).min()), float(np.append(values, high).max())
+        return low, high
+
+    def mean(self, name: str, since: float) -> float:
+        """Return the time average of a column over the steps that begin after a given time."""
+        late = self.steps[:, 0] >= since
+        if not late.any():
+            late = np.ones(len(self.steps), dtype=bool)
+        length = self.steps[late, 1]
+        k = np.arange(self.series.shape[2])
+        area = self.series[late, self.columns.index(name)] * length[:, None] ** (k + 1) / (k + 1)
+        return float(area.sum() / length.sum())
+
+    def of_steps(self, rows: NDArray[np.intp]) -> DenseOutput:
+        """Return the dense output of some steps."""
+        return replace(self, steps=self.steps[rows], series=self.series[rows])
+
+    @cached_property
+    def refined(self) -> tuple[Array, Array]:
+        """Times and columns, dense enough that a polyline looks smooth."""
+        powers = np.ascontiguousarray(self.series.transpose(2, 1, 0))
+        length = self.steps[:, 1]
+        least = np.where(self.steps[:, 3] >= 2, LEAST_POINTS, 1)
+        lines = np.clip(_line_segments(powers, length), least, MOST_POINTS).astype(int)
+        counts = lines.copy()
+        counts[-1] += 1
+        number = np.arange(int(counts.sum())) - np.repeat(np.cumsum(lines) - lines, counts)
+        offset = number * np.repeat(length / lines, counts)
+        offset[-1] = length[-1]
+        times = np.repeat(self.step_starts, counts) + offset
+        times[-1] = self.span[1]
+        return times, _spread(powers, counts, offset)
 
 
-def evaluate(
-    run: Trajectory, row: NDArray[np.intp], offset: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return all columns at offsets into given steps, shape (n + n_forcing, N)."""
-    assert run.series is not None
-    return _at(run.series, row, offset)
-
-
-def _at(
-    series: NDArray[np.float64], row: NDArray[np.intp], offset: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _at(series: Array, row: NDArray[np.intp], offset: Array) -> Array:
     """Return columns at offsets into given steps, shape (columns, N)."""
     if len(row) and row.min() == row.max():
         taken = series[row[0]].T[:, :, None]
@@ -76,9 +239,7 @@ def _at(
     return _horner(value, lower, offset)
 
 
-def _spread(
-    powers: NDArray[np.float64], counts: NDArray[np.intp], offset: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _spread(powers: Array, counts: NDArray[np.intp], offset: Array) -> Array:
     """Return columns at given numbers of offsets into each step, shape (columns, N).
 
     The coefficients have the shape (order + 1, columns, n_steps).
@@ -88,10 +249,10 @@ def _spread(
 
 
 def _horner(
-    value: NDArray[np.float64],
-    lower: Iterable[NDArray[np.float64]],
-    offset: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    value: Array,
+    lower: Iterable[Array],
+    offset: Array,
+) -> Array:
     """Evaluate polynomials in the offset by Horner's scheme; overwrites ``value``."""
     for power in lower:
         value *= offset
@@ -99,25 +260,7 @@ def _horner(
     return value
 
 
-def refined_table(run: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return times and columns, dense enough that a polyline looks smooth."""
-    if run.series is None or not len(run.steps):
-        return run.end[:1], run.end[1:, None]
-    powers = np.ascontiguousarray(run.series.transpose(2, 1, 0))
-    length = run.steps[:, 1]
-    least = np.where(run.steps[:, 3] >= 2, LEAST_POINTS, 1)
-    lines = np.clip(_line_segments(powers, length), least, MOST_POINTS).astype(int)
-    counts = lines.copy()
-    counts[-1] += 1
-    number = np.arange(int(counts.sum())) - np.repeat(np.cumsum(lines) - lines, counts)
-    offset = number * np.repeat(length / lines, counts)
-    offset[-1] = length[-1]
-    times = np.repeat(run.step_starts, counts) + offset
-    times[-1] = run.span[1]
-    return times, _spread(powers, counts, offset)
-
-
-def _line_segments(powers: NDArray[np.float64], length: NDArray[np.float64]) -> NDArray[np.float64]:
+def _line_segments(powers: Array, length: Array) -> Array:
     """Return the number of line segments for each step, from bounds of its second derivatives."""
     bend = np.zeros(powers.shape[1:])
     for k in range(len(powers) - 1, 1, -1):

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.results.trajectory.extrema import extremes_of
-from fastslow.results.trajectory.state_at import (
-    StatePoint,
-    check_readable,
-    is_dense,
-    state_points_at,
-)
-from fastslow.results.trajectory.step_polynomials import StepPolynomials, along_steps
+from fastslow.results.trajectory.dense import DenseOutput
+from fastslow.results.trajectory.state_at import StatePoint
+from fastslow.results.trajectory.step_polynomials import StepPolynomials
 from fastslow.results.trajectory.step_roots import CLOSE, Zero, find_zeros
 
-if TYPE_CHECKING:
-    from fastslow.results.trajectory.trajectory import Trajectory
-
 Array = NDArray[np.float64]
+
+#: Returns the states at given times.
+PointsAt = Callable[[Array], list[StatePoint]]
 
 #: Distance of an end of the run from the value, relative to the terms of the step, below
 #: which it is a root.
@@ -52,26 +46,14 @@ def one_value(values: Mapping[str, float], valid: Sequence[str]) -> tuple[str, f
 
 
 def states_at_level(
-    run: Trajectory, name: str, level: float, direction: int | None
+    points_at: PointsAt, dense: DenseOutput, name: str, level: float, direction: int | None
 ) -> list[StatePoint]:
     """Return the states at which a column has a value, in order of time; see `Trajectory.at`."""
-    check_readable(run)
-    if name == "t":
-        low, high = run.span if is_dense(run) else (float(run.t[0]), float(run.t[-1]))
-        if not low <= level <= high:
-            raise outside(name, level, (low, high))
-        found = state_points_at(run, np.array([level]))
-        return found if direction in (None, 1) else []
-    if not is_dense(run):
-        values = run[name]
-        return between_samples(run, name, values, level, direction)
-    quantity = along_steps(run, name).minus(level)
+    quantity = dense.polynomials(name).minus(level)
     zeros = _with_ends(find_zeros(quantity), quantity)
     if not zeros:
-        low, high = extremes_of(run, name, None)
-        if not low <= level <= high:
-            raise outside(name, level, (low, high))
-    return _states_at_roots(run, zeros, run.steps[:, 0], run.steps[:, 1], direction)
+        check_reached(name, level, dense.extremes(name, dense.span))
+    return _states_at_roots(points_at, zeros, dense.steps[:, :2], dense.span, direction)
 
 
 def _with_ends(zeros: list[Zero], quantity: StepPolynomials) -> list[Zero]:
@@ -87,21 +69,28 @@ def _with_ends(zeros: list[Zero], quantity: StepPolynomials) -> list[Zero]:
     return zeros
 
 
-def between_samples(
-    run: Trajectory, name: str, values: Array, level: float, direction: int | None
+def states_between_samples(
+    points_at: PointsAt,
+    samples: tuple[Array, Array],
+    name: str,
+    level: float,
+    direction: int | None,
 ) -> list[StatePoint]:
-    """Return states as `states_at_level`, by linear interpolation between samples."""
-    low, high = float(values.min()), float(values.max())
-    if not low <= level <= high:
-        raise outside(name, level, (low, high))
+    """Return states as `states_at_level`, by linear interpolation between samples.
+
+    The samples are times and values of the named column.
+    """
+    times, values = samples
+    check_reached(name, level, (float(values.min()), float(values.max())))
     if len(values) == 1:
-        return state_points_at(run, run.t) if direction in (None, 0) else []
+        return points_at(times) if direction in (None, 0) else []
     rise = np.diff(values)
     lines = StepPolynomials(
         np.column_stack([values[:-1] - level, rise]), np.abs(values[:-1]) + np.abs(rise)
     )
-    found = _states_at_roots(run, find_zeros(lines), run.t[:-1], np.diff(run.t), direction)
-    at_samples = np.isin([point.time for point in found], run.t).tolist()
+    steps, span = np.column_stack([times[:-1], np.diff(times)]), (times[0], times[-1])
+    found = _states_at_roots(points_at, find_zeros(lines), steps, span, direction)
+    at_samples = np.isin([point.time for point in found], times).tolist()
     return [
         replace(point, interpolated=not exact)
         for point, exact in zip(found, at_samples, strict=True)
@@ -109,7 +98,11 @@ def between_samples(
 
 
 def _states_at_roots(
-    run: Trajectory, zeros: list[Zero], starts: Array, lengths: Array, direction: int | None
+    points_at: PointsAt,
+    zeros: list[Zero],
+    steps: Array,
+    span: tuple[float, float],
+    direction: int | None,
 ) -> list[StatePoint]:
     """Return the states at roots along steps; an interval of roots gives its two ends."""
     places: list[float] = []
@@ -120,39 +113,17 @@ def _states_at_roots(
             places += ends
             resting += [zero.long] * len(ends)
     where = np.array(places)
-    step = np.minimum(where.astype(np.intp), len(starts) - 1)
-    times = starts[step] + (where - step) * lengths[step]
-    low, high = run.span
-    found = state_points_at(run, np.clip(times, low, high))
+    step = np.minimum(where.astype(np.intp), len(steps) - 1)
+    times = steps[step, 0] + (where - step) * steps[step, 1]
+    found = points_at(np.clip(times, *span))
     return [
         replace(point, resting=True) if rests else point
         for point, rests in zip(found, resting, strict=True)
     ]
 
 
-def in_region(run: Trajectory, found: list[StatePoint], region: str | None) -> list[StatePoint]:
-    """Select the states in a region, or sliding between two.
-
-    Raises
-    ------
-    UnknownNameError
-        For an unknown region.
-    """
-    if region is None:
-        return found
-    known_region(run, region)
-    return [point for point in found if point.region == region]
-
-
-def known_region(run: Trajectory, region: str) -> None:
-    """Raise UnknownNameError for a name that is neither a region nor a sliding motion."""
-    valid = tuple(dict.fromkeys([*run.regions, *run.modes]))
-    if region not in valid:
-        raise unknown_name("region", region, valid)
-
-
-def outside(name: str, level: float, over: tuple[float, float]) -> ArgumentError:
-    """Return the error for a value that is not reached."""
-    return ArgumentError(
-        f"{name} = {level:g} is outside this run's range [{over[0]:g}, {over[1]:g}]"
-    )
+def check_reached(name: str, level: float, reach: tuple[float, float]) -> None:
+    """Raise ArgumentError for a value outside the range of a column."""
+    low, high = reach
+    if not low <= level <= high:
+        raise ArgumentError(f"{name} = {level:g} is outside this run's range [{low:g}, {high:g}]")

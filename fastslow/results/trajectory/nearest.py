@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,18 +12,9 @@ from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.angles import copies, periods_of
 from fastslow.results.branch.nearest import along_line
-from fastslow.results.trajectory.dense import refined_table
-from fastslow.results.trajectory.state_at import (
-    StatePoint,
-    check_readable,
-    is_dense,
-    state_points_at,
-)
-from fastslow.results.trajectory.step_polynomials import StepPolynomials, along_steps
+from fastslow.results.trajectory.dense import DenseOutput
+from fastslow.results.trajectory.step_polynomials import StepPolynomials
 from fastslow.results.trajectory.step_roots import find_zeros
-
-if TYPE_CHECKING:
-    from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -43,7 +32,7 @@ def checked_values(values: Mapping[str, float], valid: tuple[str, ...]) -> None:
         finite(name, value)
 
 
-def nearest_time(times: Array, table: Array, target: Array) -> tuple[float, Array]:
+def nearest_on_line(times: Array, table: Array, target: Array) -> tuple[float, Array]:
     """Return the nearest time by linear interpolation, and the squared distances of all steps.
 
     Parameters
@@ -74,51 +63,59 @@ def nearest_target(table: Array, target: Array, scale: Array, periods: Array) ->
     ways = [copies(*entry) for entry in zip(target.tolist(), low, high, periods, strict=True)]
     found = [np.array(way) for way in product(*ways)]
     distances = [
-        nearest_time(np.arange(len(table), dtype=float), table / scale, t / scale)[1] for t in found
+        nearest_on_line(np.arange(len(table), dtype=float), table / scale, t / scale)[1]
+        for t in found
     ]
     return found[int(np.argmin([d.min(initial=np.inf) for d in distances]))]
 
 
-def nearest_state(run: Trajectory, values: Mapping[str, float]) -> StatePoint:
-    """Return the nearest state of a trajectory; see `Trajectory.nearest`."""
-    checked_values(values, (*run.columns, "t"))
-    check_readable(run)
-    if is_dense(run) and run.sampled is not None:
-        # samples may be few
-        times, columns = refined_table(run)
-        known = {**dict(zip(run.columns, columns, strict=True)), "t": times}
-        table = np.column_stack([known[name] for name in values])
-    else:
-        times, table = run.t, np.column_stack([run[name] for name in values])
-    periods = periods_of(tuple(values), run.periods)
-    scale = np.where(periods > 0, periods, units_of(table))
-    target = nearest_target(table, np.array([float(v) for v in values.values()]), scale, periods)
-    time, distance = nearest_time(times, table / scale, target / scale)
-    if is_dense(run) and len(distance):
-        close = np.argpartition(distance, min(4 * STEPS, len(distance)) - 1)[: 4 * STEPS]
-        close = close[np.argsort(distance[close], kind="stable")]
-        starts = times[close]
-        steps = np.searchsorted(run.step_starts, starts, side="right") - 1
-        # the nearest steps by linear interpolation, in that order, each once
-        _, order = np.unique(steps, return_index=True)
-        time = _along_series(run, steps[np.sort(order)[:STEPS]], list(values), target, scale)
-    return state_points_at(run, np.array([time]))[0]
+def nearest_time(
+    values: Mapping[str, float],
+    times: Array,
+    columns: Mapping[str, Array],
+    periods: Mapping[str, float],
+    dense: DenseOutput | None,
+) -> float:
+    """Return the time of the nearest state; see `Trajectory.nearest`.
+
+    Parameters
+    ----------
+    values : mapping
+    times : ndarray, shape (N,)
+    columns : mapping
+        The columns of the values at these times.
+    periods : mapping
+    dense : DenseOutput, optional
+        By which the result is refined.
+    """
+    table = np.column_stack([columns[name] for name in values])
+    lengths = periods_of(tuple(values), periods)
+    scale = np.where(lengths > 0, lengths, units_of(table))
+    target = nearest_target(table, np.array([float(v) for v in values.values()]), scale, lengths)
+    time, distance = nearest_on_line(times, table / scale, target / scale)
+    if dense is None or not len(distance):
+        return time
+    close = np.argpartition(distance, min(4 * STEPS, len(distance)) - 1)[: 4 * STEPS]
+    close = close[np.argsort(distance[close], kind="stable")]
+    steps = np.searchsorted(dense.step_starts, times[close], side="right") - 1
+    # the nearest steps by linear interpolation, in that order, each once
+    _, order = np.unique(steps, return_index=True)
+    return _along_series(dense, steps[np.sort(order)[:STEPS]], list(values), target, scale)
 
 
 def _along_series(
-    run: Trajectory, steps: NDArray[np.intp], names: list[str], target: Array, scale: Array
+    dense: DenseOutput, steps: NDArray[np.intp], names: list[str], target: Array, scale: Array
 ) -> float:
     """Return the time of least distance on given steps."""
-    assert run.series is not None
-    some = replace(run, steps=run.steps[steps], series=run.series[steps])
+    some = dense.of_steps(steps)
     total = StepPolynomials(np.zeros((len(steps), 1)), np.zeros(len(steps)))
     for name, value, unit in zip(names, target, scale, strict=True):
-        apart = along_steps(some, name).minus(float(value))
+        apart = some.polynomials(name).minus(float(value))
         apart = StepPolynomials(apart.coefficients / unit, apart.size / unit)
         total += apart * apart
     power = np.arange(1, total.coefficients.shape[1])
     slope = total.coefficients[:, 1:] * power
-    best = (np.inf, run.span[0])
+    best = (np.inf, dense.span[0])
     for k, (start, length) in enumerate(some.steps[:, :2]):
         one = StepPolynomials(slope[k : k + 1], np.abs(slope[k : k + 1]).sum(axis=1))
         inside = [zero.middle for zero in find_zeros(one)]
@@ -126,4 +123,4 @@ def _along_series(
         found = np.polynomial.polynomial.polyval(parts, total.coefficients[k])
         least = int(np.argmin(found))
         best = min(best, (float(found[least]), float(start + parts[least] * length)))
-    return min(max(best[1], run.span[0]), run.span[1])
+    return min(max(best[1], dense.span[0]), dense.span[1])

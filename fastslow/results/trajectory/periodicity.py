@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.errors import ArgumentError
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.base.outcome import Outcome, stopped_early
 from fastslow.results.base.result import Result
-from fastslow.results.trajectory.section import Section, poincare_section, stroboscopic_section
-
-if TYPE_CHECKING:
-    from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.results.trajectory.dense import DenseOutput
+from fastslow.results.trajectory.section import (
+    Section,
+    level_section,
+    selected,
+    stroboscopic_section,
+)
 
 Array = NDArray[np.float64]
 
@@ -82,21 +83,17 @@ class Periodicity(Result):
 
 
 def periodicity_of(
-    run: Trajectory, period: float | None, tol: float, max_multiple: int
+    dense: DenseOutput, period: float | None, tol: float, max_multiple: int, rtol: float
 ) -> Periodicity:
     """Detect a period; see `Trajectory.periodicity`."""
-    if not tol > 0:
-        raise ArgumentError(f"tol = {tol!r}; expected a positive number")
-    if max_multiple < 1:
-        raise ArgumentError(f"max_multiple = {max_multiple!r}; expected at least 1")
-    # raises the appropriate error for a run without dense output or steps
-    run.dense_columns(run.span[1])
-    assert run.series is not None
-    late = run.span[1] - LATE * (run.span[1] - run.span[0])
+    span, early = dense.span, stopped_early(dense.outcome)
+    # raises the appropriate error for a run without steps
+    dense(span[1])
+    late = span[1] - LATE * (span[1] - span[0])
     # the ends of the steps suffice to estimate the range of a state
-    everywhere = np.vstack([run.series[:, : len(run.states), 0], run.end[1:]])
-    settled = everywhere[np.append(run.steps[:, 0] >= late, True)]
-    periods = periods_of(run.states, run.periods)
+    everywhere = dense.nodes
+    settled = everywhere[np.append(dense.steps[:, 0] >= late, True)]
+    periods = periods_of(dense.states, dense.periods)
     most_apart = np.where(periods > 0, periods, np.inf)
     ranges, whole = (
         np.minimum(np.ptp(table, axis=0), most_apart) for table in (settled, everywhere)
@@ -105,22 +102,24 @@ def periodicity_of(
     size = np.abs(everywhere).max(axis=0)
     least = STILL * np.where(size > 0, size, 1.0)
     scale = np.maximum(ranges, least)
-    if period is not None or run.period is not None:
-        section = stroboscopic_section(run, period, 0.0, None)
+    if period is not None:
+        section = stroboscopic_section(dense, period, 0.0, span)
         unit = "periods"
     else:
         if (ranges <= tol * np.maximum(whole, least)).all():
-            section = Section("", run.states, np.empty(0), np.empty((len(run.states), 0)), _NONE)
-            text = "the run settles on an equilibrium." + stopped_early(run)
+            section = Section(
+                "", dense.states, np.empty(0), np.empty((len(dense.states), 0)), _NONE
+            )
+            text = "the run settles on an equilibrium." + early
             still = Outcome("equilibrium", text, True)
             return Periodicity(None, None, late, float(ranges.max()), section, still)
         widest = int(np.argmax(ranges))
-        mean = _mean(run, widest, late)
-        name = run.states[widest]
-        section = poincare_section(run, name, mean, 1, None, run.span)
+        name = dense.states[widest]
+        mean = dense.mean(name, late)
+        section = selected(level_section(dense, name, mean), 1, span)
         unit = f"returns to {name} = {mean:.6g}"
-    states = section.table[: len(run.states)] / scale[:, None]
-    noise = ERRORS * float(run.settings.get("rtol", 0.0))
+    states = section.table[: len(dense.states)] / scale[:, None]
+    noise = ERRORS * rtol
     smallest = np.inf
     for multiple in range(1, max_multiple + 1):
         if multiple >= len(section):
@@ -149,7 +148,7 @@ def periodicity_of(
             text += f", {length:.9g}, from t = {section.t[first]:.6g} on."
             if left > tol:
                 text = f"{text[:-1]}; the changes shrink, {left:.2g} of the range is left."
-            text += stopped_early(run)
+            text += early
             return Periodicity(
                 multiple,
                 length,
@@ -161,13 +160,13 @@ def periodicity_of(
             )
     if len(section) < 3:
         text = f"only {_some(len(section), unit)} within the run; simulate for longer."
-        text += stopped_early(run)
+        text += early
         return Periodicity(None, None, None, smallest, section, Outcome("too short", text, False))
     text = (
         f"no repeat within {tol:g} after up to {max_multiple} {unit}: quasi-periodic, chaotic, or "
         "not yet settled; simulate for longer, or raise max_multiple= or tol=."
     )
-    text += stopped_early(run)
+    text += early
     return Periodicity(None, None, None, smallest, section, Outcome("not periodic", text, False))
 
 
@@ -197,15 +196,3 @@ def _some(count: int, unit: str) -> str:
 
 def _single(unit: str) -> str:
     return unit.replace("periods", "period").replace("returns", "return")
-
-
-def _mean(run: Trajectory, row: int, since: float) -> float:
-    """Return the time average of a state over the steps that begin after a given time."""
-    assert run.series is not None
-    late = run.steps[:, 0] >= since
-    if not late.any():
-        late = np.ones(len(run.steps), dtype=bool)
-    length = run.steps[late, 1]
-    k = np.arange(run.series.shape[2])
-    area = run.series[late, row] * length[:, None] ** (k + 1) / (k + 1)
-    return float(area.sum() / length.sum())

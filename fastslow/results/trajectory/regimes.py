@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.errors import ArgumentError
 from fastslow.results.angles import apart, periods_of
-from fastslow.results.base.outcome import Outcome, stopped_early
+from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
+from fastslow.results.trajectory.crossings import Segment
+from fastslow.results.trajectory.dense import DenseOutput
 from fastslow.results.trajectory.lyapunov import LyapunovExponent
-from fastslow.results.trajectory.section import period_of, window_of
-
-if TYPE_CHECKING:
-    from fastslow.results.trajectory.trajectory import Trajectory
 
 Floats = NDArray[np.float64]
 Bits = NDArray[np.int64]
@@ -236,51 +232,63 @@ def labels_of(touched: Bits, multiples: NDArray[np.int64]) -> list[str]:
     return found
 
 
-def regimes_of(
-    run: Trajectory, period: float | None, since: float | None, until: float | None, tol: float
-) -> Regimes:
-    """Classify a run period by period; see `Trajectory.regimes`."""
-    if run.gap is None:
-        raise ArgumentError(
-            "this run has no gap: no three regions between two parallel interfaces; name the "
-            "region inside as gap= of simulate"
-        )
-    length = period_of(run, period)
-    first, last = window_of(run, since, until)
+def edges_of_periods(window: tuple[float, float], period: float, late: bool) -> Floats:
+    """Return the ends of the whole periods before the end of a time interval.
+
+    At least one; with ``late`` those of the second half of the interval.
+    """
+    first, last = window
     count = (
-        int(periods_at_the_end(np.array(last - first), np.array(length)))
-        if since is None
-        else max(1, int((last - first) / length + 1e-9))
+        int(periods_at_the_end(np.array(last - first), np.array(period)))
+        if late
+        else max(1, int((last - first) / period + 1e-9))
     )
-    edges = last - length * np.arange(count, -1, -1.0)
-    bits = dict(zip(run.modes, bits_of(run.modes, run.gap), strict=True))
-    touched = np.zeros(count, dtype=np.int64)
-    begins = np.array([s.start for s in run.segments])
-    ends = np.array([s.end for s in run.segments])
-    sides = np.array([bits[s.region] for s in run.segments], dtype=np.int64)
-    for k in range(count):
+    return last - period * np.arange(count, -1, -1.0)
+
+
+def touched_in(segments: Sequence[Segment], sides: Mapping[str, int], edges: Floats) -> Bits:
+    """Return the sides of a gap in contact during each period, from those of every mode."""
+    begins = np.array([s.start for s in segments])
+    ends = np.array([s.end for s in segments])
+    bits = np.array([sides[s.region] for s in segments], dtype=np.int64)
+    touched = np.zeros(len(edges) - 1, dtype=np.int64)
+    for k in range(len(touched)):
         inside = (ends > edges[k]) & (begins < edges[k + 1])
-        touched[k] = np.bitwise_or.reduce(sides[inside], initial=0)
+        touched[k] = np.bitwise_or.reduce(bits[inside], initial=0)
+    return touched
+
+
+def regimes_of(
+    touched: Bits,
+    edges: Floats,
+    period: float,
+    *,
+    span: tuple[float, float],
+    dense: DenseOutput | None,
+    allowed: float,
+    early: str,
+) -> Regimes:
+    """Classify a run by the sides in contact in its periods; see `Trajectory.regimes`.
+
+    Without dense output it is unknown whether the states repeat. Repeating states change by
+    less than ``allowed``, in units of their ranges; ``early`` is a sentence of the outcome.
+    """
     multiple, change = 0, float("nan")
-    slack = 1e-9 * length
-    if run.series is not None and len(run.steps) and edges[0] >= run.span[0] - slack:
-        everywhere = np.vstack([run.series[:, : len(run.states), 0], run.end[1:]])
-        ranges = np.ptp(everywhere, axis=0)
+    if dense is not None and len(dense.steps) and edges[0] >= span[0] - 1e-9 * period:
+        ranges = np.ptp(dense.nodes, axis=0)
         scale = np.where(ranges > 0, ranges, 1.0)
-        allowed = max(tol, ERRORS * float(run.settings.get("rtol", 0.0)))
-        turns = periods_of(run.states, run.periods)
-        states = run(np.clip(edges, *run.span)).T
+        turns = periods_of(dense.states, dense.periods)
+        states = dense(np.clip(edges, *span)).T
         (multiple,), (change,) = repeats(states[None], scale[None], turns, allowed)
-    kinds = tuple(REGIMES[b] for b in touched)
     (label,) = labels_of(touched[None], np.array([multiple]))
     return Regimes(
         label,
-        kinds,
-        length,
-        (max(float(edges[0]), run.span[0]), last),
+        tuple(REGIMES[bits] for bits in touched),
+        period,
+        (max(float(edges[0]), span[0]), float(edges[-1])),
         int(multiple) or None,
         float(change),
-        ending_of(int(multiple), float(change), count, stopped_early(run)),
+        ending_of(int(multiple), float(change), len(touched), early),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,7 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.outcome import early_end
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Table
-from fastslow.results.trajectory.section import window_of
-
-if TYPE_CHECKING:
-    from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.results.trajectory.dense import DenseOutput
 
 #: Cosine coefficients of the windows, w(s) = sum (−1)**m a_m cos(2π m s).
 WINDOWS: dict[str, tuple[float, ...]] = {
@@ -180,25 +177,30 @@ def transform(terms: tuple[float, ...], shift: float) -> float:
 
 
 def spectrum_of(
-    run: Trajectory, name: object, since: float | None, window: str, samples: int | None
+    dense: DenseOutput,
+    name: object,
+    since: float,
+    window: str,
+    samples: int | None,
+    period: float | None,
 ) -> Spectrum:
-    """Compute the spectrum of a column; see `Trajectory.spectrum`."""
-    if str(name) not in run.columns:
-        raise unknown_name("column", name, run.columns)
+    """Compute the spectrum of a column from a time to the end; see `Trajectory.spectrum`."""
+    if str(name) not in dense.columns:
+        raise unknown_name("column", name, dense.columns)
     if window not in WINDOWS:
         raise unknown_name("window", window, WINDOWS)
-    first, last = window_of(run, since)
-    if run.period is not None and last - first >= run.period:
+    first, last = since, dense.span[1]
+    if period is not None and last - first >= period:
         # with whole periods the harmonics of the forcing are at the centres of bins
-        count = int((last - first) / run.period + 1e-9)
-        first = max(last - count * run.period, run.span[0])
+        count = int((last - first) / period + 1e-9)
+        first = max(last - count * period, dense.span[0])
     if not last > first:
         raise ArgumentError(f"since = {first:g} is the end of the run; expected an earlier time")
     if samples is None:
-        steps = int(np.count_nonzero(run.steps[:, 0] + run.steps[:, 1] > first))
+        steps = int(np.count_nonzero(dense.steps[:, 0] + dense.steps[:, 1] > first))
         samples = 2 ** int(np.ceil(np.log2(np.clip(PER_STEP * steps, FEWEST, MOST))))
     part = np.arange(samples) / samples
-    values = run.dense_columns(first + (last - first) * part)[run.columns.index(str(name))]
+    values = dense.columns_at(first + (last - first) * part)[dense.columns.index(str(name))]
     mean = float(values.mean())
     weights = np.zeros(samples)
     for m, a in enumerate(WINDOWS[window]):
@@ -209,5 +211,6 @@ def spectrum_of(
     if samples % 2 == 0:
         amplitude[-1] /= 2.0
     frequency = np.arange(len(amplitude)) / (last - first)
-    ended = early_end(run)
-    return Spectrum(str(name), window, (first, last), frequency, amplitude, ended)
+    return Spectrum(
+        str(name), window, (first, last), frequency, amplitude, early_end(dense.outcome)
+    )

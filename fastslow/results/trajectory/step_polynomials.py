@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, quoted
-from fastslow.formulas.columns import computed, read, written_formula
+from fastslow.formulas.columns import computed, read
 from fastslow.formulas.grammar import (
     Name,
     Negative,
@@ -21,9 +21,6 @@ from fastslow.formulas.grammar import (
     text_of,
 )
 from fastslow.formulas.limits import DEGREE
-
-if TYPE_CHECKING:
-    from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -42,6 +39,11 @@ class StepPolynomials:
 
     coefficients: Array
     size: Array
+
+    @classmethod
+    def of(cls, coefficients: Array) -> StepPolynomials:
+        """Return the polynomials of given coefficients, with the size of their terms."""
+        return cls(coefficients, np.abs(coefficients).sum(axis=1))
 
     def __add__(self, other: StepPolynomials) -> StepPolynomials:
         one, two = self.coefficients, other.coefficients
@@ -68,59 +70,36 @@ class StepPolynomials:
         return StepPolynomials(shifted, self.size + abs(level))
 
 
-def along_steps(run: Trajectory, expression: object) -> StepPolynomials:
-    """Expand a column, or a polynomial in columns, parameters and time, along every step.
+class Expansion:
+    """The expansion of a polynomial in columns, parameters and time along every step.
 
     Parameters
     ----------
-    run : Trajectory
-        With dense output.
-    expression : str or Expr
-        A polynomial in columns and t of total degree up to `DEGREE`, whose coefficients
-        are numbers, parameters and functions of these.
-
-    Raises
-    ------
-    UnknownNameError
-        For a name that is neither a column nor a parameter.
-    ArgumentError
-        For an expression that is not a polynomial, or a run without dense output.
+    text : str
+    columns : mapping
+        Each column as a function that returns its polynomials.
+    parameters : mapping
+    line : ndarray, shape (n_steps, 2)
+        Start and length of every step, the coefficients of t.
     """
-    text = written_formula(expression)
-    if run.series is None:
-        raise ArgumentError(
-            "this run has no dense output, which this query requires; simulate with dense=True"
-        )
-    if text in run.columns:
-        return _column(run, text)
-    return _Expansion(run, text).polynomial()
 
-
-def _column(run: Trajectory, name: str) -> StepPolynomials:
-    assert run.series is not None
-    power = run.steps[:, 1:2] ** np.arange(run.series.shape[2])
-    scaled = run.series[:, run.columns.index(name)] * power
-    return StepPolynomials(scaled, np.abs(scaled).sum(axis=1))
-
-
-def _constant(run: Trajectory, value: float) -> StepPolynomials:
-    n = len(run.steps)
-    return StepPolynomials(np.full((n, 1), value), np.full(n, abs(value)))
-
-
-class _Expansion:
-    """The expansion of an expression along a run."""
-
-    def __init__(self, run: Trajectory, text: str) -> None:
-        self.run, self.text = run, text
-        names = (*run.columns, *run.parameters, "t")
+    def __init__(
+        self,
+        text: str,
+        columns: Mapping[str, Callable[[], StepPolynomials]],
+        parameters: Mapping[str, float],
+        line: Array,
+    ) -> None:
+        self.text, self.columns, self.line = text, columns, line
+        names = (*columns, *parameters, "t")
         self.tree, self.known = read(text, names, "column or parameter")
-        self.moving = {n for n, own in self.known.items() if own in run.columns or own == "t"}
+        self.moving = {n for n, own in self.known.items() if own in columns or own == "t"}
         self.constants = {
-            n: run.parameters[own] for n, own in self.known.items() if n not in self.moving
+            n: parameters[own] for n, own in self.known.items() if n not in self.moving
         }
 
-    def polynomial(self) -> StepPolynomials:
+    def polynomials(self) -> StepPolynomials:
+        """Return the polynomials; UnknownNameError or ArgumentError if it is no polynomial."""
         # check everything before the first product is computed
         self.degree(self.tree)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -184,7 +163,7 @@ class _Expansion:
         if isinstance(node, Name) and node.name in self.moving:
             return self.column(self.known[node.name])
         if self.fixed(node):
-            return _constant(self.run, self.number(node))
+            return self.constant(self.number(node))
         match node:
             case Negative(operand):
                 return -self.read(operand)
@@ -194,22 +173,22 @@ class _Expansion:
                     total = total + (self.read(term) if sign == "+" else -self.read(term))
                 return total
             case Product(pairs):
-                total = _constant(self.run, 1.0)
+                total = self.constant(1.0)
                 for sign, factor in pairs:
                     if sign == "/":
-                        total = total * _constant(self.run, 1.0 / self.number(factor))
+                        total = total * self.constant(1.0 / self.number(factor))
                     else:
                         total = total * self.read(factor)
                 return total
             case Power(base, exponent):
-                total, once = _constant(self.run, 1.0), self.read(base)
+                total, once = self.constant(1.0), self.read(base)
                 for _ in range(int(self.number(exponent))):
                     total = total * once
                 return total
         raise self.refused(node)
 
     def column(self, name: str) -> StepPolynomials:
-        if name in self.run.columns:
-            return _column(self.run, name)
-        line = self.run.steps[:, :2].copy()
-        return StepPolynomials(line, np.abs(line).sum(axis=1))
+        return self.columns[name]() if name in self.columns else StepPolynomials.of(self.line)
+
+    def constant(self, value: float) -> StepPolynomials:
+        return StepPolynomials.of(np.full((len(self.line), 1), value))

@@ -92,6 +92,45 @@ def find_roots(quantity: StepPolynomials) -> StepRoots:
     return StepRoots(step, where - step, direction)
 
 
+def find_roots_modulo(line: StepPolynomials, level: float, period: float) -> StepRoots:
+    """Return the roots of a periodic quantity at a level, modulo its period.
+
+    The steps near each copy of the level, shifted by whole periods, follow those near
+    the previous copy, joined by a linear step whose roots are discarded.
+    """
+    c = line.coefficients
+    count = len(c)
+    moved = np.abs(c[:, 1:]).sum(axis=1) + 1e-9 * period
+    low = np.ceil((c[:, 0] - moved - level) / period)
+    high = np.floor((c[:, 0] + moved - level) / period)
+    # including their neighbours, so that a root between two steps is detected from both
+    first, last = low.copy(), high.copy()
+    for shifted, source in ((slice(1, None), slice(-1)), (slice(-1), slice(1, None))):
+        first[shifted] = np.minimum(first[shifted], low[source])
+        last[shifted] = np.maximum(last[shifted], high[source])
+    copies = np.maximum(last - first + 1, 0).astype(np.intp)
+    step = np.repeat(np.arange(count), copies)
+    turn = first[step] + np.arange(len(step)) - np.repeat(np.cumsum(copies) - copies, copies)
+    order = np.lexsort((step, turn))
+    step, turn = step[order], turn[order]
+    if not len(step):
+        return StepRoots(step, np.empty(0), np.empty(0, dtype=np.int64))
+    rows = c[step].copy()
+    rows[:, 0] -= level + period * turn
+    size = line.size[step] + np.abs(level + period * turn)
+    gaps = np.flatnonzero((np.diff(step) != 1) | (np.diff(turn) != 0)) + 1
+    between = np.zeros((len(gaps), c.shape[1]))
+    between[:, 0] = rows[gaps - 1].sum(axis=1)
+    between[:, 1] = rows[gaps, 0] - between[:, 0]
+    rows, size = np.insert(rows, gaps, between, axis=0), np.insert(size, gaps, size[gaps])
+    number = np.insert(step, gaps, -1)
+    roots = find_roots(StepPolynomials(rows, size))
+    found = number[roots.step]
+    kept = (found >= 0) & ~((found == 0) & (roots.part == 0.0))
+    order = np.lexsort((roots.part[kept], found[kept]))
+    return StepRoots(found[kept][order], roots.part[kept][order], roots.direction[kept][order])
+
+
 def find_zeros(quantity: StepPolynomials) -> list[Zero]:
     """Compute all roots along consecutive steps in order, including the ends of the run."""
     b = quantity.coefficients

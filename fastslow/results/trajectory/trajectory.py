@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property, partial
-from itertools import chain
-from typing import Any, overload
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from fastslow.arguments import among, finite, numbers, position, positive, validated
-from fastslow.formulas.columns import by_value, column
-from fastslow.results.base.outcome import Outcome
-from fastslow.results.base.result import STORED, Result
-from fastslow.results.base.table import Table
+from fastslow.arguments import (
+    among,
+    finite,
+    formula,
+    positive,
+    text,
+    validated,
+    whole,
+)
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.base.outcome import early_end, stopped_early
+from fastslow.results.base.result import STORED
 from fastslow.results.io.html import trajectory_html
 from fastslow.results.stored.model import StoredModel
 from fastslow.results.trajectory.contacts import (
@@ -25,23 +31,33 @@ from fastslow.results.trajectory.contacts import (
     time_fractions_in,
 )
 from fastslow.results.trajectory.crossings import (
+    Crossing,
     Crossings,
-    Segment,
-    crossings_of,
-    regions_at,
-    segments_of,
 )
-from fastslow.results.trajectory.dense import columns_at, refined_table
-from fastslow.results.trajectory.long_time import LongTime
-from fastslow.results.trajectory.queries import Queries
-from fastslow.results.trajectory.regimes import SAME, Regimes, regimes_of
-from fastslow.results.trajectory.section import window_of
-from fastslow.results.trajectory.slicing import samples_of
-from fastslow.results.trajectory.state_at import StatePoint, in_blocks, is_dense, sample
+from fastslow.results.trajectory.periodicity import Periodicity, periodicity_of
+from fastslow.results.trajectory.regimes import (
+    ERRORS,
+    SAME,
+    Regimes,
+    bits_of,
+    edges_of_periods,
+    regimes_of,
+    touched_in,
+)
+from fastslow.results.trajectory.section import (
+    Section,
+    level_section,
+    selected,
+    stroboscopic_section,
+)
+from fastslow.results.trajectory.solution import Solution
+from fastslow.results.trajectory.spectrum import Spectrum, spectrum_of
+
+Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Queries, LongTime, Table, Result):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Trajectory(Solution):
     """A solution in time.
 
     ``run["x"]`` is a column and ``run["x**2 + v"]`` an expression at the samples ``run.t``;
@@ -105,29 +121,14 @@ class Trajectory(Queries, LongTime, Table, Result):
     array([0., 1.])
     """
 
-    states: tuple[str, ...]
-    forcing: tuple[str, ...]
     interfaces: tuple[str, ...]
-    regions: tuple[str, ...]
-    parameters: Mapping[str, float]
     period: float | None
     gap: tuple[str, str, str] | None
-    outcome: Outcome
-    span: tuple[float, float]
-    end: NDArray[np.float64]
     method: str
-    steps: NDArray[np.float64]
-    modes: tuple[str, ...]
-    crossing_table: NDArray[np.float64]
-    series: NDArray[np.float64] | None
-    sampled: tuple[NDArray[np.float64], NDArray[np.float64]] | None
+    crossing_table: Array
     equations: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict)
-    periods: Mapping[str, float] = field(default_factory=dict)
     model: Any = field(default=None, repr=False, metadata=STORED)
-
-    _row = "t"
-    _places = ("t",)
 
     @property
     def stored_model(self) -> StoredModel | None:
@@ -140,108 +141,27 @@ class Trajectory(Queries, LongTime, Table, Result):
         return None if isinstance(self.model, StoredModel) else self.model
 
     @cached_property
-    def t(self) -> NDArray[np.float64]:
-        """Times of the samples; without samples, times dense enough for a plot."""
-        return self._table[0]
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the columns: states, slow states, slow quantities."""
-        return (*self.states, *self.forcing)
-
-    def __len__(self) -> int:
-        return len(self.t)
-
-    def __iter__(self) -> Iterator[StatePoint]:
-        return chain.from_iterable(in_blocks(self))
-
-    @overload
-    def __getitem__(self, key: slice) -> Trajectory: ...
-    @overload
-    def __getitem__(self, key: int) -> StatePoint: ...
-    @overload
-    def __getitem__(self, key: str) -> NDArray[np.float64]: ...
-    def __getitem__(self, key: object) -> Trajectory | StatePoint | NDArray[np.float64]:
-        """Return a column or expression, the state at a sample, or the run of some samples.
-
-        Raises
-        ------
-        UnknownNameError
-            For a name that is neither a column nor a parameter.
-        ArgumentError
-            For text that is not an expression, or a slice that is empty or has a step.
-        OutOfRangeError
-            For an index out of range.
-        """
-        if isinstance(key, slice):
-            return samples_of(self, key)
-        if isinstance(key, int | np.integer) and not isinstance(key, bool):
-            return sample(self, position(key, len(self), "sample"))
-        columns = {name: partial(self._column, k) for k, name in enumerate(self.columns)}
-        return column(
-            key, {**columns, "t": lambda: self.t}, self.parameters, len(self.t), by_value("t", key)
-        )
-
-    def _column(self, row: int) -> NDArray[np.float64]:
-        values = self._table[1]
-        return values[row] if row < len(values) else self._all_sampled[row]
-
-    @validated(t=numbers)
-    def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Return the states at any times of the run, shape (n, N); (n,) for a scalar time.
-
-        Raises
-        ------
-        ArgumentError
-            For a time outside the run, or without dense output.
-        """
-        return columns_at(self, t, slice(len(self.states)))
-
-    @validated(t=numbers)
-    def dense_columns(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Return all columns at any times of the run, shape (n + n_forcing, N).
-
-        Raises
-        ------
-        ArgumentError
-            For a time outside the run, or without dense output.
-        """
-        return columns_at(self, t)
-
-    @cached_property
-    def _table(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return self.sampled if self.sampled is not None else refined_table(self)
-
-    @cached_property
-    def _all_sampled(self) -> NDArray[np.float64]:
-        return self.dense_columns(self.t)
-
-    @property
-    def sampled_columns(self) -> NDArray[np.float64]:
-        """Columns at the times ``t``: all of them, or the stored ones without dense output."""
-        values = self._table[1]
-        known = len(values) == len(self.columns) or not is_dense(self)
-        return values if known else self._all_sampled
-
-    @cached_property
-    def step_starts(self) -> NDArray[np.float64]:
-        """Start times of the steps, contiguous in memory for a binary search."""
-        return np.ascontiguousarray(self.steps[:, 0])
-
-    @cached_property
     def crossings(self) -> Crossings:
         """Crossings in order of time; ``run.crossings("x - D", direction=+1)`` selects some."""
-        return crossings_of(self)
+        found = (
+            Crossing(
+                float(row[0]),
+                row[6:].copy(),
+                self.interfaces[int(row[1])],
+                int(row[2]),
+                self.modes[int(row[3])],
+                self.modes[int(row[4])],
+                bool(row[5]),
+            )
+            for row in self.crossing_table
+        )
+        return Crossings(found, self.interfaces, self.states)
 
-    @cached_property
-    def segments(self) -> tuple[Segment, ...]:
-        """The time intervals in one region, in order."""
-        return segments_of(self)
-
-    @property
-    def itinerary(self) -> tuple[str, ...]:
-        """The sequence of regions along the trajectory."""
-        return tuple(segment.region for segment in self.segments)
+    def _cut(self, begin: float, end: float, sampled: tuple[Array, Array] | None) -> Self:
+        times = self.crossing_table[:, 0]
+        inside = (times >= begin) & (times <= end)
+        part = super()._cut(begin, end, sampled)
+        return replace(part, crossing_table=self.crossing_table[inside])
 
     @cached_property
     def regime(self) -> str | None:
@@ -260,7 +180,7 @@ class Trajectory(Queries, LongTime, Table, Result):
     @cached_property
     def _regimes(self) -> Regimes | None:
         known = self.gap is not None and self.period is not None
-        return regimes_of(self, None, None, None, SAME) if known else None
+        return self.regimes() if known else None
 
     @validated(period=positive, since=finite, until=finite, tol=positive)
     def regimes(
@@ -293,12 +213,28 @@ class Trajectory(Queries, LongTime, Table, Result):
         ArgumentError
             Without a gap or period, or for times outside the run.
         """
-        return regimes_of(self, period, since, until, tol)
+        if self.gap is None:
+            raise ArgumentError(
+                "this run has no gap: no three regions between two parallel interfaces; name the "
+                "region inside as gap= of simulate"
+            )
+        length = self._period(period)
+        edges = edges_of_periods(self._window(since, until), length, since is None)
+        sides = dict(zip(self.modes, bits_of(self.modes, self.gap).tolist(), strict=True))
+        return regimes_of(
+            touched_in(self.segments, sides, edges),
+            edges,
+            length,
+            span=self.span,
+            dense=None if self.series is None else self.dense,
+            allowed=max(tol, ERRORS * self._rtol),
+            early=stopped_early(self.outcome),
+        )
 
     @property
     def time_fractions(self) -> dict[str, float]:
         """The fraction of time in each region and each sliding motion."""
-        return time_fractions_in(self, self.span)
+        return time_fractions_in(self.segments, self.regions, self.span)
 
     @validated(direction=among(-1, 1, None), since=finite, until=finite)
     def hits(
@@ -325,7 +261,10 @@ class Trajectory(Queries, LongTime, Table, Result):
         ArgumentError
             For another direction, or times outside the run.
         """
-        return count_hits(self, interface, direction, window_of(self, since, until))
+        window, n = self._window(since, until), len(self.interfaces)
+        counts = count_hits(self.crossing_table, n, window, self.span[1])
+        up, down = counts[self._index(interface)]
+        return int({1: up, -1: down, None: up + down}[direction])
 
     @validated(since=finite, until=finite, period=positive)
     def contacts(
@@ -348,12 +287,198 @@ class Trajectory(Queries, LongTime, Table, Result):
         -------
         Contacts
         """
-        return contacts_of(self, period, window_of(self, since, until))
+        window = self._window(since, until)
+        return contacts_of(
+            self.crossing_table,
+            self.interfaces,
+            time_fractions_in(self.segments, self.regions, window),
+            window=window,
+            period=self.period if period is None else period,
+            last=self.span[1],
+        )
 
-    def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Return time t, every column, and the region."""
-        columns = {name: self[name] for name in self.columns}
-        return {"t": self.t, **columns, "region": regions_at(self, self.t)}
+    @validated(period=positive, phase=finite, since=finite)
+    def stroboscopic(
+        self,
+        period: float | None = None,
+        phase: float = 0.0,
+        since: float | None = None,
+    ) -> Section:
+        """Return the stroboscopic section: states at the times start + phase + k·period.
+
+        Parameters
+        ----------
+        period : float, optional
+            By default that of the forcing.
+        phase : float
+            Time after the start of the run, in units of time.
+        since : float, optional
+            Earlier points are omitted.
+
+        Raises
+        ------
+        ArgumentError
+            Without a period, or without dense output.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, v, t = sp.symbols("x v t")
+        >>> run = fs.simulate(fs.Model({x: v, v: sp.sin(t) - x - v}), [-1, 0], periods=3)
+        >>> run.stroboscopic()["x"].round(9)
+        array([-1., -1., -1., -1.])
+        """
+        length, window = self._period(period), self._window(since)
+        return stroboscopic_section(self.dense, length, phase, window)
+
+    @validated(
+        expression=formula,
+        level=finite,
+        direction=among(-1, 0, 1, None),
+        interface=formula,
+        since=finite,
+        until=finite,
+    )
+    def section(
+        self,
+        expression: object = None,
+        *,
+        level: float = 0.0,
+        direction: int | None = None,
+        interface: object = None,
+        since: float | None = None,
+        until: float | None = None,
+    ) -> Section:
+        """Return a Poincaré section, at a level of an expression or on an interface.
+
+        All roots of the polynomial of every step are computed to rounding; an initial
+        state on the section is not included. For a periodic state the level is taken
+        modulo its period.
+
+        Parameters
+        ----------
+        expression : str or Expr, optional
+            A column, or a polynomial in columns, parameters and t.
+        level : float
+        direction : int, optional
+            +1 upwards, −1 downwards, 0 for tangencies; all by default.
+        interface : str or Expr, optional
+            Instead of an expression: the crossings of this interface.
+        since, until : float, optional
+            The time interval, by default that of the run.
+
+        Raises
+        ------
+        UnknownNameError
+            For an unknown column, parameter or interface.
+        ArgumentError
+            For an expression that is not a polynomial, or without dense output.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, v = sp.symbols("x v")
+        >>> fine = fs.Integration(rtol=1e-13)
+        >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 10), integration=fine)
+        >>> (run.section("x", direction=-1).t / sp.pi.evalf()).astype(float).round(9)
+        array([0.5, 2.5])
+        """
+        window = self._window(since, until)
+        if (expression is None) == (interface is None):
+            received = "both" if interface is not None else "neither"
+            raise ArgumentError(
+                f"expected an expression with its level, or interface=, received {received}"
+            )
+        if interface is None:
+            found = level_section(self.dense, expression, float(level))
+        else:
+            found = self._on_interface(interface)
+        return selected(found, direction, window)
+
+    def _on_interface(self, interface: object) -> Section:
+        mine = self.crossing_table[self.crossing_table[:, 1] == self._index(interface)]
+        t, names, table = mine[:, 0], self.states, mine[:, 6:].T
+        if self.series is not None:
+            # states projected onto the interface, slow quantities from the series
+            names, slow = self.columns, self.dense_columns(t)[len(self.states) :]
+            table = np.vstack([table, slow])
+        rule, directions = f"{interface} = 0", mine[:, 2].astype(np.int64)
+        return Section(rule, names, t, table, directions, early_end(self.outcome))
+
+    @validated(since=finite, window=text, samples=whole(8, 2**24))
+    def spectrum(
+        self,
+        name: object,
+        since: float | None = None,
+        window: str = "hann",
+        samples: int | None = None,
+    ) -> Spectrum:
+        """Return the amplitude spectrum of a column.
+
+        Parameters
+        ----------
+        name : str or Symbol
+        since : float, optional
+            Start of the time interval, after the transient; with forcing it is shortened
+            to whole periods, so that the harmonics coincide with bins.
+        window : str
+            ``"hann"``, ``"flattop"``, ``"blackman"``, ``"hamming"`` or ``"rectangular"``.
+        samples : int, optional
+            Number of equidistant samples of the dense output; by default 16 for each
+            step, at least 4096.
+
+        Raises
+        ------
+        UnknownNameError
+            For an unknown column or window.
+        ArgumentError
+            For a time outside the run, or without dense output.
+        """
+        first, _ = self._window(since)
+        return spectrum_of(self.dense, name, first, window, samples, self.period)
+
+    @validated(period=positive, tol=positive, max_multiple=whole(1, 10**6))
+    def periodicity(
+        self, period: float | None = None, tol: float = 1e-6, max_multiple: int = 16
+    ) -> Periodicity:
+        """Detect the period of the motion at the end of the run.
+
+        Without forcing, periods are replaced by the returns to a Poincaré section,
+        on which the state with the largest range crosses its mean upwards.
+
+        Parameters
+        ----------
+        period : float, optional
+            By default that of the forcing.
+        tol : float
+            Largest difference that counts as a repeat, in units of each state's range.
+        max_multiple : int
+            Largest multiple of the period that is tried.
+
+        Returns
+        -------
+        Periodicity
+            If nothing repeats, ``multiple`` is None and ``outcome`` gives the reason.
+        """
+        length = self.period if period is None else period
+        return periodicity_of(self.dense, length, tol, max_multiple, self._rtol)
+
+    def _period(self, period: float | None) -> float:
+        """Return the given period, else that of the forcing."""
+        length = self.period if period is None else period
+        if length is None:
+            raise ArgumentError("this run has no forcing with a common period; give period=")
+        return length
+
+    def _index(self, interface: object) -> int:
+        """Return the index of an interface."""
+        if str(interface) not in self.interfaces:
+            raise unknown_name("interface", interface, self.interfaces)
+        return self.interfaces.index(str(interface))
+
+    @property
+    def _rtol(self) -> float:
+        return float(self.settings.get("rtol", 0.0))
 
     def _repr_html_(self) -> str:
         return trajectory_html(self)
